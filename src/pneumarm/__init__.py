@@ -1,0 +1,17 @@
+"""pneumarm: learn to control an arm moved by pneumatic muscles, from its own recordings."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pneumarm.control.agent import AgentController
+
+__version__ = "0.1.0"
+
+
+def load_controller(agent: str | Path) -> "AgentController":
+    """Return the greedy controller in the file ``agent``: ``reset(goal)``, then ``act(reading) -> valves``."""
+    from pneumarm.control.agent import AgentController
+    from pneumarm.learning import Agent
+
+    return AgentController(Agent.load(Path(agent)))

@@ -1,0 +1,91 @@
+"""The control cycle of thesis section 2.4.3 on any arm, and bringing the arm to rest at a random begin state."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.guard import GuardedArm
+from pneumarm.arm.seam import Reading
+
+Decide = Callable[[Reading], NDArray[np.int8] | None]
+
+
+class Step(NamedTuple):
+    """One turn of the cycle: what was read and the valves as applied, None where the decision was to stop."""
+
+    reading: Reading
+    valves: NDArray[np.int8] | None
+
+
+@dataclass
+class ControlCycle:
+    """Read, decide, let the latency pass, set the valves, wait for the period to end; over and over.
+
+    The valves stay as they are between reading and acting, or are closed then (thesis figure 2.8).
+    """
+
+    arm: GuardedArm
+    close_while_computing: bool = False
+    missed_deadlines: int = field(default=0, init=False)
+    """Number of turns that began more than half a period late."""
+
+    def run(self, decide: Decide) -> Iterator[Step]:
+        """Yield the turns until ``decide`` returns None; that last turn's valves are None, and all are closed.
+
+        Raises whatever ``decide`` or the arm raises, after closing the valves.
+        """
+        arm, period, latency = self.arm, self.arm.spec.period, self.arm.spec.latency
+        closed = np.zeros_like(arm.applied)
+        due: float | None = None
+        try:
+            while True:
+                reading = arm.read()
+                if due is not None and reading.time - due > period / 2:
+                    # Start counting afresh rather than hurry after a lost period.
+                    self.missed_deadlines += 1
+                    due = reading.time
+                due = (reading.time if due is None else due) + period
+                valves = decide(reading)
+                if valves is None:
+                    yield Step(reading, None)
+                    return
+                if self.close_while_computing:
+                    arm.set_valves(closed)
+                if latency:
+                    arm.wait(latency)
+                arm.set_valves(valves)
+                yield Step(reading, arm.applied)
+                arm.wait_until(due)
+        finally:
+            arm.set_valves(closed)
+
+
+@dataclass(frozen=True)
+class BeginState:
+    """How the arm is brought to a random begin state at rest (thesis sections 3.2.2 and 5.5)."""
+
+    deflate: float = 2.0
+    """Time that all muscles are vented [s] (thesis section 5.5: two seconds)."""
+    inflate: float = 1.5
+    """Longest time that a muscle is inflated again [s] (1.2 while collecting, 1.5 between episodes)."""
+    settle: float = 1.0
+    """Time in which the oscillations damp out, all valves closed [s]."""
+
+    def reach(self, arm: GuardedArm, random: np.random.Generator) -> None:
+        """Vent, inflate every muscle for a time uniform in 0..``inflate``, and wait."""
+        valves = np.full_like(arm.applied, -1)
+        arm.read()
+        arm.set_valves(valves)
+        arm.wait(self.deflate)
+        duration = random.uniform(0.0, self.inflate, valves.shape)
+        passed = 0.0
+        for end in [0.0, *np.sort(duration, axis=None)]:
+            if end > passed:
+                arm.wait(end - passed)
+                passed = end
+            arm.read()
+            arm.set_valves(np.where(duration > passed, 1, 0))
+        arm.wait(self.settle)

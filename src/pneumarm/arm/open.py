@@ -1,0 +1,57 @@
+"""Open an arm by its name on the command line."""
+
+import importlib
+import sys
+from pathlib import Path
+
+from pneumarm.arm.seam import Arm
+from pneumarm.errors import UnusableInput
+
+_FORMS = "virtual, virtual:seed=7, virtual:preset=A, simulation:FILE or python:module:callable"
+
+
+def open_arm(name: str, seed: int = 0) -> Arm:
+    """Return the arm called ``name``; ``seed`` seeds the noise of its sensors and of its surroundings.
+
+    ``virtual`` is the nominal virtual arm, ``virtual:seed=N`` another one from the distribution of arms;
+    ``simulation:FILE`` a fitted simulation; ``python:module:callable`` calls ``callable()`` for the arm.
+
+    Raises:
+        UnusableInput: no arm has this name.
+
+    """
+    kind, _, rest = name.partition(":")
+    if kind == "virtual":
+        from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters
+
+        if not rest:
+            return VirtualArm(seed=seed)
+        key, _, value = rest.partition("=")
+        if key == "seed" and value.isdecimal():
+            return VirtualArm(draw_parameters(int(value)), seed=seed, name=name)
+        if key == "preset":
+            return VirtualArm(preset_parameters(value), seed=seed, name=name)
+    elif kind == "simulation" and rest:
+        from pneumarm.simulation import Simulation, SimulationArm
+
+        return SimulationArm(Simulation.load(Path(rest)), seed=seed)
+    elif kind == "python" and rest.count(":") == 1:
+        return _from_python(rest)
+    raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
+
+
+def _from_python(place: str) -> Arm:
+    module_name, _, attribute = place.partition(":")
+    if "" not in sys.path:
+        sys.path.insert(0, "")  # a user's module lies in the folder that they call us from
+    try:
+        arm = getattr(importlib.import_module(module_name), attribute)()
+    except (ImportError, AttributeError, ValueError) as error:
+        raise UnusableInput(
+            f"arm python:{place}: expected a module and a callable in it that returns an Arm; {error}"
+        ) from error
+    if not isinstance(arm, Arm):
+        raise UnusableInput(
+            f"arm python:{place}: the callable must return a pneumarm.arm.Arm, it returned {type(arm).__name__}"
+        )
+    return arm

@@ -1,0 +1,157 @@
+"""The seam between pneumarm and any arm: what a user provides to use their own hardware.
+
+An arm has three primitives: read the sensors, set the valves, let time pass. Everything that moves an arm
+takes an :class:`Arm`; nothing else in pneumarm knows whether it is virtual, simulated or bolted to a table.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.errors import ArmFailure, UnusableInput
+
+
+@dataclass(frozen=True)
+class ArmSpec:
+    """What pneumarm must know of an arm. All angles and pressures of the seam are in sensor counts."""
+
+    joints: int = 1
+    """Number of hinges, each with two antagonistic muscles."""
+    period: float = 1 / 30
+    """Control period [s] (thesis section 5.1: 30 Hz)."""
+    counts_per_degree: float = 11.378
+    """Counts of the angle sensor per degree (thesis section 2.3.4)."""
+    counts_per_bar: float = 166.0
+    """Counts of the pressure sensors per bar (thesis section 2.3.4)."""
+    angle_range: tuple[float, float] = (0.0, 1023.0)
+    """Lowest and highest count of the angle sensor; its middle is called 0 degrees."""
+    max_pressure: float = 1.05
+    """Inlets stay closed while their muscle reads over this [bar]."""
+    latency: float = 0.0
+    """Time [s] between reading and acting that the control cycle has to let pass on this arm.
+
+    An arm whose reading and computing take real time by themselves leaves it 0."""
+    name: str = "arm"
+    """What reports call the arm."""
+
+    def __post_init__(self) -> None:
+        low, high = self.angle_range
+        checks = {
+            "joints": isinstance(self.joints, int) and self.joints >= 1,
+            "period": _positive(self.period),
+            "counts_per_degree": _positive(self.counts_per_degree),
+            "counts_per_bar": _positive(self.counts_per_bar),
+            "angle_range": math.isfinite(low) and math.isfinite(high) and low < high,
+            "max_pressure": _positive(self.max_pressure),
+            "latency": math.isfinite(self.latency) and 0 <= self.latency < self.period,
+        }
+        for name, valid in checks.items():
+            if not valid:
+                raise UnusableInput(f"ArmSpec: {name} cannot be {getattr(self, name)!r}; see its docstring")
+
+    @property
+    def max_pressure_counts(self) -> float:
+        """The pressure limit [counts]."""
+        return self.max_pressure * self.counts_per_bar
+
+    def degrees(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """Convert angles [counts] to degrees, 0 in the middle of the range."""
+        middle = sum(self.angle_range) / 2
+        return (np.asarray(counts, np.float64) - middle) / self.counts_per_degree
+
+    def bar(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """Convert pressures [counts] to bar gauge."""
+        return np.asarray(counts, np.float64) / self.counts_per_bar
+
+
+def _positive(value: float) -> bool:
+    return math.isfinite(value) and value > 0
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What the sensors said at one moment; ``None`` for a sensor that the arm does not have."""
+
+    time: float
+    """The arm's clock [s]."""
+    angle: NDArray[np.float64]
+    """Angles, shape (joints,) [counts]."""
+    pressure: NDArray[np.float64]
+    """Pressures, shape (joints, 2) [counts]."""
+    velocity: NDArray[np.float64] | None = None
+    """Angular velocities from a sensor of their own, shape (joints,) [counts/ms]."""
+    temperature: NDArray[np.float64] | None = None
+    """Temperatures of the muscles, shape (joints, 2) [degrees Celsius]."""
+
+
+class Arm(ABC):
+    """An arm: a context manager whose ``close`` leaves every valve closed or vented on every way out."""
+
+    spec: ArmSpec
+
+    @abstractmethod
+    def read(self) -> Reading:
+        """Return what the sensors say now."""
+
+    @abstractmethod
+    def set_valves(self, valves: NDArray[np.int8]) -> None:
+        """Set the valves (joints, 2) of -1 out, 0 closed, +1 in; takes effect now, holds until the next call."""
+
+    @abstractmethod
+    def wait(self, seconds: float) -> None:
+        """Let time pass [s]: real on hardware, simulated on a virtual arm."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Leave every valve closed or vented and let go of the hardware. May be called twice."""
+
+    def wait_until(self, time: float) -> None:
+        """Let time pass until the arm's clock shows ``time`` [s]; return at once if it is past."""
+        remaining = time - self.read().time
+        if remaining > 0:
+            self.wait(remaining)
+
+    def get_state(self) -> bytes | None:
+        """Return everything that the arm's future depends on, or None where that cannot be had (hardware).
+
+        A virtual arm gives it, so that an interrupted run goes on exactly where it was.
+        """
+        return None
+
+    def set_state(self, state: bytes) -> None:
+        """Take up a state that ``get_state`` returned."""
+        raise UnusableInput(f"{self.spec.name} cannot be put into a saved state")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def checked(reading: Reading, spec: ArmSpec) -> Reading:
+    """Return ``reading`` with float64 arrays of the right shapes.
+
+    Raises:
+        ArmFailure: a value is missing, not finite or of the wrong shape.
+
+    """
+    try:
+        time = float(reading.time)
+        angle = np.asarray(reading.angle, np.float64).reshape(spec.joints)
+        pressure = np.asarray(reading.pressure, np.float64).reshape(spec.joints, 2)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise ArmFailure(
+            f"{spec.name}: a reading needs a time, {spec.joints} angle(s) and {spec.joints} x 2 pressures, "
+            f"got {reading!r} ({error})"
+        ) from error
+    if not (math.isfinite(time) and np.isfinite(angle).all() and np.isfinite(pressure).all()):
+        raise ArmFailure(f"{spec.name}: a reading must hold finite numbers, got {reading!r}")
+    return Reading(time, angle, pressure, reading.velocity, reading.temperature)

@@ -1,0 +1,20 @@
+"""The errors that pneumarm raises on purpose.
+
+Every message says what was expected, what came, and what to do; the command line prints it as one line.
+"""
+
+
+class PneumarmError(Exception):
+    """Base of all errors raised on purpose; ``exit_code`` is what the command line exits with."""
+
+    exit_code = 1
+
+
+class UnusableInput(PneumarmError):  # noqa: N818 - reads as a sentence where it is raised
+    """A file, a setting or an argument that cannot be used: nothing was moved, nothing was written."""
+
+    exit_code = 2
+
+
+class ArmFailure(PneumarmError):  # noqa: N818
+    """The arm stopped answering or answered nonsense while it was in use."""

@@ -1,0 +1,103 @@
+"""Files that are written whole or not at all, and read with errors for people."""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.errors import UnusableInput
+
+_LARGEST_HEADER = 1 << 20
+_LARGEST_FILE = 64 << 20
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """Give a temporary path next to ``path``; on leaving, make it durable and put it in place of ``path``.
+
+    Raises:
+        UnusableInput: the parent folder is missing or cannot be written.
+
+    """
+    if not path.parent.is_dir():
+        raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield temporary
+        with open(temporary, "rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except OSError as error:
+        raise UnusableInput(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write ``text`` to ``path``, whole or not at all."""
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write ``value`` to ``path`` as JSON, whole or not at all."""
+    write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+
+
+def write_arrays(path: Path, kind: str, settings: Any, arrays: dict[str, NDArray[Any]]) -> None:
+    """Write ``arrays`` and ``settings`` (JSON) to a safetensors file of the given ``kind``."""
+    from safetensors.numpy import save_file
+
+    contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    metadata = {"kind": kind, "settings": json.dumps(settings, allow_nan=False)}
+    with written_whole(path) as temporary:
+        save_file(contiguous, temporary, metadata=metadata)
+
+
+def read_arrays(path: Path, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
+    """Return the settings and arrays of a file written by :func:`write_arrays`; all numbers are finite.
+
+    Sizes are checked before memory is taken, and nothing in the file is executed.
+
+    Raises:
+        UnusableInput: no such file, not of this kind, too large, damaged, or with numbers that are not finite.
+
+    """
+    from safetensors import SafetensorError, safe_open
+
+    expected = f"expected a file of kind {kind!r} written by pneumarm"
+    try:
+        size = path.stat().st_size
+        with open(path, "rb") as file:
+            header = int.from_bytes(file.read(8), "little")
+    except OSError as error:
+        raise UnusableInput(f"{path}: {expected}, but it cannot be read ({error.strerror})") from error
+    if size > _LARGEST_FILE or not 2 <= header <= min(_LARGEST_HEADER, size - 8):
+        raise UnusableInput(f"{path}: {expected}, this is something else")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            metadata = file.metadata() or {}
+            if metadata.get("kind") != kind:
+                raise UnusableInput(f"{path}: {expected}, its kind is {metadata.get('kind')!r}")
+            settings = json.loads(metadata["settings"], parse_constant=_refuse_constant)
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a dict
+    except (SafetensorError, ValueError, KeyError, RecursionError, TypeError) as error:
+        raise UnusableInput(f"{path}: {expected}, it is damaged ({error})") from error
+    for name, array in arrays.items():
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise UnusableInput(f"{path}: {name} holds numbers that are not finite")
+    return settings, arrays
+
+
+def _refuse_constant(name: str) -> Any:
+    raise ValueError(f"{name} is not a number")

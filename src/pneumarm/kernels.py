@@ -1,0 +1,98 @@
+"""How pneumarm compiles its hot loops: one decorator, and a cache that cannot serve stale or broken code.
+
+Two traps of Numba's cache are closed here:
+
+1. It does not see a change in a jitted function of *another* file. So the cache folder's name holds a hash
+   of every source file of the package and of Numba's version: any change starts a fresh folder.
+2. A truncated entry makes it crash. Here an entry that cannot be read is dropped and compiled again.
+"""
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core.caching import FunctionCache
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+_KEEP = 3  # folders of earlier sources kept, so that switching back and forth does not recompile
+
+
+def sources_hash(package: Path) -> str:
+    """Return a hash of all Python sources below ``package`` and of Numba's version."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(package.rglob("*.py")):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def _cache_root() -> Path:
+    base = os.environ.get("PNEUMARM_CACHE")
+    if base:
+        return Path(base)
+    xdg = os.environ.get("XDG_CACHE_HOME")
+    return (Path(xdg) if xdg else Path.home() / ".cache") / "pneumarm"
+
+
+def _cache_folder() -> Path:
+    name = sources_hash(Path(__file__).parent)
+    for root in (_cache_root(), Path(tempfile.gettempdir()) / f"pneumarm-{os.getuid()}"):
+        folder = root / name
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            os.utime(folder)
+            _forget_old(root)
+            return folder
+    raise OSError("no folder to keep compiled kernels in: set PNEUMARM_CACHE to a writable folder")
+
+
+def _forget_old(root: Path) -> None:
+    folders = sorted((f for f in root.iterdir() if f.is_dir()), key=lambda f: f.stat().st_mtime)
+    for folder in folders[:-_KEEP]:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+numba.config.CACHE_DIR = str(_cache_folder())
+
+
+class _ForgivingCache(FunctionCache):  # type: ignore[misc]
+    """Numba's function cache, except that an entry that cannot be read is compiled again."""
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(signature, target_context)
+        except Exception:
+            # Whatever a damaged file raises (EOFError, UnpicklingError, ...): forget the whole index.
+            self.flush()
+            return None
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        try:
+            super().save_overload(signature, data)
+        except Exception:
+            # The index itself can be damaged; caching is a convenience and never an error.
+            self.flush()
+
+
+def kernel(function: _Function | None = None, **options: Any) -> Any:
+    """Compile ``function`` with Numba in no-Python mode, without the GIL, cached across processes.
+
+    Division follows NumPy's rules (no check for zero), because that check alone keeps a loop with a
+    rational function in it from being vectorised. Options are passed on to ``numba.njit``.
+    """
+
+    def compile_(f: _Function) -> Any:
+        settings = {"nogil": True, "error_model": "numpy", **options}
+        dispatcher = numba.njit(**settings)(f)
+        if not numba.config.DISABLE_JIT and settings.get("inline", "never") == "never":
+            dispatcher._cache = _ForgivingCache(dispatcher.py_func)
+        return dispatcher
+
+    return compile_ if function is None else compile_(function)

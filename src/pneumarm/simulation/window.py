@@ -1,0 +1,136 @@
+"""The state window: the observations and actions of the last steps as one vector (thesis eq. 3.5).
+
+With the history ``h`` (3 in the thesis) the state is, newest first,
+
+    sigma_k = (o_k, o_{k-1}, ..., o_{k-h+1}, a_{k-1}, ..., a_{k-h+1})
+
+where an observation ``o`` holds, joint after joint, angle [counts], velocity [counts/ms], pressure 1 and
+pressure 2 [counts], and ``a`` the commands of the two muscles of every joint. The input of the simulation is
+sigma_k followed by a_k; the input of an agent is sigma_k followed by the goal (thesis eq. 4.12).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.transitions.rows import Rows
+
+QUANTITIES = ("angle", "velocity", "pressure_1", "pressure_2")
+"""What an observation holds for each joint, in this order."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """Sizes and places in the state window."""
+
+    joints: int = 1
+    history: int = 3
+    """Number of observations in the state (thesis eq. 3.5: three)."""
+
+    @property
+    def observation_size(self) -> int:
+        """Numbers in one observation."""
+        return len(QUANTITIES) * self.joints
+
+    @property
+    def command_size(self) -> int:
+        """Numbers in one command."""
+        return 2 * self.joints
+
+    @property
+    def state_size(self) -> int:
+        """Numbers in sigma."""
+        return self.history * self.observation_size + (self.history - 1) * self.command_size
+
+    @property
+    def input_size(self) -> int:
+        """Numbers in sigma and the action: the input of the simulation's networks."""
+        return self.state_size + self.command_size
+
+    def input_names(self) -> list[str]:
+        """Return a name for each input, such as ``angle[k-1]``; with more joints ``angle of joint 2[k-1]``."""
+
+        def named(quantities: tuple[str, ...], lag: int) -> list[str]:
+            suffix = "[k]" if lag == 0 else f"[k-{lag}]"
+            joints = range(self.joints)
+            return [q + (f" of joint {j + 1}" if self.joints > 1 else "") + suffix for j in joints for q in quantities]
+
+        commands = ("command_1", "command_2")
+        names = [name for lag in range(self.history) for name in named(QUANTITIES, lag)]
+        names += [name for lag in range(1, self.history) for name in named(commands, lag)]
+        return names + named(commands, 0)
+
+
+class Transitions(NamedTuple):
+    """``n`` transitions as input and target of a fit, in sensor units (not scaled)."""
+
+    inputs: NDArray[np.float32]
+    """sigma_k and a_k, shape (n, input_size)."""
+    target: NDArray[np.float32]
+    """o_{k+1}, shape (n, observation_size)."""
+    sequence: NDArray[np.int64]
+    """Shape (n,)."""
+    step: NDArray[np.int64]
+    """Step of k, shape (n,)."""
+    interval: NDArray[np.float32]
+    """t_{k+1} - t_k, shape (n,) [s]."""
+
+    @property
+    def observation(self) -> NDArray[np.float32]:
+        """o_k, shape (n, observation_size)."""
+        return self.inputs[:, : self.target.shape[1]]
+
+
+def observations(rows: Rows) -> NDArray[np.float64]:
+    """Return the observations of all rows, shape (n, 4 joints), with the velocity derived.
+
+    omega_k = (theta_k - theta_{k-1}) / (t_k - t_{k-1}) (thesis section 2.3.4) [counts/ms]; 0 in the first row of
+    a sequence or after a gap.
+    """
+    velocity = np.zeros_like(rows.angle)
+    follows = _follows(rows)
+    elapsed = 1e3 * np.diff(rows.time)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        velocity[1:] = np.where(follows[1:, None], np.diff(rows.angle, axis=0) / elapsed, 0.0)
+    stacked = np.stack([rows.angle, velocity, rows.pressure[:, :, 0], rows.pressure[:, :, 1]], axis=2)
+    return stacked.reshape(rows.count, -1)
+
+
+def transitions(rows: Rows, window: Window) -> Transitions:
+    """Return all transitions of ``rows`` whose window is complete.
+
+    A window that reaches before the first row of a sequence is complete if the sequence began at rest: the arm
+    stood there with closed valves. After a gap, or in a sequence that began in motion, ``history`` rows have to
+    pass first (the oldest velocity needs one row more than the window).
+    """
+    observed = observations(rows)
+    command = rows.command.reshape(rows.count, -1)
+    follows = _follows(rows)
+    index = np.arange(rows.count)
+    first = np.maximum.accumulate(np.where(follows, 0, index))  # where the run of joined rows began
+    position = index - first
+    padded = rows.at_rest & (rows.step[first] == 0)
+    has_next = np.append(follows[1:], False)
+    usable = has_next & (padded | (position >= window.history)) & ~np.isnan(command).any(axis=1)
+    k = np.flatnonzero(usable)
+    parts = [observed[np.maximum(k - lag, first[k])] for lag in range(window.history)]
+    for lag in range(1, window.history):
+        inside = (position[k] >= lag)[:, None]
+        parts.append(np.where(inside, command[np.maximum(k - lag, 0)], 0.0))
+    parts.append(command[k])
+    return Transitions(
+        inputs=np.concatenate(parts, axis=1, dtype=np.float32),
+        target=observed[k + 1].astype(np.float32),
+        sequence=rows.sequence[k],
+        step=rows.step[k],
+        interval=(rows.time[k + 1] - rows.time[k]).astype(np.float32),
+    )
+
+
+def _follows(rows: Rows) -> NDArray[np.bool_]:
+    """Return for each row whether it continues the row before it."""
+    follows = np.zeros(rows.count, bool)
+    follows[1:] = (np.diff(rows.sequence) == 0) & (np.diff(rows.step) == 1) & (np.diff(rows.time) > 0)
+    return follows

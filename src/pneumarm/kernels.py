@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba import config as numba_config
 from numba.core.caching import FunctionCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -59,7 +60,7 @@ def _forget_old(root: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-numba.config.CACHE_DIR = str(_cache_folder())
+numba_config.CACHE_DIR = str(_cache_folder())
 
 
 class _ForgivingCache(FunctionCache):  # type: ignore[misc]
@@ -91,7 +92,7 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
     def compile_(f: _Function) -> Any:
         settings = {"nogil": True, "error_model": "numpy", **options}
         dispatcher = numba.njit(**settings)(f)
-        if not numba.config.DISABLE_JIT and settings.get("inline", "never") == "never":
+        if not numba_config.DISABLE_JIT and settings.get("inline", "never") == "never":
             dispatcher._cache = _ForgivingCache(dispatcher.py_func)
         return dispatcher
 

@@ -55,7 +55,8 @@ class Window:
         def named(quantities: tuple[str, ...], lag: int) -> list[str]:
             suffix = "[k]" if lag == 0 else f"[k-{lag}]"
             joints = range(self.joints)
-            return [q + (f" of joint {j + 1}" if self.joints > 1 else "") + suffix for j in joints for q in quantities]
+            joint = [f" of joint {j + 1}" if self.joints > 1 else "" for j in joints]
+            return [quantity + joint[j] + suffix for j in joints for quantity in quantities]
 
         commands = ("command_1", "command_2")
         names = [name for lag in range(self.history) for name in named(QUANTITIES, lag)]
@@ -95,7 +96,7 @@ def observations(rows: Rows) -> NDArray[np.float64]:
     with np.errstate(divide="ignore", invalid="ignore"):
         velocity[1:] = np.where(follows[1:, None], np.diff(rows.angle, axis=0) / elapsed, 0.0)
     stacked = np.stack([rows.angle, velocity, rows.pressure[:, :, 0], rows.pressure[:, :, 1]], axis=2)
-    return stacked.reshape(rows.count, -1)
+    return stacked.reshape(len(rows), -1)
 
 
 def transitions(rows: Rows, window: Window) -> Transitions:
@@ -106,9 +107,9 @@ def transitions(rows: Rows, window: Window) -> Transitions:
     pass first (the oldest velocity needs one row more than the window).
     """
     observed = observations(rows)
-    command = rows.command.reshape(rows.count, -1)
+    command = rows.command.reshape(len(rows), -1)
     follows = _follows(rows)
-    index = np.arange(rows.count)
+    index = np.arange(len(rows))
     first = np.maximum.accumulate(np.where(follows, 0, index))  # where the run of joined rows began
     position = index - first
     padded = rows.at_rest & (rows.step[first] == 0)
@@ -131,6 +132,6 @@ def transitions(rows: Rows, window: Window) -> Transitions:
 
 def _follows(rows: Rows) -> NDArray[np.bool_]:
     """Return for each row whether it continues the row before it."""
-    follows = np.zeros(rows.count, bool)
+    follows = np.zeros(len(rows), bool)
     follows[1:] = (np.diff(rows.sequence) == 0) & (np.diff(rows.step) == 1) & (np.diff(rows.time) > 0)
     return follows

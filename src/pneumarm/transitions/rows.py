@@ -1,12 +1,13 @@
 """Rows of the store as arrays: what was measured, raw, and what was commanded, in order of time."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 
-class Rows(NamedTuple):
+@dataclass(frozen=True)
+class Rows:
     """A block of ``n`` rows, whole sequences in order; a row is an observation and the command that followed it.
 
     Velocity is not among them: it is derived (thesis section 2.3.4), see :mod:`pneumarm.simulation.window`.
@@ -32,9 +33,7 @@ class Rows(NamedTuple):
     @property
     def joints(self) -> int:
         """Number of joints."""
-        return self.angle.shape[1]
+        return int(self.angle.shape[1])
 
-    @property
-    def count(self) -> int:
-        """Number of rows (``len`` of a tuple would count its fields)."""
+    def __len__(self) -> int:
         return len(self.sequence)

@@ -3,7 +3,7 @@
 Two traps of Numba's cache are closed here:
 
 1. It does not see a change in a jitted function of *another* file. So the cache folder's name holds a hash
-   of every source file of the package and of Numba's version: any change starts a fresh folder.
+   of every source file that compiles anything and of Numba's version: any change starts a fresh folder.
 2. A truncated entry makes it crash. Here an entry that cannot be read is dropped and compiled again.
 """
 
@@ -24,10 +24,15 @@ _KEEP = 3  # folders of earlier sources kept, so that switching back and forth d
 
 
 def sources_hash(package: Path) -> str:
-    """Return a hash of all Python sources below ``package`` and of Numba's version."""
+    """Return a hash of all kernel sources below ``package`` and of Numba's version.
+
+    A kernel source is a file that names this module: it jits functions, or is called by those that do.
+    """
     digest = hashlib.sha256(numba.__version__.encode())
     for path in sorted(package.rglob("*.py")):
-        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+        source = path.read_bytes()
+        if b"pneumarm.kernels" in source:
+            digest.update(path.relative_to(package).as_posix().encode() + b"\0" + source + b"\0")
     return digest.hexdigest()[:16]
 
 
@@ -63,7 +68,7 @@ def _forget_old(root: Path) -> None:
 numba_config.CACHE_DIR = str(_cache_folder())
 
 
-class _ForgivingCache(FunctionCache):  # type: ignore[misc]
+class _ForgivingCache(FunctionCache):
     """Numba's function cache, except that an entry that cannot be read is compiled again."""
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.networks.network import Network
-from pneumarm.simulation.window import Window
+from pneumarm.transitions.window import Window
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 class Rows:
     """A block of ``n`` rows, whole sequences in order; a row is an observation and the command that followed it.
 
-    Velocity is not among them: it is derived (thesis section 2.3.4), see :mod:`pneumarm.simulation.window`.
+    Velocity is not among them: it is derived (thesis section 2.3.4), see :mod:`pneumarm.transitions.window`.
     """
 
     sequence: NDArray[np.int64]

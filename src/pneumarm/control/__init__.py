@@ -1,1 +1,17 @@
-"""TODO."""
+"""Controllers on an arm: agents, movements, transfer and adaptation."""
+
+from pneumarm.control.agent import AgentController
+from pneumarm.control.movement import LearningController, Movement, move
+from pneumarm.control.transfer import Episode, Transferred, TransferSettings, transfer, write_episodes
+
+__all__ = [
+    "AgentController",
+    "Episode",
+    "LearningController",
+    "Movement",
+    "TransferSettings",
+    "Transferred",
+    "move",
+    "transfer",
+    "write_episodes",
+]

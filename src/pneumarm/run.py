@@ -32,47 +32,172 @@ class RunSettings:
     """What a run is asked for. A folder is resumed with the same settings only."""
 
     arm: str = "virtual"
+    """virtual, virtual:seed=N, simulation:FILE or python:module:callable."""
     seed: int = 0
+    """Of everything that is drawn at random."""
+    joints: int = 1
+    """Joints of the arm."""
     transitions: int = 200_000
     """How many to collect (thesis section 3.2.2: 200,000, two hours)."""
+    test_episodes: int = 10_000
+    """Movements of the test in simulation (thesis section 5.2)."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     train: TrainSettings = field(default_factory=TrainSettings)
     transfer: TransferSettings = field(default_factory=TransferSettings)
-    test_episodes: int = 10_000
-    """Movements of the test in simulation (thesis section 5.2)."""
+
+    def __post_init__(self) -> None:
+        if self.transitions < FEWEST_TRANSITIONS:
+            raise UnusableInput(f"a run needs at least {FEWEST_TRANSITIONS:,} transitions, got {self.transitions:,}")
+        if self.test_episodes < 1:
+            raise UnusableInput(f"a run needs at least 1 test episode, got {self.test_episodes}")
 
 
-@dataclass(frozen=True)
-class RunFolder:
-    """The files of a run."""
+class Run:
+    """A run in a folder. Every stage leaves its files first and then its figures in ``results.json``."""
 
-    path: Path
+    def __init__(self, folder: Path, settings: RunSettings, progress: Progress = silent) -> None:
+        """Take up the run in ``folder``, or begin it.
 
-    def __getattr__(self, name: str) -> Path:
-        raise AttributeError(name)
+        Raises:
+            UnusableInput: the folder's parent is missing, it holds something else, or a run with other settings.
+
+        """
+        self.folder, self.settings, self.progress = folder, settings, progress
+        self.results: dict[str, Any] = {}
+        self.store = folder / "transitions.db"
+        self.simulation = folder / "simulation.safetensors"
+        self.agent = folder / "agent.safetensors"
+        self.adapted = folder / "adapted.safetensors"
+        self.episodes = folder / "episodes.csv"
+        self._claim()
+
+    def _claim(self) -> None:
+        folder, wanted = self.folder, json.loads(json.dumps(asdict(self.settings)))
+        if not folder.parent.is_dir():
+            raise UnusableInput(f"{folder}: the folder {folder.parent} does not exist; create it first")
+        file = folder / "settings.json"
+        if file.exists():
+            found = _read_json(file)
+            if found != wanted:
+                raise UnusableInput(
+                    f"{folder}: holds a run with other settings ({_differences(found, wanted)}); "
+                    "give the same ones or another folder"
+                )
+            if self._results_file.exists():
+                self.results = _read_json(self._results_file)
+        elif folder.is_dir() and any(folder.iterdir()):
+            raise UnusableInput(f"{folder}: is not empty and holds no run; give another folder")
+        elif folder.exists() and not folder.is_dir():
+            raise UnusableInput(f"{folder}: is a file; give a folder")
+        else:
+            open_arm_checked(self.settings).close()  # a wrong arm is found before anything is written
+            folder.mkdir(exist_ok=True)
+            write_json(file, wanted)
 
     @property
-    def settings(self) -> Path:
-        """What was asked for."""
-        return self.path / "settings.json"
+    def _results_file(self) -> Path:
+        return self.folder / "results.json"
 
-    @property
-    def results(self) -> Path:
-        """What came of it, stage by stage."""
-        return self.path / "results.json"
+    def do(self) -> dict[str, Any]:
+        """Do all stages that are not done yet and return the results."""
+        for name, stage in (
+            ("collect", self._collect),
+            ("simulation", self._fit),
+            ("training", self._train),
+            ("test", self._test),
+            ("transfer", self._transfer),
+        ):
+            if name not in self.results:
+                began = time.perf_counter()
+                figures = stage()
+                wall = {name: round(time.perf_counter() - began, 3)}
+                self.results |= figures
+                self.results["wall_seconds"] = self.results.get("wall_seconds", {}) | wall
+                write_json(self._results_file, jsonable(self.results))
+        if not (self.folder / "report.html").exists():
+            with self.progress("report") as report:
+                report(0, 1)
+                write_report(self.folder)
+                report(1, 1)
+        return self.results
 
-    @property
-    def store(self) -> Path:
-        """All transitions: collected, and of the movements in transfer."""
-        return self.path / "transitions.db"
+    def _collect(self) -> dict[str, Any]:
+        settings = self.settings
+        with (
+            self.progress("collecting") as report,
+            open_arm_checked(settings) as arm,
+            Store.writing(self.store, arm.spec) as store,
+        ):
+            collected = collect(
+                arm, store, settings.transitions, seed=settings.seed, settings=settings.collect, progress=report
+            )
+        return {"collect": collected.results()}
 
-    @property
-    def simulation(self) -> Path:
-        """The fitted simulation."""
-        return self.path / "simulation.safetensors"
+    def _fit(self) -> dict[str, Any]:
+        with self.progress("fitting the simulation") as report, Store.open(self.store) as store:
+            fitted = fit_store(store, replace(self.settings.fit, seed=self.settings.seed), progress=report)
+            fitted.simulation.save(self.simulation)
+            analyse(store, fitted.simulation, self.folder)
+        return {"filter": fitted.coverage.results(), "simulation": fitted.results()}
 
-    @property
-    def agent(self) -> Path:
-        """The agent as trained in simulation."""
-        return self.path / "agent.safetensors"
+    def _train(self) -> dict[str, Any]:
+        simulation = Simulation.load(self.simulation)
+        with self.progress("training") as report, Store.open(self.store) as store:
+            training = train(
+                simulation,
+                begin_states(store, simulation),
+                self.settings.train,
+                seed=self.settings.seed,
+                progress=report,
+                checkpoint=self.folder / "training.checkpoint",
+            )
+        training_data(training).save(self.folder)
+        training.agent.save(self.agent)
+        return {"training": training.results()}
+
+    def _test(self) -> dict[str, Any]:
+        return {}
+
+    def _transfer(self) -> dict[str, Any]:
+        settings = self.settings
+        agent = Agent.load(self.agent)
+        with (
+            self.progress("moving on the arm") as report,
+            open_arm_checked(settings) as arm,
+            Store.append_to(self.store) as store,
+        ):
+            moved = transfer(agent, arm, store, settings.transfer, seed=settings.seed, progress=report)
+        moved.agent.save(self.adapted)
+        write_episodes(self.episodes, moved.episodes)
+        return {"transfer": moved.results()}
+
+
+def open_arm_checked(settings: RunSettings) -> Arm:
+    """Open the arm of a run.
+
+    Raises:
+        UnusableInput: there is no such arm, or it has another number of joints.
+
+    """
+    arm = open_arm(settings.arm, settings.seed)
+    if arm.spec.joints != settings.joints:
+        arm.close()
+        raise UnusableInput(f"{settings.arm} has {arm.spec.joints} joint(s), asked for are {settings.joints}")
+    return arm
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise UnusableInput(f"{path}: cannot be read ({error}); remove the folder or give another") from error
+
+
+def _differences(found: Any, wanted: Any, place: str = "") -> str:
+    if not (isinstance(found, dict) and isinstance(wanted, dict)):
+        return f"{place} was {found!r}, is {wanted!r}"
+    names = [name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name)]
+    return ", ".join(
+        _differences(found.get(name), wanted.get(name), f"{place}.{name}" if place else name) for name in sorted(names)
+    )

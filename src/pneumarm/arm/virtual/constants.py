@@ -20,6 +20,9 @@ _VECTORS = {"slip_weights", "creep_times", "creep_stiffness"}
 MUSCLE_CONSTANTS = np.dtype(
     [(name, "f8", (ELEMENTS,)) if name in _VECTORS else (name, "f8") for name in _SAME_NAME]
     + [
+        ("per_rest_length", "f8"),  # 1 / l0 [1/m]
+        ("per_tip", "f8"),  # 1 / k
+        ("per_subsonic", "f8"),  # 1 / (1 - b)
         ("area", "f8"),  # A0 = pi D0^2 / 4 [m2]
         ("a", "f8"),  # 3 / tan^2 theta0
         ("b", "f8"),  # 1 / sin^2 theta0
@@ -126,6 +129,9 @@ def _fill_muscle(record: Any, muscle: MuscleParameters) -> None:
     for name in _SAME_NAME:
         record[name] = getattr(muscle, name)
     sine, cosine = math.sin(muscle.weave_angle), math.cos(muscle.weave_angle)
+    record["per_rest_length"] = 1 / muscle.rest_length
+    record["per_tip"] = 1 / muscle.tip
+    record["per_subsonic"] = 1 / (1 - muscle.critical_ratio)
     record["area"] = math.pi * muscle.diameter**2 / 4
     record["a"] = 3 * (cosine / sine) ** 2
     record["b"] = 1 / sine**2

@@ -6,7 +6,7 @@ from pneumarm.kernels import kernel
 
 
 @kernel
-def flow_function(ratio, critical, laminar, laminar_slope):  # type: ignore[no-untyped-def]
+def flow_function(ratio, c):  # type: ignore[no-untyped-def]
     """Return the flow relative to choked flow at the pressure ``ratio`` <= 1 (downstream over upstream).
 
     phi = 1 up to the critical ratio b, the quarter ellipse sqrt(1 - ((ratio - b) / (1 - b))^2) above it, and a
@@ -14,12 +14,12 @@ def flow_function(ratio, critical, laminar, laminar_slope):  # type: ignore[no-u
 
     Source: ISO 6358-1.
     """
-    if ratio <= critical:
+    if ratio <= c.critical_ratio:
         return 1.0
-    if ratio <= laminar:
-        place = (ratio - critical) / (1.0 - critical)
+    if ratio <= c.laminar_ratio:
+        place = (ratio - c.critical_ratio) * c.per_subsonic
         return math.sqrt(1.0 - place * place)
-    return laminar_slope * (1.0 - ratio)
+    return c.laminar_slope * (1.0 - ratio)
 
 
 @kernel
@@ -29,5 +29,5 @@ def free_air(conductance, source, sink, c):  # type: ignore[no-untyped-def]
     Q = C p1 phi(p2 / p1) [m3/s of free air] with the sonic ``conductance`` C [m3/(s Pa)].
     """
     if source >= sink:
-        return conductance * source * flow_function(sink / source, c.critical_ratio, c.laminar_ratio, c.laminar_slope)
-    return -conductance * sink * flow_function(source / sink, c.critical_ratio, c.laminar_ratio, c.laminar_slope)
+        return conductance * source * flow_function(sink / source, c)
+    return -conductance * sink * flow_function(source / sink, c)

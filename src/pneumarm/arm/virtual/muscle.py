@@ -12,53 +12,22 @@ The volume follows from the same law, dV/dl = -f(l), and the pressure from
 The factor s makes dF/dp = -dV/dl at the threshold too, so that a closed muscle cannot create energy.
 """
 
-import math
-
 from pneumarm.arm.virtual.flow import free_air
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS, FREE_AIR
 from pneumarm.arm.virtual.state import INLET, OUTLET
+from pneumarm.arm.virtual.threshold import engage, threshold
 from pneumarm.kernels import kernel
-
-SOFTNESS = 1000.0
-"""Width w of the threshold, 0.01 bar [Pa]."""
-_SATURATED = 14.0  # widths from the threshold where the soft threshold is as good as sharp (1e-6)
 
 
 @kernel
 def braid(c, length):  # type: ignore[no-untyped-def]
     """Return the pull per pressure f [m2] and the volume V [m3] of the braid at ``length`` [m]."""
-    relative = length / c.rest_length
-    k = c.tip if relative < 1.0 else 1.0
+    relative = length * c.per_rest_length
+    k, per_k = (c.tip, c.per_tip) if relative < 1.0 else (1.0, 1.0)
     u = 1.0 + k * (relative - 1.0)
     pull = c.area * (c.a * u * u - c.b)
-    volume = c.area * c.rest_length * (c.b * relative - c.a * (u * u * u - 1.0 + k) / (3.0 * k))
+    volume = c.area * c.rest_length * (c.b * relative - c.a * ((u * u * u - 1.0) * per_k + 1.0) * (1.0 / 3.0))
     return pull, volume
-
-
-@kernel
-def threshold(at_rest, c, length):  # type: ignore[no-untyped-def]
-    """Return the pressure [Pa] at which the bladder touches the weave at ``length`` [m].
-
-    It is ``at_rest`` at the rest length and grows with the gap between bladder and weave, up to twice that.
-    """
-    relative = length / c.rest_length
-    sine = math.sqrt(max(0.0, 1.0 - c.cosine_squared * relative * relative))
-    gap = c.contact * sine - c.contact_offset
-    return at_rest * min(max(gap, 0.0), 2.0)
-
-
-@kernel
-def engage(above):  # type: ignore[no-untyped-def]
-    """Return p_eff [Pa] and s = dp_eff/dp for a pressure that is ``above`` the threshold by so much [Pa].
-
-    p_eff = w ln(1 + exp(above / w)).
-    """
-    if above > _SATURATED * SOFTNESS:
-        return above, 1.0
-    if above < -_SATURATED * SOFTNESS:
-        return 0.0, 0.0
-    grown = math.exp(above * (1.0 / SOFTNESS))
-    return SOFTNESS * math.log(1.0 + grown), grown / (1.0 + grown)
 
 
 @kernel

@@ -1,18 +1,17 @@
 """What the report is drawn from: small records that each stage of a run leaves in its folder.
 
-A record is a frozen dataclass of arrays, checked when it is made, and kept as one safetensors file. Where ``n`` may be
-large the record holds a sample; a few ten thousand rows are plenty for a figure.
+A record is a frozen dataclass of arrays, checked when it is made, and kept as one safetensors file. Where ``n``
+may be large the record holds a sample; a few ten thousand rows are plenty for a figure.
 """
 
 import csv
-import math
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
@@ -78,10 +77,6 @@ class Record:
         return f"report {cls.__name__}"
 
 
-def _none(*shape: int) -> Any:
-    return field(default_factory=lambda: np.empty(shape))
-
-
 @dataclass(frozen=True)
 class CoverageData(Record):
     """What was collected, and what the filter made of it."""
@@ -97,7 +92,7 @@ class CoverageData(Record):
     """Cells of the grid."""
     per_cell: int
     """Most transitions of a cell that are kept."""
-    growth: NDArray[np.int64] = _none(0, 2)
+    growth: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
     """Transitions collected and cells occupied by then, shape (points, 2), for the test whether data is enough."""
 
 
@@ -126,9 +121,9 @@ class QualityData(Record):
     """a_k, shape (n, joints, 2): valves -1, 0, +1 or a continuous command."""
     time: Array
     """Time of o_k since the collecting began, shape (n,) [s]."""
-    propagation: Array = _none(0, 1, 4)
+    propagation: Array = field(default_factory=lambda: np.empty((0, 1, 4)))
     """Standard deviation of the error after k+1 steps simulated freely, shape (steps, joints, 4) [sensor units]."""
-    weights: Array = _none(0, 0)
+    weights: Array = field(default_factory=lambda: np.empty((0, 0)))
     """Standardised weights of a least-squares fit, shape (inputs, outputs); none where none was fitted."""
     inputs: Sequence[str] = ()
     """Names of the inputs."""
@@ -187,7 +182,9 @@ class TrainingData(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 <= self.chosen < len(self.evaluated):
-            raise UnusableInput(f"TrainingData: chosen must be one of {len(self.evaluated)} agents, got {self.chosen}")
+            raise UnusableInput(
+                f"TrainingData: chosen must be one of {len(self.evaluated)} agents, got {self.chosen}"
+            )
         if not ((self.evaluated >= 0) & (self.evaluated <= len(self.episodes))).all():
             raise UnusableInput(f"TrainingData: evaluated must lie in 0..{len(self.episodes)}, got {self.evaluated}")
 
@@ -243,7 +240,8 @@ class Episodes(Record):
     def none(cls, joints: int) -> Self:
         """Return no episodes at all."""
         empty = np.empty(0)
-        return cls(np.empty((0, joints)), np.empty((0, joints)), *([empty] * 6))
+        apart = np.empty((0, joints))
+        return cls(apart, apart, empty, empty, empty, np.empty(0, bool), empty, empty)
 
 
 @dataclass(frozen=True)
@@ -321,10 +319,14 @@ def read_episodes(path: Path) -> dict[str, Episodes]:
             reader = csv.DictReader(file)
             missing = set(COLUMNS) - set(reader.fieldnames or ())
             if missing:
-                raise UnusableInput(f"{path}: expected the columns {', '.join(COLUMNS)}; {sorted(missing)} are missing")
+                raise UnusableInput(
+                    f"{path}: expected the columns {', '.join(COLUMNS)}; {sorted(missing)} are missing"
+                )
             rows = list(reader)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UnusableInput(f"{path}: expected the episodes of a transfer as CSV, it cannot be read ({error})") from error
+        raise UnusableInput(
+            f"{path}: expected the episodes of a transfer as CSV, it cannot be read ({error})"
+        ) from error
     phases: dict[str, list[_Settings]] = {}
     for row in rows:
         phases.setdefault(row["phase"], []).append(row)

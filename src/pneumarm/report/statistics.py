@@ -88,8 +88,9 @@ def moving_mean(values: ArrayLike, window: int, counted: ArrayLike | None = None
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.where(count > 1, np.maximum(square - mean * mean, 0) * count / (count - 1), np.nan)
         half = Z * np.sqrt(variance / count)
-    position = np.flatnonzero(some) + (window - 1) / 2
-    return Moving(position, mean + shift, mean + shift - half, mean + shift + half)
+    position: Array = np.flatnonzero(some) + (window - 1) / 2
+    mean = np.asarray(mean + shift, np.float64)
+    return Moving(position, mean, mean - half, mean + half)
 
 
 def moving_rate(successes: ArrayLike, window: int) -> Moving:
@@ -116,7 +117,7 @@ class Bins(NamedTuple):
     """Median of x in the class."""
     mean: Array
     std: Array
-    count: Array
+    samples: Array
 
 
 def binned(x: ArrayLike, y: ArrayLike, bins: int = 12, fewest: int = 20) -> Bins:
@@ -147,12 +148,12 @@ def by_group(group: ArrayLike, x: ArrayLike, y: ArrayLike, fewest: int = 1) -> B
 
 def slope(x: ArrayLike, y: ArrayLike) -> float:
     """Return the least-squares slope of ``y`` (n,) over ``x`` (n,); NaN where x does not vary."""
-    x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
-    if len(x) < 2:
+    a, b = np.asarray(x, np.float64), np.asarray(y, np.float64)
+    if len(a) < 2:
         return math.nan
-    x = x - x.mean()
-    spread = float(x @ x)
-    return float(x @ (y - y.mean())) / spread if spread > 0 else math.nan
+    a = a - a.mean()
+    spread = float(a @ a)
+    return float(a @ (b - b.mean())) / spread if spread > 0 else math.nan
 
 
 def running_median(x: ArrayLike, y: ArrayLike, bins: int = 15, fewest: int = 5) -> tuple[Array, Array]:

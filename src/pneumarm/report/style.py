@@ -36,7 +36,7 @@ DENSITY = "cividis_r"
 RASTER_DPI = 170
 _MANY = 400  # from so many points on a scatter is stored as pixels inside the SVG
 
-_RC: dict[str, Any] = {
+_RC: Any = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
     "font.size": 8.5,
     "axes.titlesize": 9,
@@ -172,7 +172,7 @@ def nothing(axes: Axes, why: str) -> None:
     axes.text(0.5, 0.5, why, transform=axes.transAxes, ha="center", va="center", color=INK)
 
 
-def key(color: str, linestyle: str = "-", **options: Any) -> Line2D:
+def key(color: str, linestyle: Any = "-", **options: Any) -> Line2D:
     """Return an entry for a legend."""
     return Line2D([], [], color=color, linestyle=linestyle, **options)
 

@@ -1,6 +1,7 @@
 """What the collected data covers: projections of the transitions, cells of the grid (thesis section 3.2.3)."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.colors import LogNorm
@@ -8,7 +9,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.style import DARK, DENSITY, INK, MIDDLE, nothing, of_joint, panels, quantities, styled, whole_ticks
+from pneumarm.report.style import (
+    DARK,
+    DENSITY,
+    INK,
+    MIDDLE,
+    nothing,
+    of_joint,
+    panels,
+    quantities,
+    styled,
+    whole_ticks,
+)
 
 Array = NDArray[np.float64]
 
@@ -62,7 +74,9 @@ def projections_alt(observation: Array, spec: ArmSpec) -> str:
             f"{spec.degrees(b) if k.name == 'angle' else b * k.per_count:.3g} {k.unit}"
             for k, a, b in zip(kinds, low, high, strict=True)
         ]
-        parts.append(f"98 % of the observations{of_joint(joint, observation.shape[1])} lie within " + ", ".join(ranges))
+        parts.append(
+            f"98 % of the observations{of_joint(joint, observation.shape[1])} lie within " + ", ".join(ranges)
+        )
     return (
         f"Maps of {len(observation):,} observations over angle and velocity, angle and pressure 1, and the two "
         f"pressures. " + ". ".join(parts) + "."
@@ -88,7 +102,7 @@ def cells(cells_holding: NDArray[np.int64], per_cell: int, growth: NDArray[np.in
     if held.sum() == 0:
         nothing(place, "no cell is occupied")
     else:
-        ticks = [f"{a}" if b - a == 1 else f"{a}–{b - 1}" for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        ticks = [f"{a}" if b - a == 1 else f"{a}–{b - 1}" for a, b in pairwise(edges)]
         ticks[-1] = ticks[-1] if held.size < _BANDS else f"≥{edges[-2]}"
         place.bar(range(len(held)), held, color=DARK, width=0.75)
         place.set_xticks(range(len(held)), ticks)
@@ -119,7 +133,10 @@ def cells_alt(cells_holding: NDArray[np.int64], per_cell: int, growth: NDArray[n
         f"{per_cell} transitions."
     )
     if len(growth):
-        text += f" Curve: {new_share(growth):.1%} of the occupied cells were first reached in the second half of the data."
+        text += (
+            f" Curve: {new_share(growth):.1%} of the occupied cells were first reached in the second half "
+            "of the data."
+        )
     return text
 
 
@@ -134,6 +151,6 @@ def _doubling(cells_holding: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDAr
     most = len(cells_holding) - 1
     classes = min(_BANDS, max(1, math.floor(math.log2(max(most, 1))) + 1))
     edges = 2 ** np.arange(classes + 1)
-    held = [int(cells_holding[a:b].sum()) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    held = [int(cells_holding[a:b].sum()) for a, b in pairwise(edges)]
     held[-1] += int(cells_holding[edges[-1] :].sum())
     return edges, np.array(held)

@@ -58,6 +58,7 @@ def distributions_alt(reward: Array, actions: Array, switches: Array, success: N
         return f"median {median:.4g}, 90 % within {low:.4g} to {high:.4g}"
 
     return (
-        f"Histograms of {len(reward):,} episodes, {np.mean(success):.2%} of them successful. Reward: {middle(reward)}. "
+        f"Histograms of {len(reward):,} episodes, {np.mean(success):.2%} of them successful. Reward: "
+        f"{middle(reward)}. "
         f"Actions: {middle(actions)}. Switches: {middle(switches)}."
     )

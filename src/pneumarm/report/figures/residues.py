@@ -141,7 +141,9 @@ def residue_by_class_alt(residue: Array, classes: Sequence[Classification], unit
             f"deviation from {stats.std[least]:.2f} (at {_at(kind, stats, least)}) to {stats.std[most]:.2f} "
             f"(at {_at(kind, stats, most)}) {unit}."
         )
-    return f"Residue of {len(residue):,} transitions, with mean and standard deviation a class. " + " ".join(sentences)
+    return f"Residue of {len(residue):,} transitions, with mean and standard deviation a class. " + " ".join(
+        sentences
+    )
 
 
 def _at(kind: Classification, stats: Bins, index: int) -> str:

@@ -90,7 +90,8 @@ def shaping_curves_alt(
     last = int(evaluations[chosen]) - 1
     ends = np.array([episodes[max(int(e) - 1, 0)] for e in evaluations])
     return (
-        f"Shaping of {len(evaluations)} agents. The chosen one trained for {episodes[last]:,.0f} episodes; its deviation "
+        f"Shaping of {len(evaluations)} agents. The chosen one trained for {episodes[last]:,.0f} "
+        "episodes; its deviation "
         f"grew from {deviation[chosen, 0]:.0f} to {deviation[chosen, last]:.0f} counts "
         f"({deviation[chosen, last] / spec.counts_per_degree:.0f}°) and its performance ended at "
         f"{performance[chosen, last]:.3f}. All agents ended after {ends.min():,.0f} to {ends.max():,.0f} episodes."
@@ -136,6 +137,7 @@ def spread_of_agents_alt(reward: Array, success: Array, chosen: int) -> str:
         return "No agent was trained."
     return (
         f"Validation of {len(reward)} agents from different initial weights: reward from {reward.min():.2f} to "
-        f"{reward.max():.2f}, median {np.median(reward):.2f}; success from {success.min():.1%} to {success.max():.1%}. "
+        f"{reward.max():.2f}, median {np.median(reward):.2f}; success from {success.min():.1%} to "
+        f"{success.max():.1%}. "
         f"The chosen agent has reward {reward[chosen]:.2f} and success {success[chosen]:.1%}."
     )

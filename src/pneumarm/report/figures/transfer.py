@@ -87,7 +87,8 @@ def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window:
         if len(phase.reward):
             top.text(
                 begin + len(phase.reward) / 2, 0.03, phase.name, transform=top.get_xaxis_transform(), ha="center",
-                va="bottom", fontsize=8.5, fontweight="bold", color=INK, bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 1.5},
+                va="bottom", fontsize=8.5, fontweight="bold", color=INK, 
+                bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 1.5},
             )  # fmt: skip
     if total:
         _clock(top, np.concatenate([p.time_end for p in phases]))
@@ -131,7 +132,9 @@ def transfer_curves_alt(phases: list[Phase], reference: Mapping[str, float], win
         won = phase.success
         text = f"{phase.name}: {len(won):,} episodes, reward {phase.reward.mean():.2f}, success {won.mean():.1%}"
         if won.any():
-            text += f", {phase.actions[won].mean():.1f} actions and {phase.switches[won].mean():.2f} switches a success"
+            text += (
+                f", {phase.actions[won].mean():.1f} actions and {phase.switches[won].mean():.2f} switches a success"
+            )
         parts.append(text)
     told = ""
     if "reward" in reference:

@@ -7,24 +7,32 @@ grows by the stages that are done. A second call with the same folder goes on af
 
 import json
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pneumarm.arm import Arm
+from pneumarm.analysis import analyse
+from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable
-from pneumarm.control.transfer import TransferSettings, transfer
+from pneumarm.control import TransferSettings, transfer, write_episodes
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_json
-from pneumarm.learning import Agent, TrainSettings, begin_states, train
+from pneumarm.learning import Agent, BeginStates, TrainSettings, begin_states, train
 from pneumarm.learning import test as test_agent
-from pneumarm.report import write_report
+from pneumarm.records import demonstrate, test_record, training_record
+from pneumarm.report import save_movement, save_spec, write_report
 from pneumarm.simulation import FitSettings, Simulation, fit_store
-from pneumarm.transitions import CollectSettings, Store, collect
+from pneumarm.transitions import FEWEST_TRANSITIONS, CollectSettings, Store, collect
 
 Progress = Callable[[str], AbstractContextManager[Report]]
+
+
+@contextmanager
+def silent(title: str) -> Iterator[Report]:
+    """Show no progress."""
+    yield lambda done, total: None
 
 
 @dataclass(frozen=True)
@@ -123,54 +131,74 @@ class Run:
         return self.results
 
     def _collect(self) -> dict[str, Any]:
-        settings = self.settings
+        wanted = self.settings
         with (
             self.progress("collecting") as report,
-            open_arm_checked(settings) as arm,
-            Store.writing(self.store, arm.spec) as store,
+            open_arm_checked(wanted) as arm,
+            Store.append_to(self.store) if self.store.exists() else Store.create(self.store, arm.spec) as store,
         ):
             collected = collect(
-                arm, store, settings.transitions, seed=settings.seed, settings=settings.collect, progress=report
+                arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect
             )
         return {"collect": collected.results()}
 
     def _fit(self) -> dict[str, Any]:
         with self.progress("fitting the simulation") as report, Store.open(self.store) as store:
             fitted = fit_store(store, replace(self.settings.fit, seed=self.settings.seed), progress=report)
-            fitted.simulation.save(self.simulation)
-            analyse(store, fitted.simulation, self.folder)
-        return {"filter": fitted.coverage.results(), "simulation": fitted.results()}
+            analysis = analyse(store, fitted.simulation, fitted.filtered)
+        fitted.simulation.save(self.simulation)
+        analysis.save(self.folder)
+        return {"filter": analysis.figures["filter"], "simulation": fitted.results() | analysis.figures}
 
     def _train(self) -> dict[str, Any]:
         simulation = Simulation.load(self.simulation)
-        with self.progress("training") as report, Store.open(self.store) as store:
+        with self.progress("training") as report:
             training = train(
                 simulation,
-                begin_states(store, simulation),
+                self._begin_states(simulation),
                 self.settings.train,
                 seed=self.settings.seed,
-                progress=report,
+                progress=lambda now: report(100 * now.share, 100),
                 checkpoint=self.folder / "training.checkpoint",
             )
-        training_data(training).save(self.folder)
         training.agent.save(self.agent)
+        training_record(training).save(self.folder)
         return {"training": training.results()}
 
     def _test(self) -> dict[str, Any]:
-        return {}
+        simulation = Simulation.load(self.simulation)
+        tested = test_agent(
+            Agent.load(self.agent),
+            simulation,
+            self._begin_states(simulation),
+            self.settings.test_episodes,
+            self.settings.seed,
+        )
+        test_record(tested).save(self.folder)
+        return {"test": tested.results()}
 
     def _transfer(self) -> dict[str, Any]:
-        settings = self.settings
-        agent = Agent.load(self.agent)
+        wanted = self.settings
         with (
             self.progress("moving on the arm") as report,
-            open_arm_checked(settings) as arm,
+            open_arm_checked(wanted) as arm,
             Store.append_to(self.store) as store,
         ):
-            moved = transfer(agent, arm, store, settings.transfer, seed=settings.seed, progress=report)
+            moved = transfer(
+                Agent.load(self.agent), arm, store, wanted.transfer, seed=wanted.seed, progress=report
+            )
+            movements = demonstrate(moved.agent, arm, wanted.seed)
         moved.agent.save(self.adapted)
         write_episodes(self.episodes, moved.episodes)
+        for number, movement in enumerate(movements):
+            save_movement(self.folder, movement, number)
         return {"transfer": moved.results()}
+
+    def _begin_states(self, simulation: Simulation) -> BeginStates:
+        with Store.open(self.store) as store:
+            # Collected sequences only: those of the transfer come later, and a resumed run must see the same.
+            rows = store.blocks(kinds=COLLECTED)
+            return begin_states(rows, simulation.window, simulation.scaling)
 
 
 def open_arm_checked(settings: RunSettings) -> Arm:

@@ -2,9 +2,10 @@
 
 from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import LearningController, Movement, move
-from pneumarm.control.transfer import Episode, Transferred, TransferSettings, transfer, write_episodes
+from pneumarm.control.transfer import BEGIN, Episode, Transferred, TransferSettings, transfer, write_episodes
 
 __all__ = [
+    "BEGIN",
     "AgentController",
     "Episode",
     "LearningController",

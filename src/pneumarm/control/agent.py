@@ -48,8 +48,10 @@ class AgentController:
         self._tracker.commanded(valves)
         return valves
 
-    def observe(self, reading: Reading, applied: NDArray[np.int8], reward: float, terminal: bool) -> None:
-        """Learn from ``reading``, to which the valves as ``applied`` led with ``reward``."""
+    def observe(
+        self, reading: Reading, applied: NDArray[np.int8], reward: NDArray[np.float64], terminal: bool
+    ) -> None:
+        """Learn from ``reading``, to which the valves as ``applied`` led with ``reward`` (joints,)."""
         self._tracker.commanded(applied)
         state = self._tracker.push(reading.time, reading.angle, reading.pressure)
         self.learner.observe(reward, state, terminal)

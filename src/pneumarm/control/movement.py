@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, Controller, Reading
-from pneumarm.learning.reward import Reward
+from pneumarm.learning import Reward
 from pneumarm.transitions.rows import Recorded
 
 
@@ -15,8 +15,10 @@ from pneumarm.transitions.rows import Recorded
 class LearningController(Controller, Protocol):
     """A controller that also learns from what its actions led to."""
 
-    def observe(self, reading: Reading, applied: NDArray[np.int8], reward: float, terminal: bool) -> None:
-        """Learn from ``reading``, to which the valves as ``applied`` led.
+    def observe(
+        self, reading: Reading, applied: NDArray[np.int8], reward: NDArray[np.float64], terminal: bool
+    ) -> None:
+        """Learn from ``reading``, to which the valves as ``applied`` (joints, 2) led with ``reward`` (joints,).
 
         ``terminal`` says that the goal is reached; a movement that is merely cut off is not terminal.
         """
@@ -49,17 +51,20 @@ class Movement:
         return float(self.recorded.time[-1])
 
 
-def move(cycle: ControlCycle, controller: Controller, goal: NDArray[np.float64], reward: Reward) -> Movement:
+def move(
+    cycle: ControlCycle, controller: Controller, goal: NDArray[np.float64], reward: Reward, cutoff: int = 100
+) -> Movement:
     """Move the arm, at rest with closed valves, until ``goal`` is reached or the movement is cut off.
 
     Args:
         cycle: the control cycle of the arm.
         controller: what acts; a :class:`LearningController` also learns.
         goal: shape (joints,) [counts].
-        reward: what is rewarded, when the goal is reached, and the cut-off.
+        reward: what is paid for an action, and when the goal is reached.
+        cutoff: actions after which a movement that has not reached its goal ends (thesis section 5.4.2: 100).
 
     """
-    count = _Count(cycle, controller, np.asarray(goal, np.float64), reward)
+    count = _Count(cycle, controller, np.asarray(goal, np.float64), reward, cutoff)
     controller.reset(count.goal)
     steps = list(cycle.run(count.decide))
     recorded = Recorded.from_steps(steps, cycle.arm.spec, kind="episode", at_rest=True)
@@ -72,9 +77,15 @@ class _Count:
     """Decides turn by turn, counting actions, switches and reward alike in simulation and on the arm."""
 
     def __init__(
-        self, cycle: ControlCycle, controller: Controller, goal: NDArray[np.float64], reward: Reward
+        self,
+        cycle: ControlCycle,
+        controller: Controller,
+        goal: NDArray[np.float64],
+        reward: Reward,
+        cutoff: int,
     ) -> None:
-        self.cycle, self.controller, self.goal, self.rule = cycle, controller, goal, reward
+        self.cycle, self.controller, self.goal = cycle, controller, goal
+        self.reward, self.cutoff = reward, cutoff
         self.learner = controller if isinstance(controller, LearningController) else None
         self.before: Reading | None = None
         self.actions = 0
@@ -90,13 +101,14 @@ class _Count:
             gained = self._count(self.before, reading)
             if self.learner is not None:
                 self.learner.observe(reading, self.cycle.applied, gained, self.success)
-            if self.success or self.actions == self.rule.cutoff:
+            if self.success or self.actions == self.cutoff:
                 return None
         self.before = reading
         self.actions += 1
         return self.controller.act(reading)
 
-    def _count(self, before: Reading, reading: Reading) -> float:
+    def _count(self, before: Reading, reading: Reading) -> NDArray[np.float64]:
+        """Return what each joint is paid for the action between two readings."""
         applied = self.cycle.applied
         switched = np.zeros(len(self.switches), bool)
         if self._last_applied is not None:
@@ -104,7 +116,7 @@ class _Count:
         self._last_applied = applied
         self.switches += switched
         self.velocity = (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
-        self.success = self.rule.reached(reading.angle, self.velocity, self.goal)
-        gained = self.rule.of_action(self.success, int(switched.sum()))
-        self.total += gained
-        return gained
+        self.success = self.reward.reached(reading.angle, self.velocity, self.goal)
+        self.total += self.reward.goal if self.success else self.reward.action
+        self.total += self.reward.switch * int(switched.sum())
+        return self.reward.of(self.success, switched)

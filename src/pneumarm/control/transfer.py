@@ -1,6 +1,7 @@
 """Transfer: an agent moves onto an arm, is tested, goes on learning there, and is tested again (thesis 5.5)."""
 
 import csv
+import hashlib
 import io
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -16,6 +17,7 @@ from pneumarm.control.movement import Movement, move
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_text
 from pneumarm.learning import Agent, OnlineLearner
+from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
 
 Phase = Literal["before", "learning", "after"]
@@ -143,7 +145,7 @@ def transfer(
 
     """
     check_fit(agent, arm)
-    number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": agent.fingerprint()})
+    number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": _fingerprint(agent)})
     done = [Episode(**entry.info) for entry in store.catalogue(number)]
     arm_state = store.state("arm")
     if arm_state is not None and arm.get_state() is not None:
@@ -169,7 +171,7 @@ def transfer(
         for i in range(sum(e.phase == phase for e in done), count):
             random, goal = begin_and_goal(agent, seed, greedy, i)
             BEGIN.reach(cycle.arm, random)
-            movement = move(cycle, controller, goal, agent.reward)
+            movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
             episode = Episode.of(phase, movement)
             done.append(episode)
             waiting.append((episode, movement))
@@ -178,6 +180,10 @@ def transfer(
             if progress is not None:
                 progress(len(done), total)
     return Transferred(done, learner.agent, settings.learning_rate)
+
+
+def _fingerprint(agent: Agent) -> str:
+    return hashlib.sha256(agent.weights().tobytes()).hexdigest()[:16]
 
 
 def check_fit(agent: Agent, arm: Arm) -> None:
@@ -192,7 +198,14 @@ def check_fit(agent: Agent, arm: Arm) -> None:
 
 def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
     """Return means over ``episodes`` with their 95 % intervals, and the arm time that they took [s]."""
-    return {}
+    figures = summarise(
+        reward=np.array([e.reward for e in episodes]),
+        success=np.array([e.success for e in episodes], bool),
+        actions=np.array([e.actions for e in episodes]),
+        switches=np.array([e.switches for e in episodes]),
+    )
+    seconds = episodes[-1].time_end - episodes[0].time_start if episodes else 0.0
+    return {**figures, "seconds": seconds}
 
 
 def write_episodes(path: Path, episodes: Sequence[Episode]) -> None:

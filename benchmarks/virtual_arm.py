@@ -1,6 +1,6 @@
 """How much faster than real time the nominal virtual arm is, one joint on one core.
 
-    python -m benchmarks virtual_arm
+python -m benchmarks virtual_arm
 """
 
 from collections.abc import Callable, Iterator

@@ -14,7 +14,7 @@ from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
 from pneumarm.arm.virtual.rest import pass_time, static_angle
 from pneumarm.arm.virtual.sensors import MOST_CONVERSIONS, sense
 from pneumarm.arm.virtual.start import start
-from pneumarm.arm.virtual.state import JOINT, MUSCLE, SURROUNDINGS
+from pneumarm.arm.virtual.state import JOINT, MUSCLE, QUEUE, SLOW_TICK, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import kernel
@@ -24,6 +24,8 @@ LATENCY = 0.007
 """Time between reading and acting [s] (thesis section 5.1: about 7 ms)."""
 MOST_LATENESS = 8.0
 """The control cycle is never later than so many standard deviations."""
+LONGEST_WAIT = 1e8
+"""Longest wait [s], three years."""
 _SUPPLY, _SENSORS, _JITTER = range(3)
 _HEADER = struct.Struct("<8sI16s")
 _MAGIC, _VERSION = b"pneumarm", 1
@@ -62,14 +64,29 @@ class VirtualArm(Arm):
         self._muscles = np.zeros((joints, 2), MUSCLE)
         self._joints = np.zeros(joints, JOINT)
         self._surroundings = np.zeros(1, SURROUNDINGS)
+        if seed < 0:
+            raise UnusableInput(f"the seed of a virtual arm must be 0 or more, got {seed}")
         self._random = random_states(seed, 3)
         self._lateness = self.parameters.jitter / math.sqrt(2)  # an interval has two ends
         self._scratch = np.zeros(MOST_CONVERSIONS)
         fixed = self._constants
-        self._physics = (self._muscles, fixed.muscles, self._joints, fixed.joints)
-        self._physics += (self._surroundings, fixed.surroundings, self._random[_SUPPLY])
-        self._sensing = (self._muscles, self._joints, self._surroundings, fixed.sensors)
-        self._sensing += (self._random[_SENSORS], self._scratch)
+        self._physics = (
+            self._muscles,
+            fixed.muscles,
+            self._joints,
+            fixed.joints,
+            self._surroundings,
+            fixed.surroundings,
+            self._random[_SUPPLY],
+        )
+        self._sensing = (
+            self._muscles,
+            self._joints,
+            self._surroundings,
+            fixed.sensors,
+            self._random[_SENSORS],
+            self._scratch,
+        )
         start(*self._physics)
 
     @property
@@ -121,22 +138,22 @@ class VirtualArm(Arm):
         """Let exactly ``seconds`` [s] pass.
 
         Raises:
-            PneumarmError: ``seconds`` is negative or not finite.
+            PneumarmError: ``seconds`` is negative, not a number, or longer than LONGEST_WAIT.
 
         """
-        if not 0.0 <= seconds < math.inf:
-            raise PneumarmError(f"an arm can wait for a finite time of 0 or more seconds, got {seconds!r}")
+        if not 0.0 <= seconds <= LONGEST_WAIT:
+            raise PneumarmError(f"an arm can wait for 0 to {LONGEST_WAIT:g} s, got {seconds!r}")
         pass_for(*self._physics, seconds)
 
     def wait_until(self, time: float) -> None:
         """Let time pass until the clock shows ``time`` [s], or a little more; return at once if it is past.
 
         Raises:
-            PneumarmError: ``time`` is not finite.
+            PneumarmError: ``time`` is not a number or farther away than LONGEST_WAIT.
 
         """
-        if not -math.inf < time < math.inf:
-            raise PneumarmError(f"an arm can wait until a finite time, got {time!r}")
+        if not time <= LONGEST_WAIT and not time - self.time <= LONGEST_WAIT:
+            raise PneumarmError(f"an arm can wait for up to {LONGEST_WAIT:g} s, got the time {time!r}")
         pass_until(*self._physics, self._random[_JITTER], self._lateness, time)
 
     def rest(self, seconds: float) -> None:
@@ -191,12 +208,14 @@ class VirtualArm(Arm):
 def _check_state(values: NDArray[Any], name: str) -> None:
     """Raise UnusableInput unless all numbers are finite and the counts in it are possible."""
     fields = [values[field] for field in values.dtype.names] if values.dtype.names else [values]
-    finite = all(np.isfinite(field).all() for field in fields)
+    checks = [np.isfinite(field) for field in fields]
     if values.dtype == MUSCLE:
-        possible = np.isin(values["open"], (0, 1)).all() and (values["pressure"] > 0).all()
-        pending = values["pending"]
-        finite &= bool(possible and ((pending >= 0) & (pending <= values["toggles"].shape[-1])).all())
-    if not finite:
+        checks += [np.isin(values["open"], (0, 1)), values["pressure"] > 0]
+        checks += [values["pending"] >= 0, values["pending"] <= QUEUE]
+    if values.dtype == SURROUNDINGS:
+        since = values["time"] - values["tick"]
+        checks += [values["time"] >= 0, values["time"] <= 100 * LONGEST_WAIT, since >= 0, since <= 2 * SLOW_TICK]
+    if not all(check.all() for check in checks):
         raise UnusableInput(f"{name}: the saved state is damaged: it holds impossible numbers")
 
 

@@ -1,6 +1,7 @@
 """The parameters of a virtual arm as records for the kernels, with what can be computed once computed once."""
 
 import math
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,9 +13,8 @@ from pneumarm.arm.virtual.state import SLOW_TICK
 BUMPS = 12
 """Worn places in the potentiometer's track."""
 
-_SAME_NAME = """rest_length tip length_at_zero stop_length stop_stiffness bladder_stiffness bladder_length threshold
-    viscosity viscosity_per_pressure friction friction_per_pressure dead_volume inlet outlet critical_ratio
-    laminar_ratio leak seat_leak heat_capacity heat_transfer slip_weights creep_times creep_stiffness""".split()
+_ONLY_DERIVED = {"diameter", "weave_angle", "bladder_diameter", "slip_lengths"}
+_SAME_NAME = [field.name for field in fields(MuscleParameters) if field.name not in _ONLY_DERIVED]
 _VECTORS = {"slip_weights", "creep_times", "creep_stiffness"}
 
 MUSCLE_CONSTANTS = np.dtype(

@@ -6,6 +6,7 @@ absolute; "free air" is a volume of air at 100 kPa and 20 degrees Celsius (ISO 8
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,6 +23,16 @@ REFERENCE_TEMPERATURE = 20.0
 """Temperature at which a muscle's parameters hold [degrees Celsius]."""
 ELEMENTS = 4
 """Maxwell-slip elements and creep branches of a muscle."""
+
+
+def _check(parameters: object, may_be_zero: set[str], skipped: Collection[str] = ()) -> None:
+    """Raise UnusableInput unless every number is finite and positive, or 0 where that makes sense."""
+    for name, value in vars(parameters).items():
+        if name in skipped:
+            continue
+        values = np.atleast_1d(value)
+        if not np.isfinite(values).all() or (values < 0).any() or (name not in may_be_zero and (values == 0).any()):
+            raise UnusableInput(f"{type(parameters).__name__}: {name} cannot be {value!r}; see its docstring")
 
 
 @dataclass(frozen=True)
@@ -91,11 +102,15 @@ class MuscleParameters:
         if any(len(values) != ELEMENTS for values in per_element):
             raise UnusableInput(f"MuscleParameters: slip and creep need {ELEMENTS} values each, got {per_element!r}")
         may_be_zero = {"friction", "friction_per_pressure", "viscosity", "viscosity_per_pressure", "leak"}
-        may_be_zero |= {"seat_leak", "bladder_stiffness", "dead_volume", "creep_stiffness"}
-        for name, value in vars(self).items():
-            values = np.atleast_1d(value)
-            if not np.isfinite(values).all() or (values < 0).any() or (name not in may_be_zero and (values == 0).any()):
-                raise UnusableInput(f"MuscleParameters: {name} cannot be {value!r}; see its docstring")
+        may_be_zero |= {"seat_leak", "bladder_stiffness", "dead_volume", "creep_stiffness", "stop_stiffness"}
+        _check(self, may_be_zero)
+        for name, fits in {
+            "critical_ratio": self.critical_ratio < self.laminar_ratio < 1,
+            "weave_angle": self.weave_angle < math.pi / 2,
+            "bladder_diameter": self.bladder_diameter < self.diameter,
+        }.items():
+            if not fits:
+                raise UnusableInput(f"MuscleParameters: {name} cannot be {getattr(self, name)!r}; see its docstring")
 
 
 @dataclass(frozen=True)
@@ -122,6 +137,13 @@ class JointParameters:
     """Damping of the end stops [N m s/rad] (assumption)."""
     viscosity: float = 0.002
     """Viscous friction of the bearings [N m s/rad] (thesis section 2.3.2: negligible)."""
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.tilt):
+            raise UnusableInput(f"JointParameters: tilt cannot be {self.tilt!r}; see its docstring")
+        _check(self, {"mass", "link_inertia", "stop_stiffness", "stop_damping", "viscosity"}, {"muscles", "tilt"})
+        if self.inertia <= 0:
+            raise UnusableInput("JointParameters: mass and link_inertia cannot both be 0")
 
     @property
     def inertia(self) -> float:
@@ -154,6 +176,9 @@ class AirParameters:
     closing_time: float = 0.002
     """Time in which a valve closes [s]."""
 
+    def __post_init__(self) -> None:
+        _check(self, {"fluctuation", "compressor", "pipe_delay", "opening_time", "closing_time"})
+
 
 @dataclass(frozen=True)
 class RoomParameters:
@@ -167,6 +192,9 @@ class RoomParameters:
     """Time constant of the room [s]."""
     day: float = 36000.0
     """Seconds of each 24 hours, from the start of the arm's clock, in which the room is heated [s]."""
+
+    def __post_init__(self) -> None:
+        _check(self, {"cold", "warm", "day"})
 
 
 @dataclass(frozen=True)
@@ -193,6 +221,7 @@ class SensorParameters:
             raise UnusableInput(f"SensorParameters: conversions must be 1, 5, 7 or 9, got {self.conversions!r}")
         if not 0 <= self.dropout <= 1:
             raise UnusableInput(f"SensorParameters: dropout must be in 0..1, got {self.dropout!r}")
+        _check(self, {"angle_noise", "pressure_noise", "noise_limit", "wear", "dropout", "wear_seed"})
 
 
 @dataclass(frozen=True)
@@ -212,6 +241,7 @@ class ArmParameters:
         if len(self.joints) != 1:
             # The rigid body of two coupled joints is not written yet; everything else is general in joints.
             raise UnusableInput(f"ArmParameters: a virtual arm has 1 joint in this version, got {len(self.joints)}")
+        _check(self, {"jitter"}, {"joints", "air", "room", "sensors"})
 
 
 def preset_parameters(preset: str = "B") -> ArmParameters:

@@ -42,25 +42,25 @@ _LARGEST = 0.05  # an equilibrium farther away than this was no rest [rad]
 @kernel
 def pass_time(muscles, muscle_c, joints, joint_c, air, air_c, random, until):  # type: ignore[no-untyped-def]
     """Let time pass until the clock shows ``until`` [s], by fast-forward where the arm rests."""
-    surroundings = air[0]
+    surroundings, constants = air[0], air_c[0]
     calm = 0
     while until - surroundings.time > LONG:
         if calm >= CALM_SAMPLES and steady(muscles):
-            if not fast_forward(muscles, muscle_c, joints, joint_c, surroundings, air_c[0], random, until - LAST):
-                calm = 0
+            rested = fast_forward(muscles, muscle_c, joints, joint_c, surroundings, constants, random, until - LAST)
+            calm = CALM_SAMPLES if rested else 0
         soon = surroundings.time + SAMPLE
         integrate(muscles, muscle_c, joints, joint_c, air, air_c, random, min(until, soon), SUBSTEP)
-        calm = calm + 1 if still(joints) else 0
+        calm = calm + 1 if fastest(joints) < CALM_SPEED else 0
     integrate(muscles, muscle_c, joints, joint_c, air, air_c, random, until, SUBSTEP)
 
 
 @kernel
-def still(joints):  # type: ignore[no-untyped-def]
-    """Return whether every joint is slower than CALM_SPEED."""
+def fastest(joints):  # type: ignore[no-untyped-def]
+    """Return the speed of the fastest joint [rad/s]."""
+    speed = 0.0
     for j in range(len(joints)):
-        if not abs(joints[j].speed) < CALM_SPEED:
-            return False
-    return True
+        speed = max(speed, abs(joints[j].speed))
+    return speed
 
 
 @kernel
@@ -94,7 +94,9 @@ def fast_forward(muscles, muscle_c, joints, joint_c, surroundings, c, random, un
             for m in range(2):
                 relax_muscle(muscles[j, m], muscle_c[j, m], surroundings.temperature, elapsed)
                 leak(muscles[j, m], muscle_c[j, m], c, elapsed)
-            if not settle(muscles[j], muscle_c[j], trial[j], joints[j], joint_c[j], surroundings.supply, c.polytropic):
+            if not settle(
+                muscles[j], muscle_c[j], trial[j], joints[j], joint_c[j], surroundings.supply, c.polytropic
+            ):
                 return False
     return True
 

@@ -1,12 +1,13 @@
 """The begin of a virtual arm's life: vented, relaxed and cold, as after a night."""
 
+import numpy as np
+
 from pneumarm.arm.virtual.joint import muscle_length
 from pneumarm.arm.virtual.muscle import braid, move
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS
 from pneumarm.arm.virtual.rest import static_angle
 from pneumarm.arm.virtual.slow import adapt, surround
 from pneumarm.kernels import kernel
-import numpy as np
 
 
 @kernel

@@ -51,7 +51,7 @@ def integrate(muscles, muscle_c, joints, joint_c, air, air_c, random, until, lon
         for j in range(muscles.shape[0]):
             for m in range(2):
                 end = min(end, toggle_due(muscles[j, m], now))
-        count = max(1, int(math.ceil((end - now) / longest - _ROUNDING)))
+        count = max(1, math.ceil((end - now) / longest - _ROUNDING))
         dt = (end - now) / count
         supply = surroundings.supply
         for _ in range(count):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from pneumarm.arm.virtual.joint import muscle_length
-from pneumarm.arm.virtual.muscle import braid, move
+from pneumarm.arm.virtual.muscle import move
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, REFERENCE_TEMPERATURE
 from pneumarm.arm.virtual.rest import static_angle
 from pneumarm.arm.virtual.slow import adapt
@@ -22,7 +22,6 @@ RELEASE = math.radians(4)
 """How far the closed arm is moved before it is let go [rad]."""
 _PATH = 16  # steps in which the arm is moved there, slowly
 _TURNS = 4  # turning points that make a frequency
-_MUSCLE, _JOINT = MUSCLE, JOINT
 
 
 @kernel
@@ -54,7 +53,7 @@ def prepare(muscle, c, length, pressure):  # type: ignore[no-untyped-def]
 @kernel
 def fill_time(muscle_c, joint_c, air_c, which, target):  # type: ignore[no-untyped-def]
     """Return the time [s] from the command to ``target`` [Pa gauge] in muscle ``which``, held at the angle 0."""
-    muscle, c = np.zeros(1, _MUSCLE)[0], muscle_c[0, which]
+    muscle, c = np.zeros(1, MUSCLE)[0], muscle_c[0, which]
     prepare(muscle, c, c.length_at_zero, 0.0)
     muscle.open[INLET] = 1
     time = 0.0
@@ -69,7 +68,7 @@ def fill_time(muscle_c, joint_c, air_c, which, target):  # type: ignore[no-untyp
 @kernel
 def ring_frequency(muscle_c, joint_c, air_c, pressure):  # type: ignore[no-untyped-def]
     """Return the frequency [Hz] at which the closed arm at gauge ``pressure`` [Pa] swings when let go; 0 if not."""
-    muscles, joints = np.zeros((1, 2), _MUSCLE), np.zeros(1, _JOINT)
+    muscles, joints = np.zeros((1, 2), MUSCLE), np.zeros(1, JOINT)
     pressures = np.full(2, pressure)
     rest = static_angle(muscle_c[0], joint_c[0], pressures, True)
     polytropic = air_c[0].polytropic

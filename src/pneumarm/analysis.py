@@ -1,6 +1,7 @@
 """What a store covers and how good a simulation of it is, gathered for the report (thesis sections 3.2.3 and 3.3)."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,11 @@ class Analysis:
     quality: QualityData
     figures: dict[str, Any]
     """Numbers by name: one-step errors, error propagation, invalid predictions, coverage."""
+
+    def save(self, folder: Path) -> None:
+        """Write the records that the report is drawn from to ``folder``."""
+        self.coverage.save(folder)
+        self.quality.save(folder)
 
 
 def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = None) -> Analysis:

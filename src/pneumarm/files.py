@@ -24,8 +24,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         UnusableInput: the parent folder is missing or cannot be written.
 
     """
-    if not path.parent.is_dir():
-        raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
+    require_folder(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield temporary
@@ -41,6 +40,12 @@ def written_whole(path: Path) -> Iterator[Path]:
         raise UnusableInput(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def require_folder(path: Path) -> None:
+    """Raise UnusableInput where the folder that ``path`` lies in is missing, before hours go into its content."""
+    if not path.parent.is_dir():
+        raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
 
 
 def write_text(path: Path, text: str) -> None:

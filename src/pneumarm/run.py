@@ -18,13 +18,13 @@ from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable
 from pneumarm.control import TransferSettings, transfer, write_episodes
 from pneumarm.errors import UnusableInput
-from pneumarm.files import write_json
+from pneumarm.files import require_folder, write_json
 from pneumarm.learning import Agent, BeginStates, TrainSettings, begin_states, train
 from pneumarm.learning import test as test_agent
 from pneumarm.records import demonstrate, test_record, training_record
 from pneumarm.report import save_movement, save_spec, write_report
 from pneumarm.simulation import FitSettings, Simulation, fit_store
-from pneumarm.transitions import FEWEST_TRANSITIONS, CollectSettings, Store, collect
+from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectSettings, Store, collect
 
 Progress = Callable[[str], AbstractContextManager[Report]]
 
@@ -82,8 +82,7 @@ class Run:
 
     def _claim(self) -> None:
         folder, wanted = self.folder, json.loads(json.dumps(asdict(self.settings)))
-        if not folder.parent.is_dir():
-            raise UnusableInput(f"{folder}: the folder {folder.parent} does not exist; create it first")
+        require_folder(folder)
         file = folder / "settings.json"
         if file.exists():
             found = _read_json(file)
@@ -135,12 +134,11 @@ class Run:
         with (
             self.progress("collecting") as report,
             open_arm_checked(wanted) as arm,
-            Store.append_to(self.store) if self.store.exists() else Store.create(self.store, arm.spec) as store,
+            Store.for_arm(self.store, arm.spec) as store,
         ):
-            collected = collect(
-                arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect
-            )
-        return {"collect": collected.results()}
+            collected = collect(arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect)
+            save_spec(self.folder, arm.spec)
+        return {"collect": asdict(collected)}
 
     def _fit(self) -> dict[str, Any]:
         with self.progress("fitting the simulation") as report, Store.open(self.store) as store:
@@ -184,9 +182,7 @@ class Run:
             open_arm_checked(wanted) as arm,
             Store.append_to(self.store) as store,
         ):
-            moved = transfer(
-                Agent.load(self.agent), arm, store, wanted.transfer, seed=wanted.seed, progress=report
-            )
+            moved = transfer(Agent.load(self.agent), arm, store, wanted.transfer, seed=wanted.seed, progress=report)
             movements = demonstrate(moved.agent, arm, wanted.seed)
         moved.agent.save(self.adapted)
         write_episodes(self.episodes, moved.episodes)
@@ -197,8 +193,7 @@ class Run:
     def _begin_states(self, simulation: Simulation) -> BeginStates:
         with Store.open(self.store) as store:
             # Collected sequences only: those of the transfer come later, and a resumed run must see the same.
-            rows = store.blocks(kinds=COLLECTED)
-            return begin_states(rows, simulation.window, simulation.scaling)
+            return begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
 
 
 def open_arm_checked(settings: RunSettings) -> Arm:
@@ -227,5 +222,6 @@ def _differences(found: Any, wanted: Any, place: str = "") -> str:
         return f"{place} was {found!r}, is {wanted!r}"
     names = [name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name)]
     return ", ".join(
-        _differences(found.get(name), wanted.get(name), f"{place}.{name}" if place else name) for name in sorted(names)
+        _differences(found.get(name), wanted.get(name), f"{place}.{name}" if place else name)
+        for name in sorted(names)
     )

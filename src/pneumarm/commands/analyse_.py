@@ -4,7 +4,9 @@ from pathlib import Path
 
 from pneumarm.analysis import analyse
 from pneumarm.commands.common import Json
-from pneumarm.console import progress, say, show, table
+from pneumarm.console import say, show, table
+from pneumarm.files import require_folder
+from pneumarm.report import write_analysis
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
 
@@ -25,3 +27,14 @@ def analyse_(db: Path, sim: Path, /, *, out: Path, json: Json = False) -> None:
     json
         Print one JSON object on stdout and nothing else there.
     """
+    require_folder(out)
+    simulation = Simulation.load(sim)
+    with Store.open(db) as store:
+        analysis = analyse(store, simulation)
+    out.mkdir(exist_ok=True)
+    analysis.save(out)
+    page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality)
+    say(f"page: {page}")
+    errors = analysis.figures["held_out"]
+    rows = [(name, *figures.values()) for name, figures in errors.items()]
+    show(analysis.figures, json, lambda: [table(("held out", *errors["std"]), rows)])

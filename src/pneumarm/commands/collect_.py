@@ -1,11 +1,11 @@
 """``pneumarm collect``."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
-
 from pneumarm.arm import open_arm
+from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
 from pneumarm.transitions import CollectSettings, Store, collect
 
@@ -17,8 +17,8 @@ def collect_(
     *,
     transitions: int = 200_000,
     seed: int = 0,
-    settings: Annotated[CollectSettings, Parameter(name="*")] = CollectSettings(),
-    json: Annotated[bool, Parameter(negative="")] = False,
+    settings: Annotated[CollectSettings, Settings] = CollectSettings(),
+    json: Json = False,
 ) -> None:
     """Make an arm move about and record it, sequence after sequence; a second call goes on.
 
@@ -37,6 +37,6 @@ def collect_(
     json
         Print one JSON object on stdout and nothing else there.
     """
-    with open_arm(arm, seed) as opened, Store.writing(db, opened.spec) as store, progress("collecting") as report:
-        result = collect(opened, store, transitions, seed=seed, settings=settings, progress=report)
-    show(result, json, lambda: [table(("collected", ""), list(result.items()))])
+    with open_arm(arm, seed) as opened, Store.for_arm(db, opened.spec) as store, progress("collecting") as report:
+        result = collect(opened, store, transitions, seed, settings=settings, progress=report)
+    show(asdict(result), json, lambda: [table(("collected", ""), list(asdict(result).items()))])

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
+from pneumarm.files import require_folder
 from pneumarm.simulation import FitSettings, fit_store
 from pneumarm.transitions import Store
 

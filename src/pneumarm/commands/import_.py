@@ -1,9 +1,10 @@
 """``pneumarm import``."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 from pneumarm.commands.common import Json
-from pneumarm.console import progress, show, table
+from pneumarm.console import show, table
 from pneumarm.transitions import import_recording
 
 
@@ -23,6 +24,5 @@ def import_(csv: Path, db: Path, /, *, mapping: Path, json: Json = False) -> Non
     json
         Print one JSON object on stdout and nothing else there.
     """
-    with progress("importing") as report:
-        imported = import_recording(csv, mapping, db, progress=report)
+    imported = asdict(import_recording(csv, mapping, db))
     show(imported, json, lambda: [table(("imported", ""), list(imported.items()))])

@@ -7,7 +7,7 @@ from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import TransferSettings
 from pneumarm.learning import TrainSettings
-from pneumarm.run import Run, RunSettings, ledger
+from pneumarm.run import Run, RunSettings
 
 
 def run_(
@@ -42,9 +42,11 @@ def run_(
     json
         Print one JSON object on stdout and nothing else there.
     """
-    settings = RunSettings(
-        arm=arm, seed=seed, transitions=transitions, joints=joints, train=train, transfer=transfer
-    )
+    settings = RunSettings(arm=arm, seed=seed, transitions=transitions, joints=joints, train=train, transfer=transfer)
     results = Run(out, settings, progress).do()
-    show(results, json, lambda: [table(*ledger(results), title="Ledger")])
+    columns = ("episodes", "reward", "success_rate", "actions", "switches")
+    phases = {"in simulation": results["test"], "on arrival": results["transfer"]["before"]}
+    phases["after adaptation"] = results["transfer"]["after"]
+    rows = [(name, *[figures[column] for column in columns]) for name, figures in phases.items()]
+    show(results, json, lambda: [table(("", *columns), rows, title="Ledger")])
     say(f"report: {out / 'report.html'}")

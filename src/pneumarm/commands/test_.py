@@ -32,6 +32,7 @@ def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: 
     """
     trained, simulation = Agent.load(agent), Simulation.load(sim)
     with Store.open(db) as store:
-        tested = test_agent(trained, simulation, begin_states(store, simulation), episodes, seed=seed)
+        begin = begin_states(store, simulation.window, simulation.scaling)
+    tested = test_agent(trained, simulation, begin, episodes, seed)
     result = tested.results()
     show(result, json, lambda: [table(("tested", ""), list(result.items()))])

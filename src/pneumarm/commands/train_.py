@@ -40,8 +40,12 @@ def train_(
     """
     require_folder(out)
     simulation = Simulation.load(sim)
-    with Store.open(db) as store, progress("training") as report:
-        training = train(simulation, begin_states(store, simulation), settings, seed=seed, progress=report)
+    with Store.open(db) as store:
+        begin = begin_states(store, simulation.window, simulation.scaling)
+    with progress("training") as report:
+        training = train(
+            simulation, begin, settings, seed, progress=lambda now: report(round(1000 * now.share), 1000)
+        )
     training.agent.save(out)
     result = training.results()
     show(result, json, lambda: [table(("trained", ""), list(result.items()))])

@@ -41,4 +41,8 @@ def transfer_(
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
         result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
     say(f"adapted agent: {out / 'adapted.safetensors'}")
-    show(result, json, lambda: [table(("phase", *result["before"]), [(p, *result[p].values()) for p in ("before", "after")])])
+    show(
+        result,
+        json,
+        lambda: [table(("phase", *result["before"]), [(p, *result[p].values()) for p in ("before", "after")])],
+    )

@@ -2,7 +2,15 @@
 
 from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import LearningController, Movement, move
-from pneumarm.control.transfer import BEGIN, Episode, Transferred, TransferSettings, transfer, write_episodes
+from pneumarm.control.transfer import (
+    BEGIN,
+    Episode,
+    Transferred,
+    TransferSettings,
+    transfer,
+    transfer_into,
+    write_episodes,
+)
 
 __all__ = [
     "BEGIN",
@@ -14,5 +22,6 @@ __all__ = [
     "Transferred",
     "move",
     "transfer",
+    "transfer_into",
     "write_episodes",
 ]

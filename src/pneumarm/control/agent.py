@@ -39,10 +39,8 @@ class AgentController:
         if reading.time != self._seen:
             reading = checked(reading, self.agent.spec)
             state = self._tracker.push(reading.time, reading.angle, reading.pressure)
-            if self._seen is None:
-                self.learner.begin(state, self._goal)
-            else:
-                self.learner.move_on(state)
+            # A reading that nobody told the learner about begins anew: nothing can be learned from the way to it.
+            self.learner.begin(state, self._goal)
             self._seen = reading.time
         valves = to_valves(self.learner.act())
         self._tracker.commanded(valves)

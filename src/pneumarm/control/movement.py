@@ -68,9 +68,7 @@ def move(
     controller.reset(count.goal)
     steps = list(cycle.run(count.decide))
     recorded = Recorded.from_steps(steps, cycle.arm.spec, kind="episode", at_rest=True)
-    return Movement(
-        count.goal, len(steps) - 1, count.switches, count.total, count.success, count.velocity, recorded
-    )
+    return Movement(count.goal, len(steps) - 1, count.switches, count.total, count.success, count.velocity, recorded)
 
 
 class _Count:

@@ -15,7 +15,7 @@ from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import Movement, move
 from pneumarm.errors import UnusableInput
-from pneumarm.files import write_text
+from pneumarm.files import require_folder, write_text
 from pneumarm.learning import Agent, OnlineLearner
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
@@ -150,7 +150,8 @@ def transfer(
     arm_state = store.state("arm")
     if arm_state is not None and arm.get_state() is not None:
         arm.set_state(arm_state)
-    learner = OnlineLearner(agent, settings.learning_rate, seed=seed)
+    exploration = agent.settings.exploration
+    learner = OnlineLearner(agent, settings.learning_rate, exploration, seed)
     learned = store.state("learner")
     if done and learned is not None:
         learner.set_state(learned)
@@ -180,6 +181,31 @@ def transfer(
             if progress is not None:
                 progress(len(done), total)
     return Transferred(done, learner.agent, settings.learning_rate)
+
+
+def transfer_into(
+    folder: Path,
+    agent: Agent,
+    arm: Arm,
+    settings: TransferSettings = TransferSettings(),
+    *,
+    seed: int = 0,
+    progress: Callable[[float, float], None] | None = None,
+) -> dict[str, Any]:
+    """Transfer ``agent`` and leave ``episodes.csv``, ``transitions.db`` and the adapted agent in ``folder``.
+
+    Raises:
+        UnusableInput: the folder's parent is missing, or it holds another transfer.
+
+    """
+    check_fit(agent, arm)
+    require_folder(folder)
+    folder.mkdir(exist_ok=True)
+    with Store.for_arm(folder / "transitions.db", arm.spec) as store:
+        moved = transfer(agent, arm, store, settings, seed=seed, progress=progress)
+    moved.agent.save(folder / "adapted.safetensors")
+    write_episodes(folder / "episodes.csv", moved.episodes)
+    return moved.results()
 
 
 def _fingerprint(agent: Agent) -> str:

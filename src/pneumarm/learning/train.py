@@ -139,7 +139,9 @@ def train(
 
     began, before = time.perf_counter(), agents.seconds[0]
     saved = began
-    cores = threads or min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, 64)
+    cores = threads or min(
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, 64
+    )
     with ThreadPoolExecutor(min(cores, settings.agents)) as pool:
         while (running := np.flatnonzero(~_ended(agents, settings))).size:
             done = list(pool.map(lambda a: _chunk(env, agents, settings, simulation, int(a)), running))
@@ -199,7 +201,8 @@ def _ended(agents: _Agents, settings: TrainSettings) -> NDArray[np.bool_]:
     return agents.met | (agents.episodes >= settings.max_episodes)
 
 
-def _chunk(env: Environment, agents: _Agents, settings: TrainSettings, simulation: Simulation, a: int
+def _chunk(
+    env: Environment, agents: _Agents, settings: TrainSettings, simulation: Simulation, a: int
 ) -> tuple[list[float], float]:
     """Train agent ``a`` until its deviation is adjusted; return its row of the curves and the processor time."""
     now = stage(agents.deviation[a], settings, simulation.spec)
@@ -259,14 +262,22 @@ def _write_checkpoint(path: Path, identity: dict[str, Any], agents: _Agents) -> 
     write_arrays(path, _CHECKPOINT, identity, vars(agents))
 
 
-def _read_checkpoint(path: Path, identity: dict[str, Any], simulation: Simulation, settings: TrainSettings) -> _Agents:
+def _read_checkpoint(
+    path: Path, identity: dict[str, Any], simulation: Simulation, settings: TrainSettings
+) -> _Agents:
     found, arrays = read_arrays(path, _CHECKPOINT)
     if found != msgspec.json.decode(msgspec.json.encode(identity)):
-        raise UnusableInput(f"{path}: the checkpoint of another training; remove it, or train with its settings and seed")
+        raise UnusableInput(
+            f"{path}: the checkpoint of another training; remove it, or train with its settings and seed"
+        )
     expected = vars(_fresh(simulation, settings, 0))
     for name, like in expected.items():
         array = arrays.get(name)
-        shape = like.shape if name != "curves" else (len(array) if array is not None and array.ndim else 0, *like.shape[1:])
+        shape = (
+            like.shape
+            if name != "curves"
+            else (len(array) if array is not None and array.ndim else 0, *like.shape[1:])
+        )
         if array is None or array.dtype != like.dtype or array.shape != shape:
             raise UnusableInput(f"{path}: a damaged checkpoint ({name}); remove it")
     return _Agents(**{name: arrays[name].copy() for name in expected})

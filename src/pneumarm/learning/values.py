@@ -89,7 +89,12 @@ class Networks(NamedTuple):
 def network_shapes(window: Window, hidden: int) -> Networks:
     """Return empty networks whose arrays have the right shapes."""
     joints, inputs = window.joints, window.state_size + window.joints
-    shapes = (joints, ACTIONS, inputs, hidden), (joints, ACTIONS, hidden), (joints, ACTIONS, hidden), (joints, ACTIONS)
+    shapes = (
+        (joints, ACTIONS, inputs, hidden),
+        (joints, ACTIONS, hidden),
+        (joints, ACTIONS, hidden),
+        (joints, ACTIONS),
+    )
     return Networks(*(np.zeros(shape, np.float32) for shape in shapes))
 
 

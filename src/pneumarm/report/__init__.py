@@ -10,7 +10,7 @@ from pneumarm.report.data import (
     read_episodes,
 )
 from pneumarm.report.page import Picture, Section, Table, render
-from pneumarm.report.run_report import read_run, run_page, save_movement, save_spec, write_report
+from pneumarm.report.run_report import read_run, run_page, save_movement, save_spec, write_analysis, write_report
 from pneumarm.report.sections import RunData
 
 __all__ = [
@@ -30,5 +30,6 @@ __all__ = [
     "run_page",
     "save_movement",
     "save_spec",
+    "write_analysis",
     "write_report",
 ]

@@ -19,9 +19,10 @@ from pneumarm.report.data import (
     read_episodes,
 )
 from pneumarm.report.page import render
-from pneumarm.report.sections import RunData, all_sections
+from pneumarm.report.sections import RunData, all_sections, collected, predicted, propagated
 
 REPORT = "report.html"
+ANALYSIS = "analysis.html"
 RESULTS = "results.json"
 EPISODES = "episodes.csv"
 SPEC = "arm.json"
@@ -42,6 +43,15 @@ def write_report(folder: Path) -> Path:
     """
     path = folder / REPORT
     write_text(path, run_page(read_run(folder)))
+    return path
+
+
+def write_analysis(folder: Path, spec: ArmSpec, coverage: CoverageData, quality: QualityData) -> Path:
+    """Write ``analysis.html``, the part of the report on a store and a simulation, to ``folder``."""
+    path = folder / ANALYSIS
+    sections = [collected(coverage, spec), predicted(quality, spec), propagated(quality, spec)]
+    summary = [f"{spec.name}: what was collected, and how well the simulation predicts what it was not fitted to."]
+    write_text(path, render(f"The simulation of {spec.name}", summary, sections))
     return path
 
 

@@ -38,7 +38,9 @@ class SimulationArm(Arm):
 
     def __init__(self, simulation: Simulation, *, seed: int = 0, noise: NoiseSettings | None = None) -> None:
         if not simulation.valves:
-            raise UnusableInput("the simulation was fitted to continuous commands; an arm has valves that open or close")
+            raise UnusableInput(
+                "the simulation was fitted to continuous commands; an arm has valves that open or close"
+            )
         self.spec = simulation.spec
         self._simulation = simulation
         self._parameters = simulation_parameters(simulation)
@@ -114,7 +116,9 @@ class SimulationArm(Arm):
             valves = np.array(saved["valves"], np.int8).reshape(self._valves.shape)
             periods, since = int(saved["periods"]), float(saved["since"])
         except (ValueError, KeyError, TypeError, OverflowError) as error:
-            raise UnusableInput(f"{self.spec.name}: expected a state of this simulation's arm, got another ({error})") from error
+            raise UnusableInput(
+                f"{self.spec.name}: expected a state of this simulation's arm, got another ({error})"
+            ) from error
         for name, array in arrays.items():
             getattr(self._state, name)[:] = array
         self._valves, self._periods, self._since = valves, periods, since

@@ -90,6 +90,10 @@ class Simulation:
     """Lowest and highest pressure that it predicts, shape (joints, 2 muscles, 2) [counts]."""
     valves: bool = True
     """Whether the commands are valves; with continuous commands no agent of ours can be trained."""
+    hold_out: float = 0.1
+    """Share of the sequences that were kept out of the fit, see :func:`pneumarm.transitions.held_out`."""
+    hold_out_seed: int = 0
+    """Seed that they were chosen by."""
 
     @property
     def outputs(self) -> NDArray[np.int64]:
@@ -128,7 +132,9 @@ class Simulation:
 
         """
         direct = [network.direct is not None for network in self.networks]
-        header = _Header(self.spec, self.window, self.velocity, self.valves, direct)
+        header = _Header(
+            self.spec, self.window, self.velocity, self.valves, direct, self.hold_out, self.hold_out_seed
+        )
         arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in _ARRAYS}
         arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
         for number, network in enumerate(self.networks):
@@ -173,6 +179,8 @@ class Simulation:
             networks=networks,
             velocity=header.velocity,
             valves=header.valves,
+            hold_out=header.hold_out,
+            hold_out_seed=header.hold_out_seed,
             **rest,
         )
 
@@ -192,6 +200,8 @@ class _Header:
     valves: bool
     direct: list[bool]
     """For each network whether it has direct connections."""
+    hold_out: float
+    hold_out_seed: int
 
 
 def _floats(name: str, array: NDArray[np.generic]) -> NDArray[np.float64]:

@@ -87,7 +87,7 @@ def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window:
         if len(phase.reward):
             top.text(
                 begin + len(phase.reward) / 2, 0.03, phase.name, transform=top.get_xaxis_transform(), ha="center",
-                va="bottom", fontsize=8.5, fontweight="bold", color=INK, 
+                va="bottom", fontsize=8.5, fontweight="bold", color=INK,
                 bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 1.5},
             )  # fmt: skip
     if total:

@@ -64,9 +64,9 @@ def _smallest(
 
 def joined(parts: list[Transitions]) -> Transitions:
     """Return the transitions of all ``parts`` (at least one) as one."""
-    return Transitions(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    return Transitions._make(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
 
 
 def picked(transitions: Transitions, index: NDArray[np.bool_] | NDArray[np.intp]) -> Transitions:
     """Return those of the transitions that a mask (n,) or an index chooses."""
-    return Transitions(*(array[index] for array in transitions))
+    return Transitions._make(array[index] for array in transitions)

@@ -225,6 +225,7 @@ def _sequence(
     start = arm.read().time
     settings.begin.reach(arm, random)
     info: Mapping[str, object] = {}
+    actor: Controller
     if controller is None:
         kind, actor = _random_actions(arm.spec.joints, settings, random)
         actor.reset(np.zeros(arm.spec.joints))

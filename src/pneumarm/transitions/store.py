@@ -234,7 +234,7 @@ class Store:
         }
         with self._writing() as connection:
             cursor = connection.execute(
-                "INSERT INTO runs (purpose, metadata) VALUES (?, ?)", (purpose, json.dumps(metadata, allow_nan=False))
+                "INSERT INTO runs (purpose, metadata) VALUES (?, ?)", (purpose, _as_json(metadata))
             )
         self._run = cursor.lastrowid
         assert self._run is not None
@@ -294,7 +294,7 @@ class Store:
                 int(one.at_rest),
                 len(one),
                 transitions,
-                json.dumps(dict(one.info), allow_nan=False),
+                _as_json(one.info),
             ),
         )
         places = ", ".join("?" * (values.shape[1] + 1))
@@ -379,11 +379,10 @@ class Blocks:
 
     def __iter__(self) -> Iterator[Rows]:
         number, length, at_rest = self._chosen()
+        before = np.concatenate([[0], np.cumsum(length)])  # rows before each sequence, and all at the end
         begin = 0
         while begin < len(number):
-            end = (
-                begin + 1 + int(np.searchsorted(np.cumsum(length[begin + 1 :]), self._rows - length[begin], "right"))
-            )
+            end = int(np.searchsorted(before, before[begin] + self._rows, "right")) - 1
             part = slice(begin, max(end, begin + 1))
             yield self._read(number[part], length[part], at_rest[part])
             begin = part.stop
@@ -467,6 +466,15 @@ def far_outside(angle: NDArray[np.float64], pressure: NDArray[np.float64], spec:
     if not ((pressure >= -limit) & (pressure <= limit)).all():
         return f"a pressure is over three times the limit of {spec.max_pressure_counts:g} counts or no number"
     return None
+
+
+def _as_json(info: Mapping[str, Any]) -> str:
+    try:
+        return json.dumps(dict(info), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise UnusableInput(
+            f"a sequence's or a run's info must be of JSON's types, with finite numbers: {error}"
+        ) from error
 
 
 def _row_values(one: Recorded, spec: ArmSpec, valves: bool) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.learning.agent import Agent
 from pneumarm.learning.exploration import greedy
-from pneumarm.learning.loop import Room, Schedule, look_ahead
+from pneumarm.learning.loop import Schedule, look_ahead, room_of
 from pneumarm.learning.settings import Exploration
 from pneumarm.learning.values import action_values, forget_traces, learner, td_target, unpack, update
 from pneumarm.random import random_state
@@ -54,14 +54,7 @@ class OnlineLearner:
         self._places = places(agent.window)
         self._x = np.zeros(self._places.size, np.float32)
         self._x[self._places.one] = 1
-        self._room = Room(
-            before=np.zeros_like(self._x),
-            values=np.zeros(ACTIONS, np.float32),
-            actions=np.full(joints, -1, np.int64),
-            next_values=np.zeros(joints),
-            cut=np.zeros(joints, np.int64),
-            next_actions=np.full(joints, -1, np.int64),
-        )
+        self._room = room_of(joints, self._places.size)
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""

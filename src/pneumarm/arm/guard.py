@@ -6,6 +6,8 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.arm.seam import Arm, Reading, checked
 from pneumarm.errors import PneumarmError
 
+_SETTINGS = frozenset((-1, 0, 1))
+
 
 class GuardedArm(Arm):
     """An arm whose inlets stay closed while their muscle reads over ``spec.max_pressure``.
@@ -22,23 +24,27 @@ class GuardedArm(Arm):
         """Number of times that an inlet was kept closed."""
         self.peak_pressure = np.zeros((arm.spec.joints, 2))
         """Highest pressures read, shape (joints, 2) [counts]."""
-        self._over: NDArray[np.bool_] = np.zeros((arm.spec.joints, 2), bool)
+        self._limit = arm.spec.max_pressure_counts
+        self._over: NDArray[np.bool_] | None = None  # which muscles read over the limit; None if none does
 
     def read(self) -> Reading:
         """Return a checked reading and remember which muscles are over the limit."""
         reading = checked(self.arm.read(), self.spec)
-        self._over = reading.pressure > self.spec.max_pressure_counts
+        over = max(reading.pressure.ravel().tolist()) > self._limit
+        self._over = reading.pressure > self._limit if over else None
         np.maximum(self.peak_pressure, reading.pressure, out=self.peak_pressure)
         return reading
 
     def set_valves(self, valves: ArrayLike) -> None:
         """Set ``valves`` (joints, 2), with the inlets of muscles over the limit kept closed."""
         asked = np.asarray(valves)
-        if asked.shape != self.applied.shape or not np.isin(asked, (-1, 0, 1)).all():
+        if asked.shape != self.applied.shape or not _SETTINGS.issuperset(asked.ravel().tolist()):
             raise PneumarmError(f"valves must be {self.applied.shape} of -1, 0 or +1, got {valves!r}")
-        blocked = (asked > 0) & self._over
-        applied = np.where(blocked, 0, asked).astype(np.int8)
-        self.interventions += int(blocked.sum())
+        applied = asked.astype(np.int8)
+        if self._over is not None:
+            blocked = (applied > 0) & self._over
+            applied[blocked] = 0
+            self.interventions += int(blocked.sum())
         self.arm.set_valves(applied)
         self.applied = applied
 
@@ -48,7 +54,7 @@ class GuardedArm(Arm):
             self.arm.wait(self.spec.period)
             seconds -= self.spec.period
             self.read()
-            if ((self.applied > 0) & self._over).any():
+            if self._over is not None and ((self.applied > 0) & self._over).any():
                 self.set_valves(self.applied)
         self.arm.wait(seconds)
 

@@ -1,0 +1,253 @@
+"""The virtual arm behind the seam."""
+
+import hashlib
+import math
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.arm.seam import Arm, ArmSpec, Reading
+from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, constants
+from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
+from pneumarm.arm.virtual.rest import pass_time, static_angle
+from pneumarm.arm.virtual.sensors import MOST_CONVERSIONS, sense
+from pneumarm.arm.virtual.start import start
+from pneumarm.arm.virtual.state import JOINT, MUSCLE, QUEUE, SLOW_TICK, SURROUNDINGS
+from pneumarm.arm.virtual.valve import command
+from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.kernels import kernel
+from pneumarm.random import random_states, uniform
+
+LATENCY = 0.007
+"""Time between reading and acting [s] (thesis section 5.1: about 7 ms)."""
+MOST_LATENESS = 8.0
+"""The control cycle is never later than so many standard deviations."""
+LONGEST_WAIT = 1e8
+"""Longest wait [s], three years."""
+_SUPPLY, _SENSORS, _JITTER = range(3)
+_HEADER = struct.Struct("<8sI16s")
+_MAGIC, _VERSION = b"pneumarm", 1
+
+
+class VirtualArm(Arm):
+    """An arm that exists only as physics: valves, air, braided muscles, a hinge with a weight, and sensors.
+
+    Time passes only in :meth:`wait` and :meth:`wait_until`; reading and setting valves take none. ``wait`` is
+    exact; ``wait_until`` ends late, as under an operating system that is not real-time: by an exponentially
+    distributed time, such that the interval between two deadlines has the standard deviation
+    ``parameters.jitter``. Waits of more than 10 s of an arm at rest are fast-forwarded.
+
+    The arm starts in the morning, vented and at rest, as it hung overnight.
+
+    Args:
+        parameters: what the arm is made of; the nominal arm by default.
+        seed: seeds the noise of the sensors, the jitter, and the fluctuation of the supply.
+        name: what reports call the arm.
+
+    """
+
+    def __init__(self, parameters: ArmParameters | None = None, *, seed: int = 0, name: str = "virtual") -> None:
+        self.parameters = parameters if parameters is not None else ArmParameters()
+        joints = len(self.parameters.joints)
+        self.spec = ArmSpec(
+            joints=joints,
+            counts_per_degree=COUNTS_PER_DEGREE,
+            counts_per_bar=COUNTS_PER_BAR,
+            angle_range=(0.0, HIGHEST_COUNT),
+            max_pressure=self.parameters.max_pressure / BAR,
+            latency=LATENCY,
+            name=name,
+        )
+        self._constants = constants(self.parameters)
+        self._muscles = np.zeros((joints, 2), MUSCLE)
+        self._joints = np.zeros(joints, JOINT)
+        self._surroundings = np.zeros(1, SURROUNDINGS)
+        if seed < 0:
+            raise UnusableInput(f"the seed of a virtual arm must be 0 or more, got {seed}")
+        self._random = random_states(seed, 3)
+        self._lateness = self.parameters.jitter / math.sqrt(2)  # an interval has two ends
+        self._scratch = np.zeros(MOST_CONVERSIONS)
+        fixed = self._constants
+        self._physics = (
+            self._muscles,
+            fixed.muscles,
+            self._joints,
+            fixed.joints,
+            self._surroundings,
+            fixed.surroundings,
+            self._random[_SUPPLY],
+        )
+        self._sensing = (
+            self._muscles,
+            self._joints,
+            self._surroundings,
+            fixed.sensors,
+            self._random[_SENSORS],
+            self._scratch,
+        )
+        start(*self._physics)
+
+    @property
+    def time(self) -> float:
+        """The arm's clock [s]."""
+        return float(self._surroundings["time"][0])
+
+    @property
+    def angle(self) -> NDArray[np.float64]:
+        """The true angles, shape (joints,) [rad]."""
+        return self._joints["angle"].copy()
+
+    @property
+    def speed(self) -> NDArray[np.float64]:
+        """The true angular velocities, shape (joints,) [rad/s]."""
+        return self._joints["speed"].copy()
+
+    @property
+    def pressure(self) -> NDArray[np.float64]:
+        """The true gauge pressures, shape (joints, 2) [Pa]."""
+        return self._muscles["pressure"] - ATMOSPHERE
+
+    @property
+    def temperature(self) -> NDArray[np.float64]:
+        """The true temperatures of the muscles, shape (joints, 2) [degrees Celsius]."""
+        return self._muscles["temperature"].copy()
+
+    def read(self) -> Reading:
+        """Return what the sensors say now; two readings at the same time differ by their noise."""
+        joints = self.spec.joints
+        angle, pressure = np.empty(joints), np.empty((joints, 2))
+        return Reading(sense(*self._sensing, angle, pressure), angle, pressure)
+
+    def set_valves(self, valves: ArrayLike) -> None:
+        """Set the valves (joints, 2) of -1 out, 0 closed, +1 in; the air notices after the pipe's delay.
+
+        Raises:
+            PneumarmError: other values or another shape.
+
+        """
+        asked = np.asarray(valves)
+        if asked.shape == self._muscles.shape:
+            exact = asked if asked.dtype == np.int8 else _as_int8(asked)
+            if command(self._muscles, self._surroundings, self._constants.surroundings, np.ascontiguousarray(exact)):
+                return
+        raise PneumarmError(f"valves must be {self._muscles.shape} of -1, 0 or +1, got {valves!r}")
+
+    def wait(self, seconds: float) -> None:
+        """Let exactly ``seconds`` [s] pass.
+
+        Raises:
+            PneumarmError: ``seconds`` is negative, not a number, or longer than LONGEST_WAIT.
+
+        """
+        if not 0.0 <= seconds <= LONGEST_WAIT:
+            raise PneumarmError(f"an arm can wait for 0 to {LONGEST_WAIT:g} s, got {seconds!r}")
+        pass_for(*self._physics, seconds)
+
+    def wait_until(self, time: float) -> None:
+        """Let time pass until the clock shows ``time`` [s], or a little more; return at once if it is past.
+
+        Raises:
+            PneumarmError: ``time`` is not a number or farther away than LONGEST_WAIT.
+
+        """
+        if not time <= LONGEST_WAIT and not time - self.time <= LONGEST_WAIT:
+            raise PneumarmError(f"an arm can wait for up to {LONGEST_WAIT:g} s, got the time {time!r}")
+        pass_until(*self._physics, self._random[_JITTER], self._lateness, time)
+
+    def rest(self, seconds: float) -> None:
+        """Vent all muscles for ``seconds`` [s] and close the valves again; a night costs milliseconds."""
+        self.set_valves(np.full(self._muscles.shape, -1, np.int8))
+        self.wait(seconds)
+        self.set_valves(np.zeros(self._muscles.shape, np.int8))
+
+    def close(self) -> None:
+        """Close all valves."""
+        self.set_valves(np.zeros(self._muscles.shape, np.int8))
+
+    def _parts(self) -> tuple[NDArray[Any], ...]:
+        return self._muscles, self._joints, self._surroundings, self._random
+
+    def _digest(self) -> bytes:
+        digest = hashlib.blake2b(digest_size=16)
+        for record in self._constants:
+            digest.update(record.tobytes())
+        digest.update(struct.pack("<d", self._lateness))
+        return digest.digest()
+
+    def get_state(self) -> bytes:
+        """Return everything that the arm's future depends on besides its parameters."""
+        return _HEADER.pack(_MAGIC, _VERSION, self._digest()) + b"".join(part.tobytes() for part in self._parts())
+
+    def set_state(self, state: bytes) -> None:
+        """Take up a state that an arm with the same parameters returned; the future is the same bit for bit.
+
+        Raises:
+            UnusableInput: no state of an arm with these parameters, or a damaged one.
+
+        """
+        expected = _HEADER.size + sum(part.nbytes for part in self._parts())
+        if len(state) != expected:
+            raise UnusableInput(f"{self.spec.name}: expected a saved state of {expected} bytes, got {len(state)}")
+        magic, version, digest = _HEADER.unpack_from(state)
+        if (magic, version) != (_MAGIC, _VERSION):
+            raise UnusableInput(f"{self.spec.name}: this is no saved state of a virtual arm of version {_VERSION}")
+        if digest != self._digest():
+            raise UnusableInput(f"{self.spec.name}: the saved state is of an arm with other parameters")
+        offset, restored = _HEADER.size, []
+        for part in self._parts():
+            restored.append(np.frombuffer(state, part.dtype, part.size, offset).reshape(part.shape))
+            offset += part.nbytes
+        for values in restored:
+            _check_state(values, self.spec.name)
+        for part, values in zip(self._parts(), restored, strict=True):
+            part[...] = values
+
+
+def _check_state(values: NDArray[Any], name: str) -> None:
+    """Raise UnusableInput unless all numbers are finite and the counts in it are possible."""
+    fields = [values[field] for field in values.dtype.names] if values.dtype.names else [values]
+    checks = [np.isfinite(field) for field in fields]
+    if values.dtype == MUSCLE:
+        checks += [np.isin(values["open"], (0, 1)), values["pressure"] > 0]
+        checks += [values["pending"] >= 0, values["pending"] <= QUEUE]
+    if values.dtype == SURROUNDINGS:
+        since = values["time"] - values["tick"]
+        checks += [values["time"] >= 0, values["time"] <= 100 * LONGEST_WAIT, since >= 0, since <= 2 * SLOW_TICK]
+    if not all(check.all() for check in checks):
+        raise UnusableInput(f"{name}: the saved state is damaged: it holds impossible numbers")
+
+
+def _as_int8(values: NDArray[Any]) -> NDArray[np.int8]:
+    """Return ``values`` as int8, with 2, which no valve knows, where they are no whole small numbers."""
+    return np.where(np.isin(values, (-1, 0, 1)), values, 2).astype(np.int8)
+
+
+@kernel
+def pass_for(muscles, muscle_c, joints, joint_c, air, air_c, random, seconds):  # type: ignore[no-untyped-def]
+    """Let ``seconds`` [s] pass."""
+    pass_time(muscles, muscle_c, joints, joint_c, air, air_c, random, air[0].time + seconds)
+
+
+@kernel
+def pass_until(  # type: ignore[no-untyped-def]
+    muscles, muscle_c, joints, joint_c, air, air_c, random, jitter, lateness, time
+):
+    """Let time pass until ``time`` [s] and then as long as the operating system takes to wake up."""
+    if time > air[0].time:
+        late = min(-lateness * math.log(1.0 - uniform(jitter)), MOST_LATENESS * lateness)
+        pass_time(muscles, muscle_c, joints, joint_c, air, air_c, random, time + late)
+
+
+def resting_angle(parameters: ArmParameters, pressures: ArrayLike, *, end_stops: bool = True) -> NDArray[np.float64]:
+    """Return the angles [rad] (joints,) at which an arm rests at gauge ``pressures`` (joints, 2) [Pa].
+
+    Without dry friction and after all creep, at 20 degrees Celsius.
+    """
+    fixed = constants(parameters)
+    pressures = np.asarray(pressures, np.float64).reshape(fixed.muscles.shape)
+    angles = [
+        static_angle(fixed.muscles[j], fixed.joints[j], pressures[j], end_stops) for j in range(len(fixed.joints))
+    ]
+    return np.array(angles)

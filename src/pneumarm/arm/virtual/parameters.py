@@ -1,0 +1,262 @@
+"""What a virtual arm is made of, in SI units, with the nominal values as defaults.
+
+The defaults are the nominal arm (preset B of :func:`preset_parameters`). Where a figure comes from is said in
+its docstring: the thesis, the literature, or an assumption. Pressures are gauge pressures unless called
+absolute; "free air" is a volume of air at 100 kPa and 20 degrees Celsius (ISO 8778).
+"""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pneumarm.errors import UnusableInput
+
+BAR = 1e5
+"""One bar [Pa]."""
+ATMOSPHERE = 1.013 * BAR
+"""Absolute pressure of the surroundings [Pa]."""
+FREE_AIR = 1.0 * BAR
+"""Absolute pressure at which flows are counted as volumes [Pa]."""
+REFERENCE_TEMPERATURE = 20.0
+"""Temperature at which a muscle's parameters hold [degrees Celsius]."""
+ELEMENTS = 4
+"""Maxwell-slip elements and creep branches of a muscle."""
+
+
+def _check(parameters: object, may_be_zero: set[str], skipped: Collection[str] = ()) -> None:
+    """Raise UnusableInput unless every number is finite and positive, or 0 where that makes sense."""
+    for name, value in vars(parameters).items():
+        if name in skipped:
+            continue
+        values = np.atleast_1d(value)
+        if not np.isfinite(values).all() or (values < 0).any() or (name not in may_be_zero and (values == 0).any()):
+            raise UnusableInput(f"{type(parameters).__name__}: {name} cannot be {value!r}; see its docstring")
+
+
+@dataclass(frozen=True)
+class MuscleParameters:
+    """One braided muscle of 30 mm (thesis section 2.2) with its valves and its hose."""
+
+    diameter: float = 0.030
+    """Diameter D0 at rest [m] (thesis section 2.2.3)."""
+    weave_angle: float = math.radians(45)
+    """Angle theta0 of the strands with the axis at rest [rad] (thesis section 2.2.3)."""
+    rest_length: float = 0.180
+    """Length l0 of the braid at rest, without end fittings [m] (thesis section 2.2.3)."""
+    tip: float = 1.0
+    """Correction k of the contraction for the conical ends, where contracted (Tondu and Lopez)."""
+    length_at_zero: float = 0.194
+    """Length of the braid with the joint at 0 rad [m] (assumption: both ends of the stroke keep force)."""
+    stop_length: float = 0.246
+    """Length where the strands jam [m] (computed from the weave: 254.6 mm is the geometric limit)."""
+    stop_stiffness: float = 2.5e4
+    """Stiffness of the jammed braid [N/m] (assumption)."""
+    bladder_stiffness: float = 100.0
+    """Stiffness kb of the bladder [N/m] (order of magnitude from latex tubes)."""
+    bladder_length: float = 0.180
+    """Length over which the bladder pulls [m]."""
+    threshold: float = 0.050 * BAR
+    """Pressure at which the bladder touches the weave, at the rest length [Pa] (thesis 2.2.3; 0.036 to 0.072
+    bar measured in Jiang et al., Actuators 15(1):21, 2026)."""
+    bladder_diameter: float = 0.022
+    """Diameter of the weave at which the bladder touches it without pressure [m]."""
+    viscosity: float = 8.0
+    """Viscous resistance without pressure [N s/m]."""
+    viscosity_per_pressure: float = 8.0 / BAR
+    """Viscous resistance by pressure [N s/m/Pa]."""
+    friction: float = 0.40
+    """Dry friction between the strands without pressure [N]."""
+    friction_per_pressure: float = 5.5 / BAR
+    """Dry friction by pressure [N/Pa]."""
+    slip_lengths: tuple[float, ...] = (0.3e-3, 0.8e-3, 2.0e-3, 4.0e-3)
+    """Stretch after which each Maxwell-slip element slips [m]."""
+    slip_weights: tuple[float, ...] = (0.3, 0.3, 0.25, 0.15)
+    """Share of each Maxwell-slip element in the dry friction."""
+    creep_times: tuple[float, ...] = (1.5, 60.0, 1800.0, 22000.0)
+    """Relaxation times of the rubber, a Prony series [s]."""
+    creep_stiffness: tuple[float, ...] = (30.0, 30.0, 30.0, 35.0)
+    """Stiffness of each branch of the Prony series [N/m]."""
+    dead_volume: float = 15e-6
+    """Volume of hose and fittings less that of the rubber [m3]."""
+    inlet: float = 8.8e-10
+    """Sonic conductance of everything between supply and muscle [m3/(s Pa)] (ISO 6358)."""
+    outlet: float = 2.5e-9
+    """Sonic conductance of valve and hose on the way out [m3/(s Pa)] (ISO 6358)."""
+    critical_ratio: float = 0.3
+    """Pressure ratio b below which the flow is choked (ISO 6358)."""
+    laminar_ratio: float = 0.999
+    """Pressure ratio above which the flow is taken as laminar, so that its slope stays finite."""
+    leak: float = 3e-8 / BAR
+    """Leak to the surroundings, free air [m3/s/Pa] (assumption: 1.5 % of the pressure a minute)."""
+    seat_leak: float = 0.1e-8 / BAR
+    """Leak of the inlet valve's seat, free air [m3/s/Pa] (assumption)."""
+    heat_capacity: float = 144.0
+    """Heat capacity of 80 g of rubber and nylon [J/K]."""
+    heat_transfer: float = 0.2
+    """Heat given to the room [W/K] (estimate: a time constant of 9 to 18 minutes)."""
+
+    def __post_init__(self) -> None:
+        per_element = (self.slip_lengths, self.slip_weights, self.creep_times, self.creep_stiffness)
+        if any(len(values) != ELEMENTS for values in per_element):
+            raise UnusableInput(f"MuscleParameters: slip and creep need {ELEMENTS} values each, got {per_element!r}")
+        may_be_zero = {"friction", "friction_per_pressure", "viscosity", "viscosity_per_pressure", "leak"}
+        may_be_zero |= {"seat_leak", "bladder_stiffness", "dead_volume", "creep_stiffness", "stop_stiffness"}
+        _check(self, may_be_zero)
+        for name, fits in {
+            "critical_ratio": self.critical_ratio < self.laminar_ratio < 1,
+            "weave_angle": self.weave_angle < math.pi / 2,
+            "bladder_diameter": self.bladder_diameter < self.diameter,
+        }.items():
+            if not fits:
+                raise UnusableInput(f"MuscleParameters: {name} cannot be {getattr(self, name)!r}; see its docstring")
+
+
+@dataclass(frozen=True)
+class JointParameters:
+    """A hinge with a pulley, a hanging arm with a weight at its end, and two antagonistic muscles."""
+
+    muscles: tuple[MuscleParameters, MuscleParameters] = (MuscleParameters(), MuscleParameters())
+    """Muscle 1 turns the joint to positive angles, muscle 2 to negative ones."""
+    radius: float = 0.034
+    """Radius of the pulley [m] (computed from a sweep of 90 degrees)."""
+    mass: float = 0.37
+    """Mass of the weight [kg]."""
+    distance: float = 0.21
+    """Distance of the weight from the hinge [m]."""
+    link_inertia: float = 0.004
+    """Moment of inertia of the rest of the arm [kg m2]."""
+    tilt: float = 0.0
+    """Angle of the joint at which the weight would hang freely is ``-tilt`` [rad]."""
+    stop_angle: float = math.radians(47)
+    """Angle of the end stops either side [rad] (assumption)."""
+    stop_stiffness: float = 60.0
+    """Stiffness of the end stops [N m/rad] (assumption)."""
+    stop_damping: float = 0.6
+    """Damping of the end stops [N m s/rad] (assumption)."""
+    viscosity: float = 0.002
+    """Viscous friction of the bearings [N m s/rad] (thesis section 2.3.2: negligible)."""
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.tilt):
+            raise UnusableInput(f"JointParameters: tilt cannot be {self.tilt!r}; see its docstring")
+        _check(self, {"mass", "link_inertia", "stop_stiffness", "stop_damping", "viscosity"}, {"muscles", "tilt"})
+        if self.inertia <= 0:
+            raise UnusableInput("JointParameters: mass and link_inertia cannot both be 0")
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the hinge [kg m2]."""
+        return self.mass * self.distance**2 + self.link_inertia
+
+
+@dataclass(frozen=True)
+class AirParameters:
+    """The supply, the pipes and the switching of the valves."""
+
+    supply: float = 1.02 * BAR
+    """Mean pressure of the supply [Pa] (2 bar absolute: the muscles saturate at 1 bar by themselves)."""
+    fluctuation: float = 0.02 * BAR
+    """Standard deviation of the supply's fluctuation [Pa] (thesis A.1.1: other consumers; size assumed)."""
+    fluctuation_time: float = 5.0
+    """Correlation time of the fluctuation [s] (assumption)."""
+    compressor: float = 0.01 * BAR
+    """Amplitude of the compressor's saw-tooth behind the reducer [Pa] (assumption)."""
+    compressor_period: float = 120.0
+    """Period of the saw-tooth [s] (assumption)."""
+    safety_valve: float = 2.0 * BAR
+    """The supply never exceeds this [Pa] (thesis A.1.1)."""
+    polytropic: float = 1.2
+    """Polytropic exponent n of the air in the muscles, between isothermal 1 and adiabatic 1.4."""
+    pipe_delay: float = 0.010
+    """Time in which a pressure wave passes the hose [s] (thesis section 5.1: about 10 ms)."""
+    opening_time: float = 0.002
+    """Time in which a valve opens [s]."""
+    closing_time: float = 0.002
+    """Time in which a valve closes [s]."""
+
+    def __post_init__(self) -> None:
+        _check(self, {"fluctuation", "compressor", "pipe_delay", "opening_time", "closing_time"})
+
+
+@dataclass(frozen=True)
+class RoomParameters:
+    """The temperature around the arm: heated in the day, cold after the night."""
+
+    cold: float = 17.0
+    """What the room cools down to at night; the arm's clock starts in the morning [degrees Celsius]."""
+    warm: float = 21.0
+    """What the room warms up to in the day [degrees Celsius]."""
+    time: float = 5400.0
+    """Time constant of the room [s]."""
+    day: float = 36000.0
+    """Seconds of each 24 hours, from the start of the arm's clock, in which the room is heated [s]."""
+
+    def __post_init__(self) -> None:
+        _check(self, {"cold", "warm", "day"})
+
+
+@dataclass(frozen=True)
+class SensorParameters:
+    """A potentiometer at the hinge, a pressure sensor at each muscle, and the 10-bit converter."""
+
+    angle_noise: float = 1.6
+    """Standard deviation of one conversion of the angle [counts] (thesis A.1.3: at most 4 counts)."""
+    pressure_noise: float = 1.6
+    """Standard deviation of one conversion of a pressure [counts]."""
+    noise_limit: float = 4.0
+    """The noise never exceeds this [counts] (thesis A.1.3)."""
+    conversions: int = 5
+    """Conversions of which the median is read: 1, 5, 7 or 9 (thesis A.1.3; its default is not said)."""
+    wear: float = 0.0
+    """Height of the highest bump that wear has made in the potentiometer's track [counts] (thesis A.1.2)."""
+    dropout: float = 0.0
+    """Chance that the worn potentiometer loses contact during a reading, which then is 0."""
+    wear_seed: int = 0
+    """Where the bumps are."""
+
+    def __post_init__(self) -> None:
+        if self.conversions not in (1, 5, 7, 9):
+            raise UnusableInput(f"SensorParameters: conversions must be 1, 5, 7 or 9, got {self.conversions!r}")
+        if not 0 <= self.dropout <= 1:
+            raise UnusableInput(f"SensorParameters: dropout must be in 0..1, got {self.dropout!r}")
+        _check(self, {"angle_noise", "pressure_noise", "noise_limit", "wear", "dropout", "wear_seed"})
+
+
+@dataclass(frozen=True)
+class ArmParameters:
+    """A whole virtual arm; the defaults are the nominal one."""
+
+    joints: tuple[JointParameters, ...] = (JointParameters(),)
+    air: AirParameters = field(default_factory=AirParameters)
+    room: RoomParameters = field(default_factory=RoomParameters)
+    sensors: SensorParameters = field(default_factory=SensorParameters)
+    jitter: float = 1.5e-3
+    """Standard deviation of the control interval [s] (thesis section 5.1: the operating system)."""
+    max_pressure: float = 1.05 * BAR
+    """The limit of ``ArmSpec.max_pressure`` [Pa]; presets A and C need it, B saturates below by itself."""
+
+    def __post_init__(self) -> None:
+        if len(self.joints) != 1:
+            # The rigid body of two coupled joints is not written yet; everything else is general in joints.
+            raise UnusableInput(f"ArmParameters: a virtual arm has 1 joint in this version, got {len(self.joints)}")
+        _check(self, {"jitter"}, {"joints", "air", "room", "sensors"})
+
+
+def preset_parameters(preset: str = "B") -> ArmParameters:
+    """Return the arm of one of three readings of the thesis' "2 bar" and "0 to 1200 ms".
+
+    ``A``: supply of 2 bar gauge through a narrow restriction; the pressure rises almost linearly. ``B`` (nominal):
+    2 bar absolute; the muscles saturate at 1 bar. ``C``: 2 bar gauge and a cut-off at the pressure limit.
+
+    Raises:
+        UnusableInput: there is no such preset.
+
+    """
+    inlets = {"A": (2.0 * BAR, 3.1e-10), "B": (1.02 * BAR, 8.8e-10), "C": (2.0 * BAR, 6.0e-10)}
+    if preset not in inlets:
+        raise UnusableInput(f"preset {preset!r}: expected one of {', '.join(inlets)}")
+    supply, inlet = inlets[preset]
+    muscle = MuscleParameters(inlet=inlet)
+    return ArmParameters(joints=(JointParameters((muscle, muscle)),), air=replace(AirParameters(), supply=supply))

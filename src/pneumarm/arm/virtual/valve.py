@@ -1,0 +1,64 @@
+"""The on/off valves: from a command to the moment when the air at the muscle notices.
+
+A command reaches the muscle after the pipe's delay and the switching time. What is under way is kept as the
+times at which a valve toggles, so that every edge falls exactly between two substeps.
+"""
+
+import math
+
+from pneumarm.arm.virtual.state import INLET, OUTLET, QUEUE
+from pneumarm.kernels import kernel
+
+
+@kernel
+def switch(muscle, side, wanted, time):  # type: ignore[no-untyped-def]
+    """Have the valve on ``side`` be ``wanted`` (0 or 1) from ``time`` [s] on.
+
+    Toggles that would come later are withdrawn: a pulse shorter than the switching time never opens a valve.
+    """
+    count = muscle.pending[side]
+    while count > 0 and muscle.toggles[side, count - 1] >= time:
+        count -= 1
+    if (muscle.open[side] + count) % 2 != wanted:
+        if count < QUEUE:
+            muscle.toggles[side, count] = time
+            count += 1
+        else:
+            count -= 1  # faster than any valve can follow: withdrawing the last toggle has the same effect
+    muscle.pending[side] = count
+
+
+@kernel
+def command(muscles, surroundings, surroundings_c, valves):  # type: ignore[no-untyped-def]
+    """Set ``valves`` (joints, 2); return False, with nothing set, if one of them is not -1, 0 or +1."""
+    for j in range(muscles.shape[0]):
+        for m in range(2):
+            if not -1 <= valves[j, m] <= 1:
+                return False
+    now = surroundings[0].time
+    opened = now + surroundings_c[0].opening_delay
+    closed = now + surroundings_c[0].closing_delay
+    for j in range(muscles.shape[0]):
+        for m in range(2):
+            wanted = 1 if valves[j, m] == 1 else 0
+            switch(muscles[j, m], INLET, wanted, opened if wanted else closed)
+            wanted = 1 if valves[j, m] == -1 else 0
+            switch(muscles[j, m], OUTLET, wanted, opened if wanted else closed)
+    return True
+
+
+@kernel
+def toggle_due(muscle, now):  # type: ignore[no-untyped-def]
+    """Toggle the valves whose time has come, and return the time of the next toggle [s] (inf if none)."""
+    following = math.inf
+    for side in range(2):
+        count = muscle.pending[side]
+        while count > 0 and muscle.toggles[side, 0] <= now:
+            muscle.open[side] = 1 - muscle.open[side]
+            count -= 1
+            for i in range(count):
+                muscle.toggles[side, i] = muscle.toggles[side, i + 1]
+        muscle.pending[side] = count
+        if count > 0:
+            following = min(following, muscle.toggles[side, 0])
+    return following

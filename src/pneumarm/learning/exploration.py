@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from pneumarm.kernels import kernel
 from pneumarm.random import uniform
 
@@ -17,25 +19,28 @@ def greedy(values):  # type: ignore[no-untyped-def]
 
 
 @kernel(_nrt=False, forceinline=True)
-def choose(values, epsilon, temperature, random):  # type: ignore[no-untyped-def]
-    """Return the greedy action, or with probability ``epsilon`` another one by the Boltzmann distribution."""
+def choose(values, epsilon, temperature, odds, random):  # type: ignore[no-untyped-def]
+    """Return the greedy action, or with probability ``epsilon`` another one by the Boltzmann distribution.
+
+    ``odds`` (9,) is room for its probabilities, up to a factor.
+    """
     best = greedy(values)
     if uniform(random) >= epsilon:
         return best
-    second = -math.inf
+    second = -math.inf  # the highest of the others, so that no exponential overflows
+    for action in range(values.shape[0]):
+        odds[action] = np.float32(-math.inf) if action == best else values[action]
+        second = max(second, odds[action])
+    total, rate = np.float32(0.0), np.float32(1.0 / temperature)
+    for action in range(values.shape[0]):
+        odds[action] = math.exp((odds[action] - np.float32(second)) * rate)
+        total += odds[action]
+    left = np.float32(uniform(random)) * total
+    last = best
     for action in range(values.shape[0]):
         if action != best:
-            second = max(second, float(values[action]))
-    total = 0.0
-    for action in range(values.shape[0]):
-        if action != best:
-            total += math.exp((values[action] - second) / temperature)
-    left = uniform(random) * total
-    chosen = best
-    for action in range(values.shape[0]):
-        if action != best:
-            chosen = action
-            left -= math.exp((values[action] - second) / temperature)
+            last = action
+            left -= odds[action]
             if left < 0.0:
                 break
-    return chosen
+    return last

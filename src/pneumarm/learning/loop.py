@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import kernel
 from pneumarm.learning.environment import Episode, angle, begin_episode, reward, take, velocity
 from pneumarm.learning.exploration import choose, greedy
@@ -26,6 +27,8 @@ class Room(NamedTuple):
     """State vector before the action, shape (inputs,)."""
     values: NDArray[np.float32]
     """Action values, shape (9,)."""
+    odds: NDArray[np.float32]
+    """For exploring, shape (9,)."""
     actions: NDArray[np.int64]
     """Actions to take, shape (joints,)."""
     next_values: NDArray[np.float64]
@@ -38,14 +41,19 @@ class Room(NamedTuple):
 
 def room(episode: Episode) -> Room:
     """Return room for a loop on ``episode``."""
-    joints = episode.goal.size
+    return room_of(episode.goal.size, episode.state.x.size)
+
+
+def room_of(joints: int, inputs: int) -> Room:
+    """Return room for so many joints and inputs."""
     return Room(
-        before=np.zeros_like(episode.state.x),
-        values=np.zeros(9, np.float32),
-        actions=np.zeros(joints, np.int64),
+        before=np.zeros(inputs, np.float32),
+        values=np.zeros(ACTIONS, np.float32),
+        odds=np.zeros(ACTIONS, np.float32),
+        actions=np.full(joints, -1, np.int64),
         next_values=np.zeros(joints),
         cut=np.zeros(joints, np.int64),
-        next_actions=np.zeros(joints, np.int64),
+        next_actions=np.full(joints, -1, np.int64),
     )
 
 
@@ -65,7 +73,7 @@ def look_ahead(learner, schedule, x, room, random):  # type: ignore[no-untyped-d
     """Choose the next actions in ``x`` and find the values that the targets look ahead to."""
     for joint in range(room.actions.shape[0]):
         action_values(learner, joint, x, room.values)
-        chosen = choose(room.values, schedule.epsilon, schedule.temperature, random)
+        chosen = choose(room.values, schedule.epsilon, schedule.temperature, room.odds, random)
         room.next_actions[joint] = chosen
         room.next_values[joint] = room.values[chosen]
         room.cut[joint] = 0

@@ -13,7 +13,8 @@ from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.learning.agent import Agent
-from pneumarm.learning.loop import Room, Schedule, look_ahead
+from pneumarm.learning.exploration import greedy
+from pneumarm.learning.loop import Schedule, look_ahead, room_of
 from pneumarm.learning.settings import Exploration
 from pneumarm.learning.values import action_values, forget_traces, learner, td_target, unpack, update
 from pneumarm.random import random_state
@@ -53,14 +54,7 @@ class OnlineLearner:
         self._places = places(agent.window)
         self._x = np.zeros(self._places.size, np.float32)
         self._x[self._places.one] = 1
-        self._room = Room(
-            before=np.zeros_like(self._x),
-            values=np.zeros(ACTIONS, np.float32),
-            actions=np.full(joints, -1, np.int64),
-            next_values=np.zeros(joints),
-            cut=np.zeros(joints, np.int64),
-            next_actions=np.full(joints, -1, np.int64),
-        )
+        self._room = room_of(joints, self._places.size)
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
@@ -104,7 +98,9 @@ class OnlineLearner:
         self.act()
         paid = np.broadcast_to(np.asarray(reward, np.float64), self._room.actions.shape).copy()
         next_state = self._checked(next_state)
-        _observe(self._learner, self._schedule, self._x, self._room, self._random, (paid, next_state), bool(terminal))
+        _observe(
+            self._learner, self._schedule, self._x, self._room, self._random, (paid, next_state), bool(terminal)
+        )
 
     @property
     def agent(self) -> Agent:
@@ -126,8 +122,7 @@ class OnlineLearner:
         try:
             saved = json.loads(state)
             arrays = {
-                name: np.array(saved[name], array.dtype).reshape(array.shape)
-                for name, array in self._arrays().items()
+                name: np.array(saved[name], array.dtype).reshape(array.shape) for name, array in self._arrays().items()
             }
         except (ValueError, KeyError, TypeError, OverflowError) as error:
             raise UnusableInput(f"expected the state of a learner like this one, got another ({error})") from error

@@ -18,7 +18,7 @@ _PHASES = {"before": "on arrival", "learning": "while learning", "after": "after
 
 
 def ledger(test: Episodes | None, transfer: TransferData | None) -> Table:
-    """Return reward, success, actions and switches in the simulation and on the arm, with 95 % intervals."""
+    """Return reward, success, actions and switches in the simulation and on the arm, with 95% intervals."""
     rows = [_ledger_row("in the simulation", test, on_arm=False)] if test is not None else []
     if transfer is not None:
         rows += [_ledger_row(_PHASES[name], phase, on_arm=True) for name, phase in transfer.phases.items()]
@@ -36,7 +36,7 @@ def ledger(test: Episodes | None, transfer: TransferData | None) -> Table:
     return Table(
         header,
         rows,
-        "The ledger: means over the episodes with 95 % confidence intervals in brackets (normal approximation, for "
+        "The ledger: means over the episodes with 95% confidence intervals in brackets (normal approximation, for "
         "the success Wilson's; episodes taken as independent; none below 30 episodes). Greedy and without learning, "
         "except while learning. Arm time holds everything, the way to the begin states too.",
     )
@@ -66,10 +66,9 @@ def with_interval(estimate: Estimate, form: str) -> str:
     """Return an estimate for people: mean and, where there is one, its interval."""
     if math.isnan(estimate.mean):
         return MISSING
-    mean = form.format(estimate.mean)
-    if math.isnan(estimate.low):
-        return mean
-    return f"{mean} ({form.format(estimate.low)} to {form.format(estimate.high)})"
+    mean, low, high = (form.format(value).replace("-", "−") for value in estimate[:3])
+    # The interval stays together when a narrow column breaks the line.
+    return mean if math.isnan(estimate.low) else f"{mean} ({low}\u00a0to\u00a0{high})"
 
 
 def duration(seconds: float) -> str:
@@ -99,6 +98,7 @@ def beside_thesis(
         "Our figures beside the thesis' figures. Its arm is another one, with other muscles and a "
         "worn angle sensor, so "
         "that the comparison is one of magnitude.",
+        words=True,
     )
 
 
@@ -174,7 +174,8 @@ def _moved(test: Episodes | None, transfer: TransferData | None) -> list[list[st
         ["drop of the reward on arrival", _mean(home.reward, came.reward), f"over {thesis.REWARD_DROP:g}",
          "section 5.5.1"],
         ["rise of the switches of successes on arrival",
-         _mean(came.switches[came.success], home.switches[home.success]), f"{least:g} learning, {most:g} not", "section 5.5.1"],
+         _mean(came.switches[came.success], home.switches[home.success]),
+         f"{least:g} learning, {most:g} not", "section 5.5.1"],
         ["success on arrival", with_interval(rate_estimate(came.success), "{:.1%}"), thesis.SUCCESS, "section 5.6.1"],
     ]  # fmt: skip
     if len(transfer.after):

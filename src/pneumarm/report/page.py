@@ -28,6 +28,8 @@ class Table:
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     caption: str
+    words: bool = False
+    """Whether the cells hold words, set to the left, rather than numbers, set to the right."""
 
     def __post_init__(self) -> None:
         for row in self.rows:

@@ -57,7 +57,7 @@ def write_analysis(folder: Path, spec: ArmSpec, coverage: CoverageData, quality:
 
 def run_page(run: RunData) -> str:
     """Return the HTML page of ``run``."""
-    return render(f"Learning to move {run.spec.name}", _summary(run), all_sections(run))
+    return render(f"An arm learns to move: {run.spec.name}", _summary(run), all_sections(run))
 
 
 def save_spec(folder: Path, spec: ArmSpec) -> None:
@@ -133,10 +133,10 @@ def _summary(run: RunData) -> list[str]:
         )
     if run.transfer is not None:
         parts = [
-            f"{words} {phase.success.mean():.1%} with {phase.reward.mean():.2f}"
+            f"{phase.success.mean():.1%} {words} (mean reward {phase.reward.mean():.2f})"
             for words, phase in (("on arrival", run.transfer.before), ("after adaptation", run.transfer.after))
             if len(phase)
         ]
         if parts:
-            text.append("On the arm it is " + ", ".join(parts) + ".")
+            text.append("On the arm it reaches " + " and ".join(parts) + ".")
     return text

@@ -84,7 +84,8 @@ def collected(data: CoverageData, spec: ArmSpec) -> Section:
         (
             Picture(
                 figures.projections(data.observation, spec),
-                "Where the observations lie. White was never observed (thesis section 3.2.2; no figure there).",
+                "Where the observations lie (99.9% of each quantity). White was never observed "
+                "(thesis section 3.2.2; no figure there).",
                 figures.projections_alt(data.observation, spec),
             ),
             Picture(

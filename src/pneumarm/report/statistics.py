@@ -67,17 +67,14 @@ class Moving(NamedTuple):
 
 
 def moving_mean(values: ArrayLike, window: int, counted: ArrayLike | None = None) -> Moving:
-    """Return the mean of ``values`` (n,) over every run of ``window`` of them, with 95 % intervals.
+    """Return the mean of ``values`` (n,) around every one of them, with 95 % intervals.
 
-    Only the samples that are ``counted`` (n,) enter. A run with none of them is left out; one with fewer than
-    two has an interval of NaN. ``window`` is cut to n.
+    A mean is over ``window`` samples about its position, fewer at the ends, where there are no more. Only the
+    samples that are ``counted`` (n,) enter; where there are none the position is left out, where there is only one
+    the interval is NaN.
     """
     x = np.asarray(values, np.float64)
-    n = len(x)
-    use = np.ones(n, bool) if counted is None else np.asarray(counted, bool)
-    if n == 0:
-        return Moving(*(np.empty(0) for _ in range(4)))
-    window = min(window, n)
+    use = np.ones(len(x), bool) if counted is None else np.asarray(counted, bool)
     shift = x[use].mean() if use.any() else 0.0  # keeps the difference of squares below from cancelling
     kept = np.where(use, x - shift, 0.0)
     count = _window_sum(use.astype(np.float64), window)
@@ -87,26 +84,26 @@ def moving_mean(values: ArrayLike, window: int, counted: ArrayLike | None = None
     square = _window_sum(kept * kept, window)[some] / count
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.where(count > 1, np.maximum(square - mean * mean, 0) * count / (count - 1), np.nan)
-        half = Z * np.sqrt(variance / count)
-    position: Array = np.flatnonzero(some) + (window - 1) / 2
-    mean = np.asarray(mean + shift, np.float64)
-    return Moving(position, mean, mean - half, mean + half)
+        half: Array = Z * np.sqrt(variance / count)
+    level: Array = mean + shift
+    return Moving(np.flatnonzero(some).astype(np.float64), level, level - half, level + half)
 
 
 def moving_rate(successes: ArrayLike, window: int) -> Moving:
-    """Return the share of true values over every run of ``window``, with Wilson intervals."""
+    """Return the share of true values around every sample, with Wilson intervals; windows as in moving_mean."""
     x = np.asarray(successes, np.float64)
-    moving = moving_mean(x, window)
-    if len(x) == 0:
-        return moving
-    width = min(window, len(x))
-    low, high = wilson(moving.mean * width, np.full_like(moving.mean, width))
-    return Moving(moving.position, moving.mean, low, high)
+    won, trials = _window_sum(x, window), _window_sum(np.ones(len(x)), window)
+    low, high = wilson(won, trials)
+    return Moving(np.arange(len(x), dtype=np.float64), won / trials, low, high)
 
 
 def _window_sum(x: Array, window: int) -> Array:
+    """Return the sum of ``x`` (n,) over ``window`` samples about each, cut at the ends."""
     total = np.concatenate([[0.0], np.cumsum(x)])
-    summed: Array = total[window:] - total[:-window]
+    index = np.arange(len(x))
+    first = np.maximum(index - window // 2, 0)
+    end = np.minimum(index - window // 2 + window, len(x))
+    summed: Array = total[end] - total[first]
     return summed
 
 

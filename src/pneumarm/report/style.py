@@ -24,17 +24,18 @@ WIDTH = 7.4
 """Width of every figure [inch]."""
 INK = "#1a1a1a"
 DARK = "#12476b"
-"""Blue, about 30 % light: what the figure is about."""
+"""Blue, about 30% light: what the figure is about."""
 MIDDLE = "#d1602b"
-"""Orange, about 53 % light: what it is compared with."""
+"""Orange, about 53% light: what it is compared with."""
 LIGHT = "#dcb24c"
-"""Sand, about 75 % light: a third thing, or areas."""
+"""Sand, about 75% light: a third thing, or areas."""
 GREY = "#8a8a8a"
 PALE = "#d9d9d9"
 DENSITY = "cividis_r"
 """Colour map of counts: light is few, dark is many, in colour and in grey."""
 RASTER_DPI = 170
 _MANY = 400  # from so many points on a scatter is stored as pixels inside the SVG
+_MOST = 6_000  # points of a scatter; more only blacken it and make the page heavy
 
 _RC: Any = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
@@ -156,7 +157,9 @@ def second_unit(axes: Axes, label: str, per_unit: float, side: str = "right") ->
 
 
 def scatter(axes: Axes, x: Any, y: Any, **options: Any) -> None:
-    """Draw points; many of them as pixels, so that the page stays small."""
+    """Draw points, thinned out evenly where they are too many; many of them as pixels, to keep the page small."""
+    thin = slice(None, None, -(-len(x) // _MOST) or 1)
+    x, y = x[thin], y[thin]
     settings = {"s": 5, "color": DARK, "linewidths": 0, "alpha": 0.35, **options}
     axes.scatter(x, y, rasterized=len(x) > _MANY, **settings)
 

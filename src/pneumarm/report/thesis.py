@@ -33,7 +33,7 @@ TRAIN_MINUTES = 10.0
 TRAIN_ON_ARM_HOURS = 29.0
 """Time that training on the arm alone would take, estimated [h] (section 5.5)."""
 
-SUCCESS = "almost 100 %"
+SUCCESS = "almost 100%"
 """Success rate (section 5.6.1)."""
 ACTIONS_SIMULATION = 16.0
 """Mean actions of a successful episode in the simulation, about (section 5.5.1)."""

@@ -52,7 +52,10 @@ def projections(observation: Array, spec: ArmSpec) -> Figure:
             if len(seen) == 0:
                 nothing(place, "no observations")
                 continue
-            count, xs, ys = np.histogram2d(seen[:, i], seen[:, j], _BINS)
+            # A few outliers would squeeze everything else into a corner.
+            ends = np.percentile(seen[:, (i, j)], (0.05, 99.95), axis=0).T
+            ends[:, 1] = np.where(ends[:, 1] > ends[:, 0], ends[:, 1], ends[:, 0] + 1)
+            count, xs, ys = np.histogram2d(seen[:, i], seen[:, j], _BINS, range=ends)
             image = place.pcolormesh(
                 xs, ys, np.ma.masked_equal(count.T, 0), cmap=DENSITY, norm=LogNorm(), rasterized=True
             )
@@ -75,7 +78,7 @@ def projections_alt(observation: Array, spec: ArmSpec) -> str:
             for k, a, b in zip(kinds, low, high, strict=True)
         ]
         parts.append(
-            f"98 % of the observations{of_joint(joint, observation.shape[1])} lie within " + ", ".join(ranges)
+            f"98% of the observations{of_joint(joint, observation.shape[1])} lie within " + ", ".join(ranges)
         )
     return (
         f"Maps of {len(observation):,} observations over angle and velocity, angle and pressure 1, and the two "

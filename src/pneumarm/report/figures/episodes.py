@@ -30,7 +30,7 @@ def distributions(reward: Array, actions: Array, switches: Array, success: NDArr
         if len(values) == 0:
             nothing(place, "no episodes")
             continue
-        # The central 99.5 % are drawn, so that a few failures with very low rewards do not squeeze the rest.
+        # The central 99.5% are drawn, so that a few failures with very low rewards do not squeeze the rest.
         low, high = np.percentile(values, (0.5, 100) if values is reward else (0, 99.5))
         width = max(1, round((high - low) / 40))
         edges = np.arange(np.floor(low) - 0.5, np.ceil(high) + 0.5 + width, width)
@@ -55,7 +55,7 @@ def distributions_alt(reward: Array, actions: Array, switches: Array, success: N
 
     def middle(values: Array) -> str:
         low, median, high = np.percentile(values, (5, 50, 95))
-        return f"median {median:.4g}, 90 % within {low:.4g} to {high:.4g}"
+        return f"median {median:.4g}, 90% within {low:.4g} to {high:.4g}"
 
     return (
         f"Histograms of {len(reward):,} episodes, {np.mean(success):.2%} of them successful. Reward: "

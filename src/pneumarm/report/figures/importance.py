@@ -35,7 +35,7 @@ def input_importance(weights: Array, inputs: Sequence[str], outputs: Sequence[st
         axis.set_title(f"change of {name}")
         axis.set_xlabel("standardised weight [-]")
         axis.set_xlim(-limit, limit)
-    axes[0, 0].set_yticks(place, [inputs[i] for i in order])
+    axes[0, 0].set_yticks(place, [readable(inputs[i]) for i in order])
     axes[0, 0].set_ylabel("input")
     return figure
 
@@ -45,8 +45,13 @@ def input_importance_alt(weights: Array, inputs: Sequence[str], outputs: Sequenc
     parts = []
     for name, w in zip(outputs, weights.T, strict=True):
         largest = np.argsort(-np.abs(w), kind="stable")[:3]
-        parts.append(f"change of {name}: " + ", ".join(f"{inputs[i]} {w[i]:+.2f}" for i in largest))
+        parts.append(f"change of {name}: " + ", ".join(f"{readable(inputs[i])} {w[i]:+.2f}" for i in largest))
     return "Standardised weights of a least-squares fit, the largest first. " + "; ".join(parts) + "."
+
+
+def readable(name: str) -> str:
+    """Return the name of an input for people: ``pressure 1 [k-1]`` for ``pressure_1[k-1]``."""
+    return name.replace("_", " ").replace("[", " [")
 
 
 def _largest_first(weights: Array) -> NDArray[np.int64]:

@@ -12,7 +12,6 @@ from pneumarm.report.style import DENSITY, INK, MIDDLE, key, nothing, of_joint, 
 Array = NDArray[np.float64]
 
 _BINS = 70
-_SCATTERED = 20_000  # more points than this only blacken the plot
 
 
 @styled
@@ -27,14 +26,13 @@ def isoplot(observed: Array, simulated: Array, spec: ArmSpec, *, density: bool =
 
     """
     joints = observed.shape[1]
-    figure, axes = panels(joints * 2, 2, 6.4 * joints)
+    figure, axes = panels(joints * 2, 2, 6.0 * joints)
     for joint in range(joints):
         places = axes[2 * joint : 2 * joint + 2].flat
         for i, (place, kind) in enumerate(zip(places, quantities(spec), strict=True)):
             x, y = observed[:, joint, i], simulated[:, joint, i]
             place.set_xlabel(f"observed change of {kind.in_counts()}")
             place.set_ylabel(f"simulated change [{kind.counts}]")
-            place.set_box_aspect(0.85)
             if len(x) == 0:
                 nothing(place, "no transitions")
                 continue
@@ -46,7 +44,7 @@ def isoplot(observed: Array, simulated: Array, spec: ArmSpec, *, density: bool =
                 )
                 figure.colorbar(image, ax=place, aspect=25, pad=0.02).set_label("transitions")
             else:
-                scatter(place, x[:_SCATTERED], y[:_SCATTERED], s=3, alpha=0.25)
+                scatter(place, x, y, s=3, alpha=0.25)
             inclined = slope(x, y)
             middle = float(y.mean() - inclined * x.mean())
             ends = np.array([-limit, limit])

@@ -47,8 +47,8 @@ def movement(
             if end is not None and len(time):
                 place.axvline(end - time[0], color=INK, ls=":", lw=1)
         if end is not None and len(time):
-            above.annotate("goal reached", (end - time[0], 1), xycoords=("data", "axes fraction"), xytext=(3, -2),
-                           textcoords="offset points", va="top", fontsize=8)  # fmt: skip
+            above.annotate("goal reached", (end - time[0], 1), xycoords=("data", "axes fraction"), xytext=(0, 2),
+                           textcoords="offset points", ha="center", va="bottom", fontsize=8)  # fmt: skip
         above.legend(loc="best")
         middle.legend(loc="best")
     figure.align_ylabels(axes[:, 0])
@@ -89,7 +89,7 @@ def movement_alt(
         )
     reached = "the goal is not reached" if end is None else f"the goal is reached after {end - time[0]:.2f} s"
     changes = int((np.diff(valves[moving], axis=0) != 0).any(axis=(1, 2)).sum()) if moving.any() else 0
-    return f"{'; '.join(parts)}; {reached}, with {changes} changes of the valves.".capitalize()
+    return f"On the way {'; '.join(parts)}; {reached}, with {changes} changes of the valves."
 
 
 def _overshoot(angle: Array, goal: float) -> float:

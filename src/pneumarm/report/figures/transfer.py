@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 WINDOW = 100
 """Episodes in a moving average."""
+_POINTS = 400  # of a curve in one phase; more cannot be told apart in print
 
 
 class Phase(NamedTuple):
@@ -56,13 +57,13 @@ _ROWS = (
 
 @styled
 def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window: int = WINDOW) -> Figure:
-    """Draw moving averages with 95 % bands over the episodes on the arm, phase after phase.
+    """Draw moving averages with 95% bands over the episodes on the arm, phase after phase.
 
     Args:
         phases: what happened on the arm, in order.
         reference: the level in the simulation's test of reward, success_rate, actions and switches (the last two
             of successful episodes); what is missing is not drawn.
-        window: episodes in a moving average; it does not reach over the ends of a phase.
+        window: episodes in a moving average; fewer at the ends of a phase, over which it does not reach.
 
     """
     figure, axes = panels(len(_ROWS), 1, 7.6, sharex=True)
@@ -94,7 +95,7 @@ def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window:
         _clock(top, np.concatenate([p.time_end for p in phases]))
     line = axes[0, 0].plot([], [], color=DARK)[0]
     band = axes[0, 0].fill_between([], [], [], color=LIGHT, alpha=0.55, lw=0)
-    labels = [f"moving average of {window} episodes", "its 95 % confidence band", "in the simulation's test"]
+    labels = [f"moving average of {window} episodes", "its 95% confidence band", "in the simulation's test"]
     legend_below(figure, [line, band, *handles], labels[: 2 + len(handles)])
     figure.align_ylabels(axes[:, 0])
     return figure
@@ -103,9 +104,11 @@ def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window:
 def _curve(place: Axes, moving: Moving, begin: float, scale: float) -> None:
     if len(moving.mean) == 0:
         return
-    x = begin + moving.position + 1
-    place.fill_between(x, scale * moving.low, scale * moving.high, color=LIGHT, alpha=0.55, lw=0)
-    place.plot(x, scale * moving.mean, color=DARK, marker="o" if len(x) == 1 else None)
+    thin = slice(None, None, -(-len(moving.mean) // _POINTS))
+    x, mean, low, high = (values[thin] for values in moving)
+    x = begin + x + 1
+    place.fill_between(x, scale * low, scale * high, color=LIGHT, alpha=0.55, lw=0)
+    place.plot(x, scale * mean, color=DARK, marker="o" if len(x) == 1 else None)
 
 
 def _clock(place: Axes, time_end: Array) -> None:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 
+_UMASK = os.umask(0)
+os.umask(_UMASK)  # there is no other way to ask for it
 _LARGEST_HEADER = 1 << 20
 _LARGEST_FILE = 64 << 20
 
@@ -28,6 +30,7 @@ def written_whole(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield temporary
+        os.chmod(temporary, 0o666 & ~_UMASK)  # some writers make files that only their owner may read
         with open(temporary, "rb+") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)

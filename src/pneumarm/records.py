@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.control import BEGIN, AgentController, move
+from pneumarm.control import Movement as Moved
 from pneumarm.learning import Agent, TestResult, Training
 from pneumarm.report.data import Episodes, Movement, TrainingData
 
 DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large displacement": 70.0}
 """Movements that are shown [degrees] (thesis figures 5.17 to 5.19)."""
 _TAIL = 1.0  # s recorded after a movement, in which the arm swings out
-_TRIES = 30  # begin states that are tried for a displacement
 
 
 def training_record(training: Training) -> TrainingData:
@@ -55,27 +55,30 @@ def test_record(tested: TestResult) -> Episodes:
 def demonstrate(agent: Agent, arm: Arm, seed: int) -> list[Movement]:
     """Make and record typical movements, with a second after each in which the arm swings out.
 
-    A displacement for which no begin state leaves room is left out.
+    The agent itself brings the arm to where a movement begins; a displacement larger than its range is left out.
     """
     cycle = ControlCycle(guarded(arm))
     random = np.random.default_rng([seed, 2])
-    shown = [_demonstrated(agent, cycle, random, name, degrees) for name, degrees in DISPLACEMENTS.items()]
-    return [movement for movement in shown if movement is not None]
+    low, high = agent.goal_range.T
+    shown = []
+    for name, degrees in DISPLACEMENTS.items():
+        half = degrees * arm.spec.counts_per_degree / 2
+        middle = (low + high) / 2
+        if (half < (high - low) / 2).all():
+            BEGIN.reach(cycle.arm, random)
+            _move(agent, cycle, middle - half)
+            cycle.arm.wait(_TAIL)
+            shown.append(_recorded(agent, cycle, middle + half, name))
+    return shown
 
 
-def _demonstrated(
-    agent: Agent, cycle: ControlCycle, random: np.random.Generator, name: str, degrees: float
-) -> Movement | None:
+def _move(agent: Agent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Moved:
+    return move(cycle, AgentController(agent), goal, agent.settings.reward, agent.settings.cutoff)
+
+
+def _recorded(agent: Agent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Movement:
     spec = cycle.arm.spec
-    for _ in range(_TRIES):
-        BEGIN.reach(cycle.arm, random)
-        angle = cycle.arm.read().angle
-        goal = angle + degrees * spec.counts_per_degree * np.where(angle < agent.goal_range.mean(axis=1), 1, -1)
-        if ((goal >= agent.goal_range[:, 0]) & (goal <= agent.goal_range[:, 1])).all():
-            break
-    else:
-        return None
-    made = move(cycle, AgentController(agent), goal, agent.settings.reward, agent.settings.cutoff)
+    made = _move(agent, cycle, goal)
     tail = list(cycle.run(_closed_for(round(_TAIL / spec.period), cycle.applied)))
     recorded = made.recorded
     closed = np.zeros((len(tail), spec.joints, 2))

@@ -28,7 +28,11 @@ QUIET = NoiseSettings(kind="none")
 
 
 def made_up(
-    joints: int = 1, history: int = 3, outputs: list[int] | None = None, velocity: str = "derived", direct: bool = False
+    joints: int = 1,
+    history: int = 3,
+    outputs: list[int] | None = None,
+    velocity: str = "derived",
+    direct: bool = False,
 ) -> Simulation:
     """Return a simulation with random networks of different sizes; ``outputs`` of each network."""
     random = np.random.default_rng(joints + 10 * history)
@@ -131,7 +135,10 @@ def test_rational_hyperbolic_tangent() -> None:
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_readings_stay_within_the_sensors(sign: int) -> None:
     simulation = made_up()
-    pushed = [Network(n.hidden_weights, n.hidden_bias, n.output_weights, np.array([sign * 9.0])) for n in simulation.networks]
+    pushed = [
+        Network(n.hidden_weights, n.hidden_bias, n.output_weights, np.array([sign * 9.0]))
+        for n in simulation.networks
+    ]
     simulation = Simulation(**{**vars(simulation), "networks": tuple(pushed)})
     parameters, noise = simulation_parameters(simulation), noise_parameters(NoiseSettings(), simulation)
     state = simulation_state(parameters, random_state(0))

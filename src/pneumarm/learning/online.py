@@ -13,7 +13,6 @@ from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.learning.agent import Agent
-from pneumarm.learning.exploration import greedy
 from pneumarm.learning.loop import Schedule, look_ahead, room_of
 from pneumarm.learning.settings import Exploration
 from pneumarm.learning.values import action_values, forget_traces, learner, td_target, unpack, update
@@ -98,9 +97,7 @@ class OnlineLearner:
         self.act()
         paid = np.broadcast_to(np.asarray(reward, np.float64), self._room.actions.shape).copy()
         next_state = self._checked(next_state)
-        _observe(
-            self._learner, self._schedule, self._x, self._room, self._random, (paid, next_state), bool(terminal)
-        )
+        _observe(self._learner, self._schedule, self._x, self._room, self._random, (paid, next_state), bool(terminal))
 
     @property
     def agent(self) -> Agent:
@@ -122,7 +119,8 @@ class OnlineLearner:
         try:
             saved = json.loads(state)
             arrays = {
-                name: np.array(saved[name], array.dtype).reshape(array.shape) for name, array in self._arrays().items()
+                name: np.array(saved[name], array.dtype).reshape(array.shape)
+                for name, array in self._arrays().items()
             }
         except (ValueError, KeyError, TypeError, OverflowError) as error:
             raise UnusableInput(f"expected the state of a learner like this one, got another ({error})") from error

@@ -141,6 +141,11 @@ class TrainSettings:
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     """Noise on the simulation's predictions."""
 
+    @property
+    def begin_weights(self) -> tuple[float, ...]:
+        """Weights of the sub-intervals of begin states, see :class:`Shaping`."""
+        return self.shaping.weights if self.shaping else (1.0,)
+
     def __post_init__(self) -> None:
         _check(
             self,

@@ -61,12 +61,46 @@ def integer(state, bound):  # type: ignore[no-untyped-def]
     return int(uniform(state) * bound)
 
 
+def _ziggurat() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the right edges (257,) of 256 layers of equal area under exp(-x^2/2), and the curve there.
+
+    Layer 0 is the base with the tail beyond ``_TAIL``; its edge is that of a rectangle of the same area.
+    """
+    curve = math.exp(-0.5 * _TAIL**2)
+    area = _TAIL * curve + math.sqrt(math.pi / 2) * math.erfc(_TAIL / math.sqrt(2))
+    edge = [area / curve, _TAIL]
+    while len(edge) < _LAYERS:
+        edge.append(math.sqrt(-2.0 * math.log(area / edge[-1] + math.exp(-0.5 * edge[-1] ** 2))))
+    edges = np.array([*edge, 0.0])
+    return edges, np.exp(-0.5 * edges**2)
+
+
+_LAYERS = 256
+_TAIL = 3.6541528853610088  # where 256 layers of equal area begin their tail
+_EDGE, _CURVE = _ziggurat()
+
+
 @kernel
 def normal(state):  # type: ignore[no-untyped-def]
-    """Return a standard normal deviate (Marsaglia's polar method, one of the two deviates used)."""
+    """Return a standard normal deviate (the ziggurat of Marsaglia and Tsang, J. Stat. Softw. 5(8), 2000)."""
     while True:
-        u = 2.0 * uniform(state) - 1.0
-        v = 2.0 * uniform(state) - 1.0
-        s = u * u + v * v
-        if 0.0 < s < 1.0:
-            return u * math.sqrt(-2.0 * math.log(s) / s)
+        word = next_word(state)
+        layer = word & np.uint64(_LAYERS - 1)  # the lowest 8 bits; the 53 highest ones give the place in it
+        x = (2.0 * float(word >> np.uint64(11)) * _TO_UNIT - 1.0) * _EDGE[layer]
+        if abs(x) < _EDGE[layer + np.uint64(1)]:
+            return x
+        if layer == 0:
+            return _normal_tail(state, x)
+        below, above = _CURVE[layer], _CURVE[layer + np.uint64(1)]
+        if below + uniform(state) * (above - below) < math.exp(-0.5 * x * x):
+            return x
+
+
+@kernel
+def _normal_tail(state, side):  # type: ignore[no-untyped-def]
+    """Return a deviate beyond ``_TAIL`` on the ``side`` of its sign (Marsaglia, Technometrics 6, 1964)."""
+    while True:
+        x = -math.log(1.0 - uniform(state)) / _TAIL
+        y = -math.log(1.0 - uniform(state))
+        if 2.0 * y > x * x:
+            return math.copysign(_TAIL + x, side)

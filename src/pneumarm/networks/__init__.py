@@ -1,1 +1,17 @@
-"""TODO."""
+"""Tiny networks: one hidden layer, fitted by Levenberg-Marquardt, or a linear model by least squares."""
+
+from pneumarm.networks.initial import nguyen_widrow
+from pneumarm.networks.least_squares import Importance, importance, least_squares
+from pneumarm.networks.levenberg_marquardt import Fit, LevenbergMarquardt, levenberg_marquardt
+from pneumarm.networks.network import Network
+
+__all__ = [
+    "Fit",
+    "Importance",
+    "LevenbergMarquardt",
+    "Network",
+    "importance",
+    "least_squares",
+    "levenberg_marquardt",
+    "nguyen_widrow",
+]

@@ -1,14 +1,30 @@
-"""The empirical simulation: networks fitted to transitions, and what is needed to use them (thesis chapter 3)."""
+"""The empirical simulation: networks fitted to transitions, and what is needed to use them (thesis chapter 3).
 
-from dataclasses import dataclass
-from typing import Literal
+Numbered differences from the thesis:
 
+1. The networks predict *changes* of angle and pressures, not the next values. Angle and pressures hardly change
+   within a step, so a network of next values spends its first epochs on learning the identity.
+2. Predictions are clipped to what the sensors can say; pressures to a little above what was ever recorded.
+"""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal, Self
+
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.errors import UnusableInput
+from pneumarm.files import read_arrays, write_arrays
 from pneumarm.networks.network import Network
-from pneumarm.transitions.window import Window
+from pneumarm.transitions.window import QUANTITIES, Transitions, Window
+
+Velocity = Literal["derived", "network"]
+
+_KIND = "pneumarm simulation 1"
+_ANGLE, _VELOCITY = QUANTITIES.index("angle"), QUANTITIES.index("velocity")
 
 
 @dataclass(frozen=True)
@@ -22,13 +38,41 @@ class Scaling:
     command_scale: NDArray[np.float64]
     """Shape (2 joints,); ones for valves. Commands have no offset: 0 is a closed valve."""
 
+    @classmethod
+    def of(cls, transitions: Transitions, window: Window, valves: bool) -> Self:
+        """Return the scaling that puts the mean of the observations at 0 and two standard deviations at 1."""
+        observation = transitions.observation
+        command = transitions.inputs[:, window.state_size :]
+        return cls(
+            observation_offset=observation.mean(axis=0, dtype=np.float64),
+            observation_scale=_spread(observation),
+            command_scale=np.ones(window.command_size) if valves else _spread(command),
+        )
+
+    def inputs(self, raw: ArrayLike, window: Window) -> NDArray[np.float64]:
+        """Return the scaled inputs (n, input_size), or states (n, state_size), of ``raw`` ones in sensor units."""
+        raw = np.asarray(raw, np.float64)
+        commands = raw.shape[-1] // window.command_size - 2 * window.history
+        offset = np.tile(self.observation_offset, window.history)
+        scale = [*[self.observation_scale] * window.history, *[self.command_scale] * commands]
+        scaled: NDArray[np.float64] = raw / np.concatenate(scale)
+        scaled[..., : len(offset)] -= offset / np.tile(self.observation_scale, window.history)
+        return scaled
+
+
+def _spread(values: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return two standard deviations of each column, 1 where it never changes."""
+    spread = 2 * values.std(axis=0, dtype=np.float64)
+    return np.where(spread > 0, spread, 1.0)
+
 
 @dataclass(frozen=True)
 class Simulation:
     """A simulation of an arm: one step is ``o_{k+1} = o_k + networks(sigma_k, a_k)``.
 
-    The networks read scaled inputs and give scaled *changes*, in the order angle, pressure 1, pressure 2 joint
-    after joint; with ``velocity == "network"`` angle, velocity, pressure 1, pressure 2.
+    The networks read scaled inputs and give scaled *changes*, (o_{k+1} - o_k) / observation_scale, in the order
+    angle, pressure 1, pressure 2 joint after joint; with ``velocity == "network"`` angle, velocity, pressure 1,
+    pressure 2.
     """
 
     spec: ArmSpec
@@ -36,15 +80,163 @@ class Simulation:
     scaling: Scaling
     networks: tuple[Network, ...]
     """One network an output, or a single network with all outputs (thesis section 3.4)."""
-    velocity: Literal["derived", "network"]
+    velocity: Velocity
     """Whether the velocity is derived from the predicted angle with the nominal period (section 3.2.4)."""
     error_std: NDArray[np.float64]
     """Standard deviation of the one-step error on held-out transitions, shape (joints, 4) [sensor units]."""
     goal_range: NDArray[np.float64]
     """1st and 99th percentile of the stored angles, shape (joints, 2) [counts]."""
+    observation_range: NDArray[np.float64]
+    """Lowest and highest value that it predicts, shape (joints, 4, 2) [sensor units]; a derived velocity follows
+    from the angle and is not bounded of itself."""
     valves: bool = True
     """Whether the commands are valves; with continuous commands no agent of ours can be trained."""
+    hold_out: float = 0.1
+    """Share of the sequences that were kept out of the fit, see :func:`pneumarm.transitions.held_out`."""
+    hold_out_seed: int = 0
+    """Seed that they were chosen by."""
+
+    @property
+    def outputs(self) -> NDArray[np.int64]:
+        """Places in an observation that the networks predict, in their order."""
+        places = np.arange(self.window.observation_size)
+        return places if self.velocity == "network" else places[places % len(QUANTITIES) != _VELOCITY]
 
     def predict(self, inputs: ArrayLike) -> NDArray[np.float64]:
         """Return o_{k+1} (n, 4 joints) for sigma_k and a_k (n, input_size), both in sensor units."""
-        raise NotImplementedError
+        inputs = np.asarray(inputs, np.float64)
+        scaled = self.scaling.inputs(inputs, self.window)
+        change = np.concatenate([network(scaled) for network in self.networks], axis=1)
+        now = inputs[:, : self.window.observation_size]
+        following = now.copy()
+        following[:, self.outputs] += change * self.scaling.observation_scale[self.outputs]
+        limits = self.observation_range.reshape(-1, 2)
+        np.clip(following, limits[:, 0], limits[:, 1], out=following)
+        if self.velocity == "derived":
+            angle, velocity = slice(_ANGLE, None, len(QUANTITIES)), slice(_VELOCITY, None, len(QUANTITIES))
+            following[:, velocity] = (following[:, angle] - now[:, angle]) / (1e3 * self.spec.period)
+        return following
+
+    def save(self, path: str | Path) -> None:
+        """Write the simulation to ``path``, whole or not at all.
+
+        Raises:
+            UnusableInput: the parent folder is missing or cannot be written.
+
+        """
+        direct = [network.direct is not None for network in self.networks]
+        header = _Header(
+            self.spec, self.window, self.velocity, self.valves, direct, self.hold_out, self.hold_out_seed
+        )
+        arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in _ARRAYS}
+        arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
+        for number, network in enumerate(self.networks):
+            layers = {name: getattr(network, name) for name in _LAYERS}
+            arrays |= {f"network_{number}_{name}": array for name, array in layers.items() if array is not None}
+        write_arrays(Path(path), _KIND, asdict(header), arrays)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a simulation that :meth:`save` wrote.
+
+        Raises:
+            UnusableInput: no such file, or not one whose arrays fit together.
+
+        """
+        path = Path(path)
+        settings, arrays = read_arrays(path, _KIND)
+        try:
+            header = msgspec.convert(settings, _Header)
+            simulation = cls._assembled(header, {name: _floats(name, array) for name, array in arrays.items()})
+            _check(simulation)
+        except (msgspec.ValidationError, UnusableInput, ValueError, KeyError) as error:
+            raise UnusableInput(f"{path}: is no usable simulation ({error}); fit it again") from error
+        return simulation
+
+    @classmethod
+    def _assembled(cls, header: "_Header", arrays: dict[str, NDArray[np.float64]]) -> Self:
+        def network(number: int) -> Network:
+            layers = {name: arrays.pop(f"network_{number}_{name}") for name in _LAYERS[:-1]}
+            direct = arrays.pop(f"network_{number}_{_LAYERS[-1]}") if header.direct[number] else None
+            return Network(**layers, direct=direct)
+
+        networks = tuple(network(number) for number in range(len(header.direct)))
+        scaling = Scaling(**{name: arrays.pop(name) for name in _SCALINGS})
+        rest = {name: arrays.pop(name) for name in _ARRAYS}
+        if arrays:
+            raise ValueError(f"it also holds {', '.join(sorted(arrays))}")
+        return cls(
+            spec=header.spec,
+            window=header.window,
+            scaling=scaling,
+            networks=networks,
+            velocity=header.velocity,
+            valves=header.valves,
+            hold_out=header.hold_out,
+            hold_out_seed=header.hold_out_seed,
+            **rest,
+        )
+
+
+_ARRAYS = ("error_std", "goal_range", "observation_range")
+_SCALINGS = ("observation_offset", "observation_scale", "command_scale")
+_LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias", "direct")
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What the file holds besides arrays."""
+
+    spec: ArmSpec
+    window: Window
+    velocity: Velocity
+    valves: bool
+    direct: list[bool]
+    """For each network whether it has direct connections."""
+    hold_out: float
+    hold_out_seed: int
+
+
+def _floats(name: str, array: NDArray[np.generic]) -> NDArray[np.float64]:
+    if array.dtype.kind != "f":
+        raise ValueError(f"{name} holds {array.dtype}, not floating-point numbers")
+    return array.astype(np.float64)
+
+
+def _check(simulation: Simulation) -> None:
+    """Raise ValueError unless sizes, shapes and ranges fit together."""
+    window, scaling = simulation.window, simulation.scaling
+    if window.joints != simulation.spec.joints or window.joints < 1 or window.history < 1:
+        raise ValueError(f"its {window} does not fit to an arm with {simulation.spec.joints} joint(s)")
+    joints = window.joints
+    _expect("observation_offset", scaling.observation_offset, (4 * joints,))
+    _expect("observation_scale", scaling.observation_scale, (4 * joints,), scaling.observation_scale > 0)
+    _expect("command_scale", scaling.command_scale, (2 * joints,), scaling.command_scale > 0)
+    _expect("error_std", simulation.error_std, (joints, 4), simulation.error_std >= 0)
+    for name, array, shape in (
+        ("goal_range", simulation.goal_range, (joints, 2)),
+        ("observation_range", simulation.observation_range, (joints, 4, 2)),
+    ):
+        _expect(name, array, shape)
+        _expect(name, array, shape, array[..., 0] <= array[..., 1])
+    outputs = len(simulation.outputs)
+    if len(simulation.networks) not in (1, outputs):
+        raise ValueError(f"expected 1 or {outputs} networks, got {len(simulation.networks)}")
+    each = outputs // len(simulation.networks)
+    for network in simulation.networks:
+        hidden = network.hidden_bias.size
+        _expect("hidden_weights", network.hidden_weights, (window.input_size, hidden))
+        _expect("hidden_bias", network.hidden_bias, (hidden,))
+        _expect("output_weights", network.output_weights, (hidden, each))
+        _expect("output_bias", network.output_bias, (each,))
+        if network.direct is not None:
+            _expect("direct", network.direct, (window.input_size, each))
+
+
+def _expect(
+    name: str, array: NDArray[np.float64], shape: tuple[int, ...], valid: NDArray[np.bool_] | None = None
+) -> None:
+    if array.shape != shape:
+        raise ValueError(f"expected {name} of the shape {shape}, got {array.shape}")
+    if valid is not None and not valid.all():
+        raise ValueError(f"{name} holds values out of range")

@@ -1,1 +1,38 @@
-"""TODO."""
+"""Transitions: the store, collecting, the state window, the grid filter, import of recordings."""
+
+from pneumarm.transitions.choice import held_out
+from pneumarm.transitions.collect import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, collect
+from pneumarm.transitions.filtering import Enough, Filter, Filtered, enough_data, filter_transitions
+from pneumarm.transitions.grid import Coverage, Grid, GridSettings
+from pneumarm.transitions.players import Keyboard, Trajectory
+from pneumarm.transitions.recording import import_recording
+from pneumarm.transitions.rows import Recorded, Rows
+from pneumarm.transitions.store import Store
+from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
+
+__all__ = [
+    "FEWEST_TRANSITIONS",
+    "KINDS",
+    "QUANTITIES",
+    "CollectResult",
+    "CollectSettings",
+    "Coverage",
+    "Enough",
+    "Filter",
+    "Filtered",
+    "Grid",
+    "GridSettings",
+    "Keyboard",
+    "Recorded",
+    "Rows",
+    "Store",
+    "Trajectory",
+    "Transitions",
+    "Window",
+    "collect",
+    "enough_data",
+    "filter_transitions",
+    "held_out",
+    "import_recording",
+    "transitions",
+]

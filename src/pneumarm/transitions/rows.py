@@ -1,9 +1,14 @@
 """Rows of the store as arrays: what was measured, raw, and what was commanded, in order of time."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pneumarm.arm.cycle import Step
+from pneumarm.arm.seam import ArmSpec
 
 
 @dataclass(frozen=True)
@@ -37,3 +42,65 @@ class Rows:
 
     def __len__(self) -> int:
         return len(self.sequence)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One sequence of ``n`` readings and the ``n - 1`` commands between them, before it has a number in a store."""
+
+    time: NDArray[np.float64]
+    """Times of the readings on the arm's clock, rising, shape (n,) [s]."""
+    angle: NDArray[np.float64]
+    """Shape (n, joints) [counts]."""
+    pressure: NDArray[np.float64]
+    """Shape (n, joints, 2) [counts]."""
+    command: NDArray[np.float64]
+    """What was applied after each reading, shape (n, joints, 2); NaN after the last."""
+    step: NDArray[np.int64]
+    """Step of each reading, from 0, rising, shape (n,); a lost control period leaves a gap."""
+    kind: str = "recorded"
+    """What was done: zero-velocity, velocity, controller, episode, imported, ..."""
+    at_rest: bool = False
+    """Whether it began at rest with closed valves."""
+    info: Mapping[str, Any] = field(default_factory=dict)
+    """Whatever else is to be kept with it, such as the goal: small, and of JSON's types."""
+
+    @classmethod
+    def from_steps(
+        cls,
+        steps: Sequence[Step],
+        spec: ArmSpec,
+        *,
+        kind: str = "recorded",
+        at_rest: bool = False,
+        info: Mapping[str, Any] | None = None,
+    ) -> "Recorded":
+        """Return what the control cycle yielded as a sequence; the last turn's valves may be None.
+
+        The step counts control periods: after a turn that came more than half a period late the next number is
+        left out, so that no transition of a wrong length is made of it.
+        """
+        time = np.array([step.reading.time for step in steps])
+        command = np.full((len(steps), spec.joints, 2), np.nan)
+        for k, step in enumerate(steps[:-1]):
+            if step.valves is not None:
+                command[k] = step.valves
+        return cls(
+            time=time,
+            angle=np.array([step.reading.angle for step in steps], np.float64),
+            pressure=np.array([step.reading.pressure for step in steps], np.float64),
+            command=command,
+            step=steps_of(time, spec.period),
+            kind=kind,
+            at_rest=at_rest,
+            info=info or {},
+        )
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def steps_of(time: NDArray[np.float64], period: float) -> NDArray[np.int64]:
+    """Return the steps (n,) of readings at the rising times (n,) [s]: 0, then control periods passed, at least 1."""
+    passed = np.maximum(np.rint(np.diff(time) / period), 1.0).astype(np.int64)
+    return np.concatenate([[0], np.cumsum(passed)]).astype(np.int64)

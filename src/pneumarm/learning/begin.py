@@ -1,0 +1,177 @@
+"""Begin states of episodes: states of the arm at rest, taken from what was recorded (section 4.3.2)."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.errors import UnusableInput
+from pneumarm.kernels import kernel
+from pneumarm.random import integer, uniform
+from pneumarm.simulation.kernel import scaled_state
+from pneumarm.simulation.simulation import Scaling
+from pneumarm.transitions.rows import Rows
+from pneumarm.transitions.window import Window, observations
+
+_STILL = 2.0  # counts; readings of an arm at rest differ by so much
+_TRIES = 32  # draws until the farthest sub-intervals count as empty
+
+
+@dataclass(frozen=True)
+class BeginStates:
+    """Resting states with closed valves, sorted by the angle of the first joint."""
+
+    window: Window
+    states: NDArray[np.float32]
+    """Scaled state windows, shape (n, state_size)."""
+    angle: NDArray[np.float64]
+    """Their angles, shape (n, joints) [counts]."""
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+
+def begin_states(rows: Rows | Iterable[Rows], window: Window, scaling: Scaling) -> BeginStates:
+    """Return the resting states in ``rows``, one block or a stream of blocks of whole sequences.
+
+    At rest are the first rows of sequences that began so, and the windows within sequences in which all valves
+    were closed and neither an angle nor a pressure differed by more than two counts.
+
+    Raises:
+        UnusableInput: there is none.
+
+    """
+    found = [_resting(block, window) for block in ([rows] if isinstance(rows, Rows) else rows)]
+    sigma = np.concatenate(found) if found else np.zeros((0, window.state_size))
+    if len(sigma) == 0:
+        raise UnusableInput(
+            "no state at rest with closed valves among the transitions, but episodes begin at rest; "
+            "collect sequences that begin at rest"
+        )
+    sigma = sigma[np.argsort(sigma[:, 0], kind="stable")]
+    angle = np.ascontiguousarray(sigma[:, 0 : window.observation_size : 4])
+    return BeginStates(window, scaled_state(sigma, window, scaling), angle)
+
+
+def _resting(rows: Rows, window: Window) -> NDArray[np.float64]:
+    """Return the windows (m, state_size) of the resting states in one block, in sensor units."""
+    h, observed = window.history, observations(rows)
+    began = np.flatnonzero(rows.at_rest & (rows.step == 0))
+    parts = [_window([observed[began]] * h, window)]
+    if len(rows) > h:
+        k = np.arange(h, len(rows))
+        lags = k[:, None] - np.arange(h + 1)  # the oldest velocity needs one row more
+        joined = (rows.sequence[lags[:, -1]] == rows.sequence[k]) & (rows.step[k] - rows.step[lags[:, -1]] == h)
+        closed = (rows.command[lags[:, 1:]] == 0).all(axis=(1, 2, 3))
+        still = np.ones(len(k), bool)
+        for values in (rows.angle, rows.pressure.reshape(len(rows), -1)):
+            still &= (np.ptp(values[lags], axis=1) <= _STILL).all(axis=1)
+        k = k[joined & closed & still]
+        parts.append(_window([observed[k - lag] for lag in range(h)], window))
+    return np.concatenate(parts)
+
+
+def _window(newest_first: list[NDArray[np.float64]], window: Window) -> NDArray[np.float64]:
+    closed = np.zeros((len(newest_first[0]), (window.history - 1) * window.command_size))
+    return np.concatenate([*newest_first, closed], axis=1)
+
+
+class BeginParameters(NamedTuple):
+    """Begin states as a kernel draws from them. Made by :func:`begin_parameters`."""
+
+    states: NDArray[np.float32]
+    """Shape (n, state_size) [scaled]."""
+    angle: NDArray[np.float64]
+    """Shape (n, joints) [counts], sorted by the first joint."""
+    sorted: NDArray[np.float64]
+    """Angle of the first joint, shape (n,) [counts]."""
+    domain: NDArray[np.float64]
+    """Lowest and highest angle of the sensor, shape (2,) [counts]."""
+    weights: NDArray[np.float64]
+    """Cumulative probabilities of the sub-intervals of a side, the farthest first, shape (bins,)."""
+
+
+def begin_parameters(
+    begin: BeginStates, domain: tuple[float, float], weights: tuple[float, ...] = (1.0,)
+) -> BeginParameters:
+    """Return ``begin`` for a kernel; ``weights`` are those of :class:`~pneumarm.learning.settings.Shaping`."""
+    cumulative = np.cumsum(weights) / np.sum(weights)
+    sorted_ = np.ascontiguousarray(begin.angle[:, 0])
+    return BeginParameters(begin.states, begin.angle, sorted_, np.array(domain, np.float64), cumulative)
+
+
+@kernel(_nrt=False, forceinline=True)
+def side_probability(goal, domain):  # type: ignore[no-untyped-def]
+    """Return the probability of a begin state below ``goal`` in the ``domain`` of angles (thesis eq. 4.15, 4.16).
+
+    ratio / (ratio + 1) with ratio = theta_g / (1023 - theta_g) is the share of the domain below the goal.
+    """
+    return (goal - domain[0]) / (domain[1] - domain[0])
+
+
+@kernel(_nrt=False, forceinline=True)
+def draw_interval(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
+    """Return a sub-interval of begin angles around ``goal``, as its ends [counts] (section 4.3.2, table 4.1).
+
+    Each side reaches as far as ``deviation`` and the domain of angles allow and is cut into equal parts.
+    """
+    is_below = uniform(random) < side_probability(goal, begin.domain)
+    draw, bins = uniform(random), begin.weights.shape[0]
+    bin_ = 0
+    while bin_ < bins - 1 and draw >= begin.weights[bin_]:
+        bin_ += 1
+    far, near = 1.0 - bin_ / bins, 1.0 - (bin_ + 1) / bins
+    if is_below:
+        side = max(begin.domain[0], goal - deviation) - goal
+        return goal + far * side, goal + near * side
+    side = min(begin.domain[1], goal + deviation) - goal
+    return goal + near * side, goal + far * side
+
+
+@kernel(_nrt=False, forceinline=True)
+def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
+    """Return the index of a begin state for ``goal`` (joints,) within ``deviation`` [counts].
+
+    The first joint's angle lies in a drawn sub-interval, those of the others anywhere within the deviation. Where
+    nothing was recorded another draw is made; where that fails time and again the state nearest to the goal is
+    taken (the thesis does not say). With an infinite deviation all begin states are equally likely.
+    """
+    if deviation == np.inf:
+        return integer(random, begin.states.shape[0])
+    for _ in range(_TRIES):
+        low, high = draw_interval(begin, goal[0], deviation, random)
+        first = below(begin.sorted, low)
+        count = below(begin.sorted, high) - first
+        if count > 0:
+            index = first + integer(random, count)
+            if distance(begin.angle[index], goal) <= deviation:
+                return index
+    nearest = 0
+    for index in range(1, begin.states.shape[0]):
+        if distance(begin.angle[index], goal) < distance(begin.angle[nearest], goal):
+            nearest = index
+    return nearest
+
+
+@kernel(_nrt=False, forceinline=True)
+def distance(angle, goal):  # type: ignore[no-untyped-def]
+    """Return the largest difference of ``angle`` and ``goal`` over the joints (thesis eq. 4.13) [counts]."""
+    largest = 0.0
+    for joint in range(goal.shape[0]):
+        largest = max(largest, abs(angle[joint] - goal[joint]))
+    return largest
+
+
+@kernel(_nrt=False, forceinline=True)
+def below(sorted_, value):  # type: ignore[no-untyped-def]
+    """Return how many of ``sorted_`` (n,) are below ``value``."""
+    first, last = 0, sorted_.shape[0]
+    while first < last:
+        middle = (first + last) // 2
+        if sorted_[middle] < value:
+            first = middle + 1
+        else:
+            last = middle
+    return first

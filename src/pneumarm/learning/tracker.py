@@ -1,0 +1,64 @@
+"""The state window of a real arm, built from its readings one by one."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.arm.seam import Reading
+from pneumarm.simulation.simulation import Scaling
+from pneumarm.transitions.window import Window
+
+
+class StateTracker:
+    """Turns the readings of an episode, and the valves set after them, into scaled state windows (eq. 3.5).
+
+    The first reading of an episode is taken at rest with closed valves: the window is filled with copies of it, and
+    its velocity is 0. The velocity after that is derived from the time stamps (section 2.3.4).
+    """
+
+    def __init__(self, window: Window, scaling: Scaling) -> None:
+        self.window = window
+        self._offset = scaling.observation_offset.reshape(window.joints, 4)
+        self._scale = scaling.observation_scale.reshape(window.joints, 4)
+        self._command_scale = scaling.command_scale
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin an episode: the next reading is one at rest."""
+        self.velocity: NDArray[np.float64] = np.zeros(self.window.joints)
+        """Angular velocities at the newest reading, shape (joints,) [counts/ms]."""
+        self._time = 0.0
+        self._angle: NDArray[np.float64] | None = None
+        self._state = np.zeros(self.window.state_size, np.float32)
+        self._command = np.zeros(self.window.command_size)
+
+    def push(self, time: float, angle: ArrayLike, pressure: ArrayLike) -> NDArray[np.float32]:
+        """Return the scaled state window after a reading: ``time`` [s], ``angle`` (joints,), ``pressure`` (joints, 2)."""
+        window, state = self.window, self._state
+        angle = np.array(angle, np.float64).reshape(window.joints)
+        observed, commanded = window.observation_size, window.command_size
+        oldest = window.history * observed
+        first = self._angle is None
+        if self._angle is not None and time > self._time:
+            self.velocity = (angle - self._angle) / (1e3 * (time - self._time))
+        self._time, self._angle = time, angle
+        observation = np.empty((window.joints, 4))
+        observation[:, 0], observation[:, 1] = angle, self.velocity
+        observation[:, 2:] = np.asarray(pressure, np.float64).reshape(window.joints, 2)
+        newest = ((observation - self._offset) / self._scale).ravel()
+        if first:
+            state[:oldest] = np.tile(newest, window.history)
+        else:
+            state[observed:oldest] = state[: oldest - observed].copy()
+            state[:observed] = newest
+            if window.history > 1:
+                state[oldest + commanded :] = state[oldest:-commanded].copy()
+                state[oldest : oldest + commanded] = self._command
+        return state.copy()
+
+    def reading(self, reading: Reading) -> NDArray[np.float32]:
+        """Return the scaled state window after ``reading``."""
+        return self.push(reading.time, reading.angle, reading.pressure)
+
+    def commanded(self, valves: ArrayLike) -> None:
+        """Note the ``valves`` (joints, 2) as applied after the newest reading."""
+        self._command = np.asarray(valves, np.float64).ravel() / self._command_scale

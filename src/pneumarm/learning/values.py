@@ -1,0 +1,223 @@
+"""Action values in networks, one for each action of each joint, and their update (section 4.2.6, Algorithm 2).
+
+    target  = r_{k+1} + gamma Q(s_{k+1}, a_{k+1})        SARSA (eq. 4.9); Q-learning: max_b Q(s_{k+1}, b) (eq. 4.10)
+    delta   = target - Q(s_k, a_k)
+    e       = e + grad Q(s_k, a_k)
+    w       = w + beta delta e
+    e       = gamma lambda e
+
+A goal is terminal: its value is 0. A cut-off episode is not: its last update looks ahead as every other does,
+because the number of actions is not part of the state and cannot be blamed (section 4.2.2).
+
+With Q-learning the traces are Watkins': they are cut where an exploring action is taken, because what follows is not
+what the target assumes (Sutton and Barto, Reinforcement Learning, section 7.6; the thesis does not say which).
+
+With several joints each has networks of its own that see the whole state and all goals. They share the reward of
+the goal; each pays for its own switches.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.valves import ACTIONS
+from pneumarm.kernels import kernel
+from pneumarm.learning.settings import TrainSettings
+from pneumarm.simulation.kernel import FASTMATH, UNIT_BLOCK, hidden_layer, padded, places, tansig
+from pneumarm.transitions.window import Window
+
+
+class Learner(NamedTuple):
+    """The networks of an agent as a kernel changes them. Made by :func:`learner`."""
+
+    weights: NDArray[np.float32]
+    """Shape (joints, inputs + 2, units): by input, then the output weights, then in the first nine places the output
+    biases. Unit ``h`` of the network of action ``a`` is at ``9 h + a``."""
+    traces: NDArray[np.float32]
+    """Eligibility of each weight, same shape; not used if ``decay`` is 0."""
+    hidden: NDArray[np.float32]
+    """Room for all networks of a joint, shape (units,)."""
+    activation: NDArray[np.float32]
+    """Room for the hidden units of one network, shape (size,)."""
+    slope: NDArray[np.float32]
+    """Room, same shape."""
+    size: int
+    """Hidden units of one network."""
+    rate: float
+    """beta."""
+    discount: float
+    """gamma."""
+    decay: float
+    """lambda."""
+    scale: float
+    """Return that an output of 1 stands for."""
+    off_policy: bool
+    """Q-learning."""
+
+
+def learner(weights: NDArray[np.float32], settings: TrainSettings, learning_rate: float | None = None) -> Learner:
+    """Return a learner that changes ``weights`` in place."""
+    return Learner(
+        weights=weights,
+        traces=np.zeros_like(weights),
+        hidden=np.zeros(weights.shape[2], np.float32),
+        activation=np.zeros(settings.hidden, np.float32),
+        slope=np.zeros(settings.hidden, np.float32),
+        size=settings.hidden,
+        rate=float(settings.learning_rate if learning_rate is None else learning_rate),
+        discount=float(settings.discount),
+        decay=float(settings.trace_decay),
+        scale=float(settings.return_scale),
+        off_policy=settings.method == "q-learning",
+    )
+
+
+class Networks(NamedTuple):
+    """The weights of an agent's networks without padding, one network an action of each joint."""
+
+    hidden_weights: NDArray[np.float32]
+    """Shape (joints, 9, state_size + joints, hidden); inputs are sigma and the goals (thesis eq. 4.12)."""
+    hidden_bias: NDArray[np.float32]
+    """Shape (joints, 9, hidden)."""
+    output_weights: NDArray[np.float32]
+    """Shape (joints, 9, hidden)."""
+    output_bias: NDArray[np.float32]
+    """Shape (joints, 9)."""
+
+
+def network_shapes(window: Window, hidden: int) -> Networks:
+    """Return empty networks whose arrays have the right shapes."""
+    joints, inputs = window.joints, window.state_size + window.joints
+    shapes = (
+        (joints, ACTIONS, inputs, hidden),
+        (joints, ACTIONS, hidden),
+        (joints, ACTIONS, hidden),
+        (joints, ACTIONS),
+    )
+    return Networks(*(np.zeros(shape, np.float32) for shape in shapes))
+
+
+def draw_networks(window: Window, settings: TrainSettings, random: np.random.Generator) -> Networks:
+    """Return networks with all weights and biases uniform in the initial range (section 4.2.6)."""
+    most = settings.initial_weight
+    shapes = network_shapes(window, settings.hidden)
+    return Networks(*(random.uniform(-most, most, array.shape).astype(np.float32) for array in shapes))
+
+
+def pack(networks: Networks, window: Window) -> NDArray[np.float32]:
+    """Return ``networks`` as the weights of a :class:`Learner`."""
+    place, state = places(window), window.state_size
+    joints, _, _, size = networks.hidden_weights.shape
+    used = ACTIONS * size
+    weights = np.zeros((joints, place.size + 2, padded(used, UNIT_BLOCK)), np.float32)
+    columns = networks.hidden_weights.transpose(0, 2, 3, 1).reshape(joints, state + joints, used)
+    weights[:, :state, :used] = columns[:, :state]
+    weights[:, place.goal : place.one, :used] = columns[:, state:]
+    weights[:, place.one, :used] = networks.hidden_bias.transpose(0, 2, 1).reshape(joints, used)
+    weights[:, -2, :used] = networks.output_weights.transpose(0, 2, 1).reshape(joints, used)
+    weights[:, -1, :ACTIONS] = networks.output_bias
+    return weights
+
+
+def unpack(weights: NDArray[np.float32], window: Window, hidden: int) -> Networks:
+    """Return what :func:`pack` packed."""
+    place, state, used = places(window), window.state_size, ACTIONS * hidden
+    joints = weights.shape[0]
+    rows = np.concatenate([weights[:, :state, :used], weights[:, place.goal : place.one, :used]], axis=1)
+    return Networks(
+        rows.reshape(joints, state + joints, hidden, ACTIONS).transpose(0, 3, 1, 2).copy(),
+        weights[:, place.one, :used].reshape(joints, hidden, ACTIONS).transpose(0, 2, 1).copy(),
+        weights[:, -2, :used].reshape(joints, hidden, ACTIONS).transpose(0, 2, 1).copy(),
+        weights[:, -1, :ACTIONS].copy(),
+    )
+
+
+@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+def action_values(learner, joint, x, values):  # type: ignore[no-untyped-def]
+    """Set ``values`` (9,) to the action values of ``joint`` in the state and goal ``x``, in units of reward."""
+    weights, hidden, row = learner.weights[joint], learner.hidden, x.shape[0]
+    hidden_layer(weights, x, hidden)
+    for u in range(hidden.shape[0]):
+        hidden[u] *= weights[row, u]
+    for action in range(ACTIONS):
+        values[action] = weights[row + 1, action]
+    for h in range(learner.size):
+        for action in range(ACTIONS):
+            values[action] += hidden[ACTIONS * h + action]
+    for action in range(ACTIONS):
+        values[action] *= np.float32(learner.scale)
+
+
+@kernel(_nrt=False, forceinline=True)
+def td_target(reward, discount, next_value, terminal):  # type: ignore[no-untyped-def]
+    """Return what Q(s_k, a_k) should have been: r_{k+1} + gamma Q(s_{k+1}, .), where a terminal state has 0."""
+    return reward if terminal else reward + discount * next_value
+
+
+@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+def backpropagate(learner, joint, x, action):  # type: ignore[no-untyped-def]
+    """Return the value of ``action`` in ``x`` and leave its network's activations and slopes in the learner.
+
+    ``slope`` is the derivative of the network's output by what enters each hidden unit.
+    """
+    weights, activation, slope = learner.weights[joint], learner.activation, learner.slope
+    row = x.shape[0]
+    for h in range(learner.size):
+        total = np.float32(0.0)
+        for i in range(row):
+            total += x[i] * weights[i, ACTIONS * h + action]
+        activation[h] = total
+    tansig(activation)
+    output = weights[row + 1, action]
+    for h in range(learner.size):
+        weight = weights[row, ACTIONS * h + action]
+        output += activation[h] * weight
+        slope[h] = weight * (np.float32(1.0) - activation[h] * activation[h])
+    return output * np.float32(learner.scale)
+
+
+@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-def]
+    """Add ``factor`` times the gradient that :func:`backpropagate` left to ``table`` (inputs + 2, units)."""
+    row = x.shape[0]
+    for h in range(learner.size):
+        by = factor * learner.slope[h]
+        for i in range(row):
+            table[i, ACTIONS * h + action] += by * x[i]
+        table[row, ACTIONS * h + action] += factor * learner.activation[h]
+    table[row + 1, action] += factor
+
+
+@kernel(_nrt=False, forceinline=True)
+def update(learner, joint, x, action, target):  # type: ignore[no-untyped-def]
+    """Move the value of ``action`` in ``x`` towards ``target``; return the error delta, in units of reward."""
+    delta = target - backpropagate(learner, joint, x, action)
+    factor = np.float32(learner.rate * delta / learner.scale)
+    if learner.decay == 0.0:
+        add_gradient(learner, learner.weights[joint], x, action, factor)
+    else:
+        add_gradient(learner, learner.traces[joint], x, action, np.float32(1.0))
+        follow_traces(learner, joint, factor)
+    return delta
+
+
+@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+def follow_traces(learner, joint, factor):  # type: ignore[no-untyped-def]
+    """Move all weights of ``joint`` by ``factor`` along their traces, and let these decay."""
+    weights, traces = learner.weights[joint], learner.traces[joint]
+    decay = np.float32(learner.discount * learner.decay)
+    for i in range(weights.shape[0]):
+        for u in range(weights.shape[1]):
+            weights[i, u] += factor * traces[i, u]
+            traces[i, u] *= decay
+
+
+@kernel(_nrt=False, forceinline=True)
+def forget_traces(learner, joint):  # type: ignore[no-untyped-def]
+    """Set the traces of ``joint`` to 0, as at the start of every episode."""
+    if learner.decay != 0.0:
+        traces = learner.traces[joint]
+        for i in range(traces.shape[0]):
+            for u in range(traces.shape[1]):
+                traces[i, u] = np.float32(0.0)

@@ -1,0 +1,248 @@
+"""Fitting a simulation to transitions (thesis section 3.2.4), and its errors on transitions it was not fitted to."""
+
+import os
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.errors import UnusableInput
+from pneumarm.networks import (
+    Fit,
+    Importance,
+    LevenbergMarquardt,
+    Network,
+    least_squares,
+    levenberg_marquardt,
+    nguyen_widrow,
+)
+from pneumarm.networks import importance as importance_of
+from pneumarm.simulation.quality import Statistics, statistics
+from pneumarm.simulation.simulation import Scaling, Simulation, Velocity
+from pneumarm.transitions.window import QUANTITIES, Transitions, Window
+
+_MARGIN = 0.05
+"""Predicted pressures and velocities may exceed the recorded ones by this part of their range."""
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """What a person may choose of a fit."""
+
+    history: int = 3
+    """Observations in the state (thesis eq. 3.5: 3)."""
+    approximator: Literal["network", "least-squares"] = "network"
+    """Function approximator: a network (thesis), or a linear model by least squares."""
+    hidden: int = 10
+    """Hidden units of each network (thesis: 10)."""
+    epochs: int = 60
+    """Epochs of Levenberg-Marquardt at most (thesis: 15)."""
+    tolerance: float = 1e-5
+    """A fit ends early when three epochs in a row lower its error by less than this part; 0: never."""
+    decay: float = 0.0
+    """Weight decay (thesis: 0)."""
+    one_network: bool = False
+    """One network with all outputs in place of one an output (the alternative in thesis section 3.4)."""
+    velocity: Velocity = "derived"
+    """Velocity derived from the predicted angle (thesis), or by a network of its own."""
+    held_out: float = 0.1
+    """Share of the sequences that is kept out of the fit, to measure its errors on."""
+    seed: int = 0
+    """Of the initial weights and of every other choice by lot."""
+
+    def __post_init__(self) -> None:
+        checks = {
+            "history": self.history >= 1,
+            "approximator": self.approximator in ("network", "least-squares"),
+            "hidden": 1 <= self.hidden <= 1000,
+            "epochs": self.epochs >= 1,
+            "tolerance": 0 <= self.tolerance < 1,
+            "decay": 0 <= self.decay < float("inf"),
+            "velocity": self.velocity in ("derived", "network"),
+            "held_out": 0 < self.held_out < 1,
+            "seed": self.seed >= 0,
+        }
+        for name, valid in checks.items():
+            if not valid:
+                raise UnusableInput(f"FitSettings: {name} cannot be {getattr(self, name)!r}; see its docstring")
+
+
+class FitResult(NamedTuple):
+    """A fitted simulation and how good it is."""
+
+    simulation: Simulation
+    held_out: Statistics
+    """One-step errors on sequences that were kept out of the fit."""
+    training: Statistics
+    """One-step errors on the transitions that were fitted."""
+    generalisation: Statistics | None
+    """One-step errors on the generalisation set of thesis section 3.3, where there is one."""
+    importance: Importance
+    """Weights of a linear fit to the same changes, whichever approximator was chosen."""
+    outputs: list[str]
+    """What each curve, and each column of the importance, is a change of."""
+    curves: list[NDArray[np.float64]]
+    """Mean squared error before and after every epoch in units of the change's standard deviation squared, one
+    curve a network; none for least squares."""
+    converged: list[bool]
+    """Whether each network's fit ended before its epochs were used up."""
+    rows: int
+    """Transitions that were fitted."""
+    seconds: float
+    """Duration of the fits alone, without the errors."""
+
+    @property
+    def std(self) -> dict[str, Any]:
+        """Standard deviation of the one-step error on held-out sequences (eq. 3.6): a number, or one a joint."""
+        return by_quantity(self.held_out.std)
+
+    @property
+    def relative_error(self) -> dict[str, Any]:
+        """``std`` over the standard deviation of the one-step change."""
+        return by_quantity(self.held_out.relative)
+
+
+def by_quantity(values: NDArray[np.float64]) -> dict[str, Any]:
+    """Return ``values`` (4 joints,) as numbers by the names of quantities; lists where there are more joints."""
+    columns = values.reshape(-1, len(QUANTITIES)).T.tolist()
+    return {name: column[0] if len(column) == 1 else column for name, column in zip(QUANTITIES, columns, strict=True)}
+
+
+def fit(
+    training: Transitions,
+    held_out: Transitions | Iterable[Transitions],
+    *,
+    spec: ArmSpec,
+    goal_range: NDArray[np.float64],
+    valves: bool = True,
+    generalisation: Transitions | Iterable[Transitions] | None = None,
+    settings: FitSettings | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> FitResult:
+    """Fit a simulation to the ``training`` transitions and measure its errors on the others.
+
+    Args:
+        training: the filtered transitions (thesis section 3.2.3), with windows of ``settings.history``.
+        held_out: transitions of other sequences, at once or in blocks.
+        spec: the arm they are of.
+        goal_range: 1st and 99th percentile of the stored angles, (joints, 2) [counts].
+        valves: whether the commands are valves.
+        generalisation: transitions that the filter left out (section 3.3), at once or in blocks.
+        settings: what a person may choose.
+        progress: called as ``progress(epochs done, epochs at most)``, over all networks together.
+
+    Raises:
+        UnusableInput: the transitions do not fit to ``spec`` and ``settings``, or are too few.
+
+    """
+    settings = settings or FitSettings()
+    window = Window(spec.joints, settings.history)
+    if training.inputs.shape[1] != window.input_size or training.target.shape[1] != window.observation_size:
+        raise UnusableInput(
+            f"expected transitions of {spec.joints} joint(s) with a history of {settings.history}, that is "
+            f"{window.input_size} inputs, got {training.inputs.shape[1]}; make them with the same window"
+        )
+    if len(training.inputs) <= window.input_size:
+        raise UnusableInput(f"{len(training.inputs)} transitions are too few to fit; collect at least 2,000")
+    began = time.perf_counter()
+    scaling = Scaling.of(training, window, valves)
+    simulation = Simulation(
+        spec=spec,
+        window=window,
+        scaling=scaling,
+        networks=(),
+        velocity=settings.velocity,
+        error_std=np.zeros((spec.joints, len(QUANTITIES))),
+        goal_range=np.asarray(goal_range, np.float64).reshape(spec.joints, 2),
+        observation_range=_observation_range(training, spec),
+        valves=valves,
+    )
+    places = simulation.outputs
+    change = training.target[:, places].astype(np.float64) - training.observation[:, places]
+    spread = change.std(axis=0)
+    spread[spread == 0] = 1.0
+    x = scaling.inputs(training.inputs, window).astype(np.float32)
+    y = change / spread
+    outputs = [window.input_names()[place].removesuffix("[k]") for place in places]
+    linear = least_squares(x, y)
+    fits: list[Fit] = []
+    fitted = [linear]
+    if settings.approximator == "network":
+        targets = [y] if settings.one_network else [y[:, [i]] for i in range(len(places))]
+        fits = _fit_networks(x, targets, settings, progress)
+        fitted = [one.network for one in fits]
+    # The targets were in units of the change's spread, the simulation's are in those of the observation.
+    factors = np.split(spread / scaling.observation_scale[places], len(fitted))
+    networks = tuple(_rescaled(network, factor) for network, factor in zip(fitted, factors, strict=True))
+    simulation = replace(simulation, networks=networks)
+    seconds = time.perf_counter() - began
+    errors = statistics(simulation, held_out)
+    return FitResult(
+        simulation=replace(simulation, error_std=errors.std.reshape(spec.joints, -1)),
+        held_out=errors,
+        training=statistics(simulation, training),
+        generalisation=None if generalisation is None else statistics(simulation, generalisation),
+        importance=importance_of(linear, x, y, window.input_names(), outputs),
+        outputs=outputs,
+        curves=[one.mse for one in fits],
+        converged=[one.converged for one in fits],
+        rows=len(x),
+        seconds=seconds,
+    )
+
+
+def _fit_networks(
+    x: NDArray[np.float32],
+    targets: list[NDArray[np.float64]],
+    settings: FitSettings,
+    progress: Callable[[int, int], None] | None,
+) -> list[Fit]:
+    """Fit a network to each of ``targets``, on as many threads as there are cores: the work is in NumPy."""
+    solver = LevenbergMarquardt(epochs=settings.epochs, tolerance=settings.tolerance, decay=settings.decay)
+    seeds = np.random.SeedSequence(settings.seed).generate_state(len(targets))
+    done = [0] * len(targets)
+
+    def one(number: int) -> Fit:
+        def report(epoch: int, _: float) -> None:
+            done[number] = epoch
+            if progress is not None:
+                progress(sum(done), settings.epochs * len(targets))
+
+        y = targets[number]
+        start = nguyen_widrow(x.shape[1], settings.hidden, y.shape[1], int(seeds[number]))
+        return levenberg_marquardt(x, y, start, solver, report)
+
+    with ThreadPoolExecutor(min(len(targets), os.cpu_count() or 1)) as threads:
+        return list(threads.map(one, range(len(targets))))
+
+
+def _rescaled(network: Network, factor: NDArray[np.float64]) -> Network:
+    """Return the network whose outputs are ``factor`` (outputs,) times as large."""
+    return replace(
+        network,
+        output_weights=network.output_weights * factor,
+        output_bias=network.output_bias * factor,
+        direct=None if network.direct is None else network.direct * factor,
+    )
+
+
+def _observation_range(transitions: Transitions, spec: ArmSpec) -> NDArray[np.float64]:
+    """Return the range that predictions are clipped to, (joints, 4, 2).
+
+    Angles: what the sensor can say, and what was recorded. No gauge pressure lies below 0, unless the sensors said
+    so; above, it gets a margin over the recorded range, and so do velocities.
+    """
+    recorded = transitions.target.reshape(-1, spec.joints, len(QUANTITIES))
+    lowest, highest = recorded.min(axis=0).astype(np.float64), recorded.max(axis=0).astype(np.float64)
+    margin = _MARGIN * (highest - lowest)
+    bottom, top = lowest - margin, highest + margin
+    angle, pressures = QUANTITIES.index("angle"), slice(QUANTITIES.index("pressure_1"), None)
+    bottom[:, angle] = np.minimum(lowest[:, angle], spec.angle_range[0])
+    top[:, angle] = np.maximum(highest[:, angle], spec.angle_range[1])
+    bottom[:, pressures] = np.minimum(lowest[:, pressures], 0.0)
+    return np.stack([bottom, top], axis=-1)

@@ -1,0 +1,271 @@
+"""The simulation as a compiled step, in scaled units.
+
+Everything that reads the state reads one float32 vector ``x``, padded to a multiple of four:
+
+    x = (sigma, command, goal, 1, 0, ...)
+
+sigma is the state window of :mod:`pneumarm.transitions.window`; the networks of the simulation have zero weights at
+the goal, those of an agent at the command, and the 1 carries the biases. All hidden units of all networks of one
+kind lie side by side, ``[input][unit]``, padded to a multiple of sixteen, so that the compiler turns the loop over
+units into vector instructions; four inputs at a time, so that what is summed is loaded and stored less often.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.kernels import kernel
+from pneumarm.random import RandomState
+from pneumarm.simulation.noise import add_noise, begin_noise
+from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.transitions.window import Window
+
+UNIT_BLOCK = 16
+INPUT_BLOCK = 4
+FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
+"""What a compiler may assume of sums here; not-a-number and infinity stay what they are."""
+
+_CLIP = np.float32(7.0)  # tanh(7) = 1 - 1.7e-6
+_LOWEST_PRESSURE = 0.0
+_PRESSURE_MARGIN = 2.0  # a closed muscle that is moved reads over max_pressure, but not twice as much
+
+
+class SimulationParameters(NamedTuple):
+    """A simulation as a kernel needs it. Made by :func:`simulation_parameters`."""
+
+    hidden: NDArray[np.float32]
+    """W1 and b1 of all networks, shape (inputs, units)."""
+    output: NDArray[np.float32]
+    """W2 of all networks with zeros where an output belongs to another network, shape (outputs, units)."""
+    output_bias: NDArray[np.float32]
+    """b2, shape (outputs,)."""
+    direct: NDArray[np.float32]
+    """D, shape (outputs, inputs), or (0, inputs) where no network has such a part."""
+    place: NDArray[np.int64]
+    """Place of each output in the observation, shape (outputs,)."""
+    lowest: NDArray[np.float32]
+    """What the sensors can read at least, shape (outputs,) [scaled]."""
+    highest: NDArray[np.float32]
+    """What the sensors can read at most, shape (outputs,) [scaled]."""
+    velocity: NDArray[np.float32]
+    """Derived velocity by change of the angle, and at rest, shape (joints, 2) [scaled]; (0, 2) if predicted."""
+    joints: int
+    history: int
+
+
+class SimulationState(NamedTuple):
+    """What one simulated arm changes: its state, its noise, its random state, and room for sums."""
+
+    x: NDArray[np.float32]
+    """The vector described at the top of this module, shape (inputs,)."""
+    average: NDArray[np.float32]
+    """Moving average of the noise, shape (outputs,)."""
+    random: RandomState
+    hidden: NDArray[np.float32]
+    """Shape (units,)."""
+    change: NDArray[np.float32]
+    """Shape (outputs,)."""
+
+
+def padded(size: int, block: int) -> int:
+    """Return ``size`` rounded up to a multiple of ``block``."""
+    return -(-size // block) * block
+
+
+class Places(NamedTuple):
+    """Where in ``x`` the command, the goal and the 1 are, and how long ``x`` is."""
+
+    command: int
+    goal: int
+    one: int
+    size: int
+
+
+def places(window: Window) -> Places:
+    """Return the places in ``x`` of a state ``window``."""
+    goal = window.state_size + window.command_size
+    one = goal + window.joints
+    return Places(window.state_size, goal, one, padded(one + 1, INPUT_BLOCK))
+
+
+def simulation_parameters(simulation: Simulation) -> SimulationParameters:
+    """Pack ``simulation`` into float32 arrays."""
+    window, scaling, spec = simulation.window, simulation.scaling, simulation.spec
+    joints, place = window.joints, places(window)
+    hidden_sizes = [network.hidden_bias.size for network in simulation.networks]
+    output_sizes = [network.output_bias.size for network in simulation.networks]
+    inputs, outputs = window.input_size, sum(output_sizes)
+    units = padded(sum(hidden_sizes), UNIT_BLOCK)
+    hidden = np.zeros((place.size, units))
+    output, output_bias = np.zeros((outputs, units)), np.zeros(outputs)
+    has_direct = any(network.direct is not None for network in simulation.networks)
+    direct = np.zeros((outputs if has_direct else 0, place.size))
+    u = o = 0
+    for network, h, n in zip(simulation.networks, hidden_sizes, output_sizes, strict=True):
+        hidden[:inputs, u : u + h] = network.hidden_weights
+        hidden[place.one, u : u + h] = network.hidden_bias
+        output[o : o + n, u : u + h] = network.output_weights.T
+        output_bias[o : o + n] = network.output_bias
+        if network.direct is not None:
+            direct[o : o + n, :inputs] = network.direct.T
+        u, o = u + h, o + n
+
+    offset = scaling.observation_offset.reshape(joints, 4)
+    scale = scaling.observation_scale.reshape(joints, 4)
+    quantities = [0, 2, 3] if simulation.velocity == "derived" else [0, 1, 2, 3]
+    low, high = spec.angle_range
+    fastest = (high - low) / (1e3 * spec.period)
+    pressure = _PRESSURE_MARGIN * spec.max_pressure_counts
+    lowest = (np.array([low, -fastest, _LOWEST_PRESSURE, _LOWEST_PRESSURE]) - offset) / scale
+    highest = (np.array([high, fastest, pressure, pressure]) - offset) / scale
+    velocity = np.stack([scale[:, 0] / (1e3 * spec.period * scale[:, 1]), -offset[:, 1] / scale[:, 1]], axis=1)
+    return SimulationParameters(
+        hidden=_float32(hidden),
+        output=_float32(output),
+        output_bias=_float32(output_bias),
+        direct=_float32(direct),
+        place=(4 * np.arange(joints)[:, None] + quantities).ravel(),
+        lowest=_float32(lowest[:, quantities].ravel()),
+        highest=_float32(highest[:, quantities].ravel()),
+        velocity=_float32(velocity if simulation.velocity == "derived" else velocity[:0]),
+        joints=joints,
+        history=window.history,
+    )
+
+
+def simulation_state(simulation: SimulationParameters, random: RandomState) -> SimulationState:
+    """Return a state for ``simulation`` with a window of zeros, drawing its noise from ``random``."""
+    inputs, units = simulation.hidden.shape
+    outputs = simulation.output_bias.size
+    x = np.zeros(inputs, np.float32)
+    x[places(Window(simulation.joints, simulation.history)).one] = 1
+    return SimulationState(
+        x=x,
+        average=np.zeros(outputs, np.float32),
+        random=random,
+        hidden=np.zeros(units, np.float32),
+        change=np.zeros(outputs, np.float32),
+    )
+
+
+def scaled_state(sigma: ArrayLike, window: Window, scaling: Scaling) -> NDArray[np.float32]:
+    """Return windows ``sigma`` (..., state_size) in sensor units as scaled ones."""
+    offset, scale = _state_scaling(window, scaling)
+    return ((np.asarray(sigma, np.float64) - offset) / scale).astype(np.float32)
+
+
+def raw_state(sigma: ArrayLike, window: Window, scaling: Scaling) -> NDArray[np.float64]:
+    """Return scaled windows ``sigma`` (..., state_size) in sensor units."""
+    offset, scale = _state_scaling(window, scaling)
+    raw: NDArray[np.float64] = np.asarray(sigma, np.float64) * scale + offset
+    return raw
+
+
+def _state_scaling(window: Window, scaling: Scaling) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    commands = np.tile(scaling.command_scale, window.history - 1)
+    offset = np.concatenate([np.tile(scaling.observation_offset, window.history), np.zeros_like(commands)])
+    return offset, np.concatenate([np.tile(scaling.observation_scale, window.history), commands])
+
+
+def _float32(array: NDArray[np.float64]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(array, np.float32)
+
+
+@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+def tansig(hidden):  # type: ignore[no-untyped-def]
+    """Replace ``hidden`` (units,) by its hyperbolic tangent, within 3e-6.
+
+    Source: J. H. Lambert's continued fraction x/(1 + x^2/(3 + x^2/(5 + ...))), cut after eight fractions; a ratio of
+    polynomials needs neither tables nor branches, so eight or sixteen units are done at once.
+    """
+    for u in range(hidden.shape[0]):
+        z = hidden[u]
+        z = z if z < _CLIP else _CLIP
+        z = z if z > -_CLIP else -_CLIP
+        s = z * z
+        above = np.float32(34459425) + s * (
+            np.float32(4729725) + s * (np.float32(135135) + s * (np.float32(990) + s))
+        )
+        below = np.float32(34459425) + s * (
+            np.float32(16216200) + s * (np.float32(945945) + s * (np.float32(13860) + s * np.float32(45)))
+        )
+        hidden[u] = z * above / below
+
+
+@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+def hidden_layer(weights, x, hidden):  # type: ignore[no-untyped-def]
+    """Set ``hidden`` (units,) to tansig(x W), ``weights`` (at least inputs, units), ``x`` (inputs,)."""
+    units = hidden.shape[0]
+    for u in range(units):
+        hidden[u] = np.float32(0.0)
+    for first in range(0, x.shape[0], INPUT_BLOCK):
+        i = np.uint64(first)  # an unsigned index needs no test for wrapping around
+        j, k, m = np.uint64(first + 1), np.uint64(first + 2), np.uint64(first + 3)
+        x0, x1, x2, x3 = x[i], x[j], x[k], x[m]
+        for u in range(units):
+            near = x0 * weights[i, u] + x1 * weights[j, u]
+            hidden[u] += near + (x2 * weights[k, u] + x3 * weights[m, u])
+    tansig(hidden)
+
+
+@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+def predict_change(simulation, state):  # type: ignore[no-untyped-def]
+    """Set ``state.change`` to what the networks predict for the state and the command in ``state.x``."""
+    x, hidden = state.x, state.hidden
+    hidden_layer(simulation.hidden, x, hidden)
+    for o in range(simulation.output_bias.shape[0]):
+        total = np.float32(0.0)
+        for u in range(hidden.shape[0]):
+            total += hidden[u] * simulation.output[o, u]
+        state.change[o] = total + simulation.output_bias[o]
+    for o in range(simulation.direct.shape[0]):
+        total = np.float32(0.0)
+        for i in range(x.shape[0]):
+            total += x[i] * simulation.direct[o, i]
+        state.change[o] += total
+
+
+@kernel(_nrt=False, forceinline=True)
+def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
+    """Shift the window in ``x`` by one step: add ``change`` to the newest observation, remember ``command``."""
+    observed, commanded = 4 * simulation.joints, 2 * simulation.joints
+    newest = simulation.history * observed
+    for i in range(newest - 1, observed - 1, -1):
+        x[i] = x[i - observed]
+    if simulation.history > 1:
+        last = newest + (simulation.history - 1) * commanded - 1
+        for i in range(last, newest + commanded - 1, -1):
+            x[i] = x[i - commanded]
+        for i in range(commanded):
+            x[newest + i] = command[i]
+    for joint in range(simulation.velocity.shape[0]):
+        x[4 * joint + 1] = x[4 * joint]
+    for o in range(change.shape[0]):
+        place = simulation.place[o]
+        x[place] = min(max(x[place] + change[o], simulation.lowest[o]), simulation.highest[o])
+    for joint in range(simulation.velocity.shape[0]):
+        moved = x[4 * joint] - x[4 * joint + 1]
+        x[4 * joint + 1] = moved * simulation.velocity[joint, 0] + simulation.velocity[joint, 1]
+
+
+@kernel(_nrt=False, forceinline=True)
+def step(simulation, noise, state, command):  # type: ignore[no-untyped-def]
+    """Let ``state`` advance by one control period under the scaled ``command`` (2 joints,)."""
+    x = state.x
+    first = simulation.history * 4 * simulation.joints + (simulation.history - 1) * 2 * simulation.joints
+    for i in range(command.shape[0]):
+        x[first + i] = command[i]
+    predict_change(simulation, state)
+    for i in range(command.shape[0]):
+        x[first + i] = np.float32(0.0)  # so that the command of the past is no input of an agent
+    add_noise(noise, x, state.change, state.average, state.random)
+    push(simulation, x, state.change, command)
+
+
+@kernel(_nrt=False, forceinline=True)
+def begin(simulation, noise, state, sigma):  # type: ignore[no-untyped-def]
+    """Put ``state`` into the scaled window ``sigma`` (state_size,), with noise that went on before it."""
+    for i in range(sigma.shape[0]):
+        state.x[i] = sigma[i]
+    begin_noise(noise, state.average, state.random)

@@ -1,0 +1,278 @@
+"""Collect transitions on any arm (thesis section 3.2.2).
+
+    repeat
+        vent all muscles, inflate each for a random time, wait until the oscillations are damped
+        draw one of two kinds of sequence:
+            zero velocity   uncorrelated random actions
+            velocity        random actions, each held for a random number of steps
+        carry it out and store it
+
+Where we differ from the thesis, or it leaves something open:
+
+1. How long an action is held at most is not given; see :attr:`CollectSettings.longest_hold`. It is drawn anew for
+   every action. With several joints the actions of each are drawn and held independently.
+2. The guard keeps inlets closed at too high a pressure; stored are the valves as applied.
+3. Sequence ``n`` is drawn from a random generator of its own, made of the seed and ``n``, so that a collection that
+   was interrupted goes on as if it had not been.
+"""
+
+import json
+import time as wall_clock
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.arm.controller import Controller
+from pneumarm.arm.cycle import BeginState, ControlCycle, Step
+from pneumarm.arm.guard import GuardedArm, guarded
+from pneumarm.arm.seam import Arm, Reading
+from pneumarm.arm.valves import ACTIONS, to_valves
+from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
+from pneumarm.transitions.players import Trajectory
+from pneumarm.transitions.rows import Recorded
+from pneumarm.transitions.store import Store
+
+KINDS = ("zero-velocity", "velocity", "controller")
+"""Kinds of the sequences made here."""
+FEWEST_TRANSITIONS = 2_000
+"""Fewer cannot be learnt from."""
+PURPOSE = "collect"
+"""The purpose of the runs made here."""
+
+Progress = Callable[[int, int], None]
+"""Called with the transitions stored so far and those asked for."""
+
+
+@dataclass(frozen=True)
+class CollectSettings:
+    """How transitions are collected."""
+
+    actions: int = 200
+    """Actions of a sequence (thesis section 3.2.2: 200)."""
+    velocity_share: float = 0.5
+    """Share of sequences whose actions are held (the thesis decides "randomly")."""
+    longest_hold: int = 10
+    """Most control periods that an action is held, the least is 1 (the thesis does not say)."""
+    begin: BeginState = field(default_factory=lambda: BeginState(inflate=1.2))
+    """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5)."""
+    close_while_computing: bool = False
+    """Whether the valves are closed between reading and acting (thesis figure 2.8)."""
+
+    def __post_init__(self) -> None:
+        checks = {
+            "actions": 1 <= self.actions <= 50_000,
+            "velocity_share": 0 <= self.velocity_share <= 1,
+            "longest_hold": self.longest_hold >= 1,
+        }
+        for name, valid in checks.items():
+            if not valid:
+                raise UnusableInput(f"CollectSettings: {name} cannot be {getattr(self, name)!r}; see its docstring")
+
+
+@dataclass(frozen=True)
+class CollectResult:
+    """What was collected, interrupted or not."""
+
+    transitions: int
+    """Transitions stored."""
+    sequences: int
+    """Sequences stored."""
+    seconds: float
+    """Time that it took on the arm's clock [s]."""
+    wall_seconds: float
+    """Time that this call took [s]."""
+    peak_pressure: NDArray[np.float64]
+    """Highest pressures read, shape (joints, 2) [counts]."""
+    interventions: int
+    """Number of times that the guard kept an inlet closed."""
+    missed_deadlines: int
+    """Number of control periods that began more than half a period late."""
+
+
+@dataclass
+class _Tally:
+    """What is counted over all calls of one collection; kept in the store with each sequence."""
+
+    seconds: float = 0.0
+    interventions: int = 0
+    missed_deadlines: int = 0
+    peak_pressure: list[list[float]] = field(default_factory=list)
+
+    def add(self, arm: GuardedArm, interventions: int, missed: int, seconds: float) -> None:
+        self.seconds += seconds
+        self.interventions += interventions
+        self.missed_deadlines += missed
+        peak = arm.peak_pressure
+        self.peak_pressure = (np.maximum(peak, self.peak_pressure) if self.peak_pressure else peak).tolist()
+
+
+def collect(
+    arm: Arm,
+    store: Store,
+    transitions: int = 200_000,
+    seed: int = 0,
+    *,
+    progress: Progress | None = None,
+    settings: CollectSettings | None = None,
+    controller: Controller | None = None,
+    goals: ArrayLike | None = None,
+) -> CollectResult:
+    """Collect at least ``transitions`` transitions in ``store``, going on where an earlier call was interrupted.
+
+    Only whole sequences are stored, each durable before the next begins. A call that asks for more than is there
+    goes on with the same collection; one that asks for less does nothing. Where the arm has a state, a collection
+    that was interrupted and resumed equals an uninterrupted one bit for bit.
+
+    Args:
+        arm: any arm; it is closed when anything fails, and left open when all went well.
+        store: a store made for this arm, open for writing.
+        transitions: how many to have in the end.
+        seed: of the begin states, actions and goals.
+        progress: told after each sequence.
+        settings: how; the thesis' way by default.
+        controller: what acts instead of random actions.
+        goals: range (joints, 2) [counts] in which goals are drawn for ``controller``, one a sequence; by default
+            the range of the angle's sensor.
+
+    Raises:
+        UnusableInput: fewer than 2,000 transitions, another arm or other settings than the store was begun with.
+        ArmFailure: the arm failed; what was stored before stays, the sequence that it failed in is not stored.
+
+    """
+    settings = settings or CollectSettings()
+    _check(arm, store, transitions, seed)
+    begun = wall_clock.perf_counter()
+    run = store.resume_run(PURPOSE, _as_settings(settings, seed, controller))
+    entries = [entry.transitions for entry in store.catalogue(run)]
+    done, number = sum(entries), len(entries)
+    tally = _restored(arm, store, resumed=number > 0)
+    guard = guarded(arm)
+    try:
+        while done < transitions:
+            recorded = _sequence(guard, tally, settings, np.random.default_rng([seed, number]), controller, goals)
+            state = {"collect": json.dumps(asdict(tally)).encode()}
+            if (arm_state := guard.get_state()) is not None:
+                state["arm"] = arm_state
+            store.append(recorded, state)
+            done += int((np.diff(recorded.step) == 1).sum())
+            number += 1
+            if progress is not None:
+                progress(min(done, transitions), transitions)
+    except BaseException as error:
+        with suppress(Exception):  # the first failure is the one to tell of
+            arm.close()
+        if isinstance(error, PneumarmError) or not isinstance(error, Exception):
+            raise
+        raise ArmFailure(
+            f"{arm.spec.name}: failed while collecting sequence {number + 1} ({type(error).__name__}: {error}); "
+            f"the {number} sequences before it are stored: see to the arm and run the same command again"
+        ) from error
+    return CollectResult(
+        transitions=done,
+        sequences=number,
+        seconds=tally.seconds,
+        wall_seconds=wall_clock.perf_counter() - begun,
+        peak_pressure=np.array(tally.peak_pressure),
+        interventions=tally.interventions,
+        missed_deadlines=tally.missed_deadlines,
+    )
+
+
+def _check(arm: Arm, store: Store, transitions: int, seed: int) -> None:
+    if transitions < FEWEST_TRANSITIONS:
+        raise UnusableInput(
+            f"{transitions} transitions are too few to learn from; ask for at least {FEWEST_TRANSITIONS:,}"
+        )
+    if seed < 0:
+        raise UnusableInput(f"a seed must be 0 or more, got {seed}")
+    if not store.valves:
+        raise UnusableInput(f"{store.path}: holds continuous commands; collect into a store of its own")
+    mine, kept = asdict(arm.spec), asdict(store.spec)
+    different = [f"{name} was {kept[name]!r}, is {mine[name]!r}" for name in kept if mine[name] != kept[name]]
+    if different:
+        raise UnusableInput(f"{store.path}: was made for another arm ({'; '.join(different)}); give another file")
+
+
+def _as_settings(settings: CollectSettings, seed: int, controller: Controller | None) -> dict[str, object]:
+    name = None if controller is None else type(controller).__name__
+    return {"seed": seed, "controller": name, **asdict(settings)}
+
+
+def _restored(arm: Arm, store: Store, resumed: bool) -> _Tally:
+    """Put the arm back to where the last stored sequence left it, and return what was counted until then."""
+    kept = store.state("collect")
+    if not resumed or kept is None:
+        return _Tally()
+    state = store.state("arm")
+    if state is not None:
+        arm.set_state(state)
+    return _Tally(**json.loads(kept))
+
+
+def _sequence(
+    arm: GuardedArm,
+    tally: _Tally,
+    settings: CollectSettings,
+    random: np.random.Generator,
+    controller: Controller | None,
+    goals: ArrayLike | None,
+) -> Recorded:
+    """Bring the arm to a begin state, carry out one sequence, and return what was read."""
+    interventions = arm.interventions
+    start = arm.read().time
+    settings.begin.reach(arm, random)
+    info: Mapping[str, object] = {}
+    actor: Controller
+    if controller is None:
+        kind, actor = _random_actions(arm.spec.joints, settings, random)
+        actor.reset(np.zeros(arm.spec.joints))
+    else:
+        kind, actor = "controller", controller
+        goal = _goal(arm, goals, random)
+        info = {"goal": goal.tolist()}
+        _told(actor, goal)
+    cycle = ControlCycle(arm, settings.close_while_computing)
+    remaining = iter(range(settings.actions))
+
+    def decide(reading: Reading) -> NDArray[np.int8] | None:
+        return None if next(remaining, None) is None else _acted(actor, reading)
+
+    steps: list[Step] = list(cycle.run(decide))
+    tally.add(arm, arm.interventions - interventions, cycle.missed_deadlines, steps[-1].reading.time - start)
+    return Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info)
+
+
+def _random_actions(joints: int, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
+    """Return one of the two kinds of random sequences: its name and its valves."""
+    shape = (settings.actions, joints)
+    actions = random.integers(ACTIONS, size=shape)
+    if random.random() >= settings.velocity_share:
+        return "zero-velocity", Trajectory(to_valves(actions))
+    held = np.empty_like(actions)
+    for joint in range(joints):
+        lengths = random.integers(1, settings.longest_hold, size=settings.actions, endpoint=True)
+        held[:, joint] = np.repeat(actions[:, joint], lengths)[: settings.actions]
+    return "velocity", Trajectory(to_valves(held))
+
+
+def _goal(arm: Arm, goals: ArrayLike | None, random: np.random.Generator) -> NDArray[np.float64]:
+    spec = arm.spec
+    span = np.broadcast_to(np.asarray(spec.angle_range if goals is None else goals, np.float64), (spec.joints, 2))
+    return random.uniform(span[:, 0], span[:, 1])
+
+
+def _told(controller: Controller, goal: NDArray[np.float64]) -> None:
+    try:
+        controller.reset(goal)
+    except Exception as error:
+        raise PneumarmError(f"the controller failed at a new goal ({type(error).__name__}: {error})") from error
+
+
+def _acted(controller: Controller, reading: Reading) -> NDArray[np.int8]:
+    try:
+        return controller.act(reading)
+    except Exception as error:
+        raise PneumarmError(f"the controller failed to act ({type(error).__name__}: {error})") from error

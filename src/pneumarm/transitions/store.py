@@ -1,0 +1,500 @@
+"""The store: everything that was ever measured on an arm, raw, in one SQLite file.
+
+Source: thesis section 3.2.3. Rows are identified by (sequence, step) and hold an observation and the command that
+followed it, so that the store does not depend on how many steps a state window happens to take.
+
+A sequence is written in one transaction and is durable when :meth:`Store.append` returns: the write-ahead log is
+synced at every commit. One connection writes and does all the checkpoints; any number read at the same time, which
+SQLite makes sure never check-point (two that do can corrupt the file in SQLite 3.7.0 to 3.51.2).
+"""
+
+import json
+import math
+import os
+import sqlite3
+import time as wall_clock
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
+from itertools import chain
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import pneumarm
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.files import written_whole
+from pneumarm.transitions.lock import WriterLock
+from pneumarm.transitions.quantiles import Quantiles
+from pneumarm.transitions.rows import Recorded, Rows
+from pneumarm.transitions.schema import (
+    LONGEST_SEQUENCE,
+    connect,
+    create_tables,
+    damaged,
+    read_settings,
+    row_columns,
+    translated,
+)
+
+Predicate = Callable[[NDArray[np.int64]], NDArray[np.bool_]]
+"""Maps numbers of sequences (n,) to which of them are meant (n,)."""
+
+BLOCK = 200_000
+"""Rows of a block, about; with one joint a block takes 20 MB."""
+
+
+class SequenceEntry(NamedTuple):
+    """What the store knows of a sequence besides its rows."""
+
+    number: int
+    run: int | None
+    kind: str
+    at_rest: bool
+    rows: int
+    transitions: int
+    info: dict[str, Any]
+
+
+class Store:
+    """A store on disk; a context manager. Iterating over it gives :class:`Rows`, block by block, again and again."""
+
+    def __init__(self, path: Path, connection: sqlite3.Connection, lock: WriterLock | None) -> None:
+        self.path = path
+        self._connection = connection
+        self._lock = lock
+        self._run: int | None = None
+        self.spec: ArmSpec
+        """The arm that the rows are of."""
+        self.valves: bool
+        """Whether the commands are valves -1, 0, +1; an imported recording may have continuous ones."""
+        with translated(path):
+            self.spec, self.valves = read_settings(connection, path)
+            self._check_sequences()
+
+    @classmethod
+    def create(cls, path: Path | str, spec: ArmSpec, valves: bool = True) -> "Store":
+        """Make an empty store for the arm ``spec`` and return it for writing.
+
+        Raises:
+            UnusableInput: there is something at ``path`` already, or its folder is missing or cannot be written.
+
+        """
+        path = Path(path)
+        lock = lock_vacant(path)
+        try:
+            with written_whole(path) as temporary:
+                create_tables(temporary, spec, valves)
+            return cls._opened(path, lock)
+        except BaseException:
+            lock.release()
+            raise
+
+    @classmethod
+    def append_to(cls, path: Path | str) -> "Store":
+        """Return the store at ``path`` for writing.
+
+        Raises:
+            UnusableInput: it is no store or a damaged one, or another process is writing to it.
+
+        """
+        path = Path(path)
+        if not path.parent.is_dir():
+            raise UnusableInput(f"{path}: the folder {path.parent} does not exist")
+        lock = WriterLock(path)
+        try:
+            return cls._opened(path, lock)
+        except BaseException:
+            lock.release()
+            raise
+
+    @classmethod
+    def for_arm(cls, path: Path | str, spec: ArmSpec) -> "Store":
+        """Return the store at ``path`` for writing; made for the arm ``spec`` where there is none."""
+        return cls.append_to(path) if Path(path).exists() else cls.create(path, spec)
+
+    @classmethod
+    def open(cls, path: Path | str) -> "Store":
+        """Return the store at ``path`` for reading, also while another process writes to it.
+
+        Raises:
+            UnusableInput: it is no store or a damaged one.
+
+        """
+        return cls._opened(Path(path), None)
+
+    @classmethod
+    def _opened(cls, path: Path, lock: WriterLock | None) -> "Store":
+        connection = connect(path, writer=lock is not None)
+        try:
+            return cls(path, connection, lock)
+        except BaseException:
+            connection.close()
+            raise
+
+    def close(self) -> None:
+        """Close the file and let go of the lock. May be called twice."""
+        self._connection.close()
+        if self._lock is not None:
+            self._lock.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # ---- what is in it
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return self.spec.joints
+
+    @property
+    def transitions(self) -> int:
+        """Number of transitions: rows with a command and the row of the next step."""
+        return int(self._one("SELECT coalesce(sum(transitions), 0) FROM sequences"))
+
+    @property
+    def sequences(self) -> int:
+        """Number of sequences; they are numbered from 1."""
+        return int(self._one("SELECT count(*) FROM sequences"))
+
+    def catalogue(self, run: int | None = None) -> Iterator[SequenceEntry]:
+        """Yield what is known of every sequence, or of those of a run."""
+        query = "SELECT number, run, kind, at_rest, rows, transitions, info FROM sequences"
+        with translated(self.path):
+            for number, of_run, kind, at_rest, rows, transitions, info in self._connection.execute(
+                f"{query} WHERE ?1 IS NULL OR run = ?1 ORDER BY number", (run,)
+            ):
+                yield SequenceEntry(number, of_run, kind, bool(at_rest), rows, transitions, json.loads(info))
+
+    def runs(self) -> dict[int, dict[str, Any]]:
+        """Return for each run its purpose, settings, arm, version of pneumarm and time of its beginning."""
+        with translated(self.path):
+            found = self._connection.execute("SELECT number, purpose, metadata FROM runs ORDER BY number").fetchall()
+        return {number: {"purpose": purpose, **json.loads(metadata)} for number, purpose, metadata in found}
+
+    def state(self, name: str = "arm") -> bytes | None:
+        """Return the state last kept under ``name``, or None."""
+        with translated(self.path):
+            found = self._connection.execute("SELECT value FROM state WHERE name = ?", (name,)).fetchone()
+        return None if found is None else bytes(found[0])
+
+    def __iter__(self) -> Iterator[Rows]:
+        return iter(self.blocks())
+
+    def blocks(
+        self, rows: int = BLOCK, sequences: Predicate | None = None, kinds: Collection[str] | None = None
+    ) -> "Blocks":
+        """Return the rows as blocks of whole sequences of about ``rows`` rows, in bounded memory.
+
+        ``sequences`` and ``kinds`` choose what is read. The result can be iterated over again and again.
+        """
+        return Blocks(self, rows, sequences, kinds)
+
+    def percentiles(
+        self,
+        shares: ArrayLike = (1.0, 99.0),
+        sequences: Predicate | None = None,
+        kinds: Collection[str] | None = None,
+    ) -> NDArray[np.float64]:
+        """Return percentiles of the stored angles, shape (joints, len(shares)) [counts].
+
+        Equal to ``numpy.percentile`` for integer counts up to 4095, within 0.03 % of the value for others; bounded
+        memory. The default is the range that goals are drawn from.
+
+        Raises:
+            UnusableInput: nothing is stored.
+
+        """
+        counted = Quantiles(self.joints)
+        for block in self.blocks(sequences=sequences, kinds=kinds):
+            counted.add(block.angle)
+        if not counted.total:
+            raise UnusableInput(f"{self.path}: holds no rows; collect some first")
+        return counted(np.asarray(shares, np.float64) / 100).T
+
+    # ---- writing
+
+    def begin_run(self, purpose: str, settings: Mapping[str, Any]) -> int:
+        """Begin a run, to which what is appended from now on belongs, and return its number."""
+        metadata = {
+            "settings": dict(settings),
+            "arm": asdict(self.spec),
+            "version": pneumarm.__version__,
+            "started": wall_clock.strftime("%Y-%m-%dT%H:%M:%SZ", wall_clock.gmtime()),
+        }
+        with self._writing() as connection:
+            cursor = connection.execute(
+                "INSERT INTO runs (purpose, metadata) VALUES (?, ?)", (purpose, _as_json(metadata))
+            )
+        self._run = cursor.lastrowid
+        assert self._run is not None
+        return self._run
+
+    def resume_run(self, purpose: str, settings: Mapping[str, Any]) -> int:
+        """Go on with the run of this purpose, or begin one where there is none; return its number.
+
+        Raises:
+            UnusableInput: it was begun with other settings.
+
+        """
+        for number, run in self.runs().items():
+            if run["purpose"] != purpose:
+                continue
+            before, now = run["settings"], json.loads(json.dumps(dict(settings)))
+            different = [name for name in before.keys() | now.keys() if before.get(name) != now.get(name)]
+            if different:
+                changes = ", ".join(f"{n} was {before.get(n)!r}, is {now.get(n)!r}" for n in sorted(different))
+                raise UnusableInput(
+                    f"{self.path}: its {purpose} run has other settings ({changes}); give those or another file"
+                )
+            self._run = number
+            return number
+        return self.begin_run(purpose, settings)
+
+    def append(self, recorded: Recorded, state: Mapping[str, bytes] | None = None) -> int:
+        """Write a sequence, and states to go on from after it, and return its number: it is durable then.
+
+        Raises:
+            UnusableInput: shapes or numbers are impossible; nothing was written.
+            PneumarmError: the disk is full, read-only or broken; nothing of this sequence was written.
+
+        """
+        return self.append_all([recorded], state)
+
+    def append_all(self, recorded: Iterable[Recorded], state: Mapping[str, bytes] | None = None) -> int:
+        """Write sequences in one transaction, all or none, and return the number of the last one."""
+        with self._writing() as connection:
+            number = int(self._one("SELECT coalesce(max(number), 0) FROM sequences"))
+            for one in recorded:
+                number += 1
+                self._insert(connection, number, one)
+            for name, value in (state or {}).items():
+                connection.execute("INSERT OR REPLACE INTO state VALUES (?, ?)", (name, value))
+        return number
+
+    def _insert(self, connection: sqlite3.Connection, number: int, one: Recorded) -> None:
+        values = _row_values(one, self.spec, self.valves)
+        transitions = int((np.diff(one.step) == 1).sum())
+        connection.execute(
+            "INSERT INTO sequences VALUES (?, ?, ?, ?, ?, ?, ?)",
+            (
+                number,
+                self._run,
+                one.kind,
+                int(one.at_rest),
+                len(one),
+                transitions,
+                _as_json(one.info),
+            ),
+        )
+        places = ", ".join("?" * (values.shape[1] + 1))
+        # SQLite stores NaN as NULL, which is what a row without a command has.
+        connection.executemany(
+            f"INSERT INTO rows VALUES ({number}, {places})",
+            zip(one.step.tolist(), *values.T.tolist(), strict=True),
+        )
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        """Give the connection within a transaction: durable when this ends well, rolled back when it does not."""
+        if self._lock is None:
+            raise PneumarmError(f"{self.path}: was opened for reading; open it with Store.append_to to write")
+        connection = self._connection
+        with translated(self.path):
+            connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield connection
+                connection.execute("COMMIT")
+            except BaseException:
+                if connection.in_transaction:
+                    connection.execute("ROLLBACK")
+                raise
+
+    # ---- checks
+
+    def check(self) -> None:
+        """Read everything and check it.
+
+        Raises:
+            UnusableInput: something is damaged; the message says what.
+
+        """
+        with translated(self.path):
+            found = self._one("PRAGMA integrity_check(1)")
+            if found != "ok":
+                raise damaged(self.path, str(found))
+            numbers, joined = 0, 0
+            for block in self.blocks():
+                joined += int(((np.diff(block.sequence) == 0) & (np.diff(block.step) == 1)).sum())
+                numbers += len(np.unique(block.sequence))
+            stray = self._one("SELECT count(*) FROM rows") - self._one("SELECT coalesce(sum(rows), 0) FROM sequences")
+        if numbers != self.sequences or joined != self.transitions or stray:
+            raise damaged(self.path, "its catalogue does not agree with its rows")
+
+    def _check_sequences(self) -> None:
+        count, first, last, shortest, longest = self._connection.execute(
+            "SELECT count(*), min(number), max(number), min(rows), max(rows) FROM sequences"
+        ).fetchone()
+        if count and not (first == 1 and last == count and shortest >= 2 and longest <= LONGEST_SEQUENCE):
+            raise damaged(self.path, "its sequences are not numbered from 1 or are of impossible lengths")
+
+    def _one(self, query: str) -> Any:
+        with translated(self.path):
+            return self._connection.execute(query).fetchone()[0]
+
+
+def lock_vacant(path: Path) -> WriterLock:
+    """Return the lock of a place for a store where there is none yet.
+
+    Raises:
+        UnusableInput: there is something at ``path`` already, or its folder is missing or cannot be written.
+
+    """
+    if not path.parent.is_dir():
+        raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
+    lock = WriterLock(path)
+    if os.path.lexists(path):
+        lock.release()
+        raise UnusableInput(f"{path}: exists already; remove it or give another name")
+    for suffix in ("-wal", "-shm"):  # SQLite would replay a log that outlived the store it belonged to
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
+    return lock
+
+
+class Blocks:
+    """Rows of a store as blocks of whole sequences; every iteration reads them anew."""
+
+    def __init__(self, store: Store, rows: int, sequences: Predicate | None, kinds: Collection[str] | None) -> None:
+        self._store, self._rows, self._sequences, self._kinds = store, rows, sequences, kinds
+
+    def __iter__(self) -> Iterator[Rows]:
+        number, length, at_rest = self._chosen()
+        before = np.concatenate([[0], np.cumsum(length)])  # rows before each sequence, and all at the end
+        begin = 0
+        while begin < len(number):
+            end = int(np.searchsorted(before, before[begin] + self._rows, "right")) - 1
+            part = slice(begin, max(end, begin + 1))
+            yield self._read(number[part], length[part], at_rest[part])
+            begin = part.stop
+
+    def _chosen(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Return number, rows and at_rest of the sequences to read."""
+        query = "SELECT number, rows, at_rest FROM sequences"
+        kinds = list(self._kinds) if self._kinds is not None else []
+        if self._kinds is not None:
+            query += f" WHERE kind IN ({', '.join('?' * len(kinds))})"
+        with translated(self._store.path):
+            found = self._store._connection.execute(query + " ORDER BY number", kinds)
+            table = np.fromiter(chain.from_iterable(found), np.int64).reshape(-1, 3)
+        if self._sequences is not None:
+            table = table[self._sequences(table[:, 0])]
+        return table[:, 0], table[:, 1], table[:, 2].astype(bool)
+
+    def _read(self, number: NDArray[np.int64], length: NDArray[np.int64], at_rest: NDArray[np.bool_]) -> Rows:
+        store, joints = self._store, self._store.joints
+        columns = ["step", *row_columns(joints)]
+        query = f"SELECT {', '.join(columns)} FROM rows WHERE sequence = ? ORDER BY step LIMIT {LONGEST_SEQUENCE + 1}"
+        execute = store._connection.execute
+        total = int(length.sum())
+        with translated(store.path):
+            values = chain.from_iterable(chain.from_iterable(execute(query, (n,)) for n in number.tolist()))
+            try:
+                table = np.fromiter(values, np.float64, count=total * len(columns)).reshape(total, -1)
+            except (ValueError, TypeError) as error:
+                raise damaged(store.path, f"rows are missing or no numbers: {error}") from error
+            surplus = next(values, None) is not None
+        per_joint = table[:, 2:].reshape(total, joints, 5)
+        rows = Rows(
+            sequence=np.repeat(number, length),
+            step=np.nan_to_num(table[:, 0]).astype(np.int64),
+            time=table[:, 1].copy(),
+            angle=per_joint[:, :, 0].copy(),
+            pressure=per_joint[:, :, 1:3].copy(),
+            command=per_joint[:, :, 3:5].copy(),
+            at_rest=np.repeat(at_rest, length),
+        )
+        first = np.concatenate([[0], np.cumsum(length)[:-1]])
+        if surplus or not _is_sound(rows, first, store.spec, store.valves):
+            raise damaged(store.path, f"impossible values in sequences {number[0]} to {number[-1]}")
+        return rows
+
+
+def _is_sound(rows: Rows, first: NDArray[np.int64], spec: ArmSpec, valves: bool) -> bool:
+    """Return whether the rows of whole sequences that begin at the rows ``first`` are possible."""
+    begins = np.zeros(len(rows), bool)
+    begins[first] = True
+    ends = np.append(begins[1:], True)
+    rising = begins[1:] | ((np.diff(rows.step) > 0) & (np.diff(rows.time) > 0))
+    return bool(
+        (rows.step[first] == 0).all()
+        and rising.all()
+        and np.isfinite(rows.time).all()
+        and far_outside(rows.angle, rows.pressure, spec) is None
+        and np.isnan(rows.command[ends]).all()
+        and _commands_possible(rows.command[~ends], valves)
+    )
+
+
+def _commands_possible(command: NDArray[np.float64], valves: bool) -> bool:
+    if valves:
+        return bool(((command == 0) | (np.abs(command) == 1)).all())
+    return bool(np.isfinite(command).all())
+
+
+def far_outside(angle: NDArray[np.float64], pressure: NDArray[np.float64], spec: ArmSpec) -> str | None:
+    """Return what is wrong with angles and pressures [counts] that no sensor of this arm can have given.
+
+    Generous, because sensors do go past their nominal ranges: half a range of the angle, and three times the
+    largest pressure. What it catches is a wrong unit.
+    """
+    low, high = spec.angle_range
+    margin = (high - low) / 2
+    limit = 3 * spec.max_pressure_counts
+    # Written so that NaN counts as outside.
+    if not ((angle >= low - margin) & (angle <= high + margin)).all():
+        return f"an angle is far outside {low:g}..{high:g} counts or no number"
+    if not ((pressure >= -limit) & (pressure <= limit)).all():
+        return f"a pressure is over three times the limit of {spec.max_pressure_counts:g} counts or no number"
+    return None
+
+
+def _as_json(info: Mapping[str, Any]) -> str:
+    try:
+        return json.dumps(dict(info), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise UnusableInput(
+            f"a sequence's or a run's info must be of JSON's types, with finite numbers: {error}"
+        ) from error
+
+
+def _row_values(one: Recorded, spec: ArmSpec, valves: bool) -> NDArray[np.float64]:
+    """Return the rows (n, columns) of a sequence, checked."""
+    n, joints = len(one), spec.joints
+    shapes = {"angle": (n, joints), "pressure": (n, joints, 2), "command": (n, joints, 2), "step": (n,)}
+    for name, shape in shapes.items():
+        if getattr(one, name).shape != shape:
+            raise UnusableInput(f"a sequence's {name} must have shape {shape}, got {getattr(one, name).shape}")
+    if not 2 <= n <= LONGEST_SEQUENCE:
+        raise UnusableInput(f"a sequence must have 2 to {LONGEST_SEQUENCE} rows, this has {n}; cut it")
+    if one.step[0] != 0 or not (np.diff(one.step) > 0).all():
+        raise UnusableInput("a sequence's steps must begin at 0 and rise")
+    if not (math.isfinite(one.time[0]) and (np.diff(one.time) > 0).all() and math.isfinite(one.time[-1])):
+        raise UnusableInput("a sequence's times must be finite and rise")
+    problem = far_outside(one.angle, one.pressure, spec)
+    if problem:
+        raise UnusableInput(f"{problem}; does the arm's spec have the right counts?")
+    if not np.isnan(one.command[-1]).all() or not _commands_possible(one.command[:-1], valves):
+        wanted = "-1, 0 or +1" if valves else "finite"
+        raise UnusableInput(f"a sequence's commands must be {wanted}, and NaN after the last reading")
+    per_joint = np.concatenate([one.angle[:, :, None], one.pressure, one.command], axis=2)
+    return np.concatenate([one.time[:, None], per_joint.reshape(n, -1)], axis=1)

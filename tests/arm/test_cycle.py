@@ -38,14 +38,16 @@ def test_valves_can_be_closed_while_computing(smallest_arm):
     arm = smallest_arm(latency=0.007)
     list(ControlCycle(GuardedArm(arm), close_while_computing=True).run(deciding(OPEN, OPEN)))
     set_ = [call[1] for call in arm.calls if call[0] == "valves"]
-    assert set_ == [[[0, 0]], [[1, -1]], [[0, 0]], [[1, -1]], [[0, 0]]]
+    # The last two: closed while it was decided to stop, and on leaving.
+    assert set_ == [[[0, 0]], [[1, -1]], [[0, 0]], [[1, -1]], [[0, 0]], [[0, 0]]]
 
 
 def test_what_is_reported_is_what_was_applied(smallest_arm):
     arm = smallest_arm(max_pressure=0.5)
     arm.pressure = [[100, 0]]
-    steps = list(ControlCycle(GuardedArm(arm)).run(deciding(OPEN)))
-    assert steps[0].valves.tolist() == [[0, -1]]
+    cycle = ControlCycle(GuardedArm(arm))
+    steps = list(cycle.run(deciding(OPEN)))
+    assert steps[0].valves.tolist() == cycle.applied.tolist() == [[0, -1]]
 
 
 def test_a_lost_period_is_counted_and_not_caught_up(smallest_arm):

@@ -86,6 +86,8 @@ def read_arrays(path: Path, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
     from safetensors import SafetensorError, safe_open
 
     expected = f"expected a file of kind {kind!r} written by pneumarm"
+    if path.exists() and not path.is_file():
+        raise UnusableInput(f"{path}: {expected}, this is no file")  # opening a pipe would wait for ever
     try:
         size = path.stat().st_size
         with open(path, "rb") as file:

@@ -24,7 +24,7 @@ class Sums(NamedTuple):
     and of h + 1 hidden units is a constant 1.
 
     Letters as in :mod:`pneumarm.networks.levenberg_marquardt`; tables are padded at the end of both sides.
-    """  # noqa: D205
+    """
 
     xx_ss: NDArray[np.float64]
     """(x_a x_b) (s_j s_k), a <= b and j <= k in the order of ``np.triu_indices``."""

@@ -4,4 +4,15 @@ from pneumarm.simulation.fit import FitResult, FitSettings, StoreFit, by_quantit
 from pneumarm.simulation.quality import Statistics
 from pneumarm.simulation.simulation import Scaling, Simulation
 
-__all__ = ["FitResult", "FitSettings", "Scaling", "Simulation", "Statistics", "StoreFit", "by_quantity", "fit", "fit_store", "refiltered"]
+__all__ = [
+    "FitResult",
+    "FitSettings",
+    "Scaling",
+    "Simulation",
+    "Statistics",
+    "StoreFit",
+    "by_quantity",
+    "fit",
+    "fit_store",
+    "refiltered",
+]

@@ -309,7 +309,7 @@ def refiltered(store: Store, simulation: Simulation, grid: GridSettings | None =
     """
     if store.joints != simulation.window.joints:
         raise UnusableInput(
-            f"the store has {store.joints} joint(s), the simulation {simulation.window.joints}; give those that belong "
-            "together"
+            f"the store has {store.joints} joint(s), the simulation {simulation.window.joints}; "
+            "give those that belong together"
         )
     return filter_transitions(store, simulation.window, grid, seed=simulation.seed, hold_out=simulation.held_out)

@@ -1,7 +1,19 @@
 """The empirical simulation: networks fitted to transitions, and how good they are."""
 
+from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.fit import FitResult, FitSettings, by_quantity, fit
+from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.quality import Statistics
 from pneumarm.simulation.simulation import Scaling, Simulation
 
-__all__ = ["FitResult", "FitSettings", "Scaling", "Simulation", "Statistics", "by_quantity", "fit"]
+__all__ = [
+    "FitResult",
+    "FitSettings",
+    "NoiseSettings",
+    "Scaling",
+    "Simulation",
+    "SimulationArm",
+    "Statistics",
+    "by_quantity",
+    "fit",
+]

@@ -2,8 +2,8 @@
 
 Every agent has its own weights, random numbers and shaping, so the result is the same however many threads there
 are. Between two adjustments of the deviation an agent's whole state is a few arrays; a checkpoint keeps them, and a
-killed training goes on bit for bit. No episode is running then, so the state window, the noise and the traces (all set
-at the start of every episode) need not be kept.
+killed training goes on bit for bit. No episode is running then, so the state window, the noise and the traces, all
+set at the start of every episode, need not be kept.
 """
 
 import hashlib
@@ -64,7 +64,7 @@ class Training:
     curves: tuple[NDArray[np.float64], ...]
     """By agent a row every 500 episodes, columns as in ``CURVES``; the deviation [counts] as it was until then."""
     met: NDArray[np.bool_]
-    """Which agents met the criterium at the whole deviation; the others ended at ``max_episodes``, shape (agents,)."""
+    """Which agents met the criterium at the whole deviation; the others ended at ``max_episodes``; (agents,)."""
     episodes: NDArray[np.int64]
     """Training episodes by agent, shape (agents,)."""
     steps: NDArray[np.int64]
@@ -139,8 +139,7 @@ def train(
 
     began, before = time.perf_counter(), agents.seconds[0]
     saved = began
-    cores = threads or min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, 64)
-    with ThreadPoolExecutor(min(cores, settings.agents)) as pool:
+    with ThreadPoolExecutor(min(threads or _cores(), settings.agents)) as pool:
         while (running := np.flatnonzero(~_ended(agents, settings))).size:
             done = list(pool.map(lambda a: _chunk(env, agents, settings, simulation, int(a)), running))
             row = np.zeros((1, settings.agents, len(CURVES)))
@@ -179,6 +178,11 @@ def train(
     )
 
 
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def _fresh(simulation: Simulation, settings: TrainSettings, seed: int) -> _Agents:
     n = settings.agents
     draws = [np.random.default_rng([seed, _WEIGHTS, a]) for a in range(n)]
@@ -199,7 +203,8 @@ def _ended(agents: _Agents, settings: TrainSettings) -> NDArray[np.bool_]:
     return agents.met | (agents.episodes >= settings.max_episodes)
 
 
-def _chunk(env: Environment, agents: _Agents, settings: TrainSettings, simulation: Simulation, a: int
+def _chunk(
+    env: Environment, agents: _Agents, settings: TrainSettings, simulation: Simulation, a: int
 ) -> tuple[list[float], float]:
     """Train agent ``a`` until its deviation is adjusted; return its row of the curves and the processor time."""
     now = stage(agents.deviation[a], settings, simulation.spec)
@@ -259,14 +264,19 @@ def _write_checkpoint(path: Path, identity: dict[str, Any], agents: _Agents) -> 
     write_arrays(path, _CHECKPOINT, identity, vars(agents))
 
 
-def _read_checkpoint(path: Path, identity: dict[str, Any], simulation: Simulation, settings: TrainSettings) -> _Agents:
+def _read_checkpoint(
+    path: Path, identity: dict[str, Any], simulation: Simulation, settings: TrainSettings
+) -> _Agents:
     found, arrays = read_arrays(path, _CHECKPOINT)
     if found != msgspec.json.decode(msgspec.json.encode(identity)):
-        raise UnusableInput(f"{path}: the checkpoint of another training; remove it, or train with its settings and seed")
+        raise UnusableInput(
+            f"{path}: the checkpoint of another training; remove it, or train with its settings and seed"
+        )
     expected = vars(_fresh(simulation, settings, 0))
     for name, like in expected.items():
         array = arrays.get(name)
-        shape = like.shape if name != "curves" else (len(array) if array is not None and array.ndim else 0, *like.shape[1:])
-        if array is None or array.dtype != like.dtype or array.shape != shape:
+        first = 1 if name == "curves" else 0  # there are as many rows of curves as there were rounds
+        fits = array is not None and array.dtype == like.dtype and array.ndim == like.ndim
+        if array is None or not fits or array.shape[first:] != like.shape[first:]:
             raise UnusableInput(f"{path}: a damaged checkpoint ({name}); remove it")
     return _Agents(**{name: arrays[name].copy() for name in expected})

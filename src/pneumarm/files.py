@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 
+_UMASK = os.umask(0)
+os.umask(_UMASK)  # there is no other way to ask for it
 _LARGEST_HEADER = 1 << 20
 _LARGEST_FILE = 64 << 20
 
@@ -24,11 +26,11 @@ def written_whole(path: Path) -> Iterator[Path]:
         UnusableInput: the parent folder is missing or cannot be written.
 
     """
-    if not path.parent.is_dir():
-        raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
+    require_folder(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield temporary
+        os.chmod(temporary, 0o666 & ~_UMASK)  # some writers make files that only their owner may read
         with open(temporary, "rb+") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
@@ -41,6 +43,12 @@ def written_whole(path: Path) -> Iterator[Path]:
         raise UnusableInput(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def require_folder(path: Path) -> None:
+    """Raise UnusableInput where the folder that ``path`` lies in is missing, before hours go into its content."""
+    if not path.parent.is_dir():
+        raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
 
 
 def write_text(path: Path, text: str) -> None:

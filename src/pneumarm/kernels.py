@@ -65,7 +65,7 @@ def _forget_old(root: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-numba_config.CACHE_DIR = str(_cache_folder())
+numba_config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 
 class _ForgivingCache(FunctionCache):

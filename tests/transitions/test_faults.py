@@ -388,7 +388,13 @@ command_2 = {column = "d"}
     csv.write_bytes(b"\xff\xfe\x00" * 1000)
     assert "UTF-8" in limited(action, csv, mapping, store)
     csv.write_text(columns + "\n1,1,1,0,0\n1,1,1,0,0\n")
-    for hostile in ("a = " + "[" * 60_000, "x = 1\n" * 5_000_000, "a" + ".a" * 30_000 + " = 1", "\x00", "[arm]\n" * 2):
+    for hostile in (
+        "a = " + "[" * 60_000,
+        "x = 1\n" * 5_000_000,
+        "a" + ".a" * 30_000 + " = 1",
+        "\x00",
+        "[arm]\n" * 2,
+    ):
         mapping.write_text(hostile)
         assert "m.toml" in limited(action, csv, mapping, store)
     assert not store.exists()

@@ -31,6 +31,11 @@ class ControlCycle:
     close_while_computing: bool = False
     missed_deadlines: int = field(default=0, init=False)
     """Number of turns that began more than half a period late."""
+    applied: NDArray[np.int8] = field(init=False)
+    """The valves of the last turn as applied, shape (joints, 2); what they led to is read in the next turn."""
+
+    def __post_init__(self) -> None:
+        self.applied = np.zeros_like(self.arm.applied)
 
     def run(self, decide: Decide) -> Iterator[Step]:
         """Yield the turns until ``decide`` returns None; that last turn's valves are None, and all are closed.
@@ -48,15 +53,16 @@ class ControlCycle:
                     self.missed_deadlines += 1
                     due = reading.time
                 due = (reading.time if due is None else due) + period
+                if self.close_while_computing:
+                    arm.set_valves(closed)
                 valves = decide(reading)
                 if valves is None:
                     yield Step(reading, None)
                     return
-                if self.close_while_computing:
-                    arm.set_valves(closed)
                 if latency:
                     arm.wait(latency)
                 arm.set_valves(valves)
+                self.applied = arm.applied
                 yield Step(reading, arm.applied)
                 arm.wait_until(due)
         finally:

@@ -1,1 +1,27 @@
-"""TODO."""
+"""Controllers on an arm: agents, movements, transfer and adaptation."""
+
+from pneumarm.control.agent import AgentController
+from pneumarm.control.movement import LearningController, Movement, move
+from pneumarm.control.transfer import (
+    BEGIN,
+    Episode,
+    Transferred,
+    TransferSettings,
+    transfer,
+    transfer_into,
+    write_episodes,
+)
+
+__all__ = [
+    "BEGIN",
+    "AgentController",
+    "Episode",
+    "LearningController",
+    "Movement",
+    "TransferSettings",
+    "Transferred",
+    "move",
+    "transfer",
+    "transfer_into",
+    "write_episodes",
+]

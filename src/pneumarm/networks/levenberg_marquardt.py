@@ -29,15 +29,15 @@ so that the largest block of A is a sum of products of two pairs,
     sum_o dy_o/dv_aj dy_o/dv_bk = (W W^T)_jk sum_i (x_a x_b)_i (s_j s_k)_i.
 
 There are far fewer pairs (a <= b) times (j <= k) than entries in A, the weights stand outside of the sum, and more
-outputs cost nothing: one matrix product of a block of pairs a block of rows. J is never formed. Those products are of
-float32, added up over the blocks in float64; they only shape the step. Error and gradient, which judge it and say
-where the minimum is, are float64 throughout.
+outputs cost nothing. J is never formed. These sums are of float32 within a block of rows and of float64 over the
+blocks; they only shape the step. Error and gradient, which judge it and say where the minimum is, are float64
+throughout. The sums are in :mod:`pneumarm.networks.products`.
 
 Sources: D. Marquardt, SIAM J. Appl. Math. 11(2), 1963; M. Hagan and M. Menhaj, IEEE Trans. Neural
 Networks 5(6), 1994; H. B. Nielsen, Damping parameter in Marquardt's method, Technical University of Denmark, 1999.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -45,6 +45,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.networks.network import Network
+from pneumarm.networks.products import Sums, add_block, solve_positive, weighted_sums
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ class LevenbergMarquardt:
     """Weight decay: ``decay |w|^2`` is added to the error; 0 for none (thesis)."""
     damping: float = 1e-3
     """First mu, as a part of the mean of the diagonal of A."""
-    block: int = 2048
+    block: int = 4096
     """Rows whose products are in memory at once; the result does not depend on it beyond rounding."""
 
 
@@ -152,12 +153,8 @@ def damped_step(equations: NormalEquations, damping: float) -> Floats | None:
     """Return d of (A + mu I) d = -g, or None where rounding has left that matrix indefinite."""
     matrix = equations.curvature.copy()
     matrix.flat[:: len(matrix) + 1] += damping
-    try:
-        lower = np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        return None
-    # Two triangular systems; NumPy has no triangular solver, and the general one is not what takes the time.
-    return np.linalg.solve(lower.T, np.linalg.solve(lower, -equations.gradient))
+    step = -equations.gradient
+    return step if solve_positive(matrix, step) else None
 
 
 def next_damping(damping: float, growth: float, gain: float) -> tuple[float, float]:
@@ -174,7 +171,7 @@ class Problem:
     likewise, (hidden + 1, outputs).
     """
 
-    def __init__(self, x: ArrayLike, y: ArrayLike, like: Network, decay: float = 0.0, block: int = 2048) -> None:
+    def __init__(self, x: ArrayLike, y: ArrayLike, like: Network, decay: float = 0.0, block: int = 4096) -> None:
         """Keep float32 copies of ``x`` (n, inputs) and float64 of ``y`` (n, outputs), for networks as ``like``."""
         if like.direct is not None:
             raise ValueError("a network with direct connections cannot be fitted by Levenberg-Marquardt")
@@ -184,11 +181,13 @@ class Problem:
         n = len(x)
         if x.shape != (n, inputs) or y.shape != (n, self.outputs) or n == 0:
             raise ValueError(f"expected x (n, {inputs}) and y (n, {self.outputs}), got {x.shape} and {y.shape}")
-        # Rows stand side by side, so that every product below runs along memory.
-        self.x = np.ones((inputs + 1, n), np.float32)
-        self.x[:-1] = x.T
-        self.y = np.ascontiguousarray(y.T, np.float64)
-        self.decay, self.block = decay, block
+        # Rows stand side by side, so that every sum over them runs along memory; a block is one piece of it.
+        whole = np.ones((inputs + 1, n), np.float32)
+        whole[:-1] = x.T
+        pieces = [slice(begin, begin + block) for begin in range(0, n, block)]
+        self.x = [np.ascontiguousarray(whole[:, piece]) for piece in pieces]
+        self.y = [np.ascontiguousarray(y[piece].T, np.float64) for piece in pieces]
+        self.inputs, self.rows, self.decay = inputs + 1, n, decay
 
     def pack(self, network: Network) -> Floats:
         """Return the weights of ``network`` as a vector."""
@@ -203,31 +202,21 @@ class Problem:
     def error(self, weights: Floats) -> float:
         """Return E, with the decay."""
         total = sum(float(np.vdot(r, r)) for _, _, r in self._blocks(weights))
-        return total / self.x.shape[1] + self.decay * float(weights @ weights)
+        return total / self.rows + self.decay * float(weights @ weights)
 
     def normal_equations(self, weights: Floats) -> NormalEquations:
         """Return A, g and E, with the decay."""
-        n, (inputs, hidden, outputs) = self.x.shape[1], (len(self.x), self.hidden, self.outputs)
-        _, w = self._layers(weights)
-        w = w[:-1]
-        xx_ss = np.zeros((inputs * (inputs + 1) // 2, hidden * (hidden + 1) // 2))
-        x_sh = np.zeros((inputs, hidden * (hidden + 1)))
-        hh = np.zeros((hidden + 1, hidden + 1))
-        gradient_v, gradient_w = np.zeros((inputs, hidden)), np.zeros((hidden + 1, outputs))
-        total = 0.0
+        n, inputs, hidden, outputs = self.rows, self.inputs, self.hidden, self.outputs
+        w = self._layers(weights)[1][:-1]
+        sums, total = Sums.zeros(inputs, hidden, outputs), 0.0
         for x, h, r in self._blocks(weights):
-            slope = 1 - h[:-1] ** 2
             total += float(np.vdot(r, r))
-            gradient_v += x @ (slope * (w @ r)).T
-            gradient_w += h @ r.T
-            x, h, slope = x.astype(np.float32), h.astype(np.float32), slope.astype(np.float32)
-            xx_ss += _pairs(x) @ _pairs(slope).T
-            x_sh += x @ (slope[:, None] * h).reshape(-1, x.shape[1]).T
-            hh += h @ h.T
+            add_block(x, h, r, w, sums)
         of_x, of_s = _pair_numbers(inputs), _pair_numbers(hidden)
-        vv = xx_ss[of_x[:, None, :, None], of_s[:, None, :]] * (w @ w.T)[:, None, :]
+        vv = sums.xx_ss[of_x[:, None, :, None], of_s[:, None, :]] * (w @ w.T)[:, None, :]
+        x_sh = sums.x_sh[:inputs, : hidden * (hidden + 1)]
         vw = x_sh.reshape(inputs, hidden, hidden + 1, 1) * w[:, None, :]
-        ww = hh[:, None, :, None] * np.eye(outputs)[:, None, :]
+        ww = sums.hh[:, None, :, None] * np.eye(outputs)[:, None, :]
         first, size = inputs * hidden, len(weights)
         curvature = np.empty((size, size))
         curvature[:first, :first] = vv.reshape(first, first)
@@ -236,36 +225,28 @@ class Problem:
         curvature[first:, first:] = ww.reshape(size - first, -1)
         curvature /= n
         curvature.flat[:: size + 1] += self.decay
-        gradient = np.concatenate([gradient_v.ravel(), gradient_w.ravel()]) / n + self.decay * weights
+        gradient = np.concatenate([sums.x_se.ravel(), sums.h_r.ravel()]) / n + self.decay * weights
         return NormalEquations(curvature, gradient, total / n + self.decay * float(weights @ weights))
 
     def _layers(self, weights: Floats) -> tuple[Floats, Floats]:
-        first = len(self.x) * self.hidden
+        first = self.inputs * self.hidden
         return weights[:first].reshape(-1, self.hidden), weights[first:].reshape(-1, self.outputs)
 
-    def _blocks(self, weights: Floats):  # type: ignore[no-untyped-def]
+    def _blocks(self, weights: Floats) -> Iterator[tuple[NDArray[np.float32], Floats, Floats]]:
         """Yield inputs, hidden units (both with the constant) and residues of blocks of rows, each (..., rows)."""
         v, w = self._layers(weights)
-        for begin in range(0, self.x.shape[1], self.block):
-            x = self.x[:, begin : begin + self.block].astype(np.float64)
+        for x, y in zip(self.x, self.y, strict=True):
             h = np.ones((self.hidden + 1, x.shape[1]))
-            np.tanh(v.T @ x, out=h[:-1])
-            yield x, h, w.T @ h - self.y[:, begin : begin + self.block]
-
-
-def _pairs(a: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the products a_j a_k, j <= k, of the rows of ``a`` (m, n), shape (m (m + 1) / 2, n)."""
-    m, n = a.shape
-    products = np.empty((m * (m + 1) // 2, n), np.float32)
-    begin = 0
-    for j in range(m):
-        np.multiply(a[j], a[j:], out=products[begin : begin + m - j])
-        begin += m - j
-    return products
+            weighted_sums(v, x, h[:-1])
+            np.tanh(h[:-1], out=h[:-1])
+            r = np.empty(y.shape)
+            weighted_sums(w, h, r)
+            r -= y
+            yield x, h, r
 
 
 def _pair_numbers(m: int) -> NDArray[np.int64]:
-    """Return the row of :func:`_pairs` that holds a_j a_k, shape (m, m), symmetric."""
+    """Return the number of the pair (j, k) in the order of ``np.triu_indices``, shape (m, m), symmetric."""
     numbers = np.empty((m, m), np.int64)
     upper = np.triu_indices(m)
     numbers[upper] = numbers.T[upper] = np.arange(m * (m + 1) // 2)

@@ -5,6 +5,7 @@ from pneumarm.simulation.fit import FitResult, FitSettings, by_quantity, fit
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.quality import Statistics
 from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.simulation.stored import StoredFit, fit_store
 
 __all__ = [
     "FitResult",
@@ -14,6 +15,13 @@ __all__ = [
     "Simulation",
     "SimulationArm",
     "Statistics",
+<<<<<<< HEAD
     "by_quantity",
     "fit",
+=======
+    "StoredFit",
+    "by_quantity",
+    "fit",
+    "fit_store",
+>>>>>>> main
 ]

@@ -27,7 +27,7 @@ from pneumarm.simulation.simulation import Scaling, Simulation, Velocity
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
 
 _MARGIN = 0.05
-"""Predicted pressures may exceed the recorded ones by this part of their range."""
+"""Predicted pressures and velocities may exceed the recorded ones by this part of their range."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def fit(
         velocity=settings.velocity,
         error_std=np.zeros((spec.joints, len(QUANTITIES))),
         goal_range=np.asarray(goal_range, np.float64).reshape(spec.joints, 2),
-        pressure_range=_pressure_range(training, spec.joints),
+        observation_range=_observation_range(training, spec),
         valves=valves,
     )
     places = simulation.outputs
@@ -231,11 +231,18 @@ def _rescaled(network: Network, factor: NDArray[np.float64]) -> Network:
     )
 
 
-def _pressure_range(transitions: Transitions, joints: int) -> NDArray[np.float64]:
-    """Return the range that pressures are clipped to, (joints, 2 muscles, 2) [counts].
+def _observation_range(transitions: Transitions, spec: ArmSpec) -> NDArray[np.float64]:
+    """Return the range that predictions are clipped to, (joints, 4, 2).
 
-    No gauge pressure lies below 0, unless the sensors said so; above, the recorded range gets a margin.
+    Angles: what the sensor can say, and what was recorded. No gauge pressure lies below 0, unless the sensors said
+    so; above, it gets a margin over the recorded range, and so do velocities.
     """
-    pressure = transitions.target.reshape(-1, joints, len(QUANTITIES))[:, :, -2:].astype(np.float64)
-    lowest, highest = np.minimum(pressure.min(axis=0), 0.0), pressure.max(axis=0)
-    return np.stack([lowest, highest + _MARGIN * (highest - lowest)], axis=-1)
+    recorded = transitions.target.reshape(-1, spec.joints, len(QUANTITIES))
+    lowest, highest = recorded.min(axis=0).astype(np.float64), recorded.max(axis=0).astype(np.float64)
+    margin = _MARGIN * (highest - lowest)
+    bottom, top = lowest - margin, highest + margin
+    angle, pressures = QUANTITIES.index("angle"), slice(QUANTITIES.index("pressure_1"), None)
+    bottom[:, angle] = np.minimum(lowest[:, angle], spec.angle_range[0])
+    top[:, angle] = np.maximum(highest[:, angle], spec.angle_range[1])
+    bottom[:, pressures] = np.minimum(lowest[:, pressures], 0.0)
+    return np.stack([bottom, top], axis=-1)

@@ -4,7 +4,7 @@ Numbered differences from the thesis:
 
 1. The networks predict *changes* of angle and pressures, not the next values. Angle and pressures hardly change
    within a step, so a network of next values spends its first epochs on learning the identity.
-2. Predictions are clipped to what the sensors can say and, for pressures, to a little above what was ever recorded.
+2. Predictions are clipped to what the sensors can say; pressures to a little above what was ever recorded.
 """
 
 from dataclasses import asdict, dataclass
@@ -86,25 +86,21 @@ class Simulation:
     """Standard deviation of the one-step error on held-out transitions, shape (joints, 4) [sensor units]."""
     goal_range: NDArray[np.float64]
     """1st and 99th percentile of the stored angles, shape (joints, 2) [counts]."""
-    pressure_range: NDArray[np.float64]
-    """Lowest and highest pressure that it predicts, shape (joints, 2 muscles, 2) [counts]."""
+    observation_range: NDArray[np.float64]
+    """Lowest and highest value that it predicts, shape (joints, 4, 2) [sensor units]; a derived velocity follows
+    from the angle and is not bounded of itself."""
     valves: bool = True
     """Whether the commands are valves; with continuous commands no agent of ours can be trained."""
+    hold_out: float = 0.1
+    """Share of the sequences that were kept out of the fit, see :func:`pneumarm.transitions.held_out`."""
+    hold_out_seed: int = 0
+    """Seed that they were chosen by."""
 
     @property
     def outputs(self) -> NDArray[np.int64]:
         """Places in an observation that the networks predict, in their order."""
         places = np.arange(self.window.observation_size)
         return places if self.velocity == "network" else places[places % len(QUANTITIES) != _VELOCITY]
-
-    @property
-    def limits(self) -> NDArray[np.float64]:
-        """Lowest and highest value of each place in a prediction, shape (2, 4 joints); none for velocities."""
-        limits = np.empty((self.window.joints, len(QUANTITIES), 2))
-        limits[:, _ANGLE] = self.spec.angle_range
-        limits[:, _VELOCITY] = -np.inf, np.inf
-        limits[:, -2:] = self.pressure_range
-        return limits.reshape(-1, 2).T
 
     def predict(self, inputs: ArrayLike) -> NDArray[np.float64]:
         """Return o_{k+1} (n, 4 joints) for sigma_k and a_k (n, input_size), both in sensor units."""
@@ -114,7 +110,8 @@ class Simulation:
         now = inputs[:, : self.window.observation_size]
         following = now.copy()
         following[:, self.outputs] += change * self.scaling.observation_scale[self.outputs]
-        np.clip(following, *self.limits, out=following)
+        limits = self.observation_range.reshape(-1, 2)
+        np.clip(following, limits[:, 0], limits[:, 1], out=following)
         if self.velocity == "derived":
             angle, velocity = slice(_ANGLE, None, len(QUANTITIES)), slice(_VELOCITY, None, len(QUANTITIES))
             following[:, velocity] = (following[:, angle] - now[:, angle]) / (1e3 * self.spec.period)
@@ -128,7 +125,9 @@ class Simulation:
 
         """
         direct = [network.direct is not None for network in self.networks]
-        header = _Header(self.spec, self.window, self.velocity, self.valves, direct)
+        header = _Header(
+            self.spec, self.window, self.velocity, self.valves, direct, self.hold_out, self.hold_out_seed
+        )
         arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in _ARRAYS}
         arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
         for number, network in enumerate(self.networks):
@@ -173,11 +172,13 @@ class Simulation:
             networks=networks,
             velocity=header.velocity,
             valves=header.valves,
+            hold_out=header.hold_out,
+            hold_out_seed=header.hold_out_seed,
             **rest,
         )
 
 
-_ARRAYS = ("error_std", "goal_range", "pressure_range")
+_ARRAYS = ("error_std", "goal_range", "observation_range")
 _SCALINGS = ("observation_offset", "observation_scale", "command_scale")
 _LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias", "direct")
 
@@ -192,6 +193,8 @@ class _Header:
     valves: bool
     direct: list[bool]
     """For each network whether it has direct connections."""
+    hold_out: float
+    hold_out_seed: int
 
 
 def _floats(name: str, array: NDArray[np.generic]) -> NDArray[np.float64]:
@@ -212,7 +215,7 @@ def _check(simulation: Simulation) -> None:
     _expect("error_std", simulation.error_std, (joints, 4), simulation.error_std >= 0)
     for name, array, shape in (
         ("goal_range", simulation.goal_range, (joints, 2)),
-        ("pressure_range", simulation.pressure_range, (joints, 2, 2)),
+        ("observation_range", simulation.observation_range, (joints, 4, 2)),
     ):
         _expect(name, array, shape)
         _expect(name, array, shape, array[..., 0] <= array[..., 1])

@@ -35,6 +35,8 @@ from pneumarm.transitions.players import Trajectory
 from pneumarm.transitions.rows import Recorded
 from pneumarm.transitions.store import Store
 
+KINDS = ("zero-velocity", "velocity", "controller")
+"""Kinds of the sequences made here."""
 FEWEST_TRANSITIONS = 2_000
 """Fewer cannot be learnt from."""
 PURPOSE = "collect"

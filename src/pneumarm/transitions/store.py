@@ -113,6 +113,11 @@ class Store:
             raise
 
     @classmethod
+    def for_arm(cls, path: Path | str, spec: ArmSpec) -> "Store":
+        """Return the store at ``path`` for writing; made for the arm ``spec`` where there is none."""
+        return cls.append_to(path) if Path(path).exists() else cls.create(path, spec)
+
+    @classmethod
     def open(cls, path: Path | str) -> "Store":
         """Return the store at ``path`` for reading, also while another process writes to it.
 

@@ -77,6 +77,8 @@ class Transitions(NamedTuple):
     """Step of k, shape (n,)."""
     interval: NDArray[np.float32]
     """t_{k+1} - t_k, shape (n,) [s]."""
+    time: NDArray[np.float64]
+    """t_k on the arm's clock, shape (n,) [s]."""
 
     @property
     def observation(self) -> NDArray[np.float32]:
@@ -127,6 +129,7 @@ def transitions(rows: Rows, window: Window) -> Transitions:
         sequence=rows.sequence[k],
         step=rows.step[k],
         interval=(rows.time[k + 1] - rows.time[k]).astype(np.float32),
+        time=rows.time[k],
     )
 
 

@@ -1,0 +1,171 @@
+"""What a store covers and how good a simulation of it is, gathered for the report (thesis sections 3.2.3 and 3.3)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.errors import UnusableInput
+from pneumarm.networks import importance, least_squares
+from pneumarm.report.data import CoverageData, QualityData
+from pneumarm.simulation import Simulation, by_quantity
+from pneumarm.simulation.quality import Resynchronisation, Statistics, propagation, statistics, validity
+from pneumarm.transitions import Filtered, Store, Transitions, filter_transitions, transitions
+from pneumarm.transitions.choice import joined, picked
+from pneumarm.transitions.grid import CellCounts
+
+Floats = NDArray[np.float64]
+
+STEPS = 30
+"""Steps that the error is propagated over: a second at 30 Hz (thesis section 3.3)."""
+RESYNCHRONISE = 10
+"""Steps between two resynchronisations with the database (thesis section 3.4)."""
+_POINTS = 20_000  # transitions that figures are drawn from
+_GROWTH = 20  # points of the curve of occupied cells
+_IN_A_ROW = 200  # transitions in order of time, for the plot of the residue
+_MOST_IN_CELL = 10_000  # cells that hold more are counted with these
+_FEWEST = 50  # held-out transitions that say something
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Figures and data of an analysis."""
+
+    coverage: CoverageData
+    quality: QualityData
+    figures: dict[str, Any]
+    """Numbers by name: one-step errors, error propagation, invalid predictions, coverage."""
+
+    def save(self, folder: Path) -> None:
+        """Write the records that the report is drawn from to ``folder``."""
+        self.coverage.save(folder)
+        self.quality.save(folder)
+
+
+def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = None) -> Analysis:
+    """Analyse ``simulation`` on the sequences of ``store`` that it was not fitted to.
+
+    Args:
+        store: what it was fitted to, or another store of the same arm.
+        simulation: any.
+        filtered: the outcome of the filter where it is known already.
+
+    Raises:
+        UnusableInput: store and simulation do not fit, or too little is stored.
+
+    """
+    if store.joints != simulation.window.joints or store.valves != simulation.valves:
+        raise UnusableInput(
+            f"{store.path}: holds {store.joints} joint(s) with {_commands(store.valves)}, the simulation is of "
+            f"{simulation.window.joints} with {_commands(simulation.valves)}"
+        )
+    if filtered is None:
+        filtered = filter_transitions(
+            store, simulation.window, seed=simulation.hold_out_seed, hold_out=simulation.hold_out
+        )
+    apart = _in_order(filtered)
+    errors = statistics(simulation, apart)
+    steps = _longest(apart, STEPS)
+    spread = propagation(simulation, apart, steps)
+    valid = validity(simulation, apart, filtered.filter.holds_data, steps)
+    states = filtered.transitions.inputs[:, : simulation.window.state_size]
+    remedy = Resynchronisation(states[:: max(1, len(states) // 10_000)], RESYNCHRONISE)
+    remedied = propagation(simulation, apart, steps, resynchronisation=remedy)
+    joints = store.joints
+    figures = {
+        "held_out": _errors(errors),
+        "propagation": {
+            "steps": steps,
+            "measured": by_quantity(spread.measured[-1]),
+            "expected": by_quantity(spread.expected[-1]),
+            "resynchronised": by_quantity(remedied.measured[-1]),
+        },
+        "invalid": {"simulated": float(valid.simulated[-1]), "recorded": float(valid.recorded[-1])},
+        "filter": filtered.coverage.summary(),
+    }
+    return Analysis(
+        coverage=_coverage(store, filtered),
+        quality=_quality(simulation, filtered, apart, spread.measured.reshape(steps, joints, 4)),
+        figures=figures,
+    )
+
+
+def _commands(valves: bool) -> str:
+    return "valves" if valves else "continuous commands"
+
+
+def _in_order(filtered: Filtered, most: int = 300_000) -> Transitions:
+    """Return held-out transitions in the order of their recording, whole blocks until there are ``most``."""
+    parts, count = [], 0
+    for block in filtered.stream("held-out"):
+        parts.append(block)
+        count += len(block.sequence)
+        if count >= most:
+            break
+    if count < _FEWEST:
+        raise UnusableInput(
+            f"{count} transitions of sequences that were kept out of the fit are too few to judge by; collect more"
+        )
+    return joined(parts)
+
+
+def _longest(apart: Transitions, steps: int) -> int:
+    """Return the most steps, up to ``steps``, that follow on each other in at least one sequence."""
+    _, lengths = np.unique(apart.sequence, return_counts=True)
+    return int(min(steps, max(1, lengths.max())))
+
+
+def _errors(errors: Statistics) -> dict[str, Any]:
+    return {
+        "std": by_quantity(errors.std),
+        "relative_error": by_quantity(errors.relative),
+        "mean": by_quantity(errors.mean),
+        "slope": by_quantity(errors.slope),
+        "calibration": by_quantity(errors.calibration),
+    }
+
+
+def _coverage(store: Store, filtered: Filtered) -> CoverageData:
+    grid = filtered.filter.grid
+    counts, growth = CellCounts(), [(0, 0)]
+    for block in store.blocks(rows=max(1, store.transitions // _GROWTH)):
+        counts.add(grid.cells(transitions(block, grid.window).inputs))
+        held = counts.arrays()[1]
+        growth.append((int(held.sum()), len(held)))
+    sample = filtered.sample("generalisation", _POINTS) or filtered.transitions
+    return CoverageData(
+        observation=sample.observation.reshape(-1, store.joints, 4).astype(np.float64),
+        cells_holding=np.bincount(np.minimum(filtered.filter.counts.arrays()[1], _MOST_IN_CELL)),
+        cells=grid.size,
+        per_cell=filtered.filter.settings.per_cell,
+        growth=np.array(growth),
+    )
+
+
+def _quality(simulation: Simulation, filtered: Filtered, apart: Transitions, measured: Floats) -> QualityData:
+    """Return the first transitions in a row, then a sample of all held-out ones, with a linear fit's weights."""
+    count = len(apart.sequence)
+    head = np.arange(min(_IN_A_ROW, count))
+    rest = np.random.default_rng(0).permutation(np.arange(len(head), count))[: _POINTS - len(head)]
+    shown = picked(apart, np.concatenate([head, np.sort(rest)]))
+    shape = (len(shown.sequence), simulation.window.joints, 4)
+    window, places = simulation.window, simulation.outputs
+    kept = filtered.transitions
+    x = simulation.scaling.inputs(kept.inputs, window)
+    y = kept.target[:, places].astype(np.float64) - kept.observation[:, places]
+    names = window.input_names()
+    outputs = [names[place].removesuffix("[k]") for place in places]
+    weights = importance(least_squares(x, y), x, y, names, outputs)
+    return QualityData(
+        observation=shown.observation.reshape(shape).astype(np.float64),
+        target=shown.target.reshape(shape).astype(np.float64),
+        predicted=simulation.predict(shown.inputs).reshape(shape),
+        command=shown.inputs[:, window.state_size :].reshape(-1, window.joints, 2).astype(np.float64),
+        time=shown.time - apart.time.min(),
+        propagation=measured,
+        weights=weights.weight,
+        inputs=tuple(names),
+        outputs=tuple(outputs),
+    )

@@ -1,0 +1,72 @@
+"""The command line. Commands are loaded when they are called, so that ``pneumarm --help`` answers at once."""
+
+import os
+import signal
+import sys
+
+from cyclopts import App, CycloptsError
+
+from pneumarm import __version__
+from pneumarm.console import complain
+from pneumarm.errors import PneumarmError
+
+COMMANDS = {
+    "run": "Do the whole job: collect, fit, train, test, transfer, report. Resumable.",
+    "collect": "Make an arm move about and record it.",
+    "import": "Import a recording made elsewhere.",
+    "coverage": "Say which part of its space a store covers, and whether it is enough.",
+    "fit": "Fit a simulation to a store.",
+    "analyse": "Draw how good a simulation is.",
+    "train": "Train an agent in a simulation.",
+    "test": "Test an agent in a simulation.",
+    "transfer": "Move an agent onto an arm and let it adapt there.",
+    "report": "Write the report of a finished run again.",
+}
+"""Every command with its one-line help."""
+
+app = App(
+    name="pneumarm",
+    help="Learn to control an arm moved by pneumatic muscles and on/off valves, from its own recordings.",
+    version=__version__,
+    suppress_keyboard_interrupt=False,
+)
+for _name, _help in COMMANDS.items():
+    app.command(f"pneumarm.commands.{_name}_:{_name}_", name=_name, help=_help)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line; exit with 0 done, 2 unusable input, 1 anything else."""
+    # A polite kill leaves through the same doors as Ctrl-C: arms are closed, files are whole.
+    signal.signal(signal.SIGTERM, _interrupt)
+    sys.exit(_run(sys.argv[1:] if arguments is None else arguments))
+
+
+def _interrupt(signal_number: int, frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _run(arguments: list[str]) -> int:
+    try:
+        app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as error:
+        complain(f"{error} See pneumarm --help.")
+        return 2
+    except PneumarmError as error:
+        complain(error)
+        return error.exit_code
+    except KeyboardInterrupt:
+        complain("interrupted; the same command goes on where it was")
+        return 1
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 1
+    except Exception as error:
+        if os.environ.get("PNEUMARM_DEBUG"):
+            raise
+        complain(f"{type(error).__name__}: {error} (an error of pneumarm itself: PNEUMARM_DEBUG=1 shows where)")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    main()

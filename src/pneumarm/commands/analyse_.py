@@ -1,0 +1,40 @@
+"""``pneumarm analyse``."""
+
+from pathlib import Path
+
+from pneumarm.analysis import analyse
+from pneumarm.commands.common import Json
+from pneumarm.console import say, show, table
+from pneumarm.files import require_folder
+from pneumarm.report import write_analysis
+from pneumarm.simulation import Simulation
+from pneumarm.transitions import Store
+
+
+def analyse_(db: Path, sim: Path, /, *, out: Path, json: Json = False) -> None:
+    """Draw how good a simulation is: coverage, residues, isoplots, error propagation (thesis section 3.3).
+
+    Example: ``pneumarm analyse arm.db arm.sim --out quality``
+
+    Parameters
+    ----------
+    db
+        The store.
+    sim
+        The simulation, from ``pneumarm fit``.
+    out
+        Folder for the page and its figures; made where there is none.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    require_folder(out)
+    simulation = Simulation.load(sim)
+    with Store.open(db) as store:
+        analysis = analyse(store, simulation)
+    out.mkdir(exist_ok=True)
+    analysis.save(out)
+    page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality)
+    say(f"page: {page}")
+    errors = analysis.figures["held_out"]
+    rows = [(name, *figures.values()) for name, figures in errors.items()]
+    show(analysis.figures, json, lambda: [table(("held out", *errors["std"]), rows)])

@@ -1,0 +1,42 @@
+"""``pneumarm collect``."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+from pneumarm.arm import open_arm
+from pneumarm.commands.common import Json, Settings
+from pneumarm.console import progress, show, table
+from pneumarm.transitions import CollectSettings, Store, collect
+
+
+def collect_(
+    arm: str,
+    db: Path,
+    /,
+    *,
+    transitions: int = 200_000,
+    seed: int = 0,
+    settings: Annotated[CollectSettings, Settings] = CollectSettings(),
+    json: Json = False,
+) -> None:
+    """Make an arm move about and record it, sequence after sequence; a second call goes on.
+
+    Example: ``pneumarm collect virtual arm.db --transitions 20000``
+
+    Parameters
+    ----------
+    arm
+        virtual, virtual:seed=N, simulation:FILE or python:module:callable.
+    db
+        The store; made where there is none.
+    transitions
+        How many to record in all (thesis section 3.2.2: 200,000, two hours).
+    seed
+        Seed of the random begin states and actions, and of a virtual arm's noise.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    with open_arm(arm, seed) as opened, Store.for_arm(db, opened.spec) as store, progress("collecting") as report:
+        result = collect(opened, store, transitions, seed, settings=settings, progress=report)
+    show(asdict(result), json, lambda: [table(("collected", ""), list(asdict(result).items()))])

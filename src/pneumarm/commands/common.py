@@ -1,0 +1,10 @@
+"""What the commands share."""
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+Json = Annotated[bool, Parameter(name="--json", negative="")]
+"""The flag that every command has: print one JSON object on stdout and nothing else there."""
+Settings = Parameter(name="*")
+"""Marks a dataclass of settings whose fields become options."""

@@ -1,0 +1,31 @@
+"""``pneumarm coverage``."""
+
+from pathlib import Path
+
+from pneumarm.commands.common import Json
+from pneumarm.console import show, table
+from pneumarm.transitions import Store, Window, enough_data
+
+
+def coverage_(db: Path, /, *, json: Json = False) -> None:
+    """Say which part of its space a store covers, and whether its second half still found anything new.
+
+    Example: ``pneumarm coverage arm.db``
+
+    Parameters
+    ----------
+    db
+        The store.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    with Store.open(db) as store:
+        found = enough_data(store, Window(store.joints))
+    result = {
+        **found.whole.summary(),
+        "new_cells": found.new_cells,
+        "new_share": found.share,
+        "enough": found.enough,
+        "verdict": found.verdict,
+    }
+    show(result, json, lambda: [table(("coverage", ""), list(result.items()))])

@@ -1,0 +1,28 @@
+"""``pneumarm import``."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from pneumarm.commands.common import Json
+from pneumarm.console import show, table
+from pneumarm.transitions import import_recording
+
+
+def import_(csv: Path, db: Path, /, *, mapping: Path, json: Json = False) -> None:
+    """Import a recording made elsewhere; a mapping file says what its columns are.
+
+    Example: ``pneumarm import recording.csv arm.db --mapping examples/recordings/mpi_pam.toml``
+
+    Parameters
+    ----------
+    csv
+        The recording, with a header line.
+    db
+        The store to make.
+    mapping
+        TOML file with columns, units, sequences and sampling period.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    imported = asdict(import_recording(csv, mapping, db))
+    show(imported, json, lambda: [table(("imported", ""), list(imported.items()))])

@@ -1,0 +1,23 @@
+"""``pneumarm report``."""
+
+from pathlib import Path
+
+from pneumarm.commands.common import Json
+from pneumarm.console import show
+from pneumarm.report import write_report
+
+
+def report_(folder: Path, /, *, json: Json = False) -> None:
+    """Write the report of a finished run again.
+
+    Example: ``pneumarm report runs/first``
+
+    Parameters
+    ----------
+    folder
+        The folder of the run.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    page = write_report(folder)
+    show({"report": str(page)}, json, lambda: [str(page)])

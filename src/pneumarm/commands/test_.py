@@ -1,0 +1,38 @@
+"""``pneumarm test``."""
+
+from pathlib import Path
+
+from pneumarm.commands.common import Json
+from pneumarm.console import show, table
+from pneumarm.learning import Agent, begin_states
+from pneumarm.learning import test as test_agent
+from pneumarm.simulation import Simulation
+from pneumarm.transitions import Store
+
+
+def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: int = 0, json: Json = False) -> None:
+    """Test an agent in a simulation: greedy, not learning, from all begin states to all goals.
+
+    Example: ``pneumarm test arm.agent arm.sim arm.db --episodes 10000``
+
+    Parameters
+    ----------
+    agent
+        The agent, from ``pneumarm train``.
+    sim
+        The simulation, from ``pneumarm fit``.
+    db
+        The store, which the begin states are drawn from.
+    episodes
+        How many movements (thesis section 5.2: 10,000).
+    seed
+        Of the begin states, the goals and the noise.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    trained, simulation = Agent.load(agent), Simulation.load(sim)
+    with Store.open(db) as store:
+        begin = begin_states(store, simulation.window, simulation.scaling)
+    tested = test_agent(trained, simulation, begin, episodes, seed)
+    result = tested.results()
+    show(result, json, lambda: [table(("tested", ""), list(result.items()))])

@@ -1,0 +1,48 @@
+"""``pneumarm transfer``."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pneumarm.arm import open_arm
+from pneumarm.commands.common import Json, Settings
+from pneumarm.console import progress, say, show, table
+from pneumarm.control import TransferSettings, transfer_into
+from pneumarm.learning import Agent
+
+
+def transfer_(
+    agent: Path,
+    /,
+    *,
+    arm: str,
+    seed: int = 0,
+    out: Path = Path("pneumarm-transfer"),
+    settings: Annotated[TransferSettings, Settings] = TransferSettings(),
+    json: Json = False,
+) -> None:
+    """Move an agent onto an arm: test it there, let it learn there, test it again. A second call goes on.
+
+    Example: ``pneumarm transfer arm.agent --arm virtual:seed=7 --episodes 500 --out adapted``
+
+    Parameters
+    ----------
+    agent
+        The agent, from ``pneumarm train``.
+    arm
+        virtual, virtual:seed=N, simulation:FILE or python:module:callable.
+    seed
+        Of the begin states, the goals and the exploration, and of a virtual arm's noise.
+    out
+        Folder for episodes.csv, the store of all movements and the adapted agent; made where there is none.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    trained = Agent.load(agent)
+    with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
+        result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
+    say(f"adapted agent: {out / 'adapted.safetensors'}")
+    show(
+        result,
+        json,
+        lambda: [table(("phase", *result["before"]), [(p, *result[p].values()) for p in ("before", "after")])],
+    )

@@ -1,0 +1,56 @@
+"""An agent as a controller of an arm, greedy or learning."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import Reading, checked
+from pneumarm.arm.valves import to_valves
+from pneumarm.errors import UnusableInput
+from pneumarm.learning import Agent, OnlineLearner, StateTracker
+
+
+class AgentController:
+    """Maps readings to valves with an agent's action values; learns if its learner has a learning rate.
+
+    ``reset(goal)`` begins a movement with the arm at rest and its valves closed; then every ``act(reading)`` gives
+    the valves to set, one control period after the other. A learner is told what came of it by ``observe``.
+    """
+
+    def __init__(self, agent: Agent, learner: OnlineLearner | None = None) -> None:
+        self.agent = agent
+        self.learner = OnlineLearner(agent) if learner is None else learner
+        self._tracker = StateTracker(agent.window, agent.scaling)
+        self._goal: NDArray[np.float64] | None = None
+        self._seen: float | None = None
+
+    def reset(self, goal: NDArray[np.float64]) -> None:
+        """Begin a movement to ``goal`` (joints,) [counts]."""
+        goal = np.asarray(goal, np.float64).reshape(-1)
+        if goal.shape != (self.agent.spec.joints,) or not np.isfinite(goal).all():
+            raise UnusableInput(f"a goal needs {self.agent.spec.joints} finite angle(s) in counts, got {goal}")
+        self._goal = goal
+        self._seen = None
+        self._tracker.reset()
+
+    def act(self, reading: Reading) -> NDArray[np.int8]:
+        """Return the valves (joints, 2) to set after ``reading``."""
+        if self._goal is None:
+            raise UnusableInput("call reset(goal) before act(reading)")
+        if reading.time != self._seen:
+            reading = checked(reading, self.agent.spec)
+            state = self._tracker.push(reading.time, reading.angle, reading.pressure)
+            # A reading that nobody told the learner about begins anew: nothing can be learned from the way to it.
+            self.learner.begin(state, self._goal)
+            self._seen = reading.time
+        valves = to_valves(self.learner.act())
+        self._tracker.commanded(valves)
+        return valves
+
+    def observe(
+        self, reading: Reading, applied: NDArray[np.int8], reward: NDArray[np.float64], terminal: bool
+    ) -> None:
+        """Learn from ``reading``, to which the valves as ``applied`` led with ``reward`` (joints,)."""
+        self._tracker.commanded(applied)
+        state = self._tracker.push(reading.time, reading.angle, reading.pressure)
+        self.learner.observe(reward, state, terminal)
+        self._seen = reading.time

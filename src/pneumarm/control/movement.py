@@ -1,0 +1,120 @@
+"""One movement on an arm: from where it stands to a goal, counted as the thesis counts an episode (5.1, 5.2)."""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import ControlCycle, Controller, Reading
+from pneumarm.learning import Reward
+from pneumarm.transitions.rows import Recorded
+
+
+@runtime_checkable
+class LearningController(Controller, Protocol):
+    """A controller that also learns from what its actions led to."""
+
+    def observe(
+        self, reading: Reading, applied: NDArray[np.int8], reward: NDArray[np.float64], terminal: bool
+    ) -> None:
+        """Learn from ``reading``, to which the valves as ``applied`` (joints, 2) led with ``reward`` (joints,).
+
+        ``terminal`` says that the goal is reached; a movement that is merely cut off is not terminal.
+        """
+
+
+@dataclass(frozen=True)
+class Movement:
+    """A movement that was made: its figures, and all that was read and applied."""
+
+    goal: NDArray[np.float64]
+    """Shape (joints,) [counts]."""
+    actions: int
+    switches: NDArray[np.int64]
+    """Shape (joints,): how often the action of a joint differed from the one before it."""
+    reward: float
+    success: bool
+    velocity_end: NDArray[np.float64]
+    """Velocity at the last reading, shape (joints,) [counts/ms]."""
+    recorded: Recorded
+    """All readings and commands, ready for a store."""
+
+    @property
+    def time_start(self) -> float:
+        """Arm time of the first reading [s]."""
+        return float(self.recorded.time[0])
+
+    @property
+    def time_end(self) -> float:
+        """Arm time of the last reading [s]."""
+        return float(self.recorded.time[-1])
+
+
+def move(
+    cycle: ControlCycle, controller: Controller, goal: NDArray[np.float64], reward: Reward, cutoff: int = 100
+) -> Movement:
+    """Move the arm, at rest with closed valves, until ``goal`` is reached or the movement is cut off.
+
+    Args:
+        cycle: the control cycle of the arm.
+        controller: what acts; a :class:`LearningController` also learns.
+        goal: shape (joints,) [counts].
+        reward: what is paid for an action, and when the goal is reached.
+        cutoff: actions after which a movement that has not reached its goal ends (thesis section 5.4.2: 100).
+
+    """
+    count = _Count(cycle, controller, np.asarray(goal, np.float64), reward, cutoff)
+    controller.reset(count.goal)
+    steps = list(cycle.run(count.decide))
+    recorded = Recorded.from_steps(steps, cycle.arm.spec, kind="episode", at_rest=True)
+    return Movement(count.goal, len(steps) - 1, count.switches, count.total, count.success, count.velocity, recorded)
+
+
+class _Count:
+    """Decides turn by turn, counting actions, switches and reward alike in simulation and on the arm."""
+
+    def __init__(
+        self,
+        cycle: ControlCycle,
+        controller: Controller,
+        goal: NDArray[np.float64],
+        reward: Reward,
+        cutoff: int,
+    ) -> None:
+        self.cycle, self.controller, self.goal = cycle, controller, goal
+        self.reward, self.cutoff = reward, cutoff
+        self.learner = controller if isinstance(controller, LearningController) else None
+        self.before: Reading | None = None
+        self.actions = 0
+        self.switches = np.zeros(goal.shape, np.int64)
+        self.velocity = np.zeros(goal.shape)
+        self.total = 0.0
+        self.success = False
+        self._last_applied: NDArray[np.int8] | None = None
+
+    def decide(self, reading: Reading) -> NDArray[np.int8] | None:
+        """Count what the last action led to; then return the valves of the next, or None at the end."""
+        if self.before is not None:
+            gained = self._count(self.before, reading)
+            if self.learner is not None:
+                self.learner.observe(reading, self.cycle.applied, gained, self.success)
+            if self.success or self.actions == self.cutoff:
+                return None
+        self.before = reading
+        self.actions += 1
+        return self.controller.act(reading)
+
+    def _count(self, before: Reading, reading: Reading) -> NDArray[np.float64]:
+        """Return what each joint is paid for the action between two readings."""
+        applied = self.cycle.applied
+        switched = np.zeros(len(self.switches), bool)
+        if self._last_applied is not None:
+            switched = (applied != self._last_applied).any(axis=1)
+        self._last_applied = applied
+        self.switches += switched
+        self.velocity = (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
+        self.success = self.reward.reached(reading.angle, self.velocity, self.goal)
+        self.total += self.reward.goal if self.success else self.reward.action
+        self.total += self.reward.switch * int(switched.sum())
+        return self.reward.of(self.success, switched)

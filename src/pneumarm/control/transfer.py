@@ -1,0 +1,250 @@
+"""Transfer: an agent moves onto an arm, is tested, goes on learning there, and is tested again (thesis 5.5)."""
+
+import csv
+import hashlib
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
+from pneumarm.control.agent import AgentController
+from pneumarm.control.movement import Movement, move
+from pneumarm.errors import UnusableInput
+from pneumarm.files import require_folder, write_text
+from pneumarm.learning import Agent, OnlineLearner
+from pneumarm.statistics import summarise
+from pneumarm.transitions import Store
+
+Phase = Literal["before", "learning", "after"]
+PHASES: tuple[Phase, ...] = ("before", "learning", "after")
+BEGIN = BeginState()
+"""How the arm gets to a begin state between movements (thesis section 5.5)."""
+_TOGETHER = 10
+"""Movements that are stored in one transaction: at most these are made again after an interruption."""
+
+
+@dataclass(frozen=True)
+class TransferSettings:
+    """How an agent is tested and adapted on an arm."""
+
+    episodes: int = 1500
+    """Movements while learning (thesis section 5.5.1: progress is seen after some 750)."""
+    learning_rate: float = 0.05
+    """Learning rate on the arm (thesis section 5.5.1: 0, 0.05 and 0.10 were compared)."""
+    test_episodes: int = 500
+    """Greedy movements before and again after learning; at least 500 for figures to be compared."""
+    close_while_computing: bool = False
+    """Close the valves between reading and acting (thesis figure 2.8: left as they are)."""
+
+    def __post_init__(self) -> None:
+        if self.episodes < 0 or self.test_episodes < 1:
+            raise UnusableInput(
+                f"transfer needs 0 or more episodes and at least 1 test episode, got {self.episodes} and "
+                f"{self.test_episodes}"
+            )
+        if not 0 <= self.learning_rate <= 1:
+            raise UnusableInput(f"the learning rate on the arm must be in 0..1, got {self.learning_rate}")
+
+    def movements(self, phase: Phase) -> int:
+        """Number of movements in ``phase``."""
+        return self.episodes if phase == "learning" else self.test_episodes
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A movement on the arm as a row of ``episodes.csv``; one number a joint in ``goal`` to ``velocity_end``."""
+
+    phase: str
+    goal: list[float]
+    time_start: float
+    time_end: float
+    angle_begin: list[float]
+    angle_end: list[float]
+    velocity_end: list[float]
+    actions: int
+    switches: int
+    reward: float
+    success: bool
+
+    @classmethod
+    def of(cls, phase: str, movement: Movement) -> "Episode":
+        """Return the row of ``movement``."""
+        return cls(
+            phase=phase,
+            goal=movement.goal.tolist(),
+            time_start=round(movement.time_start, 4),
+            time_end=round(movement.time_end, 4),
+            angle_begin=movement.recorded.angle[0].tolist(),
+            angle_end=movement.recorded.angle[-1].tolist(),
+            velocity_end=np.round(movement.velocity_end, 4).tolist(),
+            actions=movement.actions,
+            switches=int(movement.switches.sum()),
+            reward=movement.reward,
+            success=movement.success,
+        )
+
+
+def begin_and_goal(
+    agent: Agent, seed: int, test: bool, number: int
+) -> tuple[np.random.Generator, NDArray[np.float64]]:
+    """Return the random numbers of movement ``number`` and its goal.
+
+    Both tests use the same begin states and goals, and so does every rival with the same seed.
+    """
+    random = np.random.default_rng([seed, 0 if test else 1, number])
+    low, high = agent.goal_range.T
+    return random, random.uniform(low, high)
+
+
+@dataclass(frozen=True)
+class Transferred:
+    """What came of a transfer."""
+
+    episodes: list[Episode]
+    """All movements in order."""
+    agent: Agent
+    """The agent as it is after learning."""
+    learning_rate: float
+
+    def phase(self, phase: Phase) -> list[Episode]:
+        """Return the movements of a phase."""
+        return [episode for episode in self.episodes if episode.phase == phase]
+
+    def results(self) -> dict[str, Any]:
+        """Return the figures before and after learning, as in ``results.json``."""
+        return {
+            "before": summary(self.phase("before")),
+            "after": summary(self.phase("after")),
+            "episodes": len(self.phase("learning")),
+            "learning_rate": self.learning_rate,
+        }
+
+
+def transfer(
+    agent: Agent,
+    arm: Arm,
+    store: Store,
+    settings: TransferSettings = TransferSettings(),
+    *,
+    seed: int = 0,
+    progress: Callable[[float, float], None] | None = None,
+) -> Transferred:
+    """Test ``agent`` on ``arm``, let it learn there, test it again; every movement goes into ``store``.
+
+    A transfer that was interrupted goes on after the last movement that was stored, on an arm that can be put into
+    a saved state as if nothing had happened.
+
+    Raises:
+        UnusableInput: arm and agent do not fit, or the store holds a transfer with other settings.
+        ArmFailure: the arm failed; the movements up to then are stored.
+
+    """
+    check_fit(agent, arm)
+    number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": _fingerprint(agent)})
+    done = [Episode(**entry.info) for entry in store.catalogue(number)]
+    arm_state = store.state("arm")
+    if arm_state is not None and arm.get_state() is not None:
+        arm.set_state(arm_state)
+    exploration = agent.settings.exploration
+    learner = OnlineLearner(agent, settings.learning_rate, exploration, seed)
+    learned = store.state("learner")
+    if done and learned is not None:
+        learner.set_state(learned)
+    total = sum(settings.movements(phase) for phase in PHASES)
+    cycle = ControlCycle(guarded(arm), settings.close_while_computing)
+    waiting: list[tuple[Episode, Movement]] = []
+
+    def keep() -> None:
+        state = {"learner": learner.get_state(), "arm": arm.get_state()}
+        recorded = [replace(m.recorded, info=asdict(episode)) for episode, m in waiting]
+        store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
+        waiting.clear()
+
+    for phase in PHASES:
+        count = settings.movements(phase)
+        greedy = phase != "learning"
+        controller = AgentController(agent, OnlineLearner(learner.agent) if greedy else learner)
+        for i in range(sum(e.phase == phase for e in done), count):
+            random, goal = begin_and_goal(agent, seed, greedy, i)
+            BEGIN.reach(cycle.arm, random)
+            movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
+            episode = Episode.of(phase, movement)
+            done.append(episode)
+            waiting.append((episode, movement))
+            if len(waiting) == _TOGETHER or i == count - 1:
+                keep()
+            if progress is not None:
+                progress(len(done), total)
+    return Transferred(done, learner.agent, settings.learning_rate)
+
+
+def transfer_into(
+    folder: Path,
+    agent: Agent,
+    arm: Arm,
+    settings: TransferSettings = TransferSettings(),
+    *,
+    seed: int = 0,
+    progress: Callable[[float, float], None] | None = None,
+) -> dict[str, Any]:
+    """Transfer ``agent`` and leave ``episodes.csv``, ``transitions.db`` and the adapted agent in ``folder``.
+
+    Raises:
+        UnusableInput: the folder's parent is missing, or it holds another transfer.
+
+    """
+    check_fit(agent, arm)
+    require_folder(folder)
+    folder.mkdir(exist_ok=True)
+    with Store.for_arm(folder / "transitions.db", arm.spec) as store:
+        moved = transfer(agent, arm, store, settings, seed=seed, progress=progress)
+    moved.agent.save(folder / "adapted.safetensors")
+    write_episodes(folder / "episodes.csv", moved.episodes)
+    return moved.results()
+
+
+def _fingerprint(agent: Agent) -> str:
+    return hashlib.sha256(agent.weights().tobytes()).hexdigest()[:16]
+
+
+def check_fit(agent: Agent, arm: Arm) -> None:
+    """Raise UnusableInput where ``agent`` was not trained for an arm like this."""
+    for name in ("joints", "counts_per_degree", "counts_per_bar", "angle_range", "period"):
+        trained, found = getattr(agent.spec, name), getattr(arm.spec, name)
+        if not np.allclose(trained, found, rtol=1e-3):
+            raise UnusableInput(
+                f"this agent was trained for an arm whose {name} is {trained}, that of {arm.spec.name} is {found}"
+            )
+
+
+def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
+    """Return means over ``episodes`` with their 95 % intervals, and the arm time that they took [s]."""
+    figures = summarise(
+        reward=np.array([e.reward for e in episodes]),
+        success=np.array([e.success for e in episodes], bool),
+        actions=np.array([e.actions for e in episodes]),
+        switches=np.array([e.switches for e in episodes]),
+    )
+    seconds = episodes[-1].time_end - episodes[0].time_start if episodes else 0.0
+    return {**figures, "seconds": seconds}
+
+
+def write_episodes(path: Path, episodes: Sequence[Episode]) -> None:
+    """Write ``episodes.csv``: a row a movement; with several joints a cell holds their numbers with spaces between."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([field.name for field in fields(Episode)])
+    for episode in episodes:
+        writer.writerow([_cell(getattr(episode, field.name)) for field in fields(Episode)])
+    write_text(path, text.getvalue())
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, list):
+        return " ".join(str(number) for number in value)
+    return int(value) if isinstance(value, bool) else value

@@ -1,0 +1,106 @@
+"""What the stages of a run leave for its report."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
+from pneumarm.control import BEGIN, AgentController, move
+from pneumarm.control import Movement as Moved
+from pneumarm.learning import Agent, TestResult, Training
+from pneumarm.report.data import Episodes, Movement, TrainingData
+
+DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large displacement": 70.0}
+"""Movements that are shown [degrees] (thesis figures 5.17 to 5.19)."""
+_TAIL = 1.0  # s recorded after a movement, in which the arm swings out
+
+
+def training_record(training: Training) -> TrainingData:
+    """Return the curves and the validation of all agents."""
+    longest = max(training.curves, key=len)
+    agents, evaluations = len(training.curves), len(longest)
+    curves = np.zeros((6, agents, evaluations))
+    for agent, curve in enumerate(training.curves):
+        curves[:, agent, : len(curve)] = curve.T
+    return TrainingData(
+        episodes=longest[:, 0],
+        deviation=curves[1],
+        criterium=curves[2],
+        performance=curves[3],
+        epsilon=curves[4],
+        temperature=curves[5],
+        evaluated=np.array([len(curve) for curve in training.curves]),
+        reward=np.array([result.reward.mean() for result in training.validation]),
+        success=np.array([result.success.mean() for result in training.validation]),
+        chosen=training.best,
+    )
+
+
+def test_record(tested: TestResult) -> Episodes:
+    """Return the movements of a test in the simulation."""
+    nothing = np.zeros(len(tested.reward))
+    return Episodes(
+        goal=tested.goal,
+        angle_begin=tested.angle_begin,
+        actions=tested.actions.astype(np.float64),
+        switches=tested.switches.sum(axis=1).astype(np.float64),
+        reward=tested.reward,
+        success=tested.success,
+        time_start=nothing,
+        time_end=nothing,
+    )
+
+
+def demonstrate(agent: Agent, arm: Arm, seed: int) -> list[Movement]:
+    """Make and record typical movements, with a second after each in which the arm swings out.
+
+    The agent itself brings the arm to where a movement begins; a displacement larger than its range is left out.
+    """
+    cycle = ControlCycle(guarded(arm))
+    random = np.random.default_rng([seed, 2])
+    low, high = agent.goal_range.T
+    shown = []
+    for name, degrees in DISPLACEMENTS.items():
+        half = degrees * arm.spec.counts_per_degree / 2
+        middle = (low + high) / 2
+        if (half < (high - low) / 2).all():
+            BEGIN.reach(cycle.arm, random)
+            _move(agent, cycle, middle - half)
+            cycle.arm.wait(_TAIL)
+            shown.append(_recorded(agent, cycle, middle + half, name))
+    return shown
+
+
+def _move(agent: Agent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Moved:
+    return move(cycle, AgentController(agent), goal, agent.settings.reward, agent.settings.cutoff)
+
+
+def _recorded(agent: Agent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Movement:
+    spec = cycle.arm.spec
+    made = _move(agent, cycle, goal)
+    tail = list(cycle.run(_closed_for(round(_TAIL / spec.period), cycle.applied)))
+    recorded = made.recorded
+    closed = np.zeros((len(tail), spec.joints, 2))
+    return Movement(
+        time=np.concatenate([recorded.time[:-1], _times(tail)]),
+        angle=np.concatenate([recorded.angle[:-1], [step.reading.angle for step in tail]]),
+        pressure=np.concatenate([recorded.pressure[:-1], [step.reading.pressure for step in tail]]),
+        valves=np.concatenate([recorded.command[:-1], closed]),
+        goal=goal,
+        end=made.time_end if made.success else None,
+        name=name,
+    )
+
+
+def _times(steps: list[Step]) -> NDArray[np.float64]:
+    return np.array([step.reading.time for step in steps])
+
+
+def _closed_for(turns: int, applied: NDArray[np.int8]) -> Callable[[Reading], NDArray[np.int8] | None]:
+    left = iter(range(turns))
+
+    def decide(reading: Reading) -> NDArray[np.int8] | None:
+        return np.zeros_like(applied) if next(left, None) is not None else None
+
+    return decide

@@ -1,0 +1,350 @@
+"""What the report is drawn from: small records that each stage of a run leaves in its folder.
+
+A record is a frozen dataclass of arrays, checked when it is made, and kept as one safetensors file. Where ``n``
+may be large the record holds a sample; a few ten thousand rows are plenty for a figure.
+"""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, ClassVar, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.errors import UnusableInput
+from pneumarm.files import read_arrays, write_arrays
+
+Array = NDArray[np.float64]
+
+_Settings = dict[str, Any]
+_Item = TypeVar("_Item")
+
+
+@dataclass(frozen=True)
+class Record:
+    """Base of the records: saving, loading, checking of shapes."""
+
+    file: ClassVar[str]
+    """Name of its file in the folder of a run."""
+    shapes: ClassVar[dict[str, str]]
+    """Shape of every array, such as ``n joints 4``; equal letters must be equal numbers."""
+
+    def __post_init__(self) -> None:
+        sizes: dict[str, int] = {}
+        for name, shape in self.shapes.items():
+            array = np.asarray(getattr(self, name))
+            object.__setattr__(self, name, array)
+            words = shape.split()
+            wanted = tuple(int(w) if w.isdigit() else sizes.get(w, -1) for w in words)
+            fits = array.ndim == len(words) and all(w in (-1, s) for w, s in zip(wanted, array.shape, strict=True))
+            if not fits:
+                raise UnusableInput(
+                    f"{type(self).__name__}: {name} must have the shape ({shape.replace(' ', ', ')}) with {sizes}, "
+                    f"got {array.shape}"
+                )
+            if array.dtype.kind not in "biuf" or not np.isfinite(array).all():
+                raise UnusableInput(f"{type(self).__name__}: {name} must hold finite numbers")
+            sizes.update({w: s for w, s in zip(words, array.shape, strict=True) if not w.isdigit()})
+
+    def save(self, folder: Path, name: str | None = None) -> Path:
+        """Write the record to its file in ``folder`` and return the path."""
+        path = folder / (name or self.file)
+        settings = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in self.shapes}
+        write_arrays(path, self._kind(), settings, {k: getattr(self, k) for k in self.shapes})
+        return path
+
+    @classmethod
+    def load(cls, folder: Path, name: str | None = None) -> Self:
+        """Return the record in ``folder``.
+
+        Raises:
+            UnusableInput: no such file, or it does not hold this record.
+
+        """
+        path = folder / (name or cls.file)
+        settings, arrays = read_arrays(path, cls._kind())
+        try:
+            return cls(**arrays, **{k: tuple(v) if isinstance(v, list) else v for k, v in settings.items()})
+        except TypeError as error:
+            raise UnusableInput(f"{path}: not a record that this version wrote ({error}); make it again") from error
+        except UnusableInput as error:
+            raise UnusableInput(f"{path}: {error}") from error
+
+    @classmethod
+    def _kind(cls) -> str:
+        return f"report {cls.__name__}"
+
+
+@dataclass(frozen=True)
+class CoverageData(Record):
+    """What was collected, and what the filter made of it."""
+
+    file = "coverage.safetensors"
+    shapes = {"observation": "n joints 4", "cells_holding": "counts", "growth": "points 2"}  # noqa: RUF012
+
+    observation: Array
+    """A sample of the observations, shape (n, joints, 4) [sensor units]."""
+    cells_holding: NDArray[np.int64]
+    """Number of the grid's cells that hold exactly i transitions, shape (most + 1,): ``np.bincount(count)``."""
+    cells: int
+    """Cells of the grid."""
+    per_cell: int
+    """Most transitions of a cell that are kept."""
+    growth: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    """Transitions collected and cells occupied by then, shape (points, 2), for the test whether data is enough."""
+
+
+@dataclass(frozen=True)
+class QualityData(Record):
+    """How well the simulation predicts transitions that it was not fitted to."""
+
+    file = "quality.safetensors"
+    shapes = {  # noqa: RUF012
+        "observation": "n joints 4",
+        "target": "n joints 4",
+        "predicted": "n joints 4",
+        "command": "n joints 2",
+        "time": "n",
+        "propagation": "steps joints 4",
+        "weights": "inputs outputs",
+    }
+
+    observation: Array
+    """o_k, shape (n, joints, 4) [sensor units]; the first 200 rows are transitions in order of time."""
+    target: Array
+    """o_{k+1}, the same shape."""
+    predicted: Array
+    """sim_{k+1} (eq. 3.1), the same shape."""
+    command: Array
+    """a_k, shape (n, joints, 2): valves -1, 0, +1 or a continuous command."""
+    time: Array
+    """Time of o_k since the collecting began, shape (n,) [s]."""
+    propagation: Array = field(default_factory=lambda: np.empty((0, 1, 4)))
+    """Standard deviation of the error after k+1 steps simulated freely, shape (steps, joints, 4) [sensor units]."""
+    weights: Array = field(default_factory=lambda: np.empty((0, 0)))
+    """Standardised weights of a least-squares fit, shape (inputs, outputs); none where none was fitted."""
+    inputs: Sequence[str] = ()
+    """Names of the inputs."""
+    outputs: Sequence[str] = ()
+    """Names of the outputs."""
+
+    def __post_init__(self) -> None:
+        if len(self.propagation) == 0:
+            object.__setattr__(self, "propagation", np.empty((0, np.shape(self.observation)[1], 4)))
+        super().__post_init__()
+        if (len(self.inputs), len(self.outputs)) != self.weights.shape:
+            raise UnusableInput(
+                f"QualityData: weights need a name for each input and output, got {len(self.inputs)} and "
+                f"{len(self.outputs)} for {self.weights.shape}"
+            )
+
+
+@dataclass(frozen=True)
+class TrainingData(Record):
+    """Shaping curves of all agents and their validation."""
+
+    file = "training_curves.safetensors"
+    shapes = {  # noqa: RUF012
+        "episodes": "evaluations",
+        "deviation": "agents evaluations",
+        "criterium": "agents evaluations",
+        "performance": "agents evaluations",
+        "epsilon": "agents evaluations",
+        "temperature": "agents evaluations",
+        "evaluated": "agents",
+        "reward": "agents",
+        "success": "agents",
+    }
+
+    episodes: Array
+    """Episodes at each evaluation, shape (evaluations,)."""
+    deviation: Array
+    """Shape (agents, evaluations) [counts]; what lies behind an agent's ``evaluated`` is not looked at."""
+    criterium: Array
+    """Share of successes asked for, shape (agents, evaluations)."""
+    performance: Array
+    """p(k) of eq. 4.14, shape (agents, evaluations)."""
+    epsilon: Array
+    """Share of exploring actions, shape (agents, evaluations)."""
+    temperature: Array
+    """Temperature of the exploration, shape (agents, evaluations)."""
+    evaluated: NDArray[np.int64]
+    """Evaluations that each agent took before its training ended, shape (agents,)."""
+    reward: Array
+    """Mean reward of each agent in the validation, shape (agents,)."""
+    success: Array
+    """Its success rate, shape (agents,)."""
+    chosen: int
+    """Index of the agent that is kept."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.chosen < len(self.evaluated):
+            raise UnusableInput(
+                f"TrainingData: chosen must be one of {len(self.evaluated)} agents, got {self.chosen}"
+            )
+        if not ((self.evaluated >= 0) & (self.evaluated <= len(self.episodes))).all():
+            raise UnusableInput(f"TrainingData: evaluated must lie in 0..{len(self.episodes)}, got {self.evaluated}")
+
+
+@dataclass(frozen=True)
+class Episodes(Record):
+    """``n`` episodes, in the simulation or on an arm, one after the other."""
+
+    file = "test_episodes.safetensors"
+    shapes = {  # noqa: RUF012
+        "goal": "n joints",
+        "angle_begin": "n joints",
+        "actions": "n",
+        "switches": "n",
+        "reward": "n",
+        "success": "n",
+        "time_start": "n",
+        "time_end": "n",
+    }
+
+    goal: Array
+    """Shape (n, joints) [counts]."""
+    angle_begin: Array
+    """Shape (n, joints) [counts]."""
+    actions: Array
+    """Shape (n,)."""
+    switches: Array
+    """Shape (n,)."""
+    reward: Array
+    """Shape (n,)."""
+    success: NDArray[np.bool_]
+    """Shape (n,)."""
+    time_start: Array
+    """On the arm's clock, shape (n,) [s]; zeros where the episodes stand apart, as in the simulation."""
+    time_end: Array
+    """The same of the end."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "success", np.asarray(self.success) > 0)
+        for name in ("goal", "angle_begin", "actions", "switches", "reward", "time_start", "time_end"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), np.float64))
+
+    def __len__(self) -> int:
+        return len(self.reward)
+
+    @property
+    def distance(self) -> Array:
+        """|goal - angle at the begin|, shape (n, joints) [counts]."""
+        return np.abs(self.goal - self.angle_begin)
+
+    @classmethod
+    def none(cls, joints: int) -> Self:
+        """Return no episodes at all."""
+        empty = np.empty(0)
+        apart = np.empty((0, joints))
+        return cls(apart, apart, empty, empty, empty, np.empty(0, bool), empty, empty)
+
+
+@dataclass(frozen=True)
+class TransferData:
+    """The episodes on the arm, phase after phase."""
+
+    before: Episodes
+    """Greedy, on arrival."""
+    learning: Episodes
+    """While learning."""
+    after: Episodes
+    """Greedy, after adaptation."""
+    learning_rate: float = 0.0
+
+    @property
+    def phases(self) -> dict[str, Episodes]:
+        """The phases by name, in order."""
+        return {"before": self.before, "learning": self.learning, "after": self.after}
+
+
+@dataclass(frozen=True)
+class Movement(Record):
+    """One movement on the arm, with what the arm does after it where that was recorded."""
+
+    file = "movement.safetensors"
+    shapes = {  # noqa: RUF012
+        "time": "n",
+        "angle": "n joints",
+        "pressure": "n joints 2",
+        "valves": "n joints 2",
+        "goal": "joints",
+    }
+
+    time: Array
+    """Of the readings, shape (n,) [s]."""
+    angle: Array
+    """Shape (n, joints) [counts]."""
+    pressure: Array
+    """Shape (n, joints, 2) [counts]."""
+    valves: Array
+    """In force from each reading to the next, shape (n, joints, 2)."""
+    goal: Array
+    """Shape (joints,) [counts]."""
+    end: float | None
+    """When the goal was reached [s], None if it was not."""
+    name: str
+    """What is typical of it, such as "large displacement"."""
+
+
+COLUMNS = (
+    "phase",
+    "goal",
+    "time_start",
+    "time_end",
+    "angle_begin",
+    "angle_end",
+    "velocity_end",
+    "actions",
+    "switches",
+    "reward",
+    "success",
+)
+"""Columns of ``episodes.csv``; with more joints a cell holds their numbers with spaces between."""
+
+
+def read_episodes(path: Path) -> dict[str, Episodes]:
+    """Return the episodes of each phase in the CSV file at ``path``.
+
+    Raises:
+        UnusableInput: no such file, missing columns, or a cell that is no number.
+
+    """
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            missing = set(COLUMNS) - set(reader.fieldnames or ())
+            if missing:
+                raise UnusableInput(
+                    f"{path}: expected the columns {', '.join(COLUMNS)}; {sorted(missing)} are missing"
+                )
+            rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UnusableInput(
+            f"{path}: expected the episodes of a transfer as CSV, it cannot be read ({error})"
+        ) from error
+    phases: dict[str, list[_Settings]] = {}
+    for row in rows:
+        phases.setdefault(row["phase"], []).append(row)
+    try:
+        return {phase: _episodes(group) for phase, group in phases.items()}
+    except (ValueError, TypeError, AttributeError) as error:
+        raise UnusableInput(f"{path}: a cell is not what its column says ({error})") from error
+
+
+def _episodes(rows: list[_Settings]) -> Episodes:
+    def numbers(name: str) -> Array:
+        return np.array([[float(word) for word in row[name].split()] for row in rows])
+
+    def number(name: str) -> Array:
+        return np.array([float(row[name]) for row in rows])
+
+    success = np.array([row["success"].strip().lower() in ("1", "1.0", "true") for row in rows])
+    return Episodes(
+        numbers("goal"), numbers("angle_begin"), number("actions"), number("switches"), number("reward"), success,
+        number("time_start"), number("time_end"),
+    )  # fmt: skip

@@ -1,0 +1,58 @@
+"""The weights of a least-squares fit as the importance of its inputs (thesis section 3.2.4)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pneumarm.report.style import DARK, INK, MIDDLE, panels, styled
+
+Array = NDArray[np.float64]
+
+_SHOWN = 24  # inputs; the most important ones where there are more
+
+
+@styled
+def input_importance(weights: Array, inputs: Sequence[str], outputs: Sequence[str]) -> Figure:
+    """Draw the standardised weight of every input on every output as bars.
+
+    Args:
+        weights: change of an output in its standard deviations for one standard deviation of an input, shape
+            (inputs, outputs).
+        inputs: names of the inputs.
+        outputs: names of the outputs.
+
+    """
+    order = _largest_first(weights)[:_SHOWN]
+    order = np.sort(order)[::-1]
+    figure, axes = panels(1, len(outputs), 0.9 + 0.19 * len(order), sharey=True)
+    limit = 1.08 * float(np.abs(weights).max(initial=0)) or 1.0
+    place = np.arange(len(order))
+    for axis, name, w in zip(axes[0], outputs, weights[order].T, strict=True):
+        axis.barh(place, w, color=np.where(w >= 0, DARK, MIDDLE), height=0.7)
+        axis.axvline(0, color=INK, lw=0.7)
+        axis.set_title(f"change of {name}")
+        axis.set_xlabel("standardised weight [-]")
+        axis.set_xlim(-limit, limit)
+    axes[0, 0].set_yticks(place, [readable(inputs[i]) for i in order])
+    axes[0, 0].set_ylabel("input")
+    return figure
+
+
+def input_importance_alt(weights: Array, inputs: Sequence[str], outputs: Sequence[str]) -> str:
+    """Say in words what :func:`input_importance` shows: the three largest weights on each output."""
+    parts = []
+    for name, w in zip(outputs, weights.T, strict=True):
+        largest = np.argsort(-np.abs(w), kind="stable")[:3]
+        parts.append(f"change of {name}: " + ", ".join(f"{readable(inputs[i])} {w[i]:+.2f}" for i in largest))
+    return "Standardised weights of a least-squares fit, the largest first. " + "; ".join(parts) + "."
+
+
+def readable(name: str) -> str:
+    """Return the name of an input for people: ``pressure 1 [k-1]`` for ``pressure_1[k-1]``."""
+    return name.replace("_", " ").replace("[", " [")
+
+
+def _largest_first(weights: Array) -> NDArray[np.int64]:
+    return np.argsort(-np.abs(weights).max(axis=1, initial=0), kind="stable")

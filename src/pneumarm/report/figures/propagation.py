@@ -1,0 +1,79 @@
+"""How the simulation's error grows over many steps (thesis section 3.3, eq. 3.7)."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.report.style import (
+    DARK,
+    MIDDLE,
+    legend_below,
+    nothing,
+    of_joint,
+    panels,
+    quantities,
+    second_unit,
+    styled,
+)
+
+Array = NDArray[np.float64]
+
+
+@styled
+def error_propagation(measured: Array, spec: ArmSpec) -> Figure:
+    """Draw the standard deviation of the error after 1, 2, ... simulated steps beside what eq. 3.7 expects.
+
+    Args:
+        measured: standard deviation after k+1 steps of free simulation, shape (steps, joints, 4) [sensor units].
+        spec: the arm, for units and the period.
+
+    """
+    steps, joints = measured.shape[:2]
+    figure, axes = panels(joints * 2, 2, 4.9 * joints, sharex=True)
+    k = np.arange(1, steps + 1)
+    handles = []
+    for joint in range(joints):
+        places = axes[2 * joint : 2 * joint + 2].flat
+        for i, (place, kind) in enumerate(zip(places, quantities(spec), strict=True)):
+            place.set_title(kind.name + of_joint(joint, joints))
+            place.set_ylabel(f"std of error [{kind.counts}]")
+            if steps == 0:
+                nothing(place, "not measured")
+                continue
+            found = place.plot(k, measured[:, joint, i], "o-", color=DARK, ms=3)[0]
+            expected = place.plot(k, expectation(measured)[:, joint, i], "--", color=MIDDLE)[0]
+            handles = [found, expected]
+            place.set_ylim(0)
+            place.set_xlim(0, steps + 0.5)
+            second_unit(place, f"[{kind.unit}]", kind.per_count)
+    for place in axes[-1]:
+        place.set_xlabel(f"steps simulated freely [-], {1e3 * spec.period:.3g} ms each")
+    if handles:
+        legend_below(figure, handles, ["measured on sequences not fitted", "expected by √k (eq. 3.7)"])
+    return figure
+
+
+def expectation(measured: Array) -> Array:
+    """Return std_sim(k) = sqrt(k std_sim(1)^2) (eq. 3.7), shape as ``measured`` (steps, joints, 4)."""
+    steps = np.arange(1, len(measured) + 1).reshape(-1, 1, 1)
+    expected: Array = np.sqrt(steps * measured[:1] ** 2)
+    return expected
+
+
+def error_propagation_alt(measured: Array, spec: ArmSpec) -> str:
+    """Say in words what :func:`error_propagation` shows."""
+    if len(measured) == 0:
+        return "The propagation of the error was not measured."
+    expected = expectation(measured)
+    joints = measured.shape[1]
+    parts = [
+        f"{kind.name}{of_joint(j, joints)} {measured[-1, j, i]:.3g} measured, {expected[-1, j, i]:.3g} expected "
+        f"{kind.counts}"
+        for j in range(joints)
+        for i, kind in enumerate(quantities(spec))
+    ]
+    return (
+        f"Standard deviation of the error over {len(measured)} steps. After {len(measured)} steps "
+        f"({len(measured) * spec.period:.2g} s): " + "; ".join(parts) + "."
+    )

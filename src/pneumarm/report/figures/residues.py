@@ -1,0 +1,156 @@
+"""The simulation's one-step error: along time and against classes (thesis section 3.3, figures 3.1 and 3.2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.valves import ACTIONS, VALVES
+from pneumarm.report.statistics import Bins, binned, by_group
+from pneumarm.report.style import (
+    DARK,
+    INK,
+    MIDDLE,
+    legend_below,
+    nothing,
+    of_joint,
+    panels,
+    quantities,
+    scatter,
+    second_unit,
+    styled,
+)
+
+Array = NDArray[np.float64]
+
+_SHOWN = 200  # transitions of figure 3.1: one sequence of the thesis
+
+
+@styled
+def residue(observed: Array, simulated: Array, spec: ArmSpec) -> Figure:
+    """Draw the observed angle, the simulated one, and their difference, transition after transition.
+
+    Args:
+        observed: angle of o_{k+1}, shape (n, joints) [counts], in order of time; the first 200 are drawn.
+        simulated: angle of sim_{k+1} (eq. 3.1), the same shape.
+        spec: the arm, for units.
+
+    """
+    joints = observed.shape[1]
+    figure, axes = panels(2, joints, 3.9, sharex=True, height_ratios=(3, 2))
+    angle = quantities(spec)[0]
+    for joint in range(joints):
+        o, s = observed[:_SHOWN, joint], simulated[:_SHOWN, joint]
+        k = np.arange(len(o))
+        above, below = axes[:, joint]
+        seen = above.plot(k, o, "o", color=DARK, ms=3)[0]
+        told = above.plot(k, s, color=MIDDLE, lw=1)[0]
+        above.set_ylabel(angle.in_counts() + of_joint(joint, joints))
+        below.vlines(k, 0, s - o, color=INK, lw=0.9)
+        below.axhline(0, color=INK, lw=0.7)
+        below.set_ylabel("residue [counts]")
+        below.set_xlabel("transition k [-]")
+        second_unit(below, "residue [°]", angle.per_count)
+        if len(o) == 0:
+            nothing(above, "no transitions")
+    legend_below(figure, [seen, told], ["observed", "simulated"])
+    return figure
+
+
+def residue_alt(observed: Array, simulated: Array) -> str:
+    """Say in words what :func:`residue` shows."""
+    if len(observed) == 0:
+        return "There are no transitions to compare."
+    shown = min(len(observed), _SHOWN)
+    error = (simulated - observed)[:_SHOWN]
+    return (
+        f"Observed and simulated angle of {shown} transitions, and their difference below: its mean is "
+        f"{error.mean():.2f} counts, its standard deviation {error.std():.2f} counts, the largest "
+        f"{np.abs(error).max():.1f} counts."
+    )
+
+
+@dataclass(frozen=True)
+class Classification:
+    """What transitions are classified by."""
+
+    label: str
+    """With its unit."""
+    value: Array
+    """Shape (n,)."""
+    actions: bool = False
+    """Whether the values are the actions 0..8 rather than numbers on a scale."""
+
+    def statistics(self, residue: Array) -> Bins:
+        """Return mean and standard deviation of ``residue`` (n,) in each class."""
+        return by_group(self.value, self.value, residue) if self.actions else binned(self.value, residue)
+
+
+@styled
+def residue_by_class(residue: Array, classes: Sequence[Classification], unit: str = "counts") -> Figure:
+    """Draw the residue against every classification, with mean and standard deviation in each class.
+
+    Args:
+        residue: sim_{k+1} - o_{k+1} (eq. 3.2) of one quantity, shape (n,).
+        classes: what the transitions are classified by.
+        unit: the residue's unit.
+
+    """
+    rows = -(-len(classes) // 2)
+    figure, axes = panels(rows, min(2, len(classes)), 2.6 * rows + 0.3, sharey=True)
+    limit = 1.05 * float(np.percentile(np.abs(residue), 99.8)) if len(residue) else 1.0
+    for place, kind in zip(axes.flat, classes, strict=False):
+        place.set_xlabel(kind.label)
+        place.set_ylabel(f"residue [{unit}]")
+        place.set_ylim(-limit or -1, limit or 1)
+        if len(residue) == 0:
+            nothing(place, "no transitions")
+            continue
+        x = kind.value
+        if kind.actions:
+            # A fixed pattern instead of random jitter: the same data must give the same picture.
+            x = x + 0.6 * (np.arange(len(x)) * 0.618034 % 1 - 0.5)
+            place.set_xticks(range(ACTIONS), [_valve_signs(a) for a in range(ACTIONS)])
+        else:
+            low, high = np.percentile(x, (0.2, 99.8))
+            place.set_xlim(low, high) if high > low else None
+        scatter(place, x, residue, s=3, alpha=0.25)
+        stats = kind.statistics(residue)
+        place.errorbar(stats.centre, stats.mean, stats.std, fmt="s-" if not kind.actions else "s", color=MIDDLE,
+                       ms=4, capsize=2.5, lw=1.2, mec=INK, mew=0.5)  # fmt: skip
+    for place in list(axes.flat)[len(classes) :]:
+        place.set_visible(False)
+    return figure
+
+
+def residue_by_class_alt(residue: Array, classes: Sequence[Classification], unit: str = "counts") -> str:
+    """Say in words what :func:`residue_by_class` shows: the trend in every classification."""
+    if len(residue) == 0:
+        return "There are no transitions to classify."
+    sentences = []
+    for kind in classes:
+        stats = kind.statistics(residue)
+        if len(stats.mean) == 0:
+            continue
+        least, most = int(np.argmin(stats.std)), int(np.argmax(stats.std))
+        sentences.append(
+            f"By {kind.label}: class means from {stats.mean.min():.2f} to {stats.mean.max():.2f} {unit}, standard "
+            f"deviation from {stats.std[least]:.2f} (at {_at(kind, stats, least)}) to {stats.std[most]:.2f} "
+            f"(at {_at(kind, stats, most)}) {unit}."
+        )
+    return f"Residue of {len(residue):,} transitions, with mean and standard deviation a class. " + " ".join(
+        sentences
+    )
+
+
+def _at(kind: Classification, stats: Bins, index: int) -> str:
+    value = stats.centre[index]
+    return _valve_signs(int(value)) if kind.actions else f"{value:.3g}"
+
+
+def _valve_signs(action: int) -> str:
+    """Return the action's two valve settings: + in, 0 closed, − out."""
+    return "".join({-1: "−", 0: "0", 1: "+"}[int(v)] for v in VALVES[action])

@@ -1,0 +1,213 @@
+"""The tables of the report: the ledger of a transfer, and our figures beside the thesis' figures."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.report import thesis
+from pneumarm.report.data import Episodes, QualityData, TransferData
+from pneumarm.report.figures import expectation
+from pneumarm.report.page import Table
+from pneumarm.report.statistics import Estimate, mean_estimate, rate_estimate
+
+MISSING = "–"
+_PHASES = {"before": "on arrival", "learning": "while learning", "after": "after adaptation"}
+
+
+def ledger(test: Episodes | None, transfer: TransferData | None) -> Table:
+    """Return reward, success, actions and switches in the simulation and on the arm, with 95% intervals."""
+    rows = [_ledger_row("in the simulation", test, on_arm=False)] if test is not None else []
+    if transfer is not None:
+        rows += [_ledger_row(_PHASES[name], phase, on_arm=True) for name, phase in transfer.phases.items()]
+    header = (
+        "",
+        "episodes",
+        "reward",
+        "success",
+        "actions",
+        "… of successes",
+        "switches",
+        "… of successes",
+        "arm time",
+    )
+    return Table(
+        header,
+        rows,
+        "The ledger: means over the episodes with 95% confidence intervals in brackets (normal approximation, for "
+        "the success Wilson's; episodes taken as independent; none below 30 episodes). Greedy and without learning, "
+        "except while learning. Arm time holds everything, the way to the begin states too.",
+    )
+
+
+def _ledger_row(name: str, episodes: Episodes, *, on_arm: bool) -> list[str]:
+    won = episodes.success
+    return [
+        name,
+        f"{len(episodes):,}",
+        with_interval(mean_estimate(episodes.reward), "{:.2f}"),
+        with_interval(rate_estimate(won), "{:.1%}"),
+        with_interval(mean_estimate(episodes.actions), "{:.1f}"),
+        with_interval(mean_estimate(episodes.actions[won]), "{:.1f}"),
+        with_interval(mean_estimate(episodes.switches), "{:.2f}"),
+        with_interval(mean_estimate(episodes.switches[won]), "{:.2f}"),
+        duration(arm_time(episodes)) if on_arm else MISSING,
+    ]
+
+
+def arm_time(episodes: Episodes) -> float:
+    """Return the time [s] from the begin of the first episode to the end of the last."""
+    return float(episodes.time_end[-1] - episodes.time_start[0]) if len(episodes) else 0.0
+
+
+def with_interval(estimate: Estimate, form: str) -> str:
+    """Return an estimate for people: mean and, where there is one, its interval."""
+    if math.isnan(estimate.mean):
+        return MISSING
+    mean, low, high = (form.format(value).replace("-", "−") for value in estimate[:3])
+    # The interval stays together when a narrow column breaks the line.
+    return mean if math.isnan(estimate.low) else f"{mean} ({low}\u00a0to\u00a0{high})"
+
+
+def duration(seconds: float) -> str:
+    """Return a time for people."""
+    if seconds >= 5400:
+        return f"{seconds / 3600:.1f} h"
+    return f"{seconds / 60:.0f} min" if seconds >= 90 else f"{seconds:.2g} s"
+
+
+def beside_thesis(
+    results: Mapping[str, Any],
+    quality: QualityData | None,
+    test: Episodes | None,
+    transfer: TransferData | None,
+    spec: ArmSpec,
+) -> Table:
+    """Return our figures beside the thesis' figures, with the place they stand in."""
+    rows = [
+        *_collected(results),
+        *_simulated(results, quality, spec),
+        *_learned(results, test),
+        *_moved(test, transfer),
+    ]
+    return Table(
+        ("", "ours", "thesis", "where in the thesis"),
+        rows,
+        "Our figures beside the thesis' figures. Its arm is another one, with other muscles and a "
+        "worn angle sensor, so "
+        "that the comparison is one of magnitude.",
+        words=True,
+    )
+
+
+def _collected(results: Mapping[str, Any]) -> list[list[str]]:
+    collect, kept = results.get("collect", {}), results.get("filter", {})
+    return [
+        ["transitions collected", _number(collect.get("transitions")), f"{thesis.TRANSITIONS:,}", "section 3.2.2"],
+        ["arm time of collecting", _time(collect.get("seconds")), f"{thesis.COLLECT_HOURS:g} h", "section 3.2.2"],
+        ["kept by the filter", _number(kept.get("kept")), f"about {thesis.FILTERED:,}", "section 3.2.3"],
+    ]
+
+
+def _simulated(results: Mapping[str, Any], quality: QualityData | None, spec: ArmSpec) -> list[list[str]]:
+    std = results.get("simulation", {}).get("std", {})
+    rows = []
+    for name, value in thesis.STEP_STD.items():
+        unit = "counts/ms" if name == "velocity" else "counts"
+        words = name.replace("_", " ")
+        rows.append(
+            [f"std of one-step error, {words} [{unit}]", _decimals(std.get(name)), f"{value:.2f}", "table 5.2"]
+        )
+    if quality is None or len(quality.propagation) == 0:
+        return rows
+    second = min(len(quality.propagation), round(1 / spec.period))
+    seconds = second * spec.period
+    for i, name in ((0, "angle"), (2, "pressure_1"), (3, "pressure_2")):
+        measured = quality.propagation[second - 1, :, i]
+        expected = expectation(quality.propagation)[second - 1, :, i]
+        rows.append(
+            [
+                f"std of error after {seconds:.2g} s, {name.replace('_', ' ')} [counts]",
+                f"{_decimals(measured)} measured, {_decimals(expected)} by eq. 3.7",
+                f"{thesis.SECOND_STD[name]:.2f} by eq. 3.7",
+                "table 5.2",
+            ]
+        )
+    return rows
+
+
+def _learned(results: Mapping[str, Any], test: Episodes | None) -> list[list[str]]:
+    trained = results.get("training", {})
+    best, optimal = thesis.REWARD_TRIAL_10, thesis.REWARD_OPTIMAL
+    few, many = thesis.EPISODES_OPTIMAL.min(), thesis.EPISODES_OPTIMAL.max()
+    rows = [
+        ["episodes of training", _number(trained.get("episodes")), f"{few:,} to {many:,}", "table C.18, one agent"],
+        ["time of training", _time(trained.get("seconds")), f"about {thesis.TRAIN_MINUTES:g} min",
+         "section 5.5, one agent"],
+    ]  # fmt: skip
+    if test is None:
+        return rows
+    reward, success = mean_estimate(test.reward), rate_estimate(test.success)
+    actions, switches = mean_estimate(test.actions), mean_estimate(test.switches)
+    best_actions, best_switches = thesis.ACTIONS_TRIAL_10, thesis.SWITCHES_TRIAL_10
+    return [
+        *rows,
+        ["reward in the simulation", with_interval(reward, "{:.2f}"),
+         f"{_runs(best)} best trial; {_runs(optimal)} settings derived as optimal", "tables 5.5 (trial 10) and 5.7"],
+        ["success in the simulation", with_interval(success, "{:.2%}"), thesis.SUCCESS, "section 5.6.1"],
+        ["actions an episode", with_interval(actions, "{:.2f}"), _runs(best_actions), "table C.8, trial 10"],
+        ["switches an episode", with_interval(switches, "{:.2f}"), _runs(best_switches), "table C.9, trial 10"],
+    ]  # fmt: skip
+
+
+def _moved(test: Episodes | None, transfer: TransferData | None) -> list[list[str]]:
+    if test is None or transfer is None or len(transfer.before) == 0:
+        return []
+    came, home = transfer.before, test
+    least, most = thesis.SWITCHES_RISE
+    rows = [
+        ["actions of successes, simulation → on arrival",
+         f"{_mean(home.actions[home.success])} → {_mean(came.actions[came.success])}",
+         f"about {thesis.ACTIONS_SIMULATION:g} → {thesis.ACTIONS_ON_ARRIVAL:g}", "section 5.5.1"],
+        ["drop of the reward on arrival", _mean(home.reward, came.reward), f"over {thesis.REWARD_DROP:g}",
+         "section 5.5.1"],
+        ["rise of the switches of successes on arrival",
+         _mean(came.switches[came.success], home.switches[home.success]),
+         f"{least:g} learning, {most:g} not", "section 5.5.1"],
+        ["success on arrival", with_interval(rate_estimate(came.success), "{:.1%}"), thesis.SUCCESS, "section 5.6.1"],
+    ]  # fmt: skip
+    if len(transfer.after):
+        now = transfer.after
+        rows += [
+            ["success after adaptation", with_interval(rate_estimate(now.success), "{:.1%}"), thesis.SUCCESS,
+             "section 5.6.1"],
+            ["reward gained by adaptation", _mean(now.reward, came.reward), MISSING, "figure 5.9, not in numbers"],
+            ["learning on the arm", f"{len(transfer.learning):,} episodes, {duration(arm_time(transfer.learning))}",
+             f"about {thesis.EPISODES_TO_PROGRESS} episodes, an hour, to real progress; "
+             f"{thesis.TRAIN_ON_ARM_HOURS:g} h estimated without any simulation", "sections 5.5 and 5.5.1"],
+        ]  # fmt: skip
+    return rows
+
+
+def _mean(values: Any, less: Any = (0.0,)) -> str:
+    """Return the difference of two means, or a mean where there is nothing to take off."""
+    return f"{np.mean(values) - np.mean(less):.1f}" if len(values) and len(less) else MISSING
+
+
+def _runs(values: Any) -> str:
+    return f"{np.mean(values):.2f} ({np.min(values):.2f} to {np.max(values):.2f} in {len(values)} runs)"
+
+
+def _number(value: float | None) -> str:
+    return MISSING if value is None else f"{value:,.0f}"
+
+
+def _time(value: float | None) -> str:
+    return MISSING if value is None else duration(value)
+
+
+def _decimals(value: float | Sequence[float] | Any) -> str:
+    """Return one number, or one a joint."""
+    return MISSING if value is None else ", ".join(f"{v:.2f}" for v in np.atleast_1d(value))

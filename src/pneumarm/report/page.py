@@ -1,0 +1,94 @@
+"""One self-contained HTML page of sections with text, figures and tables; it asks nothing of any network."""
+
+import base64
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from pneumarm.report.style import svg
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure, what it shows in general (caption) and what is to be seen in it (text alternative)."""
+
+    figure: Figure
+    caption: str
+    alt: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; the first cell of each row is its heading."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str
+    words: bool = False
+    """Whether the cells hold words, set to the left, rather than numbers, set to the right."""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.header):
+                raise ValueError(f"a row of {len(self.header)} cells was expected, got {row!r}")
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the page: paragraphs, then its tables, then its pictures."""
+
+    title: str
+    text: Sequence[str] = ()
+    figures: Sequence[Picture] = ()
+    tables: Sequence[Table] = field(default=())
+
+    @property
+    def anchor(self) -> str:
+        """The section's id on the page."""
+        return "section-" + re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
+
+
+def render(title: str, summary: Sequence[str], sections: Sequence[Section]) -> str:
+    """Return the page as HTML text; the same sections give the same text.
+
+    Args:
+        title: of the page.
+        summary: paragraphs under the title.
+        sections: in order; their titles must differ.
+
+    """
+    anchors = [section.anchor for section in sections]
+    if len(set(anchors)) != len(anchors):
+        raise ValueError(f"the titles of sections must differ, got {[s.title for s in sections]}")
+    environment = Environment(
+        loader=PackageLoader("pneumarm.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["embedded"] = embedded
+    template = environment.get_template("page.html")
+    return template.render(title=title, summary=summary, sections=list(_numbered(sections)))
+
+
+def _numbered(sections: Sequence[Section]) -> Iterator[dict[str, Any]]:
+    """Give figures and tables their running numbers."""
+    figures = tables = 0
+    for section in sections:
+        first_figure, first_table = figures + 1, tables + 1
+        figures, tables = figures + len(section.figures), tables + len(section.tables)
+        yield {
+            "section": section,
+            "figures": list(enumerate(section.figures, first_figure)),
+            "tables": list(enumerate(section.tables, first_table)),
+        }
+
+
+def embedded(figure: Figure) -> str:
+    """Return ``figure`` as a data URI. As an image of its own its ids cannot clash with those of another figure."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg(figure).encode()).decode()

@@ -1,0 +1,142 @@
+"""The report of a run: from the files in its folder to one HTML page."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.errors import UnusableInput
+from pneumarm.files import write_json, write_text
+from pneumarm.report.data import (
+    CoverageData,
+    Episodes,
+    Movement,
+    QualityData,
+    Record,
+    TrainingData,
+    TransferData,
+    read_episodes,
+)
+from pneumarm.report.page import render
+from pneumarm.report.sections import RunData, all_sections, collected, predicted, propagated
+
+REPORT = "report.html"
+ANALYSIS = "analysis.html"
+RESULTS = "results.json"
+EPISODES = "episodes.csv"
+SPEC = "arm.json"
+MOVEMENTS = "movement-*.safetensors"
+
+_Record = TypeVar("_Record", bound=Record)
+
+
+def write_report(folder: Path) -> Path:
+    """Write ``report.html`` of the run in ``folder`` and return its path.
+
+    The folder holds ``results.json`` and ``arm.json`` (:func:`save_spec`); what else there is of the records
+    (:class:`CoverageData`, ...), of ``episodes.csv`` and of movements (:func:`save_movement`) enters the report.
+
+    Raises:
+        UnusableInput: a file is missing or is not what it should be.
+
+    """
+    path = folder / REPORT
+    write_text(path, run_page(read_run(folder)))
+    return path
+
+
+def write_analysis(folder: Path, spec: ArmSpec, coverage: CoverageData, quality: QualityData) -> Path:
+    """Write ``analysis.html``, the part of the report on a store and a simulation, to ``folder``."""
+    path = folder / ANALYSIS
+    sections = [collected(coverage, spec), predicted(quality, spec), propagated(quality, spec)]
+    summary = [f"{spec.name}: what was collected, and how well the simulation predicts what it was not fitted to."]
+    write_text(path, render(f"The simulation of {spec.name}", summary, sections))
+    return path
+
+
+def run_page(run: RunData) -> str:
+    """Return the HTML page of ``run``."""
+    return render(f"An arm learns to move: {run.spec.name}", _summary(run), all_sections(run))
+
+
+def save_spec(folder: Path, spec: ArmSpec) -> None:
+    """Write what the report must know of the arm to ``folder``."""
+    write_json(folder / SPEC, asdict(spec))
+
+
+def save_movement(folder: Path, movement: Movement, number: int) -> None:
+    """Write a movement to ``folder``; the report shows movements in the order of their ``number``."""
+    movement.save(folder, MOVEMENTS.replace("*", f"{number:02d}"))
+
+
+def read_run(folder: Path) -> RunData:
+    """Return what the report of the run in ``folder`` is made of.
+
+    Raises:
+        UnusableInput: a file is missing or is not what it should be.
+
+    """
+    results = _read_json(folder / RESULTS)
+    return RunData(
+        spec=_read_spec(folder / SPEC),
+        results=results,
+        coverage=_read(CoverageData, folder),
+        quality=_read(QualityData, folder),
+        training=_read(TrainingData, folder),
+        test=_read(Episodes, folder),
+        transfer=_read_transfer(folder / EPISODES, results),
+        movements=tuple(Movement.load(folder, path.name) for path in sorted(folder.glob(MOVEMENTS))),
+    )
+
+
+def _read(record: type[_Record], folder: Path) -> _Record | None:
+    return record.load(folder) if (folder / record.file).exists() else None
+
+
+def _read_transfer(path: Path, results: dict[str, Any]) -> TransferData | None:
+    if not path.exists():
+        return None
+    phases = read_episodes(path)
+    joints = next(iter(phases.values())).goal.shape[1] if phases else 1
+    before, learning, after = (phases.get(name) or Episodes.none(joints) for name in ("before", "learning", "after"))
+    return TransferData(before, learning, after, float(results.get("transfer", {}).get("learning_rate", 0.0)))
+
+
+def _read_spec(path: Path) -> ArmSpec:
+    stored = _read_json(path)
+    try:
+        return ArmSpec(**{**stored, "angle_range": tuple(stored["angle_range"])})
+    except (TypeError, KeyError, ValueError) as error:
+        raise UnusableInput(f"{path}: expected the spec of an arm, {error}") from error
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UnusableInput(f"{path}: expected a JSON file of a run; finish the run first ({error})") from error
+    if not isinstance(value, dict):
+        raise UnusableInput(f"{path}: expected a JSON object, got {type(value).__name__}")
+    return value
+
+
+def _summary(run: RunData) -> list[str]:
+    spec = run.spec
+    joints = f"{spec.joints} joint{'s' if spec.joints > 1 else ''}"
+    text = [f"{spec.name}: {joints}, {1 / spec.period:.3g} Hz, pressures up to {spec.max_pressure:g} bar."]
+    if run.test is not None and len(run.test):
+        text.append(
+            f"In the simulation the controller reaches {run.test.success.mean():.2%} of its goals "
+            "with a mean reward of "
+            f"{run.test.reward.mean():.2f}."
+        )
+    if run.transfer is not None:
+        parts = [
+            f"{phase.success.mean():.1%} {words} (mean reward {phase.reward.mean():.2f})"
+            for words, phase in (("on arrival", run.transfer.before), ("after adaptation", run.transfer.after))
+            if len(phase)
+        ]
+        if parts:
+            text.append("On the arm it reaches " + " and ".join(parts) + ".")
+    return text

@@ -1,0 +1,335 @@
+"""The sections of a run's report: which figures, with which words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.valves import to_actions
+from pneumarm.report import figures
+from pneumarm.report.data import CoverageData, Episodes, Movement, QualityData, TrainingData, TransferData
+from pneumarm.report.figures import Classification, Phase
+from pneumarm.report.ledger import beside_thesis, ledger
+from pneumarm.report.page import Picture, Section
+from pneumarm.report.style import of_joint, quantities
+
+
+@dataclass(frozen=True)
+class RunData:
+    """Everything that the report of a run is made of; what is None has not been done and is left out."""
+
+    spec: ArmSpec
+    results: Mapping[str, Any]
+    """Contents of ``results.json``."""
+    coverage: CoverageData | None = None
+    quality: QualityData | None = None
+    training: TrainingData | None = None
+    test: Episodes | None = None
+    transfer: TransferData | None = None
+    movements: tuple[Movement, ...] = ()
+
+
+def all_sections(run: RunData) -> list[Section]:
+    """Return the sections of ``run`` in the order of the way of the data."""
+    sections = [overview(run)]
+    if run.coverage is not None:
+        sections.append(collected(run.coverage, run.spec))
+    if run.quality is not None:
+        sections += [predicted(run.quality, run.spec), propagated(run.quality, run.spec)]
+    if run.training is not None:
+        sections.append(trained(run.training, run.spec))
+    if run.test is not None:
+        sections.append(tested(run.test))
+    if run.transfer is not None:
+        sections += [transferred(run.transfer, run.test), by_displacement(run.transfer, run.test, run.spec)]
+    if run.movements:
+        sections.append(moved(run.movements, run.spec))
+    return sections
+
+
+def overview(run: RunData) -> Section:
+    """Return the ledger and the comparison with the thesis."""
+    return Section(
+        "Results",
+        (
+            "The first table is what counts: how well the controller moves in the simulation it was "
+            "trained in, on the "
+            "arm as it arrives there, and after it went on learning on the arm. The second table puts our figures "
+            "beside those of the thesis.",
+        ),
+        tables=(
+            ledger(run.test, run.transfer),
+            beside_thesis(run.results, run.quality, run.test, run.transfer, run.spec),
+        ),
+    )
+
+
+def collected(data: CoverageData, spec: ArmSpec) -> Section:
+    """Return what the collected data covers."""
+    occupied = int(data.cells_holding[1:].sum())
+    text = [
+        f"The filter divides observations and actions into {data.cells:,} cells and keeps at most {data.per_cell} "
+        f"transitions of each, so that the simulation is fitted to all states alike (thesis section 3.2.3). "
+        f"{occupied:,} cells are occupied; the others were not reached, most of them because the arm cannot be there."
+    ]
+    if len(data.growth) > 1:
+        share = figures.new_share(data.growth)
+        verdict = "more data would still reach new states" if share > 0.1 else "more data would add little"
+        text.append(f"The second half of the data added {share:.1%} of the occupied cells: {verdict}.")
+    return Section(
+        "Coverage of the collected data",
+        text,
+        (
+            Picture(
+                figures.projections(data.observation, spec),
+                "Where the observations lie (99.9% of each quantity). White was never observed "
+                "(thesis section 3.2.2; no figure there).",
+                figures.projections_alt(data.observation, spec),
+            ),
+            Picture(
+                figures.cells(data.cells_holding, data.per_cell, data.growth),
+                "Transitions in the cells of the filter's grid and, where it was followed, the "
+                "number of cells occupied "
+                "while collecting (thesis section 3.2.3; no figure there).",
+                figures.cells_alt(data.cells_holding, data.per_cell, data.growth),
+            ),
+        ),
+    )
+
+
+def classifications(data: QualityData, joint: int, spec: ArmSpec) -> list[Classification]:
+    """Return the classes that residues are looked at by: velocity, angle, action (or command) and time."""
+    angle, velocity = quantities(spec)[:2]
+    command = data.command[:, joint]
+    if np.isin(command, (-1, 0, 1)).all():
+        acted = Classification("action (valves of muscle 1, 2)", to_actions(command).astype(float), actions=True)
+    else:
+        acted = Classification("command of muscle 1 [-]", command[:, 0])
+    return [
+        Classification(velocity.in_counts(), data.observation[:, joint, 1]),
+        Classification(angle.in_counts(), data.observation[:, joint, 0]),
+        acted,
+        Classification("time since the begin [min]", data.time / 60),
+    ]
+
+
+def predicted(data: QualityData, spec: ArmSpec) -> Section:
+    """Return residues and isoplots."""
+    joints = data.observation.shape[1]
+    error = data.predicted - data.target
+    real, simulated = data.target - data.observation, data.predicted - data.observation
+    pictures = [
+        Picture(
+            figures.residue(data.target[:, :, 0], data.predicted[:, :, 0], spec),
+            "Observed and simulated angle of successive transitions and the residue between them "
+            "(thesis figure 3.1).",
+            figures.residue_alt(data.target[:, :, 0], data.predicted[:, :, 0]),
+        )
+    ]
+    for joint in range(joints):
+        classes = classifications(data, joint, spec)
+        pictures.append(
+            Picture(
+                figures.residue_by_class(error[:, joint, 0], classes),
+                f"Residue of the angle{of_joint(joint, joints)} against classes of the transitions "
+                "(thesis figure 3.2): "
+                "points are transitions, squares and bars are mean and standard deviation in a class. A trend of the "
+                "means is a bias, a trend of the bars shows where the simulation is unsure. Valves: + in, 0 closed, "
+                "− out.",
+                figures.residue_by_class_alt(error[:, joint, 0], classes),
+            )
+        )
+    caption = (
+        "Simulated against observed change. The closer to the 45° line and the narrower, the better; a slope other "
+        "than 1 is a structural error"
+    )
+    alt = figures.isoplot_alt(real, simulated, spec)
+    pictures += [
+        Picture(figures.isoplot(real, simulated, spec), f"{caption} (thesis figures 3.3 and 3.4).", alt),
+        Picture(
+            figures.isoplot(real, simulated, spec, density=True),
+            f"{caption}; coloured by the number of transitions (thesis figure 3.5).",
+            alt,
+        ),
+    ]
+    return Section(
+        "Residues and isoplots of the simulation",
+        (
+            f"The simulation's prediction one step ahead, on {len(error):,} transitions of sequences that it was not "
+            "fitted to (thesis section 3.3).",
+        ),
+        pictures,
+    )
+
+
+def propagated(data: QualityData, spec: ArmSpec) -> Section:
+    """Return the error over many steps and, where there is one, the importance of the inputs."""
+    pictures = [
+        Picture(
+            figures.error_propagation(data.propagation, spec),
+            "Standard deviation of the error when the simulation runs freely, beside the growth with "
+            "the square root of "
+            "the steps that uncorrelated errors would give (thesis eq. 3.7; no figure there).",
+            figures.error_propagation_alt(data.propagation, spec),
+        )
+    ]
+    if data.weights.size:
+        pictures.append(
+            Picture(
+                figures.input_importance(data.weights, data.inputs, data.outputs),
+                "Weights of a least-squares fit as the importance of its inputs: the change of an output, in its "
+                "standard deviations, for one standard deviation of the input (thesis section 3.2.4; "
+                "no figure there).",
+                figures.input_importance_alt(data.weights, data.inputs, data.outputs),
+            )
+        )
+    return Section(
+        "Error propagation",
+        (
+            "Small errors add up over a movement. Above the dashed line errors of successive steps are alike and add "
+            "up faster than chance; below it the arm's own dynamics pull the simulation back.",
+        ),
+        pictures,
+    )
+
+
+def trained(data: TrainingData, spec: ArmSpec) -> Section:
+    """Return the shaping curves and the spread of the agents."""
+    return Section(
+        "Training in the simulation",
+        (
+            f"{len(data.evaluated)} agents learn at once from different initial weights, because these decide most "
+            "(thesis section 5.4.2); the best in a validation of its own is kept. Shaping lets begin "
+            "states lie farther "
+            "from the goal as the agent meets its criterium (thesis section 4.3.2).",
+        ),
+        (
+            Picture(
+                figures.shaping_curves(
+                    data.episodes, data.deviation, data.criterium, data.performance, data.epsilon, data.temperature,
+                    data.evaluated, data.chosen, spec,
+                ),
+                "Deviation, performance with its criterium, exploration and temperature over the episodes (thesis "
+                "figure 4.3 shows the last three over the deviation).",
+                figures.shaping_curves_alt(
+                    data.episodes, data.deviation, data.performance, data.evaluated, data.chosen, spec
+                ),
+            ),
+            Picture(
+                figures.spread_of_agents(data.reward, data.success, data.chosen),
+                "Validation of all agents, ordered by reward (compare the spread over runs in thesis tables 5.5 and "
+                "5.7).",
+                figures.spread_of_agents_alt(data.reward, data.success, data.chosen),
+            ),
+        ),
+    )  # fmt: skip
+
+
+def tested(test: Episodes) -> Section:
+    """Return the distribution of the test's episodes."""
+    numbers = (test.reward, test.actions, test.switches, test.success)
+    return Section(
+        "Test in the simulation",
+        (
+            f"{len(test):,} greedy movements from all begin states to all goals in the noisy "
+            "simulation (thesis section 5.2).",
+        ),
+        (
+            Picture(
+                figures.distributions(*numbers),
+                "Reward, actions and switches of the test's episodes; the dashed line is the median. "
+                "Values beyond the "
+                "drawn range are counted in the outermost bar (thesis section 5.2; no figure there).",
+                figures.distributions_alt(*numbers),
+            ),
+        ),
+    )
+
+
+def transferred(data: TransferData, test: Episodes | None) -> Section:
+    """Return the curves of the transfer."""
+    phases = phases_of(data)
+    reference = levels(test) if test is not None else {}
+    return Section(
+        "Transfer to the arm",
+        (
+            "The controller on the arm: first as it arrives, then learning with a rate of "
+            f"{data.learning_rate:g}, then as it has become. The step between the dashed line and the first phase is "
+            "the reality gap.",
+        ),
+        (
+            Picture(
+                figures.transfer_curves(phases, reference),
+                "Reward, success, actions and switches on the arm (thesis figures 5.9 to 5.12; as there actions and "
+                "switches are those of successful episodes). Averages do not reach over the borders of the phases.",
+                figures.transfer_curves_alt(phases, reference),
+            ),
+        ),
+    )
+
+
+def phases_of(data: TransferData) -> list[Phase]:
+    """Return the phases with their time counted from the begin of the first episode."""
+    starts = [p.time_start[0] for p in data.phases.values() if len(p)]
+    begin = starts[0] if starts else 0.0
+    return [
+        Phase(name, p.reward, p.success, p.actions, p.switches, p.time_end - begin) for name, p in data.phases.items()
+    ]
+
+
+def levels(test: Episodes) -> dict[str, float]:
+    """Return the levels of the simulation's test that the curves of the transfer are compared with."""
+    if len(test) == 0:
+        return {}
+    won = test.success
+    found = {"reward": float(test.reward.mean()), "success_rate": float(won.mean())}
+    if won.any():
+        found |= {"actions": float(test.actions[won].mean()), "switches": float(test.switches[won].mean())}
+    return found
+
+
+def by_displacement(data: TransferData, test: Episodes | None, spec: ArmSpec) -> Section:
+    """Return actions and switches against displacement, on the arm and in the simulation."""
+    pictures = []
+    arrived = data.after if len(data.after) else data.before
+    for name, episodes in (("on the arm after adaptation", arrived), ("in the simulation's test", test)):
+        if episodes is None:
+            continue
+        where = "on the arm on arrival" if episodes is data.before else name
+        won = episodes.success
+        numbers = (episodes.distance[won], episodes.actions[won], episodes.switches[won])
+        pictures.append(
+            Picture(
+                figures.against_displacement(*numbers, spec),
+                f"Actions and switches of successful episodes {where} against their angular displacement (thesis "
+                "figures 5.15 and 5.16). Points are shifted up and down a little to show how many there are.",
+                figures.against_displacement_alt(*numbers, spec),
+            )
+        )
+    return Section(
+        "Actions and switches by displacement",
+        (
+            "Longer movements take more actions; short ones are often less smooth for their length (thesis section "
+            "5.5.2).",
+        ),
+        pictures,
+    )
+
+
+def moved(movements: tuple[Movement, ...], spec: ArmSpec) -> Section:
+    """Return the typical movements."""
+    pictures = []
+    for m in movements:
+        numbers = (m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec)
+        pictures.append(
+            Picture(
+                figures.movement(*numbers),
+                f"A movement on the arm: {m.name} (compare thesis figures 5.17 to 5.19, which have "
+                "neither pressures nor "
+                "valve signals). The dotted line is where the control ends.",
+                figures.movement_alt(*numbers),
+            )
+        )
+    return Section("Typical movements", ("Angle, pressures and valves of both muscles against time.",), pictures)

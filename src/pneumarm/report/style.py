@@ -1,0 +1,185 @@
+"""The one style of all figures: print quality, readable in grey and by the colour-blind.
+
+The three inks differ in lightness as well as in hue, and every series has its own line style and marker, so that
+nothing is told by colour alone. Figures are matplotlib's object-oriented ``Figure``; no global state is left behind.
+"""
+
+import functools
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ParamSpec
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from pneumarm.arm.seam import ArmSpec
+
+WIDTH = 7.4
+"""Width of every figure [inch]."""
+INK = "#1a1a1a"
+DARK = "#12476b"
+"""Blue, about 30% light: what the figure is about."""
+MIDDLE = "#d1602b"
+"""Orange, about 53% light: what it is compared with."""
+LIGHT = "#dcb24c"
+"""Sand, about 75% light: a third thing, or areas."""
+GREY = "#8a8a8a"
+PALE = "#d9d9d9"
+DENSITY = "cividis_r"
+"""Colour map of counts: light is few, dark is many, in colour and in grey."""
+RASTER_DPI = 170
+_MANY = 400  # from so many points on a scatter is stored as pixels inside the SVG
+_MOST = 6_000  # points of a scatter; more only blacken it and make the page heavy
+
+_RC: Any = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
+    "font.size": 8.5,
+    "axes.titlesize": 9,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8.5,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.fontsize": 8,
+    "legend.frameon": True,
+    "legend.framealpha": 0.9,
+    "legend.edgecolor": "none",
+    "lines.linewidth": 1.4,
+    "lines.markersize": 4,
+    "hatch.linewidth": 0.5,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "pneumarm",  # ids in the SVG must not change from run to run
+    "text.parse_math": True,
+}
+
+_Arguments = ParamSpec("_Arguments")
+
+
+def styled(draw: Callable[_Arguments, Figure]) -> Callable[_Arguments, Figure]:
+    """Let the function ``draw`` build its figure in the style of the report."""
+
+    @functools.wraps(draw)
+    def drawn(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> Figure:
+        with _style():
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+def _style() -> Any:
+    return matplotlib.rc_context(_RC)
+
+
+def panels(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
+    """Return a figure ``height`` inches high and its axes, shape (rows, columns)."""
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def svg(figure: Figure) -> str:
+    """Return ``figure`` as SVG text; the same figure gives the same text."""
+    buffer = io.StringIO()
+    with _style():
+        figure.savefig(buffer, format="svg", dpi=RASTER_DPI, metadata={"Date": None, "Creator": None})
+    return buffer.getvalue()
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One of the four quantities of an observation, and how people read it."""
+
+    name: str
+    symbol: str
+    counts: str
+    """Unit as stored."""
+    unit: str
+    """Unit for people."""
+    per_count: float
+    """How many of the unit for people one stored unit is."""
+
+    def in_counts(self, prefix: str = "") -> str:
+        """Return an axis label in stored units."""
+        return f"{prefix}{self.name} [{self.counts}]"
+
+    def in_units(self, prefix: str = "") -> str:
+        """Return an axis label in units for people."""
+        return f"{prefix}{self.name} [{self.unit}]"
+
+
+def quantities(spec: ArmSpec) -> tuple[Quantity, ...]:
+    """Return angle, velocity, pressure 1 and pressure 2 for the sensors of ``spec``."""
+    angle, pressure = 1 / spec.counts_per_degree, 1 / spec.counts_per_bar
+    return (
+        Quantity("angle", r"\theta", "counts", "°", angle),
+        Quantity("velocity", r"\omega", "counts/ms", "°/s", 1e3 * angle),
+        Quantity("pressure 1", r"p_1", "counts", "bar", pressure),
+        Quantity("pressure 2", r"p_2", "counts", "bar", pressure),
+    )
+
+
+def of_joint(joint: int, joints: int) -> str:
+    """Return " of joint 2" where there is more than one, else nothing."""
+    return f" of joint {joint + 1}" if joints > 1 else ""
+
+
+def second_unit(axes: Axes, label: str, per_unit: float, side: str = "right") -> None:
+    """Add a second scale to ``axes``: ``per_unit`` of its unit for each unit of the first."""
+
+    def forward(value: Any) -> Any:
+        return np.asarray(value) * per_unit
+
+    def back(value: Any) -> Any:
+        return np.asarray(value) / per_unit
+
+    if side == "right":
+        axes.secondary_yaxis("right", functions=(forward, back)).set_ylabel(label)
+    else:
+        axes.secondary_xaxis("top", functions=(forward, back)).set_xlabel(label)
+
+
+def scatter(axes: Axes, x: Any, y: Any, **options: Any) -> None:
+    """Draw points, thinned out evenly where they are too many; many of them as pixels, to keep the page small."""
+    thin = slice(None, None, -(-len(x) // _MOST) or 1)
+    x, y = x[thin], y[thin]
+    settings = {"s": 5, "color": DARK, "linewidths": 0, "alpha": 0.35, **options}
+    axes.scatter(x, y, rasterized=len(x) > _MANY, **settings)
+
+
+def whole_ticks(axes: Axes, which: str = "x") -> None:
+    """Put ticks of ``axes`` at whole numbers only."""
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_locator(MaxNLocator(integer=True, nbins="auto", min_n_ticks=1))
+
+
+def nothing(axes: Axes, why: str) -> None:
+    """Say in an empty panel why it is empty."""
+    axes.text(0.5, 0.5, why, transform=axes.transAxes, ha="center", va="center", color=INK)
+
+
+def key(color: str, linestyle: Any = "-", **options: Any) -> Line2D:
+    """Return an entry for a legend."""
+    return Line2D([], [], color=color, linestyle=linestyle, **options)
+
+
+def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
+    """Put one legend for all panels below them, where it hides no data."""
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(handles), 4), frameon=False)

@@ -1,0 +1,227 @@
+"""The whole job, stage by stage, from an arm to a controller that adapts on it; it can be interrupted anywhere.
+
+A folder holds a run: ``settings.json`` (what was asked for), ``transitions.db``, ``simulation.safetensors``,
+``agent.safetensors``, ``adapted.safetensors``, ``episodes.csv``, ``report.html``, and ``results.json``, which
+grows by the stages that are done. A second call with the same folder goes on after the last of them.
+"""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from pneumarm.analysis import analyse
+from pneumarm.arm import Arm, open_arm
+from pneumarm.console import Report, jsonable
+from pneumarm.control import TransferSettings, transfer, write_episodes
+from pneumarm.errors import UnusableInput
+from pneumarm.files import require_folder, write_json
+from pneumarm.learning import Agent, BeginStates, TrainSettings, begin_states, train
+from pneumarm.learning import test as test_agent
+from pneumarm.records import demonstrate, test_record, training_record
+from pneumarm.report import save_movement, save_spec, write_report
+from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectSettings, Store, collect
+
+Progress = Callable[[str], AbstractContextManager[Report]]
+
+
+@contextmanager
+def silent(title: str) -> Iterator[Report]:
+    """Show no progress."""
+    yield lambda done, total: None
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What a run is asked for. A folder is resumed with the same settings only."""
+
+    arm: str = "virtual"
+    """virtual, virtual:seed=N, simulation:FILE or python:module:callable."""
+    seed: int = 0
+    """Of everything that is drawn at random."""
+    joints: int = 1
+    """Joints of the arm."""
+    transitions: int = 200_000
+    """How many to collect (thesis section 3.2.2: 200,000, two hours)."""
+    test_episodes: int = 10_000
+    """Movements of the test in simulation (thesis section 5.2)."""
+    collect: CollectSettings = field(default_factory=CollectSettings)
+    fit: FitSettings = field(default_factory=FitSettings)
+    train: TrainSettings = field(default_factory=TrainSettings)
+    transfer: TransferSettings = field(default_factory=TransferSettings)
+
+    def __post_init__(self) -> None:
+        if self.transitions < FEWEST_TRANSITIONS:
+            raise UnusableInput(f"a run needs at least {FEWEST_TRANSITIONS:,} transitions, got {self.transitions:,}")
+        if self.test_episodes < 1:
+            raise UnusableInput(f"a run needs at least 1 test episode, got {self.test_episodes}")
+
+
+class Run:
+    """A run in a folder. Every stage leaves its files first and then its figures in ``results.json``."""
+
+    def __init__(self, folder: Path, settings: RunSettings, progress: Progress = silent) -> None:
+        """Take up the run in ``folder``, or begin it.
+
+        Raises:
+            UnusableInput: the folder's parent is missing, it holds something else, or a run with other settings.
+
+        """
+        self.folder, self.settings, self.progress = folder, settings, progress
+        self.results: dict[str, Any] = {}
+        self.store = folder / "transitions.db"
+        self.simulation = folder / "simulation.safetensors"
+        self.agent = folder / "agent.safetensors"
+        self.adapted = folder / "adapted.safetensors"
+        self.episodes = folder / "episodes.csv"
+        self._claim()
+
+    def _claim(self) -> None:
+        folder, wanted = self.folder, json.loads(json.dumps(asdict(self.settings)))
+        require_folder(folder)
+        file = folder / "settings.json"
+        if file.exists():
+            found = _read_json(file)
+            if found != wanted:
+                raise UnusableInput(
+                    f"{folder}: holds a run with other settings ({_differences(found, wanted)}); "
+                    "give the same ones or another folder"
+                )
+            if self._results_file.exists():
+                self.results = _read_json(self._results_file)
+        elif folder.is_dir() and any(folder.iterdir()):
+            raise UnusableInput(f"{folder}: is not empty and holds no run; give another folder")
+        elif folder.exists() and not folder.is_dir():
+            raise UnusableInput(f"{folder}: is a file; give a folder")
+        else:
+            open_arm_checked(self.settings).close()  # a wrong arm is found before anything is written
+            folder.mkdir(exist_ok=True)
+            write_json(file, wanted)
+
+    @property
+    def _results_file(self) -> Path:
+        return self.folder / "results.json"
+
+    def do(self) -> dict[str, Any]:
+        """Do all stages that are not done yet and return the results."""
+        for name, stage in (
+            ("collect", self._collect),
+            ("simulation", self._fit),
+            ("training", self._train),
+            ("test", self._test),
+            ("transfer", self._transfer),
+        ):
+            if name not in self.results:
+                began = time.perf_counter()
+                figures = stage()
+                wall = {name: round(time.perf_counter() - began, 3)}
+                self.results |= figures
+                self.results["wall_seconds"] = self.results.get("wall_seconds", {}) | wall
+                write_json(self._results_file, jsonable(self.results))
+        if not (self.folder / "report.html").exists():
+            with self.progress("report") as report:
+                report(0, 1)
+                write_report(self.folder)
+                report(1, 1)
+        return self.results
+
+    def _collect(self) -> dict[str, Any]:
+        wanted = self.settings
+        with (
+            self.progress("collecting") as report,
+            open_arm_checked(wanted) as arm,
+            Store.for_arm(self.store, arm.spec) as store,
+        ):
+            collected = collect(arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect)
+            save_spec(self.folder, arm.spec)
+        return {"collect": asdict(collected)}
+
+    def _fit(self) -> dict[str, Any]:
+        with self.progress("fitting the simulation") as report, Store.open(self.store) as store:
+            fitted = fit_store(store, replace(self.settings.fit, seed=self.settings.seed), progress=report)
+            analysis = analyse(store, fitted.simulation, fitted.filtered)
+        fitted.simulation.save(self.simulation)
+        analysis.save(self.folder)
+        return {"filter": analysis.figures["filter"], "simulation": fitted.results() | analysis.figures}
+
+    def _train(self) -> dict[str, Any]:
+        simulation = Simulation.load(self.simulation)
+        with self.progress("training") as report:
+            training = train(
+                simulation,
+                self._begin_states(simulation),
+                self.settings.train,
+                seed=self.settings.seed,
+                progress=lambda now: report(100 * now.share, 100),
+                checkpoint=self.folder / "training.checkpoint",
+            )
+        training.agent.save(self.agent)
+        training_record(training).save(self.folder)
+        return {"training": training.results()}
+
+    def _test(self) -> dict[str, Any]:
+        simulation = Simulation.load(self.simulation)
+        tested = test_agent(
+            Agent.load(self.agent),
+            simulation,
+            self._begin_states(simulation),
+            self.settings.test_episodes,
+            self.settings.seed,
+        )
+        test_record(tested).save(self.folder)
+        return {"test": tested.results()}
+
+    def _transfer(self) -> dict[str, Any]:
+        wanted = self.settings
+        with (
+            self.progress("moving on the arm") as report,
+            open_arm_checked(wanted) as arm,
+            Store.append_to(self.store) as store,
+        ):
+            moved = transfer(Agent.load(self.agent), arm, store, wanted.transfer, seed=wanted.seed, progress=report)
+            movements = demonstrate(moved.agent, arm, wanted.seed)
+        moved.agent.save(self.adapted)
+        write_episodes(self.episodes, moved.episodes)
+        for number, movement in enumerate(movements):
+            save_movement(self.folder, movement, number)
+        return {"transfer": moved.results()}
+
+    def _begin_states(self, simulation: Simulation) -> BeginStates:
+        with Store.open(self.store) as store:
+            # Collected sequences only: those of the transfer come later, and a resumed run must see the same.
+            return begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+
+
+def open_arm_checked(settings: RunSettings) -> Arm:
+    """Open the arm of a run.
+
+    Raises:
+        UnusableInput: there is no such arm, or it has another number of joints.
+
+    """
+    arm = open_arm(settings.arm, settings.seed)
+    if arm.spec.joints != settings.joints:
+        arm.close()
+        raise UnusableInput(f"{settings.arm} has {arm.spec.joints} joint(s), asked for are {settings.joints}")
+    return arm
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise UnusableInput(f"{path}: cannot be read ({error}); remove the folder or give another") from error
+
+
+def _differences(found: Any, wanted: Any, place: str = "") -> str:
+    if not (isinstance(found, dict) and isinstance(wanted, dict)):
+        return f"{place} was {found!r}, is {wanted!r}"
+    names = [name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name)]
+    return ", ".join(
+        _differences(found.get(name), wanted.get(name), f"{place}.{name}" if place else name)
+        for name in sorted(names)
+    )

@@ -1,0 +1,172 @@
+"""Arrays as a run leaves them, made up but of realistic size and shape; every builder takes a seed."""
+
+import numpy as np
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.report import CoverageData, Episodes, Movement, QualityData, RunData, TrainingData, TransferData
+from pneumarm.transitions.window import QUANTITIES, Window
+
+
+def observations(n, joints, random):
+    """Angles, velocities and pressures (n, joints, 4) that hang together as on an antagonistic joint."""
+    pressure = 170 * random.beta(1.3, 1.6, (n, joints, 2))
+    angle = 512 + 2.4 * (pressure[..., 0] - pressure[..., 1]) + random.normal(0, 18, (n, joints))
+    velocity = random.standard_t(3, (n, joints)) * 0.6
+    return np.stack([angle, velocity, pressure[..., 0], pressure[..., 1]], axis=2)
+
+
+def coverage(n=20_000, joints=1, seed=0):
+    random = np.random.default_rng(seed)
+    counts = random.geometric(0.09, 5200 if n else 0)
+    grown = np.linspace(n / 20, n, 20)
+    growth = np.stack([grown, 5200 * (1 - np.exp(-grown / (0.3 * max(n, 1))))], axis=1).astype(np.int64)
+    return CoverageData(
+        observation=observations(n, joints, random),
+        cells_holding=np.bincount(counts, minlength=1),
+        cells=36_864**joints,
+        per_cell=5,
+        growth=growth if n else np.empty((0, 2), np.int64),
+    )
+
+
+def quality(n=12_000, joints=1, seed=0, steps=30, continuous=False):
+    random = np.random.default_rng(seed)
+    now = observations(n, joints, random)
+    valves = random.uniform(-1, 1, (n, joints, 2)) if continuous else random.integers(-1, 2, (n, joints, 2))
+    change = np.stack(
+        [
+            33 * now[..., 1] + 6 * (valves[..., 0] - valves[..., 1]),
+            0.1 * (valves[..., 0] - valves[..., 1]) - 0.3 * now[..., 1],
+            9 * valves[..., 0] - 0.02 * now[..., 2],
+            9 * valves[..., 1] - 0.02 * now[..., 3],
+        ],
+        axis=2,
+    )
+    spread = np.array([2.0, 0.1, 1.0, 0.9]) * (1 + 0.8 * np.abs(now[..., 1:2]))
+    target = now + change + random.normal(0, 1, now.shape) * spread
+    k = np.arange(1, steps + 1).reshape(-1, 1, 1)
+    window = Window(joints=joints)
+    names = window.input_names()
+    weights = random.laplace(0, 0.15, (len(names), 3))
+    return QualityData(
+        observation=now,
+        target=target,
+        predicted=now + 0.97 * change,
+        command=valves,
+        time=np.sort(random.uniform(0, 6600, n)),
+        propagation=np.array([3.4, 0.15, 1.4, 1.2]) * np.repeat(k, joints, axis=1) ** 0.62,
+        weights=weights,
+        inputs=names,
+        outputs=[QUANTITIES[i].replace("_", " ") for i in (0, 2, 3)],
+    )
+
+
+def training(agents=16, evaluations=44, seed=0):
+    random = np.random.default_rng(seed)
+    deviation = np.empty((agents, evaluations))
+    performance = np.empty((agents, evaluations))
+    evaluated = random.integers(max(1, evaluations * 2 // 3), evaluations + 1, agents)
+    for a in range(agents):
+        now = 60.0
+        for e in range(evaluations):
+            deviation[a, e] = now
+            asked = 0.5 + 0.45 * (now - 60) / 740
+            performance[a, e] = np.clip(asked + random.normal(0.03, 0.05), 0, 1)
+            now = min(800.0, now * 1.1) if performance[a, e] > asked else now * 0.97
+    share = (deviation - 60) / 740
+    reward = 9.5 - random.exponential(2.5, agents)
+    return TrainingData(
+        episodes=500.0 * np.arange(1, evaluations + 1),
+        deviation=deviation,
+        criterium=0.5 + 0.45 * share,
+        performance=performance,
+        epsilon=0.5 - 0.45 * share,
+        temperature=20 - 19 * share,
+        evaluated=evaluated,
+        reward=reward,
+        success=np.clip(1 - random.exponential(0.004, agents), 0, 1),
+        chosen=int(np.argmax(reward)),
+    )
+
+
+def episodes(n, joints=1, seed=0, begin=0.0, on_arm=True, success=0.98, extra=0.0):
+    """``n`` episodes whose length grows with the displacement; ``extra`` actions and switches in the mean."""
+    random = np.random.default_rng(seed)
+    start, goal = random.uniform(150, 870, (2, n, joints))
+    distance = np.abs(goal - start).max(axis=1, initial=0)
+    won = random.random(n) < success
+    actions = np.where(won, 1 + random.poisson(6 + distance / 40 + extra), 100)
+    switches = np.minimum(random.poisson(2.5 + extra / 2, n), actions - 1)
+    reward = 50.0 * won - actions + won - 8 * switches
+    seconds = actions / 30
+    ends = begin + np.cumsum(seconds + 3.75)
+    return Episodes(
+        goal=goal,
+        angle_begin=start,
+        actions=actions.astype(float),
+        switches=switches.astype(float),
+        reward=reward,
+        success=won,
+        time_start=ends - seconds if on_arm else np.zeros(n),
+        time_end=ends if on_arm else np.zeros(n),
+    )
+
+
+def transfer(joints=1, counts=(500, 1500, 500), seed=0):
+    phases, begin = [], 7200.0
+    for i, (n, success, extra) in enumerate(zip(counts, (0.96, 0.97, 0.99), (4, 2, 1), strict=True)):
+        phases.append(episodes(n, joints, seed + i, begin, success=success, extra=extra))
+        begin = phases[-1].time_end[-1] if n else begin
+    return TransferData(*phases, learning_rate=0.05)
+
+
+def movement(name="large displacement", goal=70.0, joints=1, n=45, reached=True):
+    spec = ArmSpec(joints=joints)
+    t = 7300 + np.arange(n) / 30
+    x = np.minimum(np.arange(n) / 22, 1)
+    path = 10 * x**3 - 15 * x**4 + 6 * x**5
+    ringing = np.where(x >= 1, 2 * np.exp(-(np.arange(n) - 22) / 8) * np.sin((np.arange(n) - 22) / 2), 0)
+    angle = 512 + spec.counts_per_degree * (-30 + goal * path + ringing)
+    pressure = spec.counts_per_bar * np.stack([0.3 + 0.5 * path, 0.7 - 0.45 * path], axis=1)
+    valves = np.zeros((n, joints, 2))
+    valves[:14, :, 0], valves[:9, :, 1], valves[14:20, :, 1] = 1, -1, 1
+    return Movement(
+        time=t,
+        angle=np.repeat(angle[:, None], joints, axis=1),
+        pressure=np.repeat(pressure[:, None], joints, axis=1),
+        valves=valves,
+        goal=np.full(joints, 512 + spec.counts_per_degree * (goal - 30)),
+        end=float(t[22]) if reached else None,
+        name=name,
+    )
+
+
+def results():
+    return {
+        "collect": {"transitions": 200_000, "seconds": 7350.0},
+        "filter": {"kept": 21_900, "cells_occupied": 5200},
+        "simulation": {
+            "std": {"angle": 3.31, "velocity": 0.12, "pressure_1": 1.44, "pressure_2": 1.38},
+            "seconds": 1.9,
+        },
+        "training": {"episodes": 280_000, "steps": 9_000_000, "seconds": 4.2, "steps_per_second": 2.1e6},
+        "transfer": {"learning_rate": 0.05},
+    }
+
+
+def run(joints=1):
+    name = "virtual" if joints == 1 else "two joints"
+    return RunData(
+        spec=ArmSpec(joints=joints, name=name),
+        results=results(),
+        coverage=coverage(joints=joints),
+        quality=quality(joints=joints),
+        training=training(),
+        test=episodes(10_000, joints, on_arm=False, success=0.995),
+        transfer=transfer(joints),
+        movements=(
+            movement("large displacement", 70.0, joints),
+            movement("typical displacement", 30.0, joints),
+            movement("small displacement", -5.0, joints, reached=False),
+        ),
+    )

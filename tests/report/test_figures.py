@@ -1,0 +1,194 @@
+import re
+
+import builders
+import numpy as np
+import pytest
+
+from pneumarm.arm import ArmSpec
+from pneumarm.report import Episodes, figures
+from pneumarm.report.figures import Classification
+from pneumarm.report.sections import RunData, all_sections, classifications, levels, phases_of
+from pneumarm.report.style import DARK, LIGHT, MIDDLE, svg
+
+SPEC = ArmSpec()
+
+SIZES = {"many": 400, "one": 1, "none": 0}
+
+
+def figures_of(n, joints):
+    """Every figure of the report from ``n`` samples, by name."""
+    spec = ArmSpec(joints=joints)
+    seen, q = builders.coverage(n, joints), builders.quality(n, joints, steps=min(n, 30))
+    t = builders.training(agents=min(n, 16), evaluations=min(n, 44)) if n else None
+    test = builders.episodes(n, joints, on_arm=False)
+    phases = phases_of(builders.transfer(joints, (n, n, n)))
+    won = test.success
+    far = (test.distance[won], test.actions[won], test.switches[won])
+    real, simulated = q.target - q.observation, q.predicted - q.observation
+    m = builders.movement(joints=joints, n=max(n // 8, 1))
+    made = {
+        "projections": figures.projections(seen.observation, spec),
+        "cells": figures.cells(seen.cells_holding, 5, seen.growth),
+        "residue": figures.residue(q.target[:, :, 0], q.predicted[:, :, 0], spec),
+        "residue_by_class": figures.residue_by_class(simulated[:, 0, 0], classifications(q, 0, spec)),
+        "isoplot": figures.isoplot(real, simulated, spec),
+        "density": figures.isoplot(real, simulated, spec, density=True),
+        "propagation": figures.error_propagation(q.propagation, spec),
+        "importance": figures.input_importance(q.weights, q.inputs, q.outputs),
+        "distributions": figures.distributions(test.reward, test.actions, test.switches, won),
+        "transfer": figures.transfer_curves(phases, levels(test)),
+        "displacement": figures.against_displacement(*far, spec),
+        "movement": figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
+    }
+    if t is not None:
+        curves = (t.episodes, t.deviation, t.criterium, t.performance, t.epsilon, t.temperature)
+        made["shaping"] = figures.shaping_curves(*curves, t.evaluated, t.chosen, spec)
+        made["spread"] = figures.spread_of_agents(t.reward, t.success, t.chosen)
+    return made
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_every_axis_is_labelled_with_its_unit(joints):
+    for name, figure in figures_of(400, joints).items():
+        figure.draw_without_rendering()
+        for axes in (a for a in figure.axes if a.get_visible()):
+            labels = []
+            for axis in (axes.xaxis, axes.yaxis):
+                shown = axis.get_visible() and any(t.get_text() for t in axis.get_ticklabels() if t.get_visible())
+                if shown:
+                    labels.append(axis.get_label_text())
+            for label in labels:
+                named = {"valves", "input", "observations", "transitions", "action (valves of muscle 1, 2)"}
+                assert re.search(r"\[.+\]", label) or label in named, f"{name}: {label!r}"
+
+
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES.keys())
+def test_every_figure_can_be_drawn_from_many_one_and_no_samples(size):
+    for name, figure in figures_of(size, 1).items():
+        drawn = svg(figure)
+        assert drawn.startswith("<?xml"), name
+        assert "nan" not in re.findall(r'[ ="](nan)[ ",]', drawn), name
+
+
+def test_no_axis_label_is_cut_off_and_no_two_labels_lie_on_each_other():
+    for joints in (1, 2):
+        for name, figure in figures_of(400, joints).items():
+            figure.draw_without_rendering()
+            renderer, width, height = figure.canvas.get_renderer(), *figure.bbox.size
+            boxes = []
+            for axes in (a for a in figure.axes if a.get_visible()):
+                for text in (axes.xaxis.label, axes.yaxis.label, axes.title, axes._left_title):
+                    if text.get_text() and text.get_visible():
+                        boxes.append((text.get_text(), text.get_window_extent(renderer)))
+            for words, box in boxes:
+                inside = box.x0 >= -1 and box.y0 >= -1 and box.x1 <= width + 1 and box.y1 <= height + 1
+                assert inside, f"{name}: {words!r} is cut off"
+            for i, (words, box) in enumerate(boxes):
+                for others, other in boxes[i + 1 :]:
+                    overlap = (
+                        min(box.x1, other.x1) - max(box.x0, other.x0),
+                        min(box.y1, other.y1) - max(box.y0, other.y0),
+                    )
+                    assert min(overlap) < 1, f"{name} for {joints} joints: {words!r} lies on {others!r}"
+
+
+def test_the_inks_can_be_told_apart_in_grey():
+    def lightness(color):
+        linear = [((c := int(color[i : i + 2], 16) / 255) <= 0.04045 and c / 12.92) or ((c + 0.055) / 1.055) ** 2.4
+                  for i in (1, 3, 5)]  # fmt: skip
+        luminance = float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+        return 116 * luminance ** (1 / 3) - 16
+
+    dark, middle, light = (lightness(c) for c in (DARK, MIDDLE, LIGHT))
+    assert middle - dark > 20
+    assert light - middle > 18
+
+
+def test_drawing_leaves_the_style_of_others_alone():
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    svg(figures.cells(np.array([0, 3, 4]), 5, np.empty((0, 2), np.int64)))
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_same_arrays_give_the_same_svg():
+    made = [svg(figures_of(300, 1)["transfer"]) for _ in range(2)]
+    assert made[0] == made[1]
+    assert "2026" not in re.sub(r"<path.*?>|<use.*?>", "", made[0], flags=re.S)[:2000]
+
+
+def test_isoplot_shows_the_bias_of_a_simulation_that_predicts_too_little():
+    random = np.random.default_rng(0)
+    real = random.normal(0, 10, (500, 1, 4))
+    figure = figures.isoplot(real, 0.5 * real, SPEC)
+    assert [t.get_text() for t in figure.axes[0].get_legend().get_texts()] == ["ideal, 45°", "slope 0.500"]
+    assert "angle: slope 0.500" in figures.isoplot_alt(real, 0.5 * real, SPEC)
+
+
+def test_expected_propagation_is_equation_3_7_with_the_thesis_numbers():
+    # Table 5.2: 6.70 counts become 36.70 after one second at 30 Hz.
+    measured = np.zeros((30, 1, 4))
+    measured[0, 0] = (6.70, 0.19, 1.94, 1.52)
+    assert np.allclose(figures.expectation(measured)[-1, 0, (0, 2, 3)], (36.70, 10.63, 8.33), atol=0.01)
+
+
+def test_residue_by_class_tells_where_the_simulation_is_unsure():
+    random = np.random.default_rng(0)
+    velocity = random.uniform(-3, 3, 9000)
+    residue = random.normal(0, 1 + np.abs(velocity))
+    text = figures.residue_by_class_alt(residue, [Classification("velocity [counts/ms]", velocity)])
+    least, where_least, most, where_most = (
+        float(v) for v in re.search(r"from ([\d.]+) \(at (\S+)\) to ([\d.]+) \(at (\S+)\)", text).groups()
+    )
+    assert least < 1.5 < 3.2 < most
+    assert abs(where_least) < 0.5 < 2 < abs(where_most)
+
+
+def test_growth_of_coverage_is_the_thesis_test_for_enough_data():
+    assert figures.new_share(np.array([[100, 50], [200, 80], [400, 80]])) == 0
+    assert figures.new_share(np.array([[0, 0], [400, 80]])) == pytest.approx(0.5)
+
+
+def test_cells_counts_every_occupied_cell_once():
+    held = np.bincount(np.random.default_rng(0).geometric(0.02, 3000))
+    figure = figures.cells(held, 5, np.empty((0, 2), np.int64))
+    assert sum(bar.get_height() for bar in figure.axes[0].patches) == 3000
+
+
+def test_movement_marks_goal_and_valves():
+    m = builders.movement()
+    figure = figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, SPEC)
+    angle, pressure, valves = figure.axes
+    assert angle.get_legend() is not None
+    assert [t.get_text() for t in pressure.get_legend().get_texts()] == ["muscle 1", "muscle 2"]
+    assert [t.get_text() for t in valves.texts] == ["muscle 1", "muscle 2"]
+    alt = figures.movement_alt(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, SPEC)
+    assert "goes from -30.0° to a goal of 40.0°" in alt
+    assert "reached after 0.73 s, with 3 changes of the valves" in alt
+
+
+def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():
+    phases = phases_of(builders.transfer(counts=(50, 0, 0)))
+    figure = figures.transfer_curves(phases, {"reward": 12.5}, window=101)
+    curve = next(line for line in figure.axes[0].lines if len(line.get_xdata()) == 50)
+    assert np.allclose(curve.get_ydata(), phases[0].reward.mean())
+    assert any(np.allclose(line.get_ydata(), 12.5) for line in figure.axes[0].lines if len(line.get_ydata()))
+
+
+def test_all_alternatives_hold_computed_numbers():
+    run = builders.run()
+    for section in all_sections(run):
+        for picture in section.figures:
+            assert re.search(r"\d", picture.alt), picture.alt
+            assert "thesis" in picture.caption
+            assert "nan" not in picture.alt
+    test = run.test
+    alt = figures.distributions_alt(test.reward, test.actions, test.switches, test.success)
+    assert f"{test.success.mean():.2%}" in alt
+    assert f"median {np.median(test.actions):g}" in alt
+
+
+def test_a_run_without_anything_has_its_results_only():
+    sections = all_sections(RunData(SPEC, {}, test=Episodes.none(1)))
+    assert [s.title for s in sections] == ["Results", "Test in the simulation"]

@@ -1,0 +1,263 @@
+import csv
+import json
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import builders
+import numpy as np
+import pytest
+
+from pneumarm.arm import ArmSpec
+from pneumarm.errors import UnusableInput
+from pneumarm.report import (
+    CoverageData,
+    Episodes,
+    Movement,
+    QualityData,
+    RunData,
+    Section,
+    Table,
+    TrainingData,
+    read_episodes,
+    read_run,
+    render,
+    run_page,
+    save_movement,
+    save_spec,
+    write_report,
+)
+from pneumarm.report.data import COLUMNS
+from pneumarm.report.ledger import beside_thesis, ledger
+
+VOID = {"meta", "img", "link", "br", "hr", "input"}
+MOST_BYTES = 6e6
+
+
+class Page(HTMLParser):
+    """Collects elements and ids, and checks that every element is closed in order."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.elements, self.ids, self.open, self.text = [], [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        attrs = dict(attrs)
+        self.elements.append((tag, attrs))
+        self.ids += [attrs["id"]] if "id" in attrs else []
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def html():
+    return run_page(builders.run())
+
+
+@pytest.fixture(scope="module")
+def page(html):
+    return Page(html)
+
+
+def test_page_asks_nothing_of_any_network(html, page):
+    for tag, attrs in page.elements:
+        assert tag not in {"script", "link", "iframe", "object"}
+        for name in ("src", "href", "srcset", "action", "data"):
+            assert attrs.get(name, "#").startswith(("#", "data:image/svg+xml;base64,")), (tag, name)
+    style = html[html.index("<style>") : html.index("</style>")]
+    assert "url(" not in style
+    assert "@import" not in style
+
+
+def test_every_picture_has_a_caption_and_a_text_alternative(page):
+    pictures = [attrs for tag, attrs in page.elements if tag == "img"]
+    assert len(pictures) == 17
+    assert all(len(attrs["alt"]) > 60 for attrs in pictures)
+    tags = [tag for tag, _ in page.elements]
+    assert tags.count("figcaption") == tags.count("figure") == 17 + tags.count("table")
+
+
+def test_ids_are_unique_and_the_contents_lead_to_every_section(page):
+    assert len(page.ids) == len(set(page.ids))
+    links = [attrs["href"][1:] for tag, attrs in page.elements if tag == "a"]
+    assert links == [attrs["id"] for tag, attrs in page.elements if tag == "section"]
+    referred = [attrs["aria-labelledby"] for _, attrs in page.elements if "aria-labelledby" in attrs]
+    assert set(referred) <= set(page.ids)
+
+
+def test_page_is_small_and_always_the_same(html):
+    assert len(html.encode()) < MOST_BYTES
+    assert run_page(builders.run()) == html
+
+
+def test_page_of_two_joints_stays_small():
+    two = run_page(builders.run(joints=2))
+    assert len(two.encode()) < MOST_BYTES
+    assert "Residue of the angle of joint 2" in two
+
+
+def test_ledger_shows_means_and_intervals_of_every_phase():
+    run = builders.run()
+    table = ledger(run.test, run.transfer)
+    assert [row[0] for row in table.rows] == ["in the simulation", "on arrival", "while learning", "after adaptation"]
+    for row, episodes in zip(table.rows, (run.test, *run.transfer.phases.values()), strict=True):
+        mean, low, high = (
+            float(w.replace("−", "-").strip("()")) for w in row[2].replace("\u00a0to\u00a0", " ").split()
+        )
+        assert mean == pytest.approx(episodes.reward.mean(), abs=0.005)
+        assert (low + high) / 2 == pytest.approx(mean, abs=0.011)
+        assert row[3].startswith(f"{episodes.success.mean():.1%} (")
+        assert float(row[5].split()[0]) == pytest.approx(episodes.actions[episodes.success].mean(), abs=0.051)
+    assert table.rows[2][-1] == "1.8 h"
+
+
+def test_comparison_names_ours_and_the_thesis():
+    run = builders.run()
+    rows = {row[0]: row for row in beside_thesis(run.results, run.quality, run.test, run.transfer, run.spec).rows}
+    assert rows["std of one-step error, angle [counts]"][1:] == ["3.31", "6.70", "table 5.2"]
+    assert "36.70 by eq. 3.7" in rows["std of error after 1 s, angle [counts]"]
+    assert rows["reward in the simulation"][2].startswith("10.18 (8.21 to 12.10 in 8 runs)")
+    assert rows["transitions collected"][1] == "200,000"
+
+
+def test_comparison_of_an_unfinished_run_leaves_out_what_is_not_known():
+    table = beside_thesis({}, None, None, None, ArmSpec())
+    assert all(row[1] == "–" for row in table.rows)
+
+
+def test_text_of_people_is_escaped():
+    html = render("<script>", ["a < b"], [Section("1 & 2", ["<b>"], tables=[Table(["x"], [["<i>"]], "&")])])
+    page = Page(html)
+    assert {"script", "b", "i"} & {tag for tag, _ in page.elements} == {"b"}  # the number of the table is bold
+    assert "<i>" in page.text
+
+
+def test_sections_of_the_same_title_are_refused():
+    with pytest.raises(ValueError, match="must differ"):
+        render("t", [], [Section("same"), Section("same")])
+
+
+def save(folder, run):
+    (folder / "results.json").write_text(json.dumps(run.results))
+    save_spec(folder, run.spec)
+    for record in (run.coverage, run.quality, run.training, run.test):
+        record.save(folder)
+    for number, movement in enumerate(run.movements):
+        save_movement(folder, movement, number)
+    with open(folder / "episodes.csv", "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for phase, e in run.transfer.phases.items():
+            for i in range(len(e)):
+                goal, begin = (" ".join(repr(float(v)) for v in values[i]) for values in (e.goal, e.angle_begin))
+                writer.writerow(
+                    [phase, goal, e.time_start[i], e.time_end[i], begin, goal, "0.1", e.actions[i], e.switches[i],
+                     e.reward[i], int(e.success[i])]
+                )  # fmt: skip
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_what_a_run_leaves_in_its_folder_comes_back(tmp_path, joints):
+    run = replace(builders.run(joints), transfer=builders.transfer(joints, (40, 60, 40)))
+    save(tmp_path, run)
+    found = read_run(tmp_path)
+    assert found.spec == run.spec
+    records = [(found.coverage, run.coverage), (found.quality, run.quality), (found.training, run.training)]
+    records += [(found.test, run.test), *zip(found.movements, run.movements, strict=True)]
+    records += list(zip(found.transfer.phases.values(), run.transfer.phases.values(), strict=True))
+    for back, sent in records:
+        for name in sent.shapes:
+            assert np.array_equal(getattr(back, name), getattr(sent, name)), name
+    assert found.transfer.learning_rate == 0.05
+    assert [m.end for m in found.movements] == [m.end for m in run.movements]
+
+
+def test_write_report_writes_the_page_of_the_folder(tmp_path):
+    run = replace(builders.run(), transfer=builders.transfer(counts=(40, 60, 40)))
+    save(tmp_path, run)
+    path = write_report(tmp_path)
+    assert path == tmp_path / "report.html"
+    assert path.read_text(encoding="utf-8") == run_page(run)
+
+
+def test_report_of_a_run_without_transfer(tmp_path):
+    (tmp_path / "results.json").write_text("{}")
+    save_spec(tmp_path, ArmSpec())
+    builders.episodes(1, on_arm=False).save(tmp_path)
+    page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
+    assert [a["id"] for t, a in page.elements if t == "section"] == [
+        "section-results",
+        "section-test-in-the-simulation",
+    ]
+
+
+def test_run_whose_arm_did_nothing_can_be_reported():
+    run = RunData(ArmSpec(), {}, test=Episodes.none(1), transfer=builders.transfer(counts=(0, 0, 0)))
+    assert "No episodes were done on the arm." in run_page(run)
+    assert "nan" not in " ".join(Page(run_page(run)).text)
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "told"),
+    [
+        ("results.json", "not json", "expected a JSON file"),
+        ("results.json", "[1]", "expected a JSON object, got list"),
+        ("arm.json", "{}", "expected the spec of an arm"),
+        ("arm.json", '{"angle_range": [0, 1023], "wings": 2}', "expected the spec of an arm"),
+        ("episodes.csv", "phase,goal\n", "'actions'"),
+        ("episodes.csv", ",".join(COLUMNS) + "\nbefore,x,0,1,2,2,0,1,0,50,1\n", "a cell is not what its column says"),
+        ("episodes.csv", ",".join(COLUMNS) + "\nbefore,1 2,0,1,2,2,0,1,0,50,1\n", "angle_begin must have the shape"),
+        ("test_episodes.safetensors", "damaged", "this is something else"),
+    ],
+)
+def test_unusable_files_are_named_with_what_to_do(tmp_path, file, content, told):
+    (tmp_path / "results.json").write_text("{}")
+    save_spec(tmp_path, ArmSpec())
+    (tmp_path / file).write_text(content)
+    with pytest.raises(UnusableInput, match=told) as caught:
+        write_report(tmp_path)
+    assert file in str(caught.value)
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_a_file_of_another_record_is_refused(tmp_path):
+    builders.coverage(10).save(tmp_path, Episodes.file)
+    with pytest.raises(UnusableInput, match="report Episodes"):
+        Episodes.load(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("make", "change"),
+    [
+        (builders.coverage, {"observation": np.zeros((5, 4))}),
+        (builders.quality, {"target": np.zeros((3, 1, 4))}),
+        (builders.quality, {"inputs": ("one",)}),
+        (builders.training, {"chosen": 16}),
+        (builders.training, {"evaluated": np.full(16, 99)}),
+        (builders.movement, {"time": np.full(45, np.nan)}),
+        (lambda: builders.episodes(5), {"reward": np.zeros(4)}),
+    ],
+)
+def test_records_refuse_arrays_that_do_not_fit(make, change):
+    with pytest.raises(UnusableInput):
+        replace(make(), **change)
+
+
+def test_records_name_their_files():
+    files = [r.file for r in (CoverageData, QualityData, TrainingData, Episodes, Movement)]
+    assert len(set(files)) == len(files)
+
+
+def test_success_may_be_written_as_a_word(tmp_path):
+    path = tmp_path / "episodes.csv"
+    row = "after,600,1,2,500,601,0.2,10,1,33,{}\n"
+    path.write_text(",".join(COLUMNS) + "\n" + row.format("True") + row.format("False"))
+    assert read_episodes(path)["after"].success.tolist() == [True, False]

@@ -25,9 +25,9 @@ def simulation(velocity: str = "derived", joints: int = 1) -> Simulation:
     offset, scale = np.tile([512.0, 0.1, 90.0, 90.0], joints), np.tile([400.0, 5.0, 90.0, 80.0], joints)
     scaling = Scaling(offset, scale, np.ones(2 * joints))
     std = np.array([[6.7, 0.2, 1.9, 1.5], [3.0, 0.1, 1.0, 2.0]])[:joints]
-    goals, pressures = np.tile([200.0, 800.0], (joints, 1)), np.tile([0.0, 200.0], (joints, 2, 1))
+    goals, limits = np.tile([200.0, 800.0], (joints, 1)), np.tile([-9999.0, 9999.0], (joints, 4, 1))
     spec = ArmSpec(joints=joints)
-    return Simulation(spec, window, scaling, (network,), velocity, std, goals, pressures)  # type: ignore[arg-type]
+    return Simulation(spec, window, scaling, (network,), velocity, std, goals, limits)  # type: ignore[arg-type]
 
 
 @kernel

@@ -118,15 +118,8 @@ class OnlineLearner:
         """
         try:
             saved = json.loads(state)
-<<<<<<< HEAD
             like = self._arrays()
             arrays = {name: np.array(saved[name], array.dtype).reshape(array.shape) for name, array in like.items()}
-=======
-            arrays = {
-                name: np.array(saved[name], array.dtype).reshape(array.shape)
-                for name, array in self._arrays().items()
-            }
->>>>>>> main
         except (ValueError, KeyError, TypeError, OverflowError) as error:
             raise UnusableInput(f"expected the state of a learner like this one, got another ({error})") from error
         for name, array in like.items():

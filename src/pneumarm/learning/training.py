@@ -139,14 +139,7 @@ def train(
 
     began, before = time.perf_counter(), agents.seconds[0]
     saved = began
-<<<<<<< HEAD:src/pneumarm/learning/training.py
     with ThreadPoolExecutor(min(threads or _cores(), settings.agents)) as pool:
-=======
-    cores = threads or min(
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, 64
-    )
-    with ThreadPoolExecutor(min(cores, settings.agents)) as pool:
->>>>>>> main:src/pneumarm/learning/train.py
         while (running := np.flatnonzero(~_ended(agents, settings))).size:
             done = list(pool.map(lambda a: _chunk(env, agents, settings, simulation, int(a)), running))
             row = np.zeros((1, settings.agents, len(CURVES)))
@@ -282,17 +275,8 @@ def _read_checkpoint(
     expected = vars(_fresh(simulation, settings, 0))
     for name, like in expected.items():
         array = arrays.get(name)
-<<<<<<< HEAD:src/pneumarm/learning/training.py
         first = 1 if name == "curves" else 0  # there are as many rows of curves as there were rounds
         fits = array is not None and array.dtype == like.dtype and array.ndim == like.ndim
         if array is None or not fits or array.shape[first:] != like.shape[first:]:
-=======
-        shape = (
-            like.shape
-            if name != "curves"
-            else (len(array) if array is not None and array.ndim else 0, *like.shape[1:])
-        )
-        if array is None or array.dtype != like.dtype or array.shape != shape:
->>>>>>> main:src/pneumarm/learning/train.py
             raise UnusableInput(f"{path}: a damaged checkpoint ({name}); remove it")
     return _Agents(**{name: arrays[name].copy() for name in expected})

@@ -89,17 +89,8 @@ class Networks(NamedTuple):
 def network_shapes(window: Window, hidden: int) -> Networks:
     """Return empty networks whose arrays have the right shapes."""
     joints, inputs = window.joints, window.state_size + window.joints
-<<<<<<< HEAD
     networks = joints, ACTIONS
     shapes = (*networks, inputs, hidden), (*networks, hidden), (*networks, hidden), networks
-=======
-    shapes = (
-        (joints, ACTIONS, inputs, hidden),
-        (joints, ACTIONS, hidden),
-        (joints, ACTIONS, hidden),
-        (joints, ACTIONS),
-    )
->>>>>>> main
     return Networks(*(np.zeros(shape, np.float32) for shape in shapes))
 
 

@@ -15,13 +15,8 @@ __all__ = [
     "Simulation",
     "SimulationArm",
     "Statistics",
-<<<<<<< HEAD
-    "by_quantity",
-    "fit",
-=======
     "StoredFit",
     "by_quantity",
     "fit",
     "fit_store",
->>>>>>> main
 ]

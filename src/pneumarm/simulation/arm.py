@@ -38,13 +38,7 @@ class SimulationArm(Arm):
 
     def __init__(self, simulation: Simulation, *, seed: int = 0, noise: NoiseSettings | None = None) -> None:
         if not simulation.valves:
-<<<<<<< HEAD
             raise UnusableInput("the simulation was fitted to continuous commands; this arm has on/off valves")
-=======
-            raise UnusableInput(
-                "the simulation was fitted to continuous commands; an arm has valves that open or close"
-            )
->>>>>>> main
         self.spec = simulation.spec
         self._simulation = simulation
         self._parameters = simulation_parameters(simulation)

@@ -22,12 +22,12 @@ def simulation(velocity: str = "derived", joints: int = 1) -> Simulation:
     window = Window(joints)
     outputs = (3 if velocity == "derived" else 4) * joints
     network = Network(np.zeros((window.input_size, 1)), np.zeros(1), np.zeros((1, outputs)), np.zeros(outputs))
-    scaling = Scaling(
-        np.tile([512.0, 0.1, 90.0, 90.0], joints), np.tile([400.0, 5.0, 90.0, 80.0], joints), np.ones(2 * joints)
-    )
+    offset, scale = np.tile([512.0, 0.1, 90.0, 90.0], joints), np.tile([400.0, 5.0, 90.0, 80.0], joints)
+    scaling = Scaling(offset, scale, np.ones(2 * joints))
     std = np.array([[6.7, 0.2, 1.9, 1.5], [3.0, 0.1, 1.0, 2.0]])[:joints]
-    goals = np.tile([200.0, 800.0], (joints, 1))
-    return Simulation(ArmSpec(joints=joints), window, scaling, (network,), velocity, std, goals)  # type: ignore[arg-type]
+    goals, limits = np.tile([200.0, 800.0], (joints, 1)), np.tile([-9999.0, 9999.0], (joints, 4, 1))
+    spec = ArmSpec(joints=joints)
+    return Simulation(spec, window, scaling, (network,), velocity, std, goals, limits)  # type: ignore[arg-type]
 
 
 @kernel

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from small import SMALL
 
 from pneumarm.run import Run
+from small import SMALL
 
 
 @pytest.fixture(scope="session")

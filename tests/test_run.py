@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from small import SMALL
 
 from pneumarm.errors import UnusableInput
 from pneumarm.run import Run
 from pneumarm.transitions import Store
+from small import SMALL
 
 TIMES = ("seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
 STAGES = ("collect", "simulation", "training", "test", "transfer")

@@ -97,7 +97,7 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
     def compile_(f: _Function) -> Any:
         settings = {"nogil": True, "error_model": "numpy", **options}
         dispatcher = numba.njit(**settings)(f)
-        if not numba_config.DISABLE_JIT and settings.get("inline", "never") == "never":
+        if not getattr(numba_config, "DISABLE_JIT", 0) and settings.get("inline", "never") == "never":
             dispatcher._cache = _ForgivingCache(dispatcher.py_func)
         return dispatcher
 

@@ -235,7 +235,7 @@ def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
 
 
 def write_episodes(path: Path, episodes: Sequence[Episode]) -> None:
-    """Write ``episodes.csv``: a row a movement; with several joints a cell holds their numbers with spaces between."""
+    """Write ``episodes.csv``: a row a movement; with several joints a cell holds their numbers, spaces between."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([field.name for field in fields(Episode)])

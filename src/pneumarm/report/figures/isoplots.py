@@ -5,7 +5,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.statistics import slope
 from pneumarm.report.style import (
     DENSITY,
     INK,
@@ -19,6 +18,7 @@ from pneumarm.report.style import (
     scatter,
     styled,
 )
+from pneumarm.statistics import slope
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,6 @@ def run_(
 
     A second call with the same folder goes on where the first was interrupted.
 
-    Example: ``pneumarm run --arm virtual:seed=7 --out runs/seven --transitions 20000``
-
     Parameters
     ----------
     out

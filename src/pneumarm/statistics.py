@@ -166,7 +166,7 @@ def running_median(x: ArrayLike, y: ArrayLike, bins: int = 15, fewest: int = 5) 
 def summarise(reward: ArrayLike, success: ArrayLike, actions: ArrayLike, switches: ArrayLike) -> dict[str, Any]:
     """Return the means over episodes (n,) as ``results.json`` holds them, with their 95 % intervals.
 
-    ``switches`` may be (n, joints); its mean is a list then, where there are several joints.
+    There is no interval where there are too few episodes for one. ``switches`` may be (n, joints); its mean is a list then, where there are several joints.
     """
     estimates = {
         "reward": mean_estimate(reward),
@@ -175,14 +175,19 @@ def summarise(reward: ArrayLike, success: ArrayLike, actions: ArrayLike, switche
     }
     columns = np.asarray(switches, np.float64).reshape(len(np.asarray(reward)), -1).T
     per_joint = [mean_estimate(column) for column in columns]
-    figures = {name: estimate.mean for name, estimate in estimates.items()}
-    intervals: dict[str, Any] = {name: [estimate.low, estimate.high] for name, estimate in estimates.items()}
     switched = [estimate.mean for estimate in per_joint]
-    ranges = [[estimate.low, estimate.high] for estimate in per_joint]
+    ranges = [_interval(estimate) for estimate in per_joint]
     one = len(per_joint) == 1
     return {
         "episodes": len(np.asarray(reward)),
-        **figures,
+        **{name: estimate.mean for name, estimate in estimates.items()},
         "switches": switched[0] if one else switched,
-        "intervals": {**intervals, "switches": ranges[0] if one else ranges},
+        "intervals": {
+            **{name: _interval(estimate) for name, estimate in estimates.items()},
+            "switches": ranges[0] if one else ranges,
+        },
     }
+
+
+def _interval(estimate: Estimate) -> list[float] | None:
+    return None if math.isnan(estimate.low) else [estimate.low, estimate.high]

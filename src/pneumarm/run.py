@@ -24,7 +24,7 @@ from pneumarm.learning import test as test_agent
 from pneumarm.records import demonstrate, test_record, training_record
 from pneumarm.report import save_movement, save_spec, write_report
 from pneumarm.simulation import FitSettings, Simulation, fit_store
-from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectSettings, Store, collect
+from pneumarm.transitions import KINDS, CollectSettings, Store, collect, require_enough
 
 Progress = Callable[[str], AbstractContextManager[Report]]
 
@@ -55,8 +55,7 @@ class RunSettings:
     transfer: TransferSettings = field(default_factory=TransferSettings)
 
     def __post_init__(self) -> None:
-        if self.transitions < FEWEST_TRANSITIONS:
-            raise UnusableInput(f"a run needs at least {FEWEST_TRANSITIONS:,} transitions, got {self.transitions:,}")
+        require_enough(self.transitions)
         if self.test_episodes < 1:
             raise UnusableInput(f"a run needs at least 1 test episode, got {self.test_episodes}")
 

@@ -7,7 +7,7 @@ from typing import Annotated
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
-from pneumarm.transitions import CollectSettings, Store, collect
+from pneumarm.transitions import CollectSettings, Store, collect, require_enough
 
 
 def collect_(
@@ -22,8 +22,6 @@ def collect_(
 ) -> None:
     """Make an arm move about and record it, sequence after sequence; a second call goes on.
 
-    Example: ``pneumarm collect virtual arm.db --transitions 20000``
-
     Parameters
     ----------
     arm
@@ -37,6 +35,7 @@ def collect_(
     json
         Print one JSON object on stdout and nothing else there.
     """
+    require_enough(transitions)
     with open_arm(arm, seed) as opened, Store.for_arm(db, opened.spec) as store, progress("collecting") as report:
         result = collect(opened, store, transitions, seed, settings=settings, progress=report)
     show(asdict(result), json, lambda: [table(("collected", ""), list(asdict(result).items()))])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import VALVES
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
 from pneumarm.learning.environment import (
     Environment,
     Episode,
@@ -112,7 +112,7 @@ def limits(
     )
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-untyped-def]
     """Return whether ``joint`` may take ``action`` in the state ``x`` (inputs,).
 
@@ -192,7 +192,7 @@ def advance(environment, limits, fleet, e):  # type: ignore[no-untyped-def]
     fleet.taken[e] += 1
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def look(x, before):  # type: ignore[no-untyped-def]
     """Set ``before`` (joints, 3) to the angle and the pressures in the state ``x`` (inputs,)."""
     for joint in range(before.shape[0]):
@@ -201,7 +201,7 @@ def look(x, before):  # type: ignore[no-untyped-def]
         before[joint, 2] = x[4 * joint + 3]
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def note_still(limits, x, before, switched, still):  # type: ignore[no-untyped-def]
     """Count in ``still`` (joints,) the steps in which the same action has changed nothing."""
     for joint in range(still.shape[0]):

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
 from pneumarm.learning.environment import reward
 from pneumarm.learning.fleet.arms import begin_one, is_useful, take_all
 from pneumarm.learning.fleet.inputs import write_inputs
@@ -108,7 +108,7 @@ class Rule(NamedTuple):
     """Return that a value of 1 stands for."""
 
 
-@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+@part(fastmath=FASTMATH)
 def exponential(values):  # type: ignore[no-untyped-def]
     """Replace ``values`` (n,), none of them positive, by their exponentials within 2e-6, eight or sixteen at once.
 
@@ -162,7 +162,7 @@ def log_softmax(logits, bias, probability):  # type: ignore[no-untyped-def]
                 probability[row, e] *= part
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def write_bias(limits, hold, x, actions, still, bias, e):  # type: ignore[no-untyped-def]
     """Set column ``e`` of ``bias`` (9 joints, n) for an arm in ``x`` (inputs,) after its ``actions`` (joints,)."""
     for joint in range(actions.shape[0]):

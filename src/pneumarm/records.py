@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.control import Movement as Moved
-from pneumarm.learning import Agent, TestResult, Training
+from pneumarm.learning import AnyAgent, TestResult, Training
 from pneumarm.report.data import Episodes, Movement, TrainingData
 
 DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large displacement": 70.0}
@@ -52,7 +52,7 @@ def test_record(tested: TestResult) -> Episodes:
     )
 
 
-def demonstrate(agent: Agent, arm: Arm, seed: int) -> list[Movement]:
+def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Movement]:
     """Make and record typical movements, with a second after each in which the arm swings out.
 
     The agent itself brings the arm to where a movement begins; a displacement larger than its range is left out.
@@ -72,11 +72,11 @@ def demonstrate(agent: Agent, arm: Arm, seed: int) -> list[Movement]:
     return shown
 
 
-def _move(agent: Agent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Moved:
+def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Moved:
     return move(cycle, AgentController(agent), goal, agent.settings.reward, agent.settings.cutoff)
 
 
-def _recorded(agent: Agent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Movement:
+def _recorded(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Movement:
     spec = cycle.arm.spec
     made = _move(agent, cycle, goal)
     tail = list(cycle.run(_closed_for(round(_TAIL / spec.period), cycle.applied)))

@@ -119,9 +119,9 @@ def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-unty
     Not useful is an action that would open the inlet of a muscle over its limit (the guard would keep it closed),
     and one that has changed nothing for some steps: an arm that sticks near its goal would stick for ever.
     """
-    if limits.patience > 0 and action == actions[joint] and still[joint] >= limits.patience:
-        if abs(x[limits.goal_place + joint] - x[4 * joint]) > limits.tolerance[joint]:
-            return False
+    is_stuck = limits.patience > 0 and action == actions[joint] and still[joint] >= limits.patience
+    if is_stuck and abs(x[limits.goal_place + joint] - x[4 * joint]) > limits.tolerance[joint]:
+        return False
     for muscle in range(2):
         if VALVES[action, muscle] > 0 and x[4 * joint + 2 + muscle] > limits.inlet[joint, muscle]:
             return False
@@ -144,6 +144,13 @@ def begin_one(environment, fleet, e):  # type: ignore[no-untyped-def]
     fleet.taken[e] = 0
     for joint in range(fleet.still.shape[1]):
         fleet.still[e, joint] = 0
+
+
+@kernel
+def begin_all(environment, fleet):  # type: ignore[no-untyped-def]
+    """Let all arms begin episodes anywhere."""
+    for e in range(fleet.taken.shape[0]):
+        begin_one(environment, fleet, e)
 
 
 @kernel

@@ -5,6 +5,7 @@ whatever the sizes of the layers are. A layer's weights are (inputs + 1, outputs
 units are tansig, outputs linear.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +42,7 @@ class Trainable(NamedTuple):
 
 def layer_sizes(sizes: tuple[int, ...]) -> list[tuple[int, int]]:
     """Return the shapes of the weights of a network with layers of so many ``sizes``, inputs first."""
-    return [(n + 1, m) for n, m in zip(sizes[:-1], sizes[1:], strict=True)]
+    return [(n + 1, m) for n, m in pairwise(sizes)]
 
 
 def split(flat: NDArray[np.float32], sizes: tuple[int, ...]) -> Layers:
@@ -112,7 +113,7 @@ def weighted_sums(weights, x, out):  # type: ignore[no-untyped-def]
 
 @kernel(fastmath=FASTMATH)
 def forward(layers, x, units):  # type: ignore[no-untyped-def]
-    """Set ``units`` to those of a network of ``layers`` over the inputs ``x`` (inputs, n); the last are its outputs."""
+    """Set ``units`` to those of a network of ``layers`` over ``x`` (inputs, n); the last are its outputs."""
     below = x
     for number in range(len(layers)):
         weights, above = layers[number], units[number]

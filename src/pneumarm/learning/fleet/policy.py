@@ -100,8 +100,6 @@ class Rule(NamedTuple):
     """h."""
     epochs: int
     """How often each step of a batch is learned from."""
-    group: int
-    """Steps of all arms in a minibatch."""
     largest: float
     """Longest gradient."""
     scale: float
@@ -116,30 +114,21 @@ def exponential(values):  # type: ignore[no-untyped-def]
     """
     for e in range(values.shape[0]):
         v = values[e] if values[e] > _SHORTEST else _SHORTEST
-        t = v * np.float32(1.0 / 32.0)
-        s = t * (
-            np.float32(1.0)
-            + t
-            * (
-                np.float32(1 / 2)
-                + t
-                * (
-                    np.float32(1 / 6)
-                    + t * (np.float32(1 / 24) + t * (np.float32(1 / 120) + t * (np.float32(1 / 720) + t * np.float32(1 / 5040))))
-                )
-            )
-        )
-        p = np.float32(1.0) + s
-        p = p * p
-        p = p * p
-        p = p * p
-        p = p * p
-        values[e] = p * p
+        t = v * np.float32(1 / 32)
+        p = np.float32(1 / 720) + t * np.float32(1 / 5040)
+        p = np.float32(1 / 120) + t * p
+        p = np.float32(1 / 24) + t * p
+        p = np.float32(1 / 6) + t * p
+        p = np.float32(1 / 2) + t * p
+        p = np.float32(1.0) + t * (np.float32(1.0) + t * p)
+        for _ in range(_SQUARINGS):
+            p *= p
+        values[e] = p
 
 
 @kernel(fastmath=FASTMATH)
 def log_softmax(logits, bias, probability):  # type: ignore[no-untyped-def]
-    """Replace ``logits`` (9 joints, n) plus ``bias`` by log probabilities; set ``probability`` to their exponentials."""
+    """Replace ``logits`` (9 joints, n) plus ``bias`` by log probabilities; set ``probability`` to these."""
     n = logits.shape[1]
     for first in range(0, logits.shape[0], ACTIONS):
         for e in range(n):
@@ -201,7 +190,7 @@ def act_all(limits, inputs, rule, policy, fleet, batch, k):  # type: ignore[no-u
 
 @kernel
 def collect(environment, limits, inputs, rule, policy, fleet, batch):  # type: ignore[no-untyped-def]
-    """Fill ``batch`` with what the policy does, going on with the episodes of ``fleet``; return episodes and returns."""
+    """Fill ``batch``, going on with the episodes of ``fleet``; return episodes, successes and sum of rewards."""
     task, part = environment.task, 1.0 / rule.scale
     episodes, successes, total = 0, 0, 0.0
     for k in range(batch.reward.shape[0]):
@@ -292,23 +281,23 @@ def improve(rule, policy, value, batch, rates, count, random):  # type: ignore[n
     """Learn from ``batch`` with the learning ``rates`` of policy and values; return how many updates there are now."""
     estimate(rule, value, batch)
     steps, n = batch.reward.shape
-    part = 1.0 / (rule.group * n)
+    part = 1.0 / n
+    for k in range(steps):
+        batch.order[k] = k
     for _ in range(rule.epochs):
         for k in range(steps - 1, 0, -1):
             other = integer(random, k + 1)
             batch.order[k], batch.order[other] = batch.order[other], batch.order[k]
-        for first in range(0, steps - steps % rule.group, rule.group):
-            for place in range(first, first + rule.group):
-                k = batch.order[place]
-                x = batch.inputs[k]
-                forward(policy.layers, x, policy.units)
-                policy_errors(rule, policy, batch, k, part)
-                backward(policy, x)
-                forward(value.layers, x, value.units)
-                for e in range(n):
-                    error = value.units[-1][0, e] - batch.target[k, e]
-                    value.errors[-1][0, e] = np.float32(part) * error
-                backward(value, x)
+        for place in range(steps):
+            k = batch.order[place]
+            x = batch.inputs[k]
+            forward(policy.layers, x, policy.units)
+            policy_errors(rule, policy, batch, k, part)
+            backward(policy, x)
+            forward(value.layers, x, value.units)
+            for e in range(n):
+                value.errors[-1][0, e] = np.float32(part) * (value.units[-1][0, e] - batch.target[k, e])
+            backward(value, x)
             count += 1
             adam(policy, rates[0], rule.largest, count)
             adam(value, rates[1], rule.largest, count)

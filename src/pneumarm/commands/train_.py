@@ -46,9 +46,7 @@ def train_(
     with Store.open(db) as store:
         begin = begin_states(store, simulation.window, simulation.scaling)
     with progress("training") as report:
-        training = train(
-            simulation, begin, chosen, seed, progress=lambda now: report(round(1000 * now.share), 1000)
-        )
+        training = train(simulation, begin, chosen, seed, progress=lambda now: report(round(1000 * now.share), 1000))
     training.agent.save(out)
     result = training.results()
     show(result, json, lambda: [table(("trained", ""), list(result.items()))])

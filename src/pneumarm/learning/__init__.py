@@ -6,7 +6,18 @@ from pneumarm.learning.fleet.agent import PolicyAgent
 from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
 from pneumarm.learning.fleet.side_by_side import FLEET_CURVES
 from pneumarm.learning.fleet.training import FleetTraining
-from pneumarm.learning.kinds import METHODS, Actor, AnyAgent, LearnSettings, Method, Settings, Trained, load_agent, test, train
+from pneumarm.learning.kinds import (
+    METHODS,
+    Actor,
+    AnyAgent,
+    LearnSettings,
+    Method,
+    Settings,
+    Trained,
+    load_agent,
+    test,
+    train,
+)
 from pneumarm.learning.online import OnlineLearner
 from pneumarm.learning.settings import Exploration, Reward, Shaping, TrainSettings
 from pneumarm.learning.testing import TestResult
@@ -14,32 +25,32 @@ from pneumarm.learning.tracker import StateTracker
 from pneumarm.learning.training import CURVES, Progress, Training
 
 __all__ = [
-    "METHODS",
+    "CURVES",
     "FLEET_CURVES",
+    "METHODS",
     "Actor",
+    "Agent",
     "AnyAgent",
     "BatchedSettings",
+    "BeginStates",
+    "Exploration",
     "FleetTraining",
     "LearnSettings",
     "Method",
+    "OnlineLearner",
     "PolicyAgent",
     "PolicySettings",
-    "Settings",
-    "Trained",
-    "load_agent",
-    "CURVES",
-    "Agent",
-    "BeginStates",
-    "Exploration",
-    "OnlineLearner",
     "Progress",
     "Reward",
+    "Settings",
     "Shaping",
     "StateTracker",
     "TestResult",
     "TrainSettings",
+    "Trained",
     "Training",
     "begin_states",
+    "load_agent",
     "test",
     "train",
 ]

@@ -111,7 +111,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
     commands = VALVES[None] / simulation.scaling.command_scale.reshape(joints, 1, 2)
     task = Task(
         goal_range=np.ascontiguousarray(simulation.goal_range, np.float64),
-        unit=np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1),
+        unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
         commands=np.ascontiguousarray(commands, np.float32),
         goal_place=places(simulation.window).goal,
         angle_tolerance=float(reward.angle_tolerance),

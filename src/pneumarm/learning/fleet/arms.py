@@ -104,8 +104,8 @@ def limits(
     """
     offset, scale = scaling.observation_offset.reshape(-1, 4), scaling.observation_scale.reshape(-1, 4)
     return Limits(
-        inlet=((spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:]).astype(np.float32),
-        still=(still / scale[:, [0, 2, 3]]).astype(np.float32),
+        inlet=np.ascontiguousarray((spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:], np.float32),
+        still=np.ascontiguousarray(still / scale[:, [0, 2, 3]], np.float32),
         tolerance=(tolerance / scale[:, 0]).astype(np.float32),
         goal_place=places(window).goal,
         patience=patience,

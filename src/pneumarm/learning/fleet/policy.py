@@ -37,7 +37,8 @@ from pneumarm.simulation.kernel import FASTMATH
 FORBIDDEN = np.float32(-1e9)
 """Added to the logit of an action that may not be taken."""
 _SQUARINGS = 5
-_SHORTEST = np.float32(-80.0)  # exp(-80) is as good as 0, and no squaring underflows
+_SHORTEST = np.float32(-60.0)  # exp(-60) is as good as 0, and no squaring underflows
+_NEVER = np.float32(1e-20)  # less probable is a forbidden action only
 
 
 class Batch(NamedTuple):
@@ -181,7 +182,7 @@ def act_all(limits, inputs, rule, policy, fleet, batch, k):  # type: ignore[no-u
             while action < ACTIONS - 1 and left >= 0.0:
                 action += 1
                 left -= probability[row + action, e]
-            while probability[row + action, e] == 0.0:  # rounding has left more than nothing of the draw
+            while probability[row + action, e] < _NEVER:  # rounding has left more than nothing of the draw
                 action -= 1
             batch.actions[k, e, joint] = action
             log_probability += logits[row + action, e]
@@ -278,7 +279,7 @@ def policy_errors(rule, policy, batch, k, part):  # type: ignore[no-untyped-def]
 
 @kernel
 def improve(rule, policy, value, batch, rates, count, random):  # type: ignore[no-untyped-def]
-    """Learn from ``batch`` with the learning ``rates`` of policy and values; return how many updates there are now."""
+    """Learn from ``batch`` with the learning ``rates`` of policy and values; return the number of updates so far."""
     estimate(rule, value, batch)
     steps, n = batch.reward.shape
     part = 1.0 / n

@@ -13,17 +13,17 @@ class PolicySettings:
 
     agents: int = 2
     """Policies trained at once from different weights, of which the best is kept; one a core takes no longer."""
-    updates: int = 200
+    updates: int = 90
     """How often experience is collected and learned from."""
-    arms: int = 256
+    arms: int = 128
     """Simulated arms that move at once."""
-    steps: int = 32
+    steps: int = 64
     """Steps of each arm in a batch of experience."""
     hidden: tuple[int, ...] = (32, 32)
     """Hidden units of each layer, of the policy and of the state's value alike."""
-    learning_rate: float = 3e-3
+    learning_rate: float = 4e-3
     """Of Adam at the start; falls linearly to 0."""
-    epochs: int = 3
+    epochs: int = 6
     """How often each batch is learned from."""
     discount: float = 0.99
     """gamma."""
@@ -33,7 +33,7 @@ class PolicySettings:
     """How much more or less probable an action may become by one batch."""
     entropy: float = 0.01
     """Price of being certain, in standard deviations of the advantage."""
-    hold: float = 2.0
+    hold: float = 3.0
     """Bonus, on its logit, of the action that is being held: a first guess at what switches cost."""
     largest_gradient: float = 0.5
     """Longer gradients are cut to this length."""
@@ -45,7 +45,7 @@ class PolicySettings:
     """Changes of angle and pressures up to this count as none [counts]."""
     patience: int = 2
     """Steps without change, off the goal, after which another action must be taken; 0: never."""
-    lookahead: int = 288
+    lookahead: int = 192
     """Simulated movements by which a decision that is not clear is made on the arm; 0: as the policy says."""
     horizon: int = 25
     """Longest of these movements [steps]."""

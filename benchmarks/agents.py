@@ -1,0 +1,161 @@
+"""All methods side by side on arms of the distribution: collect, fit, train, then move on the arm, learning nothing.
+
+All rivals get the same begin states and goals. Settings come from the environment:
+
+PNEUMARM_AGENTS_ARMS       seeds of virtual arms, "1,2,3" by default; the judging arms are 1001 to 1010
+PNEUMARM_AGENTS_SEEDS      seeds of the training, "1,2"
+PNEUMARM_AGENTS_METHODS    "policy,batched,sarsa"; "policy-greedy" is the policy without lookahead
+PNEUMARM_AGENTS_MOVEMENTS  greedy movements on the arm for each agent, 500
+PNEUMARM_AGENTS_FOLDER     where collected stores and simulations are kept; a temporary folder by default
+
+Seconds of training are wall time with validation; decision times are processor time at the 99th percentile.
+"""
+
+import os
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
+from pneumarm.control import BEGIN, AgentController, Movement, move
+from pneumarm.control.transfer import begin_and_goal
+from pneumarm.learning import AnyAgent, BeginStates, LearnSettings, PolicyAgent, Trained, begin_states, test, train
+from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.statistics import summarise
+from pneumarm.transitions import KINDS, Store, collect
+
+TRANSITIONS = 200_000
+SEED_OF_MOVEMENTS = 0
+HEADER = (
+    f"{'arm':6}{'seed':>5} {'method':14}{'train':>7}{'in simulation':>15}{'on the arm':>17}{'success':>22}"
+    f"{'actions':>9}{'switches':>9}{'p99':>9}"
+)
+
+
+def listed(name: str, default: str) -> list[str]:
+    return os.environ.get(f"PNEUMARM_AGENTS_{name}", default).split(",")
+
+
+def measure() -> Iterator[str]:
+    movements = int(os.environ.get("PNEUMARM_AGENTS_MOVEMENTS", "500"))
+    methods, seeds = listed("METHODS", "policy,batched,sarsa"), listed("SEEDS", "1,2")
+    found: dict[str, list[tuple[dict[str, Any], Trained]]] = {method: [] for method in methods}
+    failures: dict[str, Counter[str]] = {method: Counter() for method in methods}
+    yield HEADER
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(os.environ.get("PNEUMARM_AGENTS_FOLDER", temporary))
+        folder.mkdir(exist_ok=True)
+        for arm in listed("ARMS", "1,2,3"):
+            simulation, begin = prepared(folder, int(arm))
+            for seed in seeds:
+                for method in methods:
+                    trained = train_by(method, simulation, begin, int(seed))
+                    simulated = test(trained.agent, simulation, begin).reward.mean()
+                    made, p99 = moved(trained.agent, int(arm), movements)
+                    figures = summary(made)
+                    found[method].append((figures, trained))
+                    failures[method].update(kind(one) for one in made if not one.success)
+                    yield row(arm, seed, method, trained, simulated, figures, p99)
+    for method, each in found.items():
+        yield total(method, each, failures[method])
+
+
+def prepared(folder: Path, arm: int) -> tuple[Simulation, BeginStates]:
+    """Return the simulation of a virtual arm and its begin states; collect and fit where that is not done yet."""
+    db, file = folder / f"{arm}.db", folder / f"{arm}.sim"
+    if not db.exists():
+        with open_arm(f"virtual:seed={arm}", arm) as opened, Store.for_arm(db, opened.spec) as store:
+            collect(opened, store, TRANSITIONS, arm)
+    with Store.open(db) as store:
+        if not file.exists():
+            fit_store(store, FitSettings(seed=arm)).simulation.save(file)
+        simulation = Simulation.load(file)
+        return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+
+
+def train_by(method: str, simulation: Simulation, begin: BeginStates, seed: int) -> Trained:
+    plain = method == "policy-greedy"
+    settings = LearnSettings(method="policy" if plain else method).chosen  # type: ignore[arg-type]
+    trained = train(simulation, begin, settings, seed)
+    if plain and isinstance(trained.agent, PolicyAgent):
+        agent = replace(trained.agent, settings=replace(trained.agent.settings, lookahead=0))
+        return replace(trained, agent=agent)  # type: ignore[arg-type]
+    return trained
+
+
+class Timed(AgentController):
+    """A controller that notes the processor time of its decisions."""
+
+    def __init__(self, agent: AnyAgent) -> None:
+        super().__init__(agent)
+        self.seconds: list[float] = []
+
+    def act(self, reading: Reading) -> NDArray[np.int8]:
+        began = time.thread_time()
+        valves = super().act(reading)
+        self.seconds.append(time.thread_time() - began)
+        return valves
+
+
+def moved(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
+    """Return movements on a virtual arm, and the processor time of a decision at the 99th percentile [ms]."""
+    controller, made = Timed(agent), []
+    controller.reset(agent.goal_range.mean(axis=1))
+    with open_arm(f"virtual:seed={arm}", 1000 + arm) as opened:
+        cycle = ControlCycle(guarded(opened))
+        controller.act(cycle.arm.read())  # compiles
+        for number in range(movements):
+            random, goal = begin_and_goal(agent, SEED_OF_MOVEMENTS, True, number)
+            BEGIN.reach(cycle.arm, random)
+            made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
+    return made, 1e3 * float(np.quantile(controller.seconds[1:], 0.99))
+
+
+def kind(movement: Movement) -> str:
+    """Return how a movement failed, by its last twenty readings."""
+    last = movement.recorded.angle[-20:]
+    away = np.abs(last[-1] - movement.goal).max()
+    spread = np.ptp(last, axis=0).max()
+    if spread <= 5:
+        return "stands still near the goal" if away <= 100 else "stands still far from the goal"
+    return "moves about near the goal" if away <= 100 else "moves about far from the goal"
+
+
+def summary(made: list[Movement]) -> dict[str, Any]:
+    return summarise(
+        reward=[one.reward for one in made],
+        success=[one.success for one in made],
+        actions=[one.actions for one in made],
+        switches=[one.switches.sum() for one in made],
+    )
+
+
+def row(
+    arm: str, seed: str, method: str, trained: Trained, simulated: float, figures: dict[str, Any], p99: float
+) -> str:
+    low, high = figures["intervals"]["reward"]
+    worst, best = figures["intervals"]["success_rate"]
+    reward = f"{figures['reward']:.2f} ± {(high - low) / 2:.2f}"
+    success = f"{figures['success_rate']:.4f} ({worst:.3f}..{best:.3f})"
+    return (
+        f"{arm:6}{seed:>5} {method:14}{trained.seconds:5.1f} s{simulated:15.2f}{reward:>17}{success:>22}"
+        f"{figures['actions']:9.2f}{figures['switches']:9.2f}{p99:6.2f} ms"
+    )
+
+
+def total(method: str, each: list[tuple[dict[str, Any], Trained]], failures: Counter[str]) -> str:
+    rewards = np.array([figures["reward"] for figures, _ in each])
+    rates = [figures["success_rate"] for figures, _ in each]
+    seconds = [trained.seconds for _, trained in each]
+    kinds = ", ".join(f"{count} {name}" for name, count in failures.most_common()) or "none"
+    return (
+        f"{method}: reward {rewards.mean():.2f} (of an agent {rewards.min():.2f} to {rewards.max():.2f}), success "
+        f"{np.mean(rates):.5f} (lowest {min(rates):.4f}), training {np.mean(seconds):.1f} s; failures: {kinds}"
+    )

@@ -3,7 +3,6 @@ import re
 import shlex
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -96,9 +95,7 @@ def test_a_missing_parent_folder_is_refused_before_any_work(
         ("train", sim, store, "--out", missing),
         ("transfer", agent, "--arm", "virtual", "--out", missing),
     ):
-        began = time.perf_counter()
         assert Outcome(capsys, *arguments).is_refused(str(missing.parent), "does not exist"), arguments
-        assert time.perf_counter() - began < 5
 
 
 def test_files_of_another_kind_are_refused(

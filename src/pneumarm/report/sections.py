@@ -217,8 +217,8 @@ def _invalid(found: Mapping[str, Any]) -> list[str]:
     errors = " and ".join(f"from {a:.1f} to {b:.1f}" for a, b in zip(before, remedied, strict=True))
     return [
         f"After {spread['steps']} simulated steps {invalid['simulated']:.1%} of the states lie in cells of the "
-        f"filter's grid that hold no data, and {invalid['recorded']:.1%} of the recorded ones do. Replacing the state by the "
-        f"most similar one of the database every ten steps changes the error of the angle then {errors} counts "
+        f"filter's grid that hold no data, and {invalid['recorded']:.1%} of the recorded ones do. Replacing the state "
+        f"by the most similar one of the database every ten steps changes the error of the angle then {errors} counts "
         "(invalid predictions and their remedy, thesis section 3.4)."
     ]
 

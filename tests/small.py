@@ -11,6 +11,7 @@ SMALL = RunSettings(
     transitions=6_000,
     test_episodes=300,
     fit=FitSettings(epochs=10),
-    train=TrainSettings(agents=2, max_episodes=3_000, validation_episodes=100, shaping=Shaping(episodes=100)),
+    method="sarsa",
+    thesis=TrainSettings(agents=2, max_episodes=3_000, validation_episodes=100, shaping=Shaping(episodes=100)),
     transfer=TransferSettings(episodes=30, test_episodes=20),
 )

@@ -80,7 +80,7 @@ def test_wrong_commands_and_options_are_refused(capsys: pytest.CaptureFixture[st
     train = ("train", sim, store, "--out", "x")
     assert Outcome(capsys, *train, "--method", "dqn").is_refused("--method", "sarsa")
     assert Outcome(capsys, *train, "--agents", 0).is_refused("agents cannot be 0")
-    assert Outcome(capsys, *train, "--learning-rate", "nan").is_refused("learning_rate cannot be nan")
+    assert Outcome(capsys, *train, "--policy.learning-rate", "nan").is_refused("learning_rate cannot be nan")
     assert not Path("x").exists()
 
 
@@ -212,7 +212,7 @@ def test_json_is_one_object_on_stdout_and_nothing_else(
 
     fitted = asked("fit", store, "--out", tmp_path / "sim", "--epochs", 3)
     assert set(fitted["std"]) == set(fitted["relative_error"]) == quantities  # type: ignore[call-overload]
-    trained = asked("train", sim, store, "--out", tmp_path / "agent", "--agents", 1, "--max-episodes", 500)
+    trained = asked("train", sim, store, "--out", tmp_path / "agent", "--agents", 1, "--policy.updates", 5)
     assert {"episodes", "steps", "seconds", "steps_per_second_per_core"} <= trained.keys()
     assert figures <= asked("test", agent, sim, store, "--episodes", 50).keys()
     out = ("--out", tmp_path / "t", "--episodes", 3, "--test-episodes", 4)

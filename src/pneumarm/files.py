@@ -74,6 +74,18 @@ def write_arrays(path: Path, kind: str, settings: Any, arrays: dict[str, NDArray
         save_file(contiguous, temporary, metadata=metadata)
 
 
+def kind_of(path: Path) -> str:
+    """Return the kind of a file written by :func:`write_arrays`.
+
+    Raises:
+        UnusableInput: no such file, or one that pneumarm did not write.
+
+    """
+    expected = "expected a file written by pneumarm"
+    with _opened(path, expected) as (kind, _, _):
+        return kind
+
+
 def read_arrays(path: Path, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
     """Return the settings and arrays of a file written by :func:`write_arrays`; all numbers are finite.
 
@@ -83,9 +95,22 @@ def read_arrays(path: Path, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
         UnusableInput: no such file, not of this kind, too large, damaged, or with numbers that are not finite.
 
     """
+    expected = f"expected a file of kind {kind!r} written by pneumarm"
+    with _opened(path, expected) as (found, settings, file):
+        if found != kind:
+            raise UnusableInput(f"{path}: {expected}, its kind is {found!r}")
+        arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a dict
+    for name, array in arrays.items():
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise UnusableInput(f"{path}: {name} holds numbers that are not finite")
+    return settings, arrays
+
+
+@contextmanager
+def _opened(path: Path, expected: str) -> Iterator[tuple[str, Any, Any]]:
+    """Give the kind, the settings and the opened file; whatever is wrong with it, inside too, is an UnusableInput."""
     from safetensors import SafetensorError, safe_open
 
-    expected = f"expected a file of kind {kind!r} written by pneumarm"
     if path.exists() and not path.is_file():
         raise UnusableInput(f"{path}: {expected}, this is no file")  # opening a pipe would wait for ever
     try:
@@ -99,16 +124,9 @@ def read_arrays(path: Path, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
     try:
         with safe_open(path, framework="numpy") as file:
             metadata = json.loads((file.metadata() or {})[_ENTRY], parse_constant=_refuse_constant)
-            found, settings = metadata["kind"], metadata["settings"]
-            if found != kind:
-                raise UnusableInput(f"{path}: {expected}, its kind is {found!r}")
-            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a dict
+            yield metadata["kind"], metadata["settings"], file
     except (SafetensorError, ValueError, KeyError, RecursionError, TypeError) as error:
         raise UnusableInput(f"{path}: {expected}, it is damaged ({error})") from error
-    for name, array in arrays.items():
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise UnusableInput(f"{path}: {name} holds numbers that are not finite")
-    return settings, arrays
 
 
 def _refuse_constant(name: str) -> Any:

@@ -8,16 +8,26 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.control import Movement as Moved
-from pneumarm.learning import Agent, TestResult, Training
-from pneumarm.report.data import Episodes, Movement, TrainingData
+from pneumarm.learning import AnyAgent, FleetTraining, TestResult, Trained
+from pneumarm.report.data import Episodes, LearningData, Movement, TrainingData
 
 DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large displacement": 70.0}
 """Movements that are shown [degrees] (thesis figures 5.17 to 5.19)."""
 _TAIL = 1.0  # s recorded after a movement, in which the arm swings out
 
 
-def training_record(training: Training) -> TrainingData:
+def training_record(training: Trained) -> TrainingData | LearningData:
     """Return the curves and the validation of all agents."""
+    if isinstance(training, FleetTraining):
+        episodes, reward, success = training.curves.transpose(2, 0, 1)
+        return LearningData(
+            episodes=episodes,
+            reward_learning=reward,
+            success_learning=success,
+            reward=np.array([result.reward.mean() for result in training.validation]),
+            success=np.array([result.success.mean() for result in training.validation]),
+            chosen=training.best,
+        )
     longest = max(training.curves, key=len)
     agents, evaluations = len(training.curves), len(longest)
     curves = np.zeros((6, agents, evaluations))
@@ -52,7 +62,7 @@ def test_record(tested: TestResult) -> Episodes:
     )
 
 
-def demonstrate(agent: Agent, arm: Arm, seed: int) -> list[Movement]:
+def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Movement]:
     """Make and record typical movements, with a second after each in which the arm swings out.
 
     The agent itself brings the arm to where a movement begins; a displacement larger than its range is left out.
@@ -72,11 +82,11 @@ def demonstrate(agent: Agent, arm: Arm, seed: int) -> list[Movement]:
     return shown
 
 
-def _move(agent: Agent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Moved:
+def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Moved:
     return move(cycle, AgentController(agent), goal, agent.settings.reward, agent.settings.cutoff)
 
 
-def _recorded(agent: Agent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Movement:
+def _recorded(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Movement:
     spec = cycle.arm.spec
     made = _move(agent, cycle, goal)
     tail = list(cycle.run(_closed_for(round(_TAIL / spec.period), cycle.applied)))

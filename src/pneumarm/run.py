@@ -19,7 +19,7 @@ from pneumarm.console import Report, jsonable, peak_memory
 from pneumarm.control import TransferSettings, transfer, write_episodes
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
-from pneumarm.learning import Agent, BeginStates, TrainSettings, begin_states, train
+from pneumarm.learning import BeginStates, LearnSettings, begin_states, load_agent, train
 from pneumarm.learning import test as test_agent
 from pneumarm.records import demonstrate, test_record, training_record
 from pneumarm.report import save_movement, save_spec, write_report
@@ -36,7 +36,7 @@ def silent(title: str) -> Iterator[Report]:
 
 
 @dataclass(frozen=True)
-class RunSettings:
+class RunSettings(LearnSettings):
     """What a run is asked for. A folder is resumed with the same settings only."""
 
     arm: str = "virtual"
@@ -51,7 +51,6 @@ class RunSettings:
     """Movements of the test in simulation (thesis section 5.2)."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
-    train: TrainSettings = field(default_factory=TrainSettings)
     transfer: TransferSettings = field(default_factory=TransferSettings)
 
     def __post_init__(self) -> None:
@@ -154,7 +153,7 @@ class Run:
             training = train(
                 simulation,
                 self._begin_states(simulation),
-                self.settings.train,
+                self.settings.chosen,
                 seed=self.settings.seed,
                 progress=lambda now: report(100 * now.share, 100),
                 checkpoint=self.folder / "training.checkpoint",
@@ -166,7 +165,7 @@ class Run:
     def _test(self) -> dict[str, Any]:
         simulation = Simulation.load(self.simulation)
         tested = test_agent(
-            Agent.load(self.agent),
+            load_agent(self.agent),
             simulation,
             self._begin_states(simulation),
             self.settings.test_episodes,
@@ -182,7 +181,7 @@ class Run:
             open_arm_checked(wanted) as arm,
             Store.append_to(self.store) as store,
         ):
-            moved = transfer(Agent.load(self.agent), arm, store, wanted.transfer, seed=wanted.seed, progress=report)
+            moved = transfer(load_agent(self.agent), arm, store, wanted.transfer, seed=wanted.seed, progress=report)
             movements = demonstrate(moved.agent, arm, wanted.seed)
         moved.agent.save(self.adapted)
         write_episodes(self.episodes, moved.episodes)

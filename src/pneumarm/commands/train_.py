@@ -1,12 +1,13 @@
 """``pneumarm train``."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
 from pneumarm.files import require_folder
-from pneumarm.learning import TrainSettings, begin_states, train
+from pneumarm.learning import LearnSettings, begin_states, train
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
 
@@ -18,7 +19,8 @@ def train_(
     *,
     out: Path,
     seed: int = 0,
-    settings: Annotated[TrainSettings, Settings] = TrainSettings(),
+    agents: int | None = None,
+    settings: Annotated[LearnSettings, Settings] = LearnSettings(),
     json: Json = False,
 ) -> None:
     """Train agents in a simulation and keep the best.
@@ -33,17 +35,18 @@ def train_(
         File of the agent to write; it needs neither of the others then.
     seed
         Of the initial weights, the exploration and the begin states.
+    agents
+        Agents trained at once, of which the best is kept; otherwise as many as the method's settings say.
     json
         Print one JSON object on stdout and nothing else there.
     """
     require_folder(out)
+    chosen = settings.chosen if agents is None else replace(settings.chosen, agents=agents)
     simulation = Simulation.load(sim)
     with Store.open(db) as store:
         begin = begin_states(store, simulation.window, simulation.scaling)
     with progress("training") as report:
-        training = train(
-            simulation, begin, settings, seed, progress=lambda now: report(round(1000 * now.share), 1000)
-        )
+        training = train(simulation, begin, chosen, seed, progress=lambda now: report(round(1000 * now.share), 1000))
     training.agent.save(out)
     result = training.results()
     show(result, json, lambda: [table(("trained", ""), list(result.items()))])

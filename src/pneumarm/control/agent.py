@@ -6,19 +6,19 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Agent, OnlineLearner, StateTracker
+from pneumarm.learning import Actor, AnyAgent, StateTracker
 
 
 class AgentController:
-    """Maps readings to valves with an agent's action values; learns if its learner has a learning rate.
+    """Maps readings to valves with an agent of any kind; learns if its actor does.
 
     ``reset(goal)`` begins a movement with the arm at rest and its valves closed; then every ``act(reading)`` gives
-    the valves to set, one control period after the other. A learner is told what came of it by ``observe``.
+    the valves to set, one control period after the other. An actor is told what came of it by ``observe``.
     """
 
-    def __init__(self, agent: Agent, learner: OnlineLearner | None = None) -> None:
+    def __init__(self, agent: AnyAgent, actor: Actor | None = None) -> None:
         self.agent = agent
-        self.learner = OnlineLearner(agent) if learner is None else learner
+        self.actor = agent.actor() if actor is None else actor
         self._tracker = StateTracker(agent.window, agent.scaling)
         self._goal: NDArray[np.float64] | None = None
         self._seen: float | None = None
@@ -39,10 +39,12 @@ class AgentController:
         if reading.time != self._seen:
             reading = checked(reading, self.agent.spec)
             state = self._tracker.push(reading.time, reading.angle, reading.pressure)
-            # A reading that nobody told the learner about begins anew: nothing can be learned from the way to it.
-            self.learner.begin(state, self._goal)
+            if self._seen is None:
+                self.actor.begin(state, self._goal)
+            else:  # a reading that nobody told the actor about: nothing can be learned from the way to it
+                self.actor.follow(state)
             self._seen = reading.time
-        valves = to_valves(self.learner.act())
+        valves = to_valves(self.actor.act())
         self._tracker.commanded(valves)
         return valves
 
@@ -52,5 +54,5 @@ class AgentController:
         """Learn from ``reading``, to which the valves as ``applied`` led with ``reward`` (joints,)."""
         self._tracker.commanded(applied)
         state = self._tracker.push(reading.time, reading.angle, reading.pressure)
-        self.learner.observe(reward, state, terminal)
+        self.actor.observe(reward, state, terminal)
         self._seen = reading.time

@@ -16,7 +16,7 @@ from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import Movement, move
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder, write_text
-from pneumarm.learning import Agent, OnlineLearner
+from pneumarm.learning import AnyAgent
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
 
@@ -98,7 +98,7 @@ class Episode:
 
 
 def begin_and_goal(
-    agent: Agent, seed: int, test: bool, number: int
+    agent: AnyAgent, seed: int, test: bool, number: int
 ) -> tuple[np.random.Generator, NDArray[np.float64]]:
     """Return the random numbers of movement ``number`` and its goal.
 
@@ -115,7 +115,7 @@ class Transferred:
 
     episodes: list[Episode]
     """All movements in order."""
-    agent: Agent
+    agent: AnyAgent
     """The agent as it is after learning."""
     learning_rate: float
 
@@ -134,7 +134,7 @@ class Transferred:
 
 
 def transfer(
-    agent: Agent,
+    agent: AnyAgent,
     arm: Arm,
     store: Store,
     settings: TransferSettings = TransferSettings(),
@@ -158,8 +158,8 @@ def transfer(
     arm_state = store.state("arm")
     if arm_state is not None and arm.get_state() is not None:
         arm.set_state(arm_state)
-    exploration = agent.settings.exploration
-    learner = OnlineLearner(agent, settings.learning_rate, exploration, seed)
+    rate = settings.learning_rate if agent.learns else 0.0
+    learner = agent.actor(rate, explores=agent.learns, seed=seed)
     mean = _Mean(agent)
     if done:
         learner.set_state(store.state("learner") or learner.get_state())
@@ -178,14 +178,14 @@ def transfer(
         for phase in PHASES:
             count = settings.movements(phase)
             greedy = phase != "learning"
-            shown = mean.agent if mean.count else learner.agent
-            controller = AgentController(agent, OnlineLearner(shown) if greedy else learner)
+            shown = mean.agent if mean.count else agent.with_weights(learner.weights())
+            controller = AgentController(agent, shown.actor() if greedy else learner)
             for i in range(sum(e.phase == phase for e in done), count):
                 random, goal = begin_and_goal(agent, seed, greedy, i)
                 BEGIN.reach(cycle.arm, random)
                 movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
-                if phase == "learning" and i >= (1 - settings.averaged) * count:
-                    mean.add(learner.agent.weights())
+                if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * count:
+                    mean.add(learner.weights())
                 episode = Episode.of(phase, movement)
                 done.append(episode)
                 waiting.append((episode, movement))
@@ -200,13 +200,14 @@ def transfer(
             f"{arm.spec.name}: failed in movement {len(done) + 1} ({type(error).__name__}: {error}); "
             "see to the arm and run the same command again"
         ) from error
-    return Transferred(done, mean.agent if mean.count else learner.agent, settings.learning_rate)
+    adapted = mean.agent if mean.count else agent.with_weights(learner.weights())
+    return Transferred(done, adapted, rate)
 
 
 class _Mean:
     """The mean of an agent's weights over movements."""
 
-    def __init__(self, agent: Agent) -> None:
+    def __init__(self, agent: AnyAgent) -> None:
         self._agent = agent
         self._sum = np.zeros(agent.weights().shape)
         self.count = 0
@@ -216,7 +217,7 @@ class _Mean:
         self.count += 1
 
     @property
-    def agent(self) -> Agent:
+    def agent(self) -> AnyAgent:
         """The agent with the mean weights."""
         return self._agent.with_weights((self._sum / self.count).astype(np.float32))
 
@@ -230,7 +231,7 @@ class _Mean:
 
 def transfer_into(
     folder: Path,
-    agent: Agent,
+    agent: AnyAgent,
     arm: Arm,
     settings: TransferSettings = TransferSettings(),
     *,
@@ -253,11 +254,11 @@ def transfer_into(
     return moved.results()
 
 
-def _fingerprint(agent: Agent) -> str:
+def _fingerprint(agent: AnyAgent) -> str:
     return hashlib.sha256(agent.weights().tobytes()).hexdigest()[:16]
 
 
-def check_fit(agent: Agent, arm: Arm) -> None:
+def check_fit(agent: AnyAgent, arm: Arm) -> None:
     """Raise UnusableInput where ``agent`` was not trained for an arm like this."""
     for name in ("joints", "counts_per_degree", "counts_per_bar", "angle_range", "period"):
         trained, found = getattr(agent.spec, name), getattr(arm.spec, name)

@@ -2,26 +2,55 @@
 
 from pneumarm.learning.agent import Agent
 from pneumarm.learning.begin import BeginStates, begin_states
+from pneumarm.learning.fleet.agent import PolicyAgent
+from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
+from pneumarm.learning.fleet.side_by_side import FLEET_CURVES
+from pneumarm.learning.fleet.training import FleetTraining
+from pneumarm.learning.kinds import (
+    METHODS,
+    Actor,
+    AnyAgent,
+    LearnSettings,
+    Method,
+    Settings,
+    Trained,
+    load_agent,
+    test,
+    train,
+)
 from pneumarm.learning.online import OnlineLearner
 from pneumarm.learning.settings import Exploration, Reward, Shaping, TrainSettings
-from pneumarm.learning.testing import TestResult, test
+from pneumarm.learning.testing import TestResult
 from pneumarm.learning.tracker import StateTracker
-from pneumarm.learning.training import CURVES, Progress, Training, train
+from pneumarm.learning.training import CURVES, Progress, Training
 
 __all__ = [
     "CURVES",
+    "FLEET_CURVES",
+    "METHODS",
+    "Actor",
     "Agent",
+    "AnyAgent",
+    "BatchedSettings",
     "BeginStates",
     "Exploration",
+    "FleetTraining",
+    "LearnSettings",
+    "Method",
     "OnlineLearner",
+    "PolicyAgent",
+    "PolicySettings",
     "Progress",
     "Reward",
+    "Settings",
     "Shaping",
     "StateTracker",
     "TestResult",
     "TrainSettings",
+    "Trained",
     "Training",
     "begin_states",
+    "load_agent",
     "test",
     "train",
 ]

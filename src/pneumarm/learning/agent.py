@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 import numpy as np
@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
+from pneumarm.learning.begin import BeginStates
+from pneumarm.learning.environment import environment
 from pneumarm.learning.settings import TrainSettings
+from pneumarm.learning.testing import TestResult, run_test
 from pneumarm.learning.values import Networks, network_shapes, pack, unpack
-from pneumarm.simulation.simulation import Scaling
+from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.transitions.window import Window
+
+if TYPE_CHECKING:
+    from pneumarm.learning.online import OnlineLearner
 
 KIND = "pneumarm agent"
 _MOST_JOINTS, _MOST_HISTORY = 16, 64  # beyond these a file is damaged, not ambitious
@@ -46,6 +52,23 @@ class Agent:
     def with_weights(self, weights: NDArray[np.float32]) -> Self:
         """Return the agent with other ``weights``, as of :meth:`weights`."""
         return replace(self, networks=unpack(weights, self.window, self.settings.hidden))
+
+    @property
+    def learns(self) -> bool:
+        """It can learn on an arm."""
+        return True
+
+    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> "OnlineLearner":
+        """Return the agent acting step by step, greedily or exploring as at the end of its training."""
+        from pneumarm.learning.online import OnlineLearner  # which imports this module
+
+        exploration = self.settings.exploration if explores else None
+        return OnlineLearner(self, learning_rate, exploration, seed)
+
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> TestResult:
+        """Let the agent move greedily in ``simulation``."""
+        env = environment(simulation, begin, self.settings)
+        return run_test(env, self.weights(), self.settings, episodes, seed)
 
     def save(self, path: Path) -> None:
         """Write the agent to ``path``, whole or not at all.

@@ -4,7 +4,7 @@ Any learner can be run on it: it knows nothing of action values. ``begin_episode
 learner calls; both work on one :class:`Episode`, of which there can be as many as one wants.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from pneumarm.arm.valves import VALVES
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import part
 from pneumarm.learning.begin import BeginParameters, BeginStates, begin_parameters, draw_begin
-from pneumarm.learning.settings import TrainSettings
+from pneumarm.learning.settings import Reward
 from pneumarm.random import RandomState, uniform
 from pneumarm.simulation.kernel import (
     SimulationParameters,
@@ -24,8 +24,28 @@ from pneumarm.simulation.kernel import (
     simulation_state,
     step,
 )
-from pneumarm.simulation.noise import NoiseParameters, noise_parameters
+from pneumarm.simulation.noise import NoiseParameters, NoiseSettings, noise_parameters
 from pneumarm.simulation.simulation import Simulation
+
+
+class TaskSettings(Protocol):
+    """What of a learner's settings decides its task."""
+
+    @property
+    def reward(self) -> Reward:
+        """What is paid for an action."""
+
+    @property
+    def cutoff(self) -> int:
+        """Actions after which an episode is cut off."""
+
+    @property
+    def noise(self) -> NoiseSettings:
+        """Noise on the simulation's predictions."""
+
+    @property
+    def begin_weights(self) -> tuple[float, ...]:
+        """Weights of the sub-intervals of begin states on each side of the goal, the farthest first."""
 
 
 class Task(NamedTuple):
@@ -72,7 +92,7 @@ class Episode(NamedTuple):
     """Room, shape (2 joints,)."""
 
 
-def environment(simulation: Simulation, begin: BeginStates, settings: TrainSettings) -> Environment:
+def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettings) -> Environment:
     """Return the task of ``settings`` on ``simulation``.
 
     Raises:
@@ -89,10 +109,9 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TrainSetti
     offset = simulation.scaling.observation_offset.reshape(joints, 4)
     scale = simulation.scaling.observation_scale.reshape(joints, 4)
     commands = VALVES[None] / simulation.scaling.command_scale.reshape(joints, 1, 2)
-    weights = settings.shaping.weights if settings.shaping else (1.0,)
     task = Task(
         goal_range=np.ascontiguousarray(simulation.goal_range, np.float64),
-        unit=np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1),
+        unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
         commands=np.ascontiguousarray(commands, np.float32),
         goal_place=places(simulation.window).goal,
         angle_tolerance=float(reward.angle_tolerance),
@@ -105,7 +124,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TrainSetti
     return Environment(
         simulation=simulation_parameters(simulation),
         noise=noise_parameters(settings.noise, simulation),
-        begin=begin_parameters(begin, simulation.spec.angle_range, weights),
+        begin=begin_parameters(begin, simulation.spec.angle_range, settings.begin_weights),
         task=task,
     )
 
@@ -138,14 +157,20 @@ def begin_episode(environment, episode, deviation, random):  # type: ignore[no-u
 
 
 @part
-def take(environment, episode, actions):  # type: ignore[no-untyped-def]
-    """Take ``actions`` (joints,) for a period; return whether the goals are reached. Notes who switched."""
+def order(task, episode, actions):  # type: ignore[no-untyped-def]
+    """Make ``actions`` (joints,) the command of ``episode``. Notes who switched."""
     for joint in range(actions.shape[0]):
         action, before = actions[joint], episode.actions[joint]
         episode.switched[joint] = 1 if before >= 0 and before != action else 0
         episode.actions[joint] = action
-        episode.command[2 * joint] = environment.task.commands[joint, action, 0]
-        episode.command[2 * joint + 1] = environment.task.commands[joint, action, 1]
+        episode.command[2 * joint] = task.commands[joint, action, 0]
+        episode.command[2 * joint + 1] = task.commands[joint, action, 1]
+
+
+@part
+def take(environment, episode, actions):  # type: ignore[no-untyped-def]
+    """Take ``actions`` (joints,) for a period; return whether the goals are reached."""
+    order(environment.task, episode, actions)
     step(environment.simulation, environment.noise, episode.state, episode.command)
     return reached(environment.task, episode)
 

@@ -87,6 +87,15 @@ class OnlineLearner:
             action_values(self._learner, joint, self._x, values[joint])
         return values
 
+    def follow(self, next_state: ArrayLike) -> None:
+        """Go on in ``next_state`` without learning, as if an episode began there."""
+        self._x[: self._places.command] = self._checked(next_state)
+        _begin(self._learner, self._schedule, self._x, self._room, self._random)
+
+    def weights(self) -> NDArray[np.float32]:
+        """Return a copy of the weights as they are now."""
+        return self._learner.weights.copy()
+
     def observe(self, reward: ArrayLike, next_state: ArrayLike, terminal: bool) -> None:
         """Learn from what the actions of :meth:`act` led to.
 

@@ -13,7 +13,8 @@ from pneumarm.simulation.noise import NoiseSettings
 Method = Literal["sarsa", "q-learning"]
 
 
-def _check(settings: object, **valid: bool) -> None:
+def check(settings: object, **valid: bool) -> None:
+    """Raise UnusableInput for the first field of ``settings`` that is not ``valid``."""
     for name, is_valid in valid.items():
         if not is_valid:
             kind = type(settings).__name__
@@ -36,7 +37,7 @@ class Reward:
     """Highest speed at which it counts as reached [counts/ms] (thesis: 1)."""
 
     def __post_init__(self) -> None:
-        _check(
+        check(
             self,
             goal=math.isfinite(self.goal),
             action=math.isfinite(self.action),
@@ -66,7 +67,7 @@ class Exploration:
     """Temperature T of its Boltzmann distribution, in units of reward (thesis: 1 at the end of shaping)."""
 
     def __post_init__(self) -> None:
-        _check(self, epsilon=0 <= self.epsilon <= 1, temperature=0 < self.temperature < math.inf)
+        check(self, epsilon=0 <= self.epsilon <= 1, temperature=0 < self.temperature < math.inf)
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class Shaping:
     """Weights of the sub-intervals of begin states on each side of the goal, the farthest first (thesis: these)."""
 
     def __post_init__(self) -> None:
-        _check(
+        check(
             self,
             initial_deviation=0 < self.initial_deviation < math.inf,
             episodes=self.episodes >= 1,
@@ -141,8 +142,13 @@ class TrainSettings:
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     """Noise on the simulation's predictions."""
 
+    @property
+    def begin_weights(self) -> tuple[float, ...]:
+        """Weights of the sub-intervals of begin states, see :class:`Shaping`."""
+        return self.shaping.weights if self.shaping else (1.0,)
+
     def __post_init__(self) -> None:
-        _check(
+        check(
             self,
             method=self.method in ("sarsa", "q-learning"),
             learning_rate=0 <= self.learning_rate < math.inf,

@@ -139,7 +139,7 @@ def train(
 
     began, before = time.perf_counter(), agents.seconds[0]
     saved = began
-    with ThreadPoolExecutor(min(threads or _cores(), settings.agents)) as pool:
+    with ThreadPoolExecutor(min(threads or cores(), settings.agents)) as pool:
         while (running := np.flatnonzero(~_ended(agents, settings))).size:
             done = list(pool.map(lambda a: _chunk(env, agents, settings, simulation, int(a)), running))
             row = np.zeros((1, settings.agents, len(CURVES)))
@@ -178,7 +178,7 @@ def train(
     )
 
 
-def _cores() -> int:
+def cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

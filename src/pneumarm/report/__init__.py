@@ -3,6 +3,7 @@
 from pneumarm.report.data import (
     CoverageData,
     Episodes,
+    LearningData,
     Movement,
     QualityData,
     TrainingData,
@@ -16,6 +17,7 @@ from pneumarm.report.sections import RunData
 __all__ = [
     "CoverageData",
     "Episodes",
+    "LearningData",
     "Movement",
     "Picture",
     "QualityData",

@@ -142,6 +142,38 @@ class QualityData(Record):
 
 
 @dataclass(frozen=True)
+class LearningData(Record):
+    """Learning curves of all agents that learned in many simulated arms at once, and their validation."""
+
+    file = "learning_curves.safetensors"
+    shapes = {  # noqa: RUF012
+        "episodes": "agents evaluations",
+        "reward_learning": "agents evaluations",
+        "success_learning": "agents evaluations",
+        "reward": "agents",
+        "success": "agents",
+    }
+
+    episodes: Array
+    """Episodes at each evaluation, shape (agents, evaluations)."""
+    reward_learning: Array
+    """Mean reward of the episodes since the evaluation before, exploring, shape (agents, evaluations)."""
+    success_learning: Array
+    """Their success rate, shape (agents, evaluations)."""
+    reward: Array
+    """Mean reward of each agent in the validation, shape (agents,)."""
+    success: Array
+    """Its success rate, shape (agents,)."""
+    chosen: int
+    """Index of the agent that is kept."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.chosen < len(self.reward):
+            raise UnusableInput(f"LearningData: chosen must be one of {len(self.reward)} agents, got {self.chosen}")
+
+
+@dataclass(frozen=True)
 class TrainingData(Record):
     """Shaping curves of all agents and their validation."""
 

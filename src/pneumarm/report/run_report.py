@@ -12,6 +12,7 @@ from pneumarm.files import write_json, write_text
 from pneumarm.report.data import (
     CoverageData,
     Episodes,
+    LearningData,
     Movement,
     QualityData,
     Record,
@@ -86,7 +87,7 @@ def read_run(folder: Path) -> RunData:
         results=results,
         coverage=_read(CoverageData, folder),
         quality=_read(QualityData, folder),
-        training=_read(TrainingData, folder),
+        training=_read(TrainingData, folder) or _read(LearningData, folder),
         test=_read(Episodes, folder),
         transfer=_read_transfer(folder / EPISODES, results),
         movements=tuple(Movement.load(folder, path.name) for path in sorted(folder.glob(MOVEMENTS))),

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
 from pneumarm.report import figures
-from pneumarm.report.data import CoverageData, Episodes, Movement, QualityData, TrainingData, TransferData
+from pneumarm.report.data import (
+    CoverageData,
+    Episodes,
+    LearningData,
+    Movement,
+    QualityData,
+    TrainingData,
+    TransferData,
+)
 from pneumarm.report.figures import Classification, Phase
 from pneumarm.report.ledger import beside_thesis, ledger
 from pneumarm.report.page import Picture, Section
@@ -26,7 +34,7 @@ class RunData:
     """Contents of ``results.json``."""
     coverage: CoverageData | None = None
     quality: QualityData | None = None
-    training: TrainingData | None = None
+    training: TrainingData | LearningData | None = None
     test: Episodes | None = None
     transfer: TransferData | None = None
     movements: tuple[Movement, ...] = ()
@@ -42,8 +50,10 @@ def all_sections(run: RunData) -> list[Section]:
             predicted(run.quality, run.spec),
             propagated(run.quality, run.spec, run.results.get("simulation", {})),
         ]
-    if run.training is not None:
+    if isinstance(run.training, TrainingData):
         sections.append(trained(run.training, run.spec))
+    elif run.training is not None:
+        sections.append(learned(run.training))
     if run.test is not None:
         sections.append(tested(run.test))
     if run.transfer is not None:
@@ -217,9 +227,9 @@ def _invalid(found: Mapping[str, Any]) -> list[str]:
     errors = " and ".join(f"from {a:.1f} to {b:.1f}" for a, b in zip(before, remedied, strict=True))
     return [
         f"After {spread['steps']} simulated steps {invalid['simulated']:.1%} of the states lie in cells of the "
-        f"filter's grid that hold no data, and {invalid['recorded']:.1%} of the recorded ones do. Replacing the state "
-        f"by the most similar one of the database every ten steps changes the error of the angle then {errors} counts "
-        "(invalid predictions and their remedy, thesis section 3.4)."
+        f"filter's grid that hold no data, and {invalid['recorded']:.1%} of the recorded ones do. Replacing the "
+        f"state by the most similar one of the database every ten steps changes the angle's error then {errors} "
+        "counts (invalid predictions and their remedy, thesis section 3.4)."
     ]
 
 
@@ -253,6 +263,29 @@ def trained(data: TrainingData, spec: ArmSpec) -> Section:
             ),
         ),
     )  # fmt: skip
+
+
+def learned(data: LearningData) -> Section:
+    """Return the learning curves and the spread of agents that learned in many simulated arms at once."""
+    return Section(
+        "Training in the simulation",
+        (
+            f"{len(data.reward)} agents learn from different initial weights, each in many simulated arms at once; "
+            "the best in a validation of its own is kept.",
+        ),
+        (
+            Picture(
+                figures.learning_curves(data.episodes, data.reward_learning, data.success_learning, data.chosen),
+                "Reward and success while learning; with exploration they stay below those of the test.",
+                figures.learning_curves_alt(data.episodes, data.reward_learning, data.success_learning, data.chosen),
+            ),
+            Picture(
+                figures.spread_of_agents(data.reward, data.success, data.chosen),
+                "Validation of all agents, ordered by reward.",
+                figures.spread_of_agents_alt(data.reward, data.success, data.chosen),
+            ),
+        ),
+    )
 
 
 def tested(test: Episodes) -> Section:

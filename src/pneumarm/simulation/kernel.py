@@ -238,17 +238,30 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
 
 
 @part
-def step(simulation, noise, state, command):  # type: ignore[no-untyped-def]
-    """Let ``state`` advance by one control period under the scaled ``command`` (2 joints,)."""
-    x = state.x
+def put_command(simulation, x, command):  # type: ignore[no-untyped-def]
+    """Put the scaled ``command`` (2 joints,) into ``x``, where the networks of the simulation read it."""
     first = simulation.history * 4 * simulation.joints + (simulation.history - 1) * 2 * simulation.joints
     for i in range(command.shape[0]):
         x[first + i] = command[i]
-    predict_change(simulation, state)
+
+
+@part
+def settle(simulation, noise, state, command):  # type: ignore[no-untyped-def]
+    """Let ``state`` go to what ``state.change`` predicts, with noise."""
+    x = state.x
+    first = simulation.history * 4 * simulation.joints + (simulation.history - 1) * 2 * simulation.joints
     for i in range(command.shape[0]):
         x[first + i] = np.float32(0.0)  # so that the command of the past is no input of an agent
     add_noise(noise, x, state.change, state.average, state.random)
     push(simulation, x, state.change, command)
+
+
+@part
+def step(simulation, noise, state, command):  # type: ignore[no-untyped-def]
+    """Let ``state`` advance by one control period under the scaled ``command`` (2 joints,)."""
+    put_command(simulation, state.x, command)
+    predict_change(simulation, state)
+    settle(simulation, noise, state, command)
 
 
 @part

@@ -12,7 +12,7 @@ Numbered differences from the thesis:
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import msgspec
 import numpy as np
@@ -134,14 +134,8 @@ class Simulation:
             UnusableInput: the parent folder is missing or cannot be written.
 
         """
-        direct = [network.direct is not None for network in self.networks]
-        header = _Header(self.spec, self.window, self.velocity, self.valves, self.held_out, self.seed, direct)
-        arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in _ARRAYS}
-        arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
-        for number, network in enumerate(self.networks):
-            layers = {name: getattr(network, name) for name in _LAYERS}
-            arrays |= {f"network_{number}_{name}": array for name, array in layers.items() if array is not None}
-        write_arrays(Path(path), _KIND, asdict(header), arrays)
+        header, arrays = self.parts()
+        write_arrays(Path(path), _KIND, header, arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -154,11 +148,32 @@ class Simulation:
         path = Path(path)
         settings, arrays = read_arrays(path, _KIND)
         try:
-            header = msgspec.convert(settings, _Header)
-            simulation = cls._assembled(header, {name: _floats(name, array) for name, array in arrays.items()})
-            _check(simulation)
+            return cls.of_parts(settings, arrays)
         except (msgspec.ValidationError, UnusableInput, ValueError, KeyError) as error:
             raise UnusableInput(f"{path}: is no usable simulation ({error}); fit it again") from error
+
+    def parts(self) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
+        """Return what a file has to hold: settings for its header, and arrays."""
+        direct = [network.direct is not None for network in self.networks]
+        header = _Header(self.spec, self.window, self.velocity, self.valves, self.held_out, self.seed, direct)
+        arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in _ARRAYS}
+        arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
+        for number, network in enumerate(self.networks):
+            layers = {name: getattr(network, name) for name in _LAYERS}
+            arrays |= {f"network_{number}_{name}": array for name, array in layers.items() if array is not None}
+        return asdict(header), arrays
+
+    @classmethod
+    def of_parts(cls, settings: Any, arrays: dict[str, NDArray[Any]]) -> Self:
+        """Return what :meth:`parts` came from.
+
+        Raises:
+            ValueError, KeyError, msgspec.ValidationError, UnusableInput: they do not fit together.
+
+        """
+        header = msgspec.convert(settings, _Header)
+        simulation = cls._assembled(header, {name: _floats(name, array) for name, array in arrays.items()})
+        _check(simulation)
         return simulation
 
     @classmethod

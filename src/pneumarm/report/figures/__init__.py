@@ -9,6 +9,7 @@ from pneumarm.report.figures.displacement import against_displacement, against_d
 from pneumarm.report.figures.episodes import distributions, distributions_alt
 from pneumarm.report.figures.importance import input_importance, input_importance_alt
 from pneumarm.report.figures.isoplots import isoplot, isoplot_alt
+from pneumarm.report.figures.learning import learning_curves, learning_curves_alt
 from pneumarm.report.figures.movements import movement, movement_alt
 from pneumarm.report.figures.propagation import error_propagation, error_propagation_alt, expectation
 from pneumarm.report.figures.residues import (
@@ -42,6 +43,8 @@ __all__ = [
     "input_importance_alt",
     "isoplot",
     "isoplot_alt",
+    "learning_curves",
+    "learning_curves_alt",
     "movement",
     "movement_alt",
     "new_share",

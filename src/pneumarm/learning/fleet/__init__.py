@@ -1,0 +1,1 @@
+"""Learning in many simulated arms at once."""

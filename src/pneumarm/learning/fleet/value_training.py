@@ -1,0 +1,130 @@
+"""Training the thesis' nine networks in many simulated arms at once."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from pneumarm.learning.agent import Agent
+from pneumarm.learning.begin import BeginStates
+from pneumarm.learning.environment import environment
+from pneumarm.learning.fleet.acting import Mind
+from pneumarm.learning.fleet.arms import begin_all, fleet, limits
+from pneumarm.learning.fleet.inputs import input_parameters
+from pneumarm.learning.fleet.layers import initial_weights, trainable
+from pneumarm.learning.fleet.settings import BatchedSettings
+from pneumarm.learning.fleet.side_by_side import Learner, identity_of, train_side_by_side
+from pneumarm.learning.fleet.training import FleetTraining, fleet_training
+from pneumarm.learning.fleet.values import (
+    ValueRule,
+    collect_values,
+    connections,
+    improve_values,
+    network_sizes,
+    to_networks,
+    value_batch,
+)
+from pneumarm.learning.testing import TestResult
+from pneumarm.learning.training import Progress
+from pneumarm.random import random_state, random_states
+from pneumarm.simulation.simulation import Simulation
+
+_WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
+_LAST_LAYER = 0.1  # the first values are small
+
+
+def train_batched(
+    simulation: Simulation,
+    begin_states: BeginStates,
+    settings: BatchedSettings | None = None,
+    seed: int = 0,
+    *,
+    progress: Callable[[Progress], None] | None = None,
+    checkpoint: Path | None = None,
+    threads: int | None = None,
+) -> FleetTraining[Agent]:
+    """Train ``settings.agents`` agents of the thesis' kind and return the best, with what it took.
+
+    Raises:
+        UnusableInput: begin states and simulation do not fit, or the checkpoint is of another training.
+
+    """
+    settings = settings or BatchedSettings()
+    compiled = ValueLearner(simulation, begin_states, settings, seed, 0)
+    compiled.update()  # on a learner that is thrown away, so that compiling is not counted as training
+    compiled.validate(1)
+    learners = [ValueLearner(simulation, begin_states, settings, seed, a) for a in range(settings.agents)]
+    trained = train_side_by_side(
+        learners,
+        settings.updates,
+        settings.validation_episodes,
+        identity_of(compiled.mind.environment, settings, seed),
+        progress=progress,
+        checkpoint=checkpoint,
+        threads=threads,
+    )
+    return fleet_training(learners[trained.best].agent(), learners, trained, settings.arms * settings.steps)
+
+
+class ValueLearner(Learner):
+    """Nine networks a joint, with the arms in which they are learned."""
+
+    networks = ("values",)
+
+    def __init__(
+        self, simulation: Simulation, begin_states: BeginStates, settings: BatchedSettings, seed: int, number: int
+    ) -> None:
+        window, scaling = simulation.window, simulation.scaling
+        sizes = network_sizes(window, settings.hidden)
+        mask = connections(window, settings.hidden)
+        weights = initial_weights(sizes, _LAST_LAYER, np.random.default_rng([seed, _WEIGHTS, number])) * mask
+        self.values = trainable(weights, sizes, settings.arms, mask)
+        env = environment(simulation, begin_states, settings)
+        tolerance = settings.reward.angle_tolerance
+        self.mind = Mind(
+            environment=env,
+            limits=limits(window, scaling, simulation.spec, tolerance, patience=0),
+            inputs=input_parameters(window, scaling, ()),
+            layers=self.values.layers,
+            hold=0.0,
+            seeds=random_states(0, 1),
+        )
+        arms = fleet(env, random_states((seed, _ARMS, number), settings.arms))
+        begin_all(env, arms)
+        super().__init__(arms, random_state((seed, _ORDER, number)))
+        self._batch = value_batch(settings.steps, sizes[0], window.joints, settings.arms)
+        self._rule = ValueRule(
+            discount=float(settings.discount),
+            decay=float(settings.trace_decay),
+            epochs=int(settings.epochs),
+            largest=float(settings.largest_gradient),
+            scale=float(settings.return_scale),
+        )
+        self._simulation, self._begin, self._settings, self._seed = simulation, begin_states, settings, seed
+
+    def update(self) -> tuple[int, int, float]:
+        """Act for a batch of steps and learn from them."""
+        settings, counts = self._settings, self.counts
+        first, last, share = settings.first_exploration, settings.last_exploration, counts[0] / settings.updates
+        exploration = (
+            float(first.epsilon + share * (last.epsilon - first.epsilon)),
+            float(first.temperature + share * (last.temperature - first.temperature)),
+        )
+        seen: tuple[int, int, float] = collect_values(
+            self.mind, self._rule, exploration, self.values, self.fleet, self._batch
+        )
+        rate = settings.learning_rate * (1 - share)
+        counts[1] = improve_values(self._rule, self.values, self._batch, rate, counts[1], self.random)
+        return seen
+
+    def agent(self) -> Agent:
+        """Return the agent as it is now."""
+        window, simulation = self._simulation.window, self._simulation
+        networks = to_networks(self.values.flat, window, self._settings.hidden)
+        return Agent(
+            simulation.spec, window, simulation.scaling, simulation.goal_range, networks, self._settings.online
+        )
+
+    def validate(self, episodes: int) -> TestResult:
+        """Return greedy movements."""
+        return self.agent().test(self._simulation, self._begin, episodes, (self._seed, _VALIDATION))

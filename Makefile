@@ -32,7 +32,7 @@ judge: setup  ## the whole job on the ten judging arms; takes about ten minutes
 	$(BIN)/python -m benchmarks judging
 
 soak: setup  ## fault injection that takes minutes: kills, power cuts, full disks
-	$(BIN)/python -m pytest -m soak
+	$(BIN)/python -m pytest -m soak -s
 
 clean:
 	rm -rf $(VENV) runs .pytest_cache .ruff_cache .mypy_cache

@@ -16,7 +16,7 @@ from pneumarm.run import Run
 from pneumarm.transitions import Store
 from small import SMALL
 
-TIMES = ("seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
+TIMES = ("peak_memory_mb", "seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
 STAGES = ("collect", "simulation", "training", "test", "transfer")
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
-from pneumarm.console import Report, jsonable
+from pneumarm.console import Report, jsonable, peak_memory
 from pneumarm.control import TransferSettings, transfer, write_episodes
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
@@ -119,6 +119,7 @@ class Run:
                 wall = {name: round(time.perf_counter() - began, 3)}
                 self.results |= figures
                 self.results["wall_seconds"] = self.results.get("wall_seconds", {}) | wall
+                self.results["peak_memory_mb"] = max(peak_memory(), self.results.get("peak_memory_mb", 0.0))
                 write_json(self._results_file, jsonable(self.results))
         if not (self.folder / "report.html").exists():
             with self.progress("report") as report:

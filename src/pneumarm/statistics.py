@@ -166,7 +166,8 @@ def running_median(x: ArrayLike, y: ArrayLike, bins: int = 15, fewest: int = 5) 
 def summarise(reward: ArrayLike, success: ArrayLike, actions: ArrayLike, switches: ArrayLike) -> dict[str, Any]:
     """Return the means over episodes (n,) as ``results.json`` holds them, with their 95 % intervals.
 
-    There is no interval where there are too few episodes for one. ``switches`` may be (n, joints); its mean is a list then, where there are several joints.
+    There is no interval where there are too few episodes for one. ``switches`` may be (n, joints); its mean is a
+    list then, where there are several joints.
     """
     estimates = {
         "reward": mean_estimate(reward),

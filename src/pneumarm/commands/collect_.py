@@ -7,6 +7,7 @@ from typing import Annotated
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
+from pneumarm.control import open_controller
 from pneumarm.transitions import CollectSettings, Store, collect, require_enough
 
 
@@ -17,6 +18,7 @@ def collect_(
     *,
     transitions: int = 200_000,
     seed: int = 0,
+    controller: str = "random",
     settings: Annotated[CollectSettings, Settings] = CollectSettings(),
     json: Json = False,
 ) -> None:
@@ -32,10 +34,17 @@ def collect_(
         How many to record in all (thesis section 3.2.2: 200,000, two hours).
     seed
         Seed of the random begin states and actions, and of a virtual arm's noise.
+    controller
+        What acts: random, keyboard, a CSV file of valves, or an agent (thesis section 3.2.2).
     json
         Print one JSON object on stdout and nothing else there.
     """
     require_enough(transitions)
-    with open_arm(arm, seed) as opened, Store.for_arm(db, opened.spec) as store, progress("collecting") as report:
-        result = collect(opened, store, transitions, seed, settings=settings, progress=report)
+    with (
+        open_arm(arm, seed) as opened,
+        open_controller(controller, opened) as player,
+        Store.for_arm(db, opened.spec) as store,
+        progress("collecting") as report,
+    ):
+        result = collect(opened, store, transitions, seed, progress=report, settings=settings, controller=player)
     show(asdict(result), json, lambda: [table(("collected", ""), list(asdict(result).items()))])

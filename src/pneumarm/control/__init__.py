@@ -2,6 +2,7 @@
 
 from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import LearningController, Movement, move
+from pneumarm.control.players import open_controller
 from pneumarm.control.transfer import (
     BEGIN,
     Episode,
@@ -21,6 +22,7 @@ __all__ = [
     "TransferSettings",
     "Transferred",
     "move",
+    "open_controller",
     "transfer",
     "transfer_into",
     "write_episodes",

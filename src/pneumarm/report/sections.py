@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
@@ -45,7 +46,10 @@ def all_sections(run: RunData) -> list[Section]:
     if run.coverage is not None:
         sections.append(collected(run.coverage, run.spec))
     if run.quality is not None:
-        sections += [predicted(run.quality, run.spec), propagated(run.quality, run.spec)]
+        sections += [
+            predicted(run.quality, run.spec),
+            propagated(run.quality, run.spec, run.results.get("simulation", {})),
+        ]
     if isinstance(run.training, TrainingData):
         sections.append(trained(run.training, run.spec))
     elif run.training is not None:
@@ -121,8 +125,14 @@ def classifications(data: QualityData, joint: int, spec: ArmSpec) -> list[Classi
         Classification(velocity.in_counts(), data.observation[:, joint, 1]),
         Classification(angle.in_counts(), data.observation[:, joint, 0]),
         acted,
-        Classification("time since the begin [min]", data.time / 60),
+        _times(data.time),
     ]
+
+
+def _times(time: NDArray[np.float64]) -> Classification:
+    if len(time) and time.max() < 120:
+        return Classification("time since the begin [s]", time)
+    return Classification("time since the begin [min]", time / 60)
 
 
 def predicted(data: QualityData, spec: ArmSpec) -> Section:
@@ -174,8 +184,11 @@ def predicted(data: QualityData, spec: ArmSpec) -> Section:
     )
 
 
-def propagated(data: QualityData, spec: ArmSpec) -> Section:
-    """Return the error over many steps and, where there is one, the importance of the inputs."""
+def propagated(data: QualityData, spec: ArmSpec, figures_found: Mapping[str, Any]) -> Section:
+    """Return the error over many steps and, where there is one, the importance of the inputs.
+
+    ``figures_found`` are those of an analysis: what it says of invalid predictions is told (thesis section 3.4).
+    """
     pictures = [
         Picture(
             figures.error_propagation(data.propagation, spec),
@@ -200,9 +213,24 @@ def propagated(data: QualityData, spec: ArmSpec) -> Section:
         (
             "Small errors add up over a movement. Above the dashed line errors of successive steps are alike and add "
             "up faster than chance; below it the arm's own dynamics pull the simulation back.",
+            *_invalid(figures_found),
         ),
         pictures,
     )
+
+
+def _invalid(found: Mapping[str, Any]) -> list[str]:
+    if "invalid" not in found or "propagation" not in found:
+        return []
+    invalid, spread = found["invalid"], found["propagation"]
+    before, remedied = (np.atleast_1d(spread[name]["angle"]) for name in ("measured", "resynchronised"))
+    errors = " and ".join(f"from {a:.1f} to {b:.1f}" for a, b in zip(before, remedied, strict=True))
+    return [
+        f"After {spread['steps']} simulated steps {invalid['simulated']:.1%} of the states lie in cells of the "
+        f"filter's grid that hold no data, and {invalid['recorded']:.1%} of the recorded ones do. Replacing the "
+        f"state by the most similar one of the database every ten steps changes the angle's error then {errors} "
+        "counts (invalid predictions and their remedy, thesis section 3.4)."
+    ]
 
 
 def trained(data: TrainingData, spec: ArmSpec) -> Section:

@@ -1,7 +1,7 @@
 """The whole job with its defaults on the ten judging arms, which nothing is developed on.
 
 Takes about a minute an arm on two cores. Settings of ``pneumarm run`` may be given in PNEUMARM_JUDGING, such as
-"--train.method q-learning --seed 1"; PNEUMARM_JUDGING_ARMS names other arms, such as "virtual,virtual:seed=5".
+"--method q-learning --seed 1"; PNEUMARM_JUDGING_ARMS names other arms, such as "virtual,virtual:seed=5".
 """
 
 import json

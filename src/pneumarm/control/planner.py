@@ -1,0 +1,174 @@
+"""Controllers that plan, with the arm's true physics or with its learned simulation.
+
+Three of them answer what can be achieved (thesis section 5.5.1: "we do not know what an optimal controller can
+achieve"):
+
+========================  ===================  ==========  ==========================================================
+controller                plans with           plans       what it is
+========================  ===================  ==========  ==========================================================
+open loop                 true physics         once        on an arm without noise and jitter: the bound itself
+closed loop               true physics         every turn  the same with the arm's sensors and jitter
+simulated                 learned simulation   every turn  what planning makes of a simulation, as any rival may
+========================  ===================  ==========  ==========================================================
+
+A planner that knows the true physics and the commands has little to learn from noisy sensors, so it is given the true
+state at each reading. What it is not given is the noise to come: whether the goal is reached is judged by the readings,
+and turns end late. The fluctuation of the supply is foreseen by both.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.guard import GuardedArm
+from pneumarm.arm.seam import Arm, ArmSpec, Reading
+from pneumarm.arm.valves import to_actions
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
+from pneumarm.control.search import Found, PlanSettings, find, problem, room_of, tree
+from pneumarm.errors import UnusableInput
+from pneumarm.learning import Reward, StateTracker
+from pneumarm.simulation.rollout import look_simulated, simulated_states, simulated_world
+from pneumarm.simulation.simulation import Simulation
+
+
+class Model(Protocol):
+    """What a planner plans with: it follows an arm, and can be rolled out from where the arm is."""
+
+    spec: ArmSpec
+    world: Any
+    states: Any
+    """Room for a search; the first state is where the arm is."""
+
+    def reset(self) -> None:
+        """Begin a movement: the next reading is one at rest."""
+
+    def follow(self, reading: Reading) -> None:
+        """Put the first state to where the arm is at ``reading``."""
+
+    def commanded(self, valves: NDArray[np.int8]) -> None:
+        """Note the ``valves`` (joints, 2) that are set after the last reading."""
+
+
+class PhysicsModel:
+    """The true physics of a virtual arm, from its true state."""
+
+    def __init__(self, arm: Arm, settings: PlanSettings = PlanSettings()) -> None:
+        """Follow ``arm``, a virtual one, which may stand behind a guard.
+
+        Raises:
+            UnusableInput: another kind of arm, whose physics nobody knows.
+
+        """
+        inner = arm.arm if isinstance(arm, GuardedArm) else arm
+        if not isinstance(inner, VirtualArm):
+            raise UnusableInput(f"{arm.spec.name}: only a virtual arm's true physics are known; plan with a simulation")
+        self._arm = inner
+        self.spec = inner.spec
+        self.world = physics_of(inner)
+        self.states = physics_states(self.world, room_of(settings, self.spec.joints))
+        self._due: float | None = None
+
+    def reset(self) -> None:
+        """Begin a movement."""
+        self._due = None
+
+    def follow(self, reading: Reading) -> None:
+        """Copy the arm's state; turns end where the control cycle's do, at equal distances from the first one."""
+        capture(self._arm, self.world, self.states, 0)
+        period = self.spec.period
+        due = reading.time if self._due is None else self._due + period
+        if reading.time - due > period / 2:
+            due = reading.time  # the control cycle counts afresh after a lost period
+        self.states.due[0] = self._due = due
+        self.states.angle[0], self.states.pressure[0] = reading.angle, reading.pressure
+
+    def commanded(self, valves: NDArray[np.int8]) -> None:
+        """Do nothing: the arm knows its valves."""
+
+
+class SimulationModel:
+    """A learned simulation, from the state window of what was read."""
+
+    def __init__(self, simulation: Simulation, settings: PlanSettings = PlanSettings()) -> None:
+        """Plan with ``simulation``.
+
+        Raises:
+            UnusableInput: it was fitted to continuous commands.
+
+        """
+        if not simulation.valves:
+            raise UnusableInput("the simulation was fitted to continuous commands; a plan needs one fitted to valves")
+        self.spec = simulation.spec
+        self.world = simulated_world(simulation)
+        self.states = simulated_states(self.world, room_of(settings, self.spec.joints))
+        self._tracker = StateTracker(simulation.window, simulation.scaling)
+
+    def reset(self) -> None:
+        """Begin a movement."""
+        self._tracker.reset()
+
+    def follow(self, reading: Reading) -> None:
+        """Put the first state to the window of the last readings."""
+        state = self._tracker.reading(reading)
+        self.states.x[0, : len(state)] = state
+        look_simulated(self.world, self.states, 0)
+
+    def commanded(self, valves: NDArray[np.int8]) -> None:
+        """Remember the valves in the window."""
+        self._tracker.commanded(valves)
+
+
+@dataclass
+class Planner:
+    """A controller that takes the first action of the best plan, and plans again every turn or never.
+
+    Without ``replan`` the first plan is carried out whatever happens, and its last action goes on after its end.
+    """
+
+    model: Model
+    settings: PlanSettings = PlanSettings()
+    reward: Reward = Reward()
+    replan: bool = True
+    clock: Callable[[], float] = perf_counter
+    """Tells the time of a decision [s]."""
+    seconds: list[float] = field(default_factory=list, init=False)
+    """How long each decision took [s]."""
+    unproven: int = field(default=0, init=False)
+    """Plans of which it is not proven that none is better."""
+    found: Found | None = field(default=None, init=False)
+    """The last plan."""
+
+    def __post_init__(self) -> None:
+        joints = self.model.spec.joints
+        self._room = tree(self.settings, joints)
+        self._places = 9 ** np.arange(joints)[::-1]
+        self._problem = problem(np.zeros(joints), self.reward, self.settings)
+        self._turn = 0
+        self._last = -1
+
+    def reset(self, goal: NDArray[np.float64]) -> None:
+        """Begin a movement to ``goal`` (joints,) [counts]."""
+        self._problem.goal[:] = goal
+        self.model.reset()
+        self.found, self._turn, self._last = None, 0, -1
+
+    def act(self, reading: Reading) -> NDArray[np.int8]:
+        """Return the valves (joints, 2) to set after ``reading``."""
+        began = self.clock()
+        if self.found is None or self.replan:
+            self.model.follow(reading)
+            self.found = find(self.model.world, self.model.states, self._problem, self._room, self._last)
+            self.unproven += not self.found.proven
+            self._turn = 0
+        plan = self.found.actions
+        action = int(plan[min(self._turn, len(plan) - 1)])
+        self._turn, self._last = self._turn + 1, action
+        valves: NDArray[np.int8] = self._problem.commands[action]
+        self.model.commanded(valves)
+        self.seconds.append(self.clock() - began)
+        return valves.copy()

@@ -20,6 +20,7 @@ COMMANDS = {
     "train": "Train an agent in a simulation.",
     "test": "Test an agent in a simulation.",
     "transfer": "Move an agent onto an arm and let it adapt there.",
+    "bound": "Say what can be achieved on a virtual arm at all.",
     "report": "Write the report of a finished run again.",
 }
 """Every command with its one-line help."""

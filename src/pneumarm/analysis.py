@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.networks import importance, least_squares
 from pneumarm.report.data import CoverageData, QualityData
-from pneumarm.simulation import Simulation, by_quantity
+from pneumarm.simulation import Simulation, by_quantity, refiltered
 from pneumarm.simulation.quality import Resynchronisation, Statistics, propagation, statistics, validity
-from pneumarm.transitions import Filtered, Store, Transitions, filter_transitions, transitions
+from pneumarm.transitions import Filtered, Store, Transitions, transitions
 from pneumarm.transitions.choice import joined, picked
 from pneumarm.transitions.grid import CellCounts
 
@@ -56,15 +56,11 @@ def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = No
         UnusableInput: store and simulation do not fit, or too little is stored.
 
     """
-    if store.joints != simulation.window.joints or store.valves != simulation.valves:
+    if store.valves != simulation.valves:
         raise UnusableInput(
-            f"{store.path}: holds {store.joints} joint(s) with {_commands(store.valves)}, the simulation is of "
-            f"{simulation.window.joints} with {_commands(simulation.valves)}"
+            f"{store.path}: holds {_commands(store.valves)}, the simulation is of {_commands(simulation.valves)}"
         )
-    if filtered is None:
-        filtered = filter_transitions(
-            store, simulation.window, seed=simulation.hold_out_seed, hold_out=simulation.hold_out
-        )
+    filtered = filtered or refiltered(store, simulation)
     apart = _in_order(filtered)
     errors = statistics(simulation, apart)
     steps = _longest(apart, STEPS)

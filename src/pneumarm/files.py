@@ -14,6 +14,7 @@ from pneumarm.errors import UnusableInput
 
 _UMASK = os.umask(0)
 os.umask(_UMASK)  # there is no other way to ask for it
+_ENTRY = "pneumarm"
 _LARGEST_HEADER = 1 << 20
 _LARGEST_FILE = 64 << 20
 
@@ -67,7 +68,8 @@ def write_arrays(path: Path, kind: str, settings: Any, arrays: dict[str, NDArray
     from safetensors.numpy import save_file
 
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-    metadata = {"kind": kind, "settings": json.dumps(settings, allow_nan=False)}
+    # One entry: the order of several would differ from file to file.
+    metadata = {_ENTRY: json.dumps({"kind": kind, "settings": settings}, allow_nan=False)}
     with written_whole(path) as temporary:
         save_file(contiguous, temporary, metadata=metadata)
 
@@ -84,6 +86,8 @@ def read_arrays(path: Path, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
     from safetensors import SafetensorError, safe_open
 
     expected = f"expected a file of kind {kind!r} written by pneumarm"
+    if path.exists() and not path.is_file():
+        raise UnusableInput(f"{path}: {expected}, this is no file")  # opening a pipe would wait for ever
     try:
         size = path.stat().st_size
         with open(path, "rb") as file:
@@ -94,10 +98,10 @@ def read_arrays(path: Path, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
         raise UnusableInput(f"{path}: {expected}, this is something else")
     try:
         with safe_open(path, framework="numpy") as file:
-            metadata = file.metadata() or {}
-            if metadata.get("kind") != kind:
-                raise UnusableInput(f"{path}: {expected}, its kind is {metadata.get('kind')!r}")
-            settings = json.loads(metadata["settings"], parse_constant=_refuse_constant)
+            metadata = json.loads((file.metadata() or {})[_ENTRY], parse_constant=_refuse_constant)
+            found, settings = metadata["kind"], metadata["settings"]
+            if found != kind:
+                raise UnusableInput(f"{path}: {expected}, its kind is {found!r}")
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a dict
     except (SafetensorError, ValueError, KeyError, RecursionError, TypeError) as error:
         raise UnusableInput(f"{path}: {expected}, it is damaged ({error})") from error

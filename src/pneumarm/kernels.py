@@ -97,8 +97,18 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
     def compile_(f: _Function) -> Any:
         settings = {"nogil": True, "error_model": "numpy", **options}
         dispatcher = numba.njit(**settings)(f)
-        if not numba_config.DISABLE_JIT and settings.get("inline", "never") == "never":
+        if not getattr(numba_config, "DISABLE_JIT", 0) and settings.get("inline", "never") == "never":
             dispatcher._cache = _ForgivingCache(dispatcher.py_func)
         return dispatcher
 
     return compile_ if function is None else compile_(function)
+
+
+def part(function: _Function | None = None, **options: Any) -> Any:
+    """Compile ``function`` as a part of hot loops: as :func:`kernel`, but made to vanish in its caller.
+
+    Parts take their arguments as named tuples of arrays. Passed in the usual way each of these arrays is copied word
+    by word and its references are counted, which takes longer than a small network; a part is always inlined
+    and counts no references. So it must not make arrays, nor assign to slices; Numba says so if it does.
+    """
+    return kernel(function, **{"_nrt": False, "forceinline": True, **options})

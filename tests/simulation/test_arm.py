@@ -35,6 +35,7 @@ def simulation(joints: int = 1, latency: float = 0.0, valves: bool = True) -> Si
         "derived",
         np.tile([5.0, 0.1, 2, 2], (joints, 1)),
         np.tile([400.0, 600.0], (joints, 1)),
+        np.tile([[0.0, 1023.0], [-31.0, 31.0], [0.0, 200.0], [0.0, 200.0]], (joints, 1, 1)),
         valves,
     )
 

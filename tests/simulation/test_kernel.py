@@ -1,5 +1,6 @@
 """The compiled simulation step against a plain NumPy reading of thesis eq. 3.5 and section 3.2.4."""
 
+from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
@@ -13,7 +14,7 @@ from pneumarm.simulation.kernel import (
     begin,
     padded,
     places,
-    raw_state,
+    raw_observation,
     scaled_state,
     simulation_parameters,
     simulation_state,
@@ -63,6 +64,7 @@ def made_up(
         velocity,  # type: ignore[arg-type]
         np.tile([4.0, 0.12, 1.0, 1.0], (joints, 1)),
         np.tile([300.0, 700.0], (joints, 1)),
+        np.tile([[0.0, 1023.0], [-9.0, 9.0], [0.0, 190.0], [0.0, 190.0]], (joints, 1, 1)),
     )
 
 
@@ -78,7 +80,8 @@ def reference(simulation: Simulation, sigma: NDArray, command: NDArray) -> NDArr
     quantities = [0, 2, 3] if simulation.velocity == "derived" else [0, 1, 2, 3]
     new[:, quantities] += change * scaling.observation_scale.reshape(joints, 4)[:, quantities]
     new[:, 0] = np.clip(new[:, 0], *simulation.spec.angle_range)
-    new[:, 2:] = np.clip(new[:, 2:], 0, 2 * simulation.spec.max_pressure_counts)
+    new[:, 2:] = np.clip(new[:, 2:], 0, 190)
+    new[:, 1] = np.clip(new[:, 1], -9, 9)
     if simulation.velocity == "derived":
         new[:, 1] = (new[:, 0] - old[:, 0]) / (1e3 * simulation.spec.period)
     observations = np.concatenate([new.ravel(), sigma[: (h - 1) * o]])
@@ -112,9 +115,11 @@ def test_twenty_steps_follow_the_definitions(simulation: Simulation) -> None:
     for _ in range(20):
         command = random.integers(-1, 2, 2 * joints).astype(float)
         step(parameters, noise, state, (command / scaling.command_scale).astype(np.float32))
+        predicted = simulation.predict(np.concatenate([sigma, command])[None])[0]
         sigma = reference(simulation, sigma, command)
-        got = raw_state(state.x[: window.state_size], window, scaling)
-        np.testing.assert_allclose(got, sigma, rtol=0, atol=5e-2)
+        np.testing.assert_allclose(predicted, sigma[: len(predicted)], rtol=1e-5, atol=1e-5)
+        got = state.x[: window.state_size]
+        np.testing.assert_allclose(got, scaled_state(sigma, window, scaling), rtol=0, atol=5e-4)
         visited.append(sigma[0])
     assert np.ptp(visited) > 5  # the arm did move
 
@@ -123,8 +128,8 @@ def test_rational_hyperbolic_tangent() -> None:
     x = np.concatenate([np.linspace(-20, 20, 100_001), [np.inf, -np.inf, 0.0]]).astype(np.float32)
     got = x.copy()
     tansig(got)
-    assert np.abs(got - np.tanh(x.astype(np.float64))).max() < 5e-6
-    assert np.abs(got).max() <= 1
+    assert np.abs(got - np.tanh(x.astype(np.float64))).max() < 1e-5
+    assert np.abs(got).max() <= 1 + 1e-6
     assert got[-1] == 0
     small = np.linspace(0.001, 6, 1000).astype(np.float32)
     grown = small.copy()
@@ -135,20 +140,17 @@ def test_rational_hyperbolic_tangent() -> None:
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_readings_stay_within_the_sensors(sign: int) -> None:
     simulation = made_up()
-    pushed = [
-        Network(n.hidden_weights, n.hidden_bias, n.output_weights, np.array([sign * 9.0]))
-        for n in simulation.networks
-    ]
-    simulation = Simulation(**{**vars(simulation), "networks": tuple(pushed)})
+    pushed = tuple(replace(network, output_bias=np.array([sign * 9.0])) for network in simulation.networks)
+    simulation = replace(simulation, networks=pushed)
     parameters, noise = simulation_parameters(simulation), noise_parameters(NoiseSettings(), simulation)
     state = simulation_state(parameters, random_state(0))
     for _ in range(5):
         step(parameters, noise, state, np.zeros(2, np.float32))
-    angle, velocity, *pressures = raw_state(state.x[:16], simulation.window, simulation.scaling)[:4]
+    angle, velocity, *pressures = raw_observation(state.x[:16], simulation.window, simulation.scaling)[0]
     low, high = simulation.spec.angle_range
     assert angle == pytest.approx(high if sign > 0 else low, abs=1e-2)
     assert velocity == pytest.approx(0, abs=1e-3)  # derived from the clipped angle
-    assert pressures == pytest.approx([2 * simulation.spec.max_pressure_counts if sign > 0 else 0] * 2, abs=1e-2)
+    assert pressures == pytest.approx([190 if sign > 0 else 0] * 2, abs=1e-2)
 
 
 def test_layout_of_the_state_vector() -> None:

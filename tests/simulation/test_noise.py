@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 import pytest
+import scipy.stats
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.networks.network import Network
-from pneumarm.random import random_state
+from pneumarm.random import normal, random_state
 from pneumarm.simulation.noise import NoiseSettings, add_noise, begin_noise, noise_parameters, noise_share
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.transitions.window import Window
@@ -22,12 +23,12 @@ def simulation(velocity: str = "derived", joints: int = 1) -> Simulation:
     window = Window(joints)
     outputs = (3 if velocity == "derived" else 4) * joints
     network = Network(np.zeros((window.input_size, 1)), np.zeros(1), np.zeros((1, outputs)), np.zeros(outputs))
-    scaling = Scaling(
-        np.tile([512.0, 0.1, 90.0, 90.0], joints), np.tile([400.0, 5.0, 90.0, 80.0], joints), np.ones(2 * joints)
-    )
+    offset, scale = np.tile([512.0, 0.1, 90.0, 90.0], joints), np.tile([400.0, 5.0, 90.0, 80.0], joints)
+    scaling = Scaling(offset, scale, np.ones(2 * joints))
     std = np.array([[6.7, 0.2, 1.9, 1.5], [3.0, 0.1, 1.0, 2.0]])[:joints]
-    goals = np.tile([200.0, 800.0], (joints, 1))
-    return Simulation(ArmSpec(joints=joints), window, scaling, (network,), velocity, std, goals)  # type: ignore[arg-type]
+    goals, limits = np.tile([200.0, 800.0], (joints, 1)), np.tile([-9999.0, 9999.0], (joints, 4, 1))
+    spec = ArmSpec(joints=joints)
+    return Simulation(spec, window, scaling, (network,), velocity, std, goals, limits)  # type: ignore[arg-type]
 
 
 @kernel
@@ -124,3 +125,20 @@ def test_share_by_velocity(velocity: str, omega: float, share: float) -> None:
 def test_unusable_settings(wrong: dict) -> None:
     with pytest.raises(UnusableInput, match=next(iter(wrong))):
         NoiseSettings(**wrong)
+
+
+@kernel
+def _normals(random, record):  # type: ignore[no-untyped-def]
+    for i in range(record.shape[0]):
+        record[i] = normal(random)
+
+
+def test_the_ziggurat_is_normal() -> None:
+    """By Kolmogorov and Smirnov over everything, and by counts in the tail, where it is sampled otherwise."""
+    record = np.zeros(2_000_000)
+    _normals(random_state(11), record)
+    assert scipy.stats.kstest(record, "norm").pvalue > 0.01
+    for beyond in (2.5, 3.6, 3.8, 4.2):
+        expected = 2 * scipy.stats.norm.sf(beyond) * len(record)
+        assert (np.abs(record) > beyond).sum() == pytest.approx(expected, abs=4 * math.sqrt(expected))
+    assert abs(record[1:] @ record[:-1]) / len(record) < 4 / math.sqrt(len(record))

@@ -45,6 +45,10 @@ class FirstOrderArm(Arm):
         settled = 511.0 + 1.2 * (self.pressure[:, 0] - self.pressure[:, 1])
         self.angle += (1 - np.exp(-seconds / 0.1)) * (settled - self.angle)
 
+    def wait_until(self, time):
+        if time > self.time:
+            self.wait(time - self.time)
+
     def close(self):
         self.valves[:] = 0
         self.closed = True

@@ -96,7 +96,7 @@ class Arm(ABC):
 
     @abstractmethod
     def read(self) -> Reading:
-        """Return what the sensors say now."""
+        """Return what the sensors say now, in arrays that later readings do not change."""
 
     @abstractmethod
     def set_valves(self, valves: NDArray[np.int8]) -> None:

@@ -6,7 +6,7 @@ from pneumarm.learning.online import OnlineLearner
 from pneumarm.learning.settings import Exploration, Reward, Shaping, TrainSettings
 from pneumarm.learning.testing import TestResult, test
 from pneumarm.learning.tracker import StateTracker
-from pneumarm.learning.train import CURVES, Progress, Training, train
+from pneumarm.learning.training import CURVES, Progress, Training, train
 
 __all__ = [
     "CURVES",

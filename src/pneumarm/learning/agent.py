@@ -1,6 +1,6 @@
 """A trained agent and its file, which holds all that is needed to use it: neither simulation nor store."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -12,7 +12,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning.settings import TrainSettings
-from pneumarm.learning.values import Networks, network_shapes, pack
+from pneumarm.learning.values import Networks, network_shapes, pack, unpack
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import Window
 
@@ -42,6 +42,10 @@ class Agent:
     def weights(self) -> NDArray[np.float32]:
         """Return a fresh copy of the networks as a kernel uses them, see :class:`~.values.Learner`."""
         return pack(self.networks, self.window)
+
+    def with_weights(self, weights: NDArray[np.float32]) -> Self:
+        """Return the agent with other ``weights``, as of :meth:`weights`."""
+        return replace(self, networks=unpack(weights, self.window, self.settings.hidden))
 
     def save(self, path: Path) -> None:
         """Write the agent to ``path``, whole or not at all.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.random import integer, uniform
 from pneumarm.simulation.kernel import scaled_state
 from pneumarm.simulation.simulation import Scaling
@@ -102,7 +102,7 @@ def begin_parameters(
     return BeginParameters(begin.states, begin.angle, sorted_, np.array(domain, np.float64), cumulative)
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def side_probability(goal, domain):  # type: ignore[no-untyped-def]
     """Return the probability of a begin state below ``goal`` in the ``domain`` of angles (thesis eq. 4.15, 4.16).
 
@@ -111,7 +111,7 @@ def side_probability(goal, domain):  # type: ignore[no-untyped-def]
     return (goal - domain[0]) / (domain[1] - domain[0])
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def draw_interval(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
     """Return a sub-interval of begin angles around ``goal``, as its ends [counts] (section 4.3.2, table 4.1).
 
@@ -130,7 +130,7 @@ def draw_interval(begin, goal, deviation, random):  # type: ignore[no-untyped-de
     return goal + near * side, goal + far * side
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
     """Return the index of a begin state for ``goal`` (joints,) within ``deviation`` [counts].
 
@@ -155,7 +155,7 @@ def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
     return nearest
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def distance(angle, goal):  # type: ignore[no-untyped-def]
     """Return the largest difference of ``angle`` and ``goal`` over the joints (thesis eq. 4.13) [counts]."""
     largest = 0.0
@@ -164,7 +164,7 @@ def distance(angle, goal):  # type: ignore[no-untyped-def]
     return largest
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def below(sorted_, value):  # type: ignore[no-untyped-def]
     """Return how many of ``sorted_`` (n,) are below ``value``."""
     first, last = 0, sorted_.shape[0]

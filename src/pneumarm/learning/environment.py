@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.valves import VALVES
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.learning.begin import BeginParameters, BeginStates, begin_parameters, draw_begin
 from pneumarm.learning.settings import TrainSettings
 from pneumarm.random import RandomState, uniform
@@ -122,7 +122,7 @@ def episode(environment: Environment, random: RandomState) -> Episode:
     )
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def begin_episode(environment, episode, deviation, random):  # type: ignore[no-untyped-def]
     """Draw goals and a begin state within ``deviation`` [counts] of them from ``random``, and put the arm there."""
     task = environment.task
@@ -137,7 +137,7 @@ def begin_episode(environment, episode, deviation, random):  # type: ignore[no-u
     begin(environment.simulation, environment.noise, episode.state, environment.begin.states[index])
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def take(environment, episode, actions):  # type: ignore[no-untyped-def]
     """Take ``actions`` (joints,) for a period; return whether the goals are reached. Notes who switched."""
     for joint in range(actions.shape[0]):
@@ -150,19 +150,19 @@ def take(environment, episode, actions):  # type: ignore[no-untyped-def]
     return reached(environment.task, episode)
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def angle(task, episode, joint):  # type: ignore[no-untyped-def]
     """Return the angle of ``joint`` [counts]."""
     return task.unit[joint, 0] + task.unit[joint, 1] * episode.state.x[4 * joint]
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def velocity(task, episode, joint):  # type: ignore[no-untyped-def]
     """Return the velocity of ``joint`` [counts/ms]."""
     return task.unit[joint, 2] + task.unit[joint, 3] * episode.state.x[4 * joint + 1]
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def reached(task, episode):  # type: ignore[no-untyped-def]
     """Return whether every joint is at its goal and slow (thesis eq. 5.1, 5.2)."""
     for joint in range(episode.goal.shape[0]):
@@ -173,7 +173,7 @@ def reached(task, episode):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def reward(task, is_reached, switched):  # type: ignore[no-untyped-def]
     """Return what a joint is paid for an action (thesis eq. 4.2, with the price of a switch of section 5.4.1)."""
     return (task.reward_goal if is_reached else task.reward_action) + task.reward_switch * switched

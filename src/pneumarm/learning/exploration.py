@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.random import uniform
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def greedy(values):  # type: ignore[no-untyped-def]
     """Return the action with the highest of ``values`` (9,), the first of equals."""
     best = 0
@@ -18,7 +18,7 @@ def greedy(values):  # type: ignore[no-untyped-def]
     return best
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def choose(values, epsilon, temperature, odds, random):  # type: ignore[no-untyped-def]
     """Return the greedy action, or with probability ``epsilon`` another one by the Boltzmann distribution.
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.learning.environment import Episode, angle, begin_episode, reward, take, velocity
 from pneumarm.learning.exploration import choose, greedy
 from pneumarm.learning.values import action_values, forget_traces, td_target, update
@@ -68,7 +68,7 @@ class Schedule(NamedTuple):
     """Weight of the newest episode in the performance."""
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def look_ahead(learner, schedule, x, room, random):  # type: ignore[no-untyped-def]
     """Choose the next actions in ``x`` and find the values that the targets look ahead to."""
     for joint in range(room.actions.shape[0]):
@@ -83,7 +83,7 @@ def look_ahead(learner, schedule, x, room, random):  # type: ignore[no-untyped-d
             room.cut[joint] = 1 if chosen != best else 0
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def train_episode(environment, learner, schedule, episode, room):  # type: ignore[no-untyped-def]
     """Run one episode, learning; return actions taken, sum of rewards, and whether the goal was reached."""
     x, random, total = episode.state.x, episode.state.random, 0.0
@@ -112,7 +112,7 @@ def train_episode(environment, learner, schedule, episode, room):  # type: ignor
     return environment.task.cutoff, total, False
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def train_episodes(environment, learner, schedule, episode, room, count, performance):  # type: ignore[no-untyped-def]
     """Run ``count`` episodes; return the performance (thesis eq. 4.14) after them, and the actions taken."""
     steps = 0
@@ -148,15 +148,18 @@ def movements(episodes: int, joints: int) -> Movements:
     """Return room for ``episodes``."""
     each, all_ = (episodes, joints), (episodes,)
     return Movements(
-        *(np.zeros(each) for _ in range(4)),
-        np.zeros(all_, np.int64),
-        np.zeros(each, np.int64),
-        np.zeros(all_),
-        np.zeros(all_, np.bool_),
+        goal=np.zeros(each),
+        angle_begin=np.zeros(each),
+        angle_end=np.zeros(each),
+        velocity_end=np.zeros(each),
+        actions=np.zeros(all_, np.int64),
+        switches=np.zeros(each, np.int64),
+        reward=np.zeros(all_),
+        success=np.zeros(all_, np.bool_),
     )
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def test_episodes(environment, learner, episode, room, random, record):  # type: ignore[no-untyped-def]
     """Fill ``record`` with greedy episodes over all begin states and goals, drawn from ``random``."""
     task, x = environment.task, episode.state.x

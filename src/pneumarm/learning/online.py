@@ -4,18 +4,17 @@ It runs the same kernels as training does, so it learns the same.
 """
 
 import json
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.learning.agent import Agent
 from pneumarm.learning.loop import Schedule, look_ahead, room_of
 from pneumarm.learning.settings import Exploration
-from pneumarm.learning.values import action_values, forget_traces, learner, td_target, unpack, update
+from pneumarm.learning.values import action_values, forget_traces, learner, td_target, update
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import places
 
@@ -102,8 +101,7 @@ class OnlineLearner:
     @property
     def agent(self) -> Agent:
         """The agent with the weights as they are now."""
-        networks = unpack(self._learner.weights, self._agent.window, self._agent.settings.hidden)
-        return replace(self._agent, networks=networks)
+        return self._agent.with_weights(self._learner.weights)
 
     def get_state(self) -> bytes:
         """Return everything that the future depends on, besides what the learner was made with."""
@@ -118,13 +116,11 @@ class OnlineLearner:
         """
         try:
             saved = json.loads(state)
-            arrays = {
-                name: np.array(saved[name], array.dtype).reshape(array.shape)
-                for name, array in self._arrays().items()
-            }
+            like = self._arrays()
+            arrays = {name: np.array(saved[name], array.dtype).reshape(array.shape) for name, array in like.items()}
         except (ValueError, KeyError, TypeError, OverflowError) as error:
             raise UnusableInput(f"expected the state of a learner like this one, got another ({error})") from error
-        for name, array in self._arrays().items():
+        for name, array in like.items():
             array[...] = arrays[name]
 
     def _arrays(self) -> dict[str, NDArray[np.generic]]:
@@ -139,14 +135,14 @@ class OnlineLearner:
         return checked
 
 
-@kernel(_nrt=False)
+@part
 def _begin(learner, schedule, x, room, random):  # type: ignore[no-untyped-def]
     for joint in range(room.actions.shape[0]):
         forget_traces(learner, joint)
     look_ahead(learner, schedule, x, room, random)
 
 
-@kernel(_nrt=False)
+@part
 def _observe(learner, schedule, x, room, random, seen, terminal):  # type: ignore[no-untyped-def]
     """Do what the training loop does after an action; ``seen`` are the rewards (joints,) and the next state."""
     paid, next_state = seen

@@ -58,11 +58,8 @@ class TestResult:
     def intervals(self) -> dict[str, tuple[float, float]]:
         """Return 95 % confidence intervals of the means of ``results``; Wilson's for the rate of success."""
         intervals = {"success_rate": wilson(int(self.success.sum()), len(self.success))}
-        for name, values in (
-            ("reward", self.reward),
-            ("actions", self.actions),
-            ("switches", self.switches.sum(axis=1)),
-        ):
+        measured = {"reward": self.reward, "actions": self.actions, "switches": self.switches.sum(axis=1)}
+        for name, values in measured.items():
             mean = float(values.mean())
             half = _NORMAL_95 * float(values.std()) / math.sqrt(len(values))
             intervals[name] = (mean - half, mean + half)
@@ -82,7 +79,11 @@ def wilson(successes: int, n: int) -> tuple[float, float]:
 
 
 def test(
-    agent: Agent, simulation: Simulation, begin_states: BeginStates, episodes: int = 10_000, seed: int = 0
+    agent: Agent,
+    simulation: Simulation,
+    begin_states: BeginStates,
+    episodes: int = 10_000,  # noqa: PT028 - this is no test case
+    seed: int = 0,  # noqa: PT028
 ) -> TestResult:
     """Let ``agent`` move greedily and without learning, from all begin states to all goals.
 

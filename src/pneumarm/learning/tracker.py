@@ -32,7 +32,10 @@ class StateTracker:
         self._command = np.zeros(self.window.command_size)
 
     def push(self, time: float, angle: ArrayLike, pressure: ArrayLike) -> NDArray[np.float32]:
-        """Return the scaled state window after a reading: ``time`` [s], ``angle`` (joints,), ``pressure`` (joints, 2)."""
+        """Return the scaled state window after a reading.
+
+        ``time`` [s], ``angle`` (joints,) [counts], ``pressure`` (joints, 2) [counts].
+        """
         window, state = self.window, self._state
         angle = np.array(angle, np.float64).reshape(window.joints)
         observed, commanded = window.observation_size, window.command_size

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.learning.settings import TrainSettings
 from pneumarm.simulation.kernel import FASTMATH, UNIT_BLOCK, hidden_layer, padded, places, tansig
 from pneumarm.transitions.window import Window
@@ -89,12 +89,8 @@ class Networks(NamedTuple):
 def network_shapes(window: Window, hidden: int) -> Networks:
     """Return empty networks whose arrays have the right shapes."""
     joints, inputs = window.joints, window.state_size + window.joints
-    shapes = (
-        (joints, ACTIONS, inputs, hidden),
-        (joints, ACTIONS, hidden),
-        (joints, ACTIONS, hidden),
-        (joints, ACTIONS),
-    )
+    networks = joints, ACTIONS
+    shapes = (*networks, inputs, hidden), (*networks, hidden), (*networks, hidden), networks
     return Networks(*(np.zeros(shape, np.float32) for shape in shapes))
 
 
@@ -133,7 +129,7 @@ def unpack(weights: NDArray[np.float32], window: Window, hidden: int) -> Network
     )
 
 
-@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+@part(fastmath=FASTMATH)
 def action_values(learner, joint, x, values):  # type: ignore[no-untyped-def]
     """Set ``values`` (9,) to the action values of ``joint`` in the state and goal ``x``, in units of reward."""
     weights, hidden, row = learner.weights[joint], learner.hidden, x.shape[0]
@@ -149,13 +145,13 @@ def action_values(learner, joint, x, values):  # type: ignore[no-untyped-def]
         values[action] *= np.float32(learner.scale)
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def td_target(reward, discount, next_value, terminal):  # type: ignore[no-untyped-def]
     """Return what Q(s_k, a_k) should have been: r_{k+1} + gamma Q(s_{k+1}, .), where a terminal state has 0."""
     return reward if terminal else reward + discount * next_value
 
 
-@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+@part(fastmath=FASTMATH)
 def backpropagate(learner, joint, x, action):  # type: ignore[no-untyped-def]
     """Return the value of ``action`` in ``x`` and leave its network's activations and slopes in the learner.
 
@@ -177,7 +173,7 @@ def backpropagate(learner, joint, x, action):  # type: ignore[no-untyped-def]
     return output * np.float32(learner.scale)
 
 
-@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+@part(fastmath=FASTMATH)
 def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-def]
     """Add ``factor`` times the gradient that :func:`backpropagate` left to ``table`` (inputs + 2, units)."""
     row = x.shape[0]
@@ -189,7 +185,7 @@ def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-
     table[row + 1, action] += factor
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def update(learner, joint, x, action, target):  # type: ignore[no-untyped-def]
     """Move the value of ``action`` in ``x`` towards ``target``; return the error delta, in units of reward."""
     delta = target - backpropagate(learner, joint, x, action)
@@ -202,7 +198,7 @@ def update(learner, joint, x, action, target):  # type: ignore[no-untyped-def]
     return delta
 
 
-@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+@part(fastmath=FASTMATH)
 def follow_traces(learner, joint, factor):  # type: ignore[no-untyped-def]
     """Move all weights of ``joint`` by ``factor`` along their traces, and let these decay."""
     weights, traces = learner.weights[joint], learner.traces[joint]
@@ -213,7 +209,7 @@ def follow_traces(learner, joint, factor):  # type: ignore[no-untyped-def]
             traces[i, u] *= decay
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def forget_traces(learner, joint):  # type: ignore[no-untyped-def]
     """Set the traces of ``joint`` to 0, as at the start of every episode."""
     if learner.decay != 0.0:

@@ -32,7 +32,8 @@ def least_squares(x: ArrayLike, y: ArrayLike, block: int = 8192) -> Network:
         rows = np.concatenate([np.ones((len(x[part]), 1)), x[part], y[part]], axis=1, dtype=np.float64)
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, rows]), mode="r"))
     size = 1 + inputs
-    weights = np.linalg.lstsq(triangle[:size, :size], triangle[:size, size:], rcond=_SMALLEST)[0]
+    solution = np.linalg.lstsq(triangle[:size, :size], triangle[:size, size:], rcond=_SMALLEST)[0]
+    weights = np.asarray(solution, np.float64)
     return Network(
         hidden_weights=np.zeros((inputs, 0)),
         hidden_bias=np.zeros(0),

@@ -1,11 +1,10 @@
 """The empirical simulation: networks fitted to transitions, and how good they are."""
 
 from pneumarm.simulation.arm import SimulationArm
-from pneumarm.simulation.fit import FitResult, FitSettings, by_quantity, fit
+from pneumarm.simulation.fit import FitResult, FitSettings, StoreFit, by_quantity, fit, fit_store, refiltered
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.quality import Statistics
 from pneumarm.simulation.simulation import Scaling, Simulation
-from pneumarm.simulation.stored import StoredFit, fit_store
 
 __all__ = [
     "FitResult",
@@ -15,8 +14,9 @@ __all__ = [
     "Simulation",
     "SimulationArm",
     "Statistics",
-    "StoredFit",
+    "StoreFit",
     "by_quantity",
     "fit",
     "fit_store",
+    "refiltered",
 ]

@@ -10,7 +10,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
     begin,
-    raw_state,
+    raw_observation,
     scaled_state,
     simulation_parameters,
     simulation_state,
@@ -38,9 +38,7 @@ class SimulationArm(Arm):
 
     def __init__(self, simulation: Simulation, *, seed: int = 0, noise: NoiseSettings | None = None) -> None:
         if not simulation.valves:
-            raise UnusableInput(
-                "the simulation was fitted to continuous commands; an arm has valves that open or close"
-            )
+            raise UnusableInput("the simulation was fitted to continuous commands; this arm has on/off valves")
         self.spec = simulation.spec
         self._simulation = simulation
         self._parameters = simulation_parameters(simulation)
@@ -70,8 +68,7 @@ class SimulationArm(Arm):
     def read(self) -> Reading:
         """Return the newest simulated observation."""
         window = self._simulation.window
-        sigma = raw_state(self._state.x[: window.state_size], window, self._simulation.scaling)
-        observation = sigma[: window.observation_size].reshape(-1, 4)
+        observation = raw_observation(self._state.x[: window.state_size], window, self._simulation.scaling)
         time = self._periods * self.spec.period + self._since
         return Reading(time, observation[:, 0].copy(), observation[:, 2:].copy())
 

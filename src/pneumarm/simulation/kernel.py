@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.random import RandomState
 from pneumarm.simulation.noise import add_noise, begin_noise
 from pneumarm.simulation.simulation import Scaling, Simulation
@@ -26,9 +26,7 @@ INPUT_BLOCK = 4
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 """What a compiler may assume of sums here; not-a-number and infinity stay what they are."""
 
-_CLIP = np.float32(7.0)  # tanh(7) = 1 - 1.7e-6
-_LOWEST_PRESSURE = 0.0
-_PRESSURE_MARGIN = 2.0  # a closed muscle that is moved reads over max_pressure, but not twice as much
+_CLIP = np.float32(6.29701)  # where the ratio in tansig reaches 1; tanh is 1 - 6.8e-6 there
 
 
 class SimulationParameters(NamedTuple):
@@ -45,9 +43,9 @@ class SimulationParameters(NamedTuple):
     place: NDArray[np.int64]
     """Place of each output in the observation, shape (outputs,)."""
     lowest: NDArray[np.float32]
-    """What the sensors can read at least, shape (outputs,) [scaled]."""
+    """Lowest prediction, shape (outputs,) [scaled]."""
     highest: NDArray[np.float32]
-    """What the sensors can read at most, shape (outputs,) [scaled]."""
+    """Highest prediction, shape (outputs,) [scaled]."""
     velocity: NDArray[np.float32]
     """Derived velocity by change of the angle, and at rest, shape (joints, 2) [scaled]; (0, 2) if predicted."""
     joints: int
@@ -91,7 +89,7 @@ def places(window: Window) -> Places:
 
 def simulation_parameters(simulation: Simulation) -> SimulationParameters:
     """Pack ``simulation`` into float32 arrays."""
-    window, scaling, spec = simulation.window, simulation.scaling, simulation.spec
+    window, scaling = simulation.window, simulation.scaling
     joints, place = window.joints, places(window)
     hidden_sizes = [network.hidden_bias.size for network in simulation.networks]
     output_sizes = [network.output_bias.size for network in simulation.networks]
@@ -113,21 +111,18 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
 
     offset = scaling.observation_offset.reshape(joints, 4)
     scale = scaling.observation_scale.reshape(joints, 4)
-    quantities = [0, 2, 3] if simulation.velocity == "derived" else [0, 1, 2, 3]
-    low, high = spec.angle_range
-    fastest = (high - low) / (1e3 * spec.period)
-    pressure = _PRESSURE_MARGIN * spec.max_pressure_counts
-    lowest = (np.array([low, -fastest, _LOWEST_PRESSURE, _LOWEST_PRESSURE]) - offset) / scale
-    highest = (np.array([high, fastest, pressure, pressure]) - offset) / scale
-    velocity = np.stack([scale[:, 0] / (1e3 * spec.period * scale[:, 1]), -offset[:, 1] / scale[:, 1]], axis=1)
+    limits = simulation.limits
+    lowest, highest = (limits - scaling.observation_offset) / scaling.observation_scale
+    rate = scale[:, 0] / (1e3 * simulation.spec.period * scale[:, 1])
+    velocity = np.stack([rate, -offset[:, 1] / scale[:, 1]], axis=1)
     return SimulationParameters(
         hidden=_float32(hidden),
         output=_float32(output),
         output_bias=_float32(output_bias),
         direct=_float32(direct),
-        place=(4 * np.arange(joints)[:, None] + quantities).ravel(),
-        lowest=_float32(lowest[:, quantities].ravel()),
-        highest=_float32(highest[:, quantities].ravel()),
+        place=simulation.outputs,
+        lowest=_float32(lowest[simulation.outputs]),
+        highest=_float32(highest[simulation.outputs]),
         velocity=_float32(velocity if simulation.velocity == "derived" else velocity[:0]),
         joints=joints,
         history=window.history,
@@ -151,30 +146,23 @@ def simulation_state(simulation: SimulationParameters, random: RandomState) -> S
 
 def scaled_state(sigma: ArrayLike, window: Window, scaling: Scaling) -> NDArray[np.float32]:
     """Return windows ``sigma`` (..., state_size) in sensor units as scaled ones."""
-    offset, scale = _state_scaling(window, scaling)
-    return ((np.asarray(sigma, np.float64) - offset) / scale).astype(np.float32)
+    return scaling.inputs(sigma, window).astype(np.float32)
 
 
-def raw_state(sigma: ArrayLike, window: Window, scaling: Scaling) -> NDArray[np.float64]:
-    """Return scaled windows ``sigma`` (..., state_size) in sensor units."""
-    offset, scale = _state_scaling(window, scaling)
-    raw: NDArray[np.float64] = np.asarray(sigma, np.float64) * scale + offset
-    return raw
-
-
-def _state_scaling(window: Window, scaling: Scaling) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    commands = np.tile(scaling.command_scale, window.history - 1)
-    offset = np.concatenate([np.tile(scaling.observation_offset, window.history), np.zeros_like(commands)])
-    return offset, np.concatenate([np.tile(scaling.observation_scale, window.history), commands])
+def raw_observation(sigma: ArrayLike, window: Window, scaling: Scaling) -> NDArray[np.float64]:
+    """Return the newest observation (..., joints, 4) of scaled windows ``sigma``, in sensor units."""
+    newest = np.asarray(sigma, np.float64)[..., : window.observation_size]
+    raw = newest * scaling.observation_scale + scaling.observation_offset
+    return raw.reshape(*newest.shape[:-1], window.joints, 4)
 
 
 def _float32(array: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.ascontiguousarray(array, np.float32)
 
 
-@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+@part(fastmath=FASTMATH)
 def tansig(hidden):  # type: ignore[no-untyped-def]
-    """Replace ``hidden`` (units,) by its hyperbolic tangent, within 3e-6.
+    """Replace ``hidden`` (units,) by its hyperbolic tangent, within 7e-6.
 
     Source: J. H. Lambert's continued fraction x/(1 + x^2/(3 + x^2/(5 + ...))), cut after eight fractions; a ratio of
     polynomials needs neither tables nor branches, so eight or sixteen units are done at once.
@@ -193,7 +181,7 @@ def tansig(hidden):  # type: ignore[no-untyped-def]
         hidden[u] = z * above / below
 
 
-@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+@part(fastmath=FASTMATH)
 def hidden_layer(weights, x, hidden):  # type: ignore[no-untyped-def]
     """Set ``hidden`` (units,) to tansig(x W), ``weights`` (at least inputs, units), ``x`` (inputs,)."""
     units = hidden.shape[0]
@@ -209,7 +197,7 @@ def hidden_layer(weights, x, hidden):  # type: ignore[no-untyped-def]
     tansig(hidden)
 
 
-@kernel(_nrt=False, forceinline=True, fastmath=FASTMATH)
+@part(fastmath=FASTMATH)
 def predict_change(simulation, state):  # type: ignore[no-untyped-def]
     """Set ``state.change`` to what the networks predict for the state and the command in ``state.x``."""
     x, hidden = state.x, state.hidden
@@ -226,7 +214,7 @@ def predict_change(simulation, state):  # type: ignore[no-untyped-def]
         state.change[o] += total
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
     """Shift the window in ``x`` by one step: add ``change`` to the newest observation, remember ``command``."""
     observed, commanded = 4 * simulation.joints, 2 * simulation.joints
@@ -249,7 +237,7 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
         x[4 * joint + 1] = moved * simulation.velocity[joint, 0] + simulation.velocity[joint, 1]
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def step(simulation, noise, state, command):  # type: ignore[no-untyped-def]
     """Let ``state`` advance by one control period under the scaled ``command`` (2 joints,)."""
     x = state.x
@@ -263,7 +251,7 @@ def step(simulation, noise, state, command):  # type: ignore[no-untyped-def]
     push(simulation, x, state.change, command)
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def begin(simulation, noise, state, sigma):  # type: ignore[no-untyped-def]
     """Put ``state`` into the scaled window ``sigma`` (state_size,), with noise that went on before it."""
     for i in range(sigma.shape[0]):

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.random import normal
 
 if TYPE_CHECKING:
@@ -85,10 +85,10 @@ def noise_parameters(settings: NoiseSettings, simulation: "Simulation") -> Noise
     joints = simulation.window.joints
     scale = simulation.scaling.observation_scale.reshape(joints, 4)
     derived = simulation.velocity == "derived"
-    quantities = [0, 2, 3] if derived else [0, 1, 2, 3]
-    std = settings.factor * (simulation.error_std / scale)[:, quantities]
+    std = settings.factor * (simulation.error_std / scale).ravel()[simulation.outputs]
+    outputs = std.size // joints
     if settings.kind == "none" or settings.factor == 0:
-        std = std[:, :0]
+        std = std[:0]
     speed = np.zeros((joints, 3))
     if derived:
         speed[:, 0] = scale[:, 0] / (1e3 * simulation.spec.period)
@@ -96,11 +96,11 @@ def noise_parameters(settings: NoiseSettings, simulation: "Simulation") -> Noise
         speed[:, 0] = speed[:, 1] = scale[:, 1]
         speed[:, 2] = simulation.scaling.observation_offset.reshape(joints, 4)[:, 1]
     first = np.arange(joints)
-    output = first * len(quantities) + (0 if derived else 1)
+    output = first * outputs + (0 if derived else 1)
     n = settings.steps if settings.kind == "correlated" else 1
     share = settings.slow_share if settings.by_velocity else 1.0
     return NoiseParameters(
-        std=np.ascontiguousarray(std.ravel(), np.float32),
+        std=np.ascontiguousarray(std, np.float32),
         keep=(n - 1) / n,
         gain=math.sqrt(2 * n - 1) / n,
         source=np.stack([output, 4 * first + 1], axis=1),
@@ -109,14 +109,14 @@ def noise_parameters(settings: NoiseSettings, simulation: "Simulation") -> Noise
     )
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def begin_noise(noise, average, random):  # type: ignore[no-untyped-def]
     """Put the moving ``average`` (outputs,) into its stationary distribution."""
     for o in range(noise.std.shape[0]):
         average[o] = normal(random)
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def noise_share(noise, joint, x, change):  # type: ignore[no-untyped-def]
     """Return the share of the noise that ``joint`` gets, moving as fast as ``change`` predicts."""
     output, place = noise.source[joint, 0], noise.source[joint, 1]
@@ -125,7 +125,7 @@ def noise_share(noise, joint, x, change):  # type: ignore[no-untyped-def]
     return min(share, np.float32(1.0))
 
 
-@kernel(_nrt=False, forceinline=True)
+@part
 def add_noise(noise, x, change, average, random):  # type: ignore[no-untyped-def]
     """Add noise to ``change`` (outputs,), the scaled change that the networks predict from the state ``x``."""
     if noise.std.shape[0] == 0:

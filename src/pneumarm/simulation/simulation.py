@@ -2,8 +2,11 @@
 
 Numbered differences from the thesis:
 
-1. The networks predict *changes* of angle and pressures, not the next values. Angle and pressures hardly change
-   within a step, so a network of next values spends its first epochs on learning the identity.
+1. The networks predict *changes* of angle and pressures, not the next values: these hardly change within a step, so a
+   network of next values spends its first epochs on learning the identity. On the nominal virtual arm (200,000
+   transitions, held-out sequences, mean of three seeds) the standard deviation of the error of the angle [counts] is
+   2.97 instead of 3.17 after 15 epochs and 2.78 instead of 2.86 after 60; of the pressures 1.40 instead of 1.78, and
+   1.26 instead of 1.30.
 2. Predictions are clipped to what the sensors can say; pressures to a little above what was ever recorded.
 """
 
@@ -86,21 +89,29 @@ class Simulation:
     """Standard deviation of the one-step error on held-out transitions, shape (joints, 4) [sensor units]."""
     goal_range: NDArray[np.float64]
     """1st and 99th percentile of the stored angles, shape (joints, 2) [counts]."""
-    observation_range: NDArray[np.float64]
-    """Lowest and highest value that it predicts, shape (joints, 4, 2) [sensor units]; a derived velocity follows
-    from the angle and is not bounded of itself."""
+    pressure_range: NDArray[np.float64]
+    """Lowest and highest pressure that it predicts, shape (joints, 2 muscles, 2) [counts]."""
     valves: bool = True
     """Whether the commands are valves; with continuous commands no agent of ours can be trained."""
-    hold_out: float = 0.1
-    """Share of the sequences that were kept out of the fit, see :func:`pneumarm.transitions.held_out`."""
-    hold_out_seed: int = 0
-    """Seed that they were chosen by."""
+    held_out: float = 0.0
+    """Share of the sequences that were kept out of the fit, chosen by :func:`pneumarm.transitions.held_out`."""
+    seed: int = 0
+    """Of that choice, of the filter and of the fit, so that an analysis finds the same parts again."""
 
     @property
     def outputs(self) -> NDArray[np.int64]:
         """Places in an observation that the networks predict, in their order."""
         places = np.arange(self.window.observation_size)
         return places if self.velocity == "network" else places[places % len(QUANTITIES) != _VELOCITY]
+
+    @property
+    def limits(self) -> NDArray[np.float64]:
+        """Lowest and highest value of each place in a prediction, shape (2, 4 joints); none for velocities."""
+        limits = np.empty((self.window.joints, len(QUANTITIES), 2))
+        limits[:, _ANGLE] = self.spec.angle_range
+        limits[:, _VELOCITY] = -np.inf, np.inf
+        limits[:, -2:] = self.pressure_range
+        return limits.reshape(-1, 2).T
 
     def predict(self, inputs: ArrayLike) -> NDArray[np.float64]:
         """Return o_{k+1} (n, 4 joints) for sigma_k and a_k (n, input_size), both in sensor units."""
@@ -110,8 +121,7 @@ class Simulation:
         now = inputs[:, : self.window.observation_size]
         following = now.copy()
         following[:, self.outputs] += change * self.scaling.observation_scale[self.outputs]
-        limits = self.observation_range.reshape(-1, 2)
-        np.clip(following, limits[:, 0], limits[:, 1], out=following)
+        np.clip(following, *self.limits, out=following)
         if self.velocity == "derived":
             angle, velocity = slice(_ANGLE, None, len(QUANTITIES)), slice(_VELOCITY, None, len(QUANTITIES))
             following[:, velocity] = (following[:, angle] - now[:, angle]) / (1e3 * self.spec.period)
@@ -125,9 +135,7 @@ class Simulation:
 
         """
         direct = [network.direct is not None for network in self.networks]
-        header = _Header(
-            self.spec, self.window, self.velocity, self.valves, direct, self.hold_out, self.hold_out_seed
-        )
+        header = _Header(self.spec, self.window, self.velocity, self.valves, self.held_out, self.seed, direct)
         arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in _ARRAYS}
         arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
         for number, network in enumerate(self.networks):
@@ -172,13 +180,13 @@ class Simulation:
             networks=networks,
             velocity=header.velocity,
             valves=header.valves,
-            hold_out=header.hold_out,
-            hold_out_seed=header.hold_out_seed,
+            held_out=header.held_out,
+            seed=header.seed,
             **rest,
         )
 
 
-_ARRAYS = ("error_std", "goal_range", "observation_range")
+_ARRAYS = ("error_std", "goal_range", "pressure_range")
 _SCALINGS = ("observation_offset", "observation_scale", "command_scale")
 _LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias", "direct")
 
@@ -191,10 +199,10 @@ class _Header:
     window: Window
     velocity: Velocity
     valves: bool
+    held_out: float
+    seed: int
     direct: list[bool]
     """For each network whether it has direct connections."""
-    hold_out: float
-    hold_out_seed: int
 
 
 def _floats(name: str, array: NDArray[np.generic]) -> NDArray[np.float64]:
@@ -208,6 +216,8 @@ def _check(simulation: Simulation) -> None:
     window, scaling = simulation.window, simulation.scaling
     if window.joints != simulation.spec.joints or window.joints < 1 or window.history < 1:
         raise ValueError(f"its {window} does not fit to an arm with {simulation.spec.joints} joint(s)")
+    if not (0 <= simulation.held_out < 1 and simulation.seed >= 0):
+        raise ValueError(f"its share held out is {simulation.held_out}, its seed {simulation.seed}")
     joints = window.joints
     _expect("observation_offset", scaling.observation_offset, (4 * joints,))
     _expect("observation_scale", scaling.observation_scale, (4 * joints,), scaling.observation_scale > 0)
@@ -215,7 +225,7 @@ def _check(simulation: Simulation) -> None:
     _expect("error_std", simulation.error_std, (joints, 4), simulation.error_std >= 0)
     for name, array, shape in (
         ("goal_range", simulation.goal_range, (joints, 2)),
-        ("observation_range", simulation.observation_range, (joints, 4, 2)),
+        ("pressure_range", simulation.pressure_range, (joints, 2, 2)),
     ):
         _expect(name, array, shape)
         _expect(name, array, shape, array[..., 0] <= array[..., 1])

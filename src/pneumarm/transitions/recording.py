@@ -39,7 +39,9 @@ from pneumarm.files import written_whole
 from pneumarm.transitions.rows import Recorded, steps_of
 from pneumarm.transitions.store import Store, lock_vacant
 
-_LONGEST_MAPPING = 64 << 10  # bytes
+# A key of n dotted parts takes tomllib n**2 memory, hence both of these.
+_LONGEST_MAPPING = 16 << 10  # bytes
+_LONGEST_MAPPING_LINE = 1000  # characters
 _LONGEST_LINE = 64 << 10  # characters
 _LONGEST_SEQUENCE = 10_000  # rows; a longer one is stored in parts, which costs a window's length of each
 
@@ -159,8 +161,10 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
             raise UnusableInput(f"{path}: expected a mapping file (TOML), there is none")
         if path.stat().st_size > _LONGEST_MAPPING:
             raise UnusableInput(f"{path}: a mapping file has {_LONGEST_MAPPING} bytes at most, this is none")
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-        mapping = msgspec.convert(table, Mapping)
+        text = path.read_text(encoding="utf-8")
+        if max(map(len, text.splitlines()), default=0) > _LONGEST_MAPPING_LINE:
+            raise UnusableInput(f"{path}: a line has {_LONGEST_MAPPING_LINE} characters at most")
+        mapping = msgspec.convert(tomllib.loads(text), Mapping)
         allowed = {field.name for field in fields(ArmSpec)} - {"joints"}
         if unknown := mapping.arm.keys() - allowed:
             raise UnusableInput(f"[arm] has no {', '.join(sorted(unknown))}; it has {', '.join(sorted(allowed))}")

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pneumarm.arm.virtual import MuscleParameters
@@ -47,6 +47,7 @@ def test_the_flow_function_has_no_steps():
     assert values[-1] == 0
 
 
+@settings(deadline=None)
 @given(PRESSURES, PRESSURES)
 def test_air_runs_from_high_to_low_either_way_alike(source, sink):
     c = record()

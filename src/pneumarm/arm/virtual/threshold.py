@@ -22,6 +22,7 @@ def _cubics() -> NDArray[np.float64]:
     """Return the coefficients, lowest order first, of Hermite cubics through ln(1 + exp(-y)), y = 0.._SATURATED."""
     y = np.arange(0, _SATURATED * _PER_WIDTH + 1) / _PER_WIDTH
     value, slope = np.log1p(np.exp(-y)), -1 / (1 + np.exp(y)) / _PER_WIDTH
+    value[-1] = slope[-1] = 0.0  # it joins the sharp threshold without a step
     rise = np.diff(value)
     second = 3 * rise - 2 * slope[:-1] - slope[1:]
     third = slope[:-1] + slope[1:] - 2 * rise

@@ -2,8 +2,8 @@
 
 Every agent has its own weights, random numbers and shaping, so the result is the same however many threads there
 are. Between two adjustments of the deviation an agent's whole state is a few arrays; a checkpoint keeps them, and a
-killed training goes on bit for bit. No episode is running then, so the state window, the noise and the traces (all set
-at the start of every episode) need not be kept.
+killed training goes on bit for bit. No episode is running then, so the state window, the noise and the traces, all
+set at the start of every episode, need not be kept.
 """
 
 import hashlib
@@ -64,7 +64,7 @@ class Training:
     curves: tuple[NDArray[np.float64], ...]
     """By agent a row every 500 episodes, columns as in ``CURVES``; the deviation [counts] as it was until then."""
     met: NDArray[np.bool_]
-    """Which agents met the criterium at the whole deviation; the others ended at ``max_episodes``, shape (agents,)."""
+    """Which agents met the criterium at the whole deviation; the others ended at ``max_episodes``; (agents,)."""
     episodes: NDArray[np.int64]
     """Training episodes by agent, shape (agents,)."""
     steps: NDArray[np.int64]
@@ -139,10 +139,7 @@ def train(
 
     began, before = time.perf_counter(), agents.seconds[0]
     saved = began
-    cores = threads or min(
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, 64
-    )
-    with ThreadPoolExecutor(min(cores, settings.agents)) as pool:
+    with ThreadPoolExecutor(min(threads or _cores(), settings.agents)) as pool:
         while (running := np.flatnonzero(~_ended(agents, settings))).size:
             done = list(pool.map(lambda a: _chunk(env, agents, settings, simulation, int(a)), running))
             row = np.zeros((1, settings.agents, len(CURVES)))
@@ -179,6 +176,11 @@ def train(
         seconds=float(agents.seconds[0]),
         core_seconds=float(agents.seconds[1]),
     )
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _fresh(simulation: Simulation, settings: TrainSettings, seed: int) -> _Agents:
@@ -273,11 +275,8 @@ def _read_checkpoint(
     expected = vars(_fresh(simulation, settings, 0))
     for name, like in expected.items():
         array = arrays.get(name)
-        shape = (
-            like.shape
-            if name != "curves"
-            else (len(array) if array is not None and array.ndim else 0, *like.shape[1:])
-        )
-        if array is None or array.dtype != like.dtype or array.shape != shape:
+        first = 1 if name == "curves" else 0  # there are as many rows of curves as there were rounds
+        fits = array is not None and array.dtype == like.dtype and array.ndim == like.ndim
+        if array is None or not fits or array.shape[first:] != like.shape[first:]:
             raise UnusableInput(f"{path}: a damaged checkpoint ({name}); remove it")
     return _Agents(**{name: arrays[name].copy() for name in expected})

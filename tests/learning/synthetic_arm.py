@@ -36,6 +36,7 @@ def synthetic_simulation(joints: int = 1, history: int = 3, hidden: int = 10, di
         velocity="derived",
         error_std=np.tile([4.0, 0.12, 1.0, 1.0], (joints, 1)),
         goal_range=np.tile([350.0, 670.0], (joints, 1)),
+        pressure_range=np.tile([[0.0, 200.0], [0.0, 200.0]], (joints, 1, 1)),
     )
 
 

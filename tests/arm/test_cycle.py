@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from pneumarm.arm import BeginState, ControlCycle, GuardedArm
+
+OPEN = np.array([[1, -1]], np.int8)
+
+
+def kinds(arm):
+    return [call if isinstance(call, str) else call[0] for call in arm.calls]
+
+
+def deciding(*decisions):
+    """A decision that gives these one after the other, then None."""
+    remaining = list(decisions)
+    return lambda reading: remaining.pop(0) if remaining else None
+
+
+def test_a_turn_is_read_decide_wait_act_wait(smallest_arm):
+    arm = smallest_arm(latency=0.007)
+    steps = list(ControlCycle(GuardedArm(arm)).run(deciding(OPEN)))
+    # wait_until is made of a reading and a wait on an arm that does not bring its own.
+    assert kinds(arm) == ["read", "wait", "valves", "read", "wait", "read", "valves"]
+    assert arm.calls[1] == ("wait", 0.007)
+    assert arm.calls[4][1] == pytest.approx(1 / 30 - 0.007)
+    assert [s.valves is None for s in steps] == [False, True]
+    assert steps[0].valves.tolist() == [[1, -1]]
+    assert arm.valves == [[0, 0]]
+
+
+def test_an_arm_without_latency_acts_at_once(smallest_arm):
+    arm = smallest_arm()
+    list(ControlCycle(GuardedArm(arm)).run(deciding(OPEN)))
+    assert kinds(arm)[:2] == ["read", "valves"]
+
+
+def test_valves_can_be_closed_while_computing(smallest_arm):
+    arm = smallest_arm(latency=0.007)
+    list(ControlCycle(GuardedArm(arm), close_while_computing=True).run(deciding(OPEN, OPEN)))
+    set_ = [call[1] for call in arm.calls if call[0] == "valves"]
+    # The last two: closed while it was decided to stop, and on leaving.
+    assert set_ == [[[0, 0]], [[1, -1]], [[0, 0]], [[1, -1]], [[0, 0]], [[0, 0]]]
+
+
+def test_what_is_reported_is_what_was_applied(smallest_arm):
+    arm = smallest_arm(max_pressure=0.5)
+    arm.pressure = [[100, 0]]
+    cycle = ControlCycle(GuardedArm(arm))
+    steps = list(cycle.run(deciding(OPEN)))
+    assert steps[0].valves.tolist() == cycle.applied.tolist() == [[0, -1]]
+
+
+def test_a_lost_period_is_counted_and_not_caught_up(smallest_arm):
+    arm = smallest_arm()
+    cycle = ControlCycle(GuardedArm(arm))
+    times = []
+    for step in cycle.run(deciding(*[OPEN * 0] * 6)):
+        times.append(step.reading.time)
+        if len(times) == 3:
+            arm.time += 0.1  # whoever looks at the steps took their time
+    assert cycle.missed_deadlines == 1
+    assert np.diff(times)[3:] == pytest.approx(1 / 30)
+
+
+def test_an_error_in_deciding_closes_the_valves(smallest_arm):
+    arm = smallest_arm()
+
+    def decide(reading):
+        if reading.time > 0:
+            raise RuntimeError("no idea")
+        return OPEN
+
+    with pytest.raises(RuntimeError, match="no idea"):
+        list(ControlCycle(GuardedArm(arm)).run(decide))
+    assert arm.valves == [[0, 0]]
+
+
+def test_stopping_early_closes_the_valves(smallest_arm):
+    arm = smallest_arm()
+    steps = ControlCycle(GuardedArm(arm)).run(lambda reading: OPEN)
+    next(steps)
+    assert arm.valves == [[1, -1]]
+    steps.close()
+    assert arm.valves == [[0, 0]]
+
+
+def test_begin_states_are_random_and_at_rest(smallest_arm):
+    reached = []
+    for seed in range(40):
+        arm = smallest_arm(joints=2)
+        arm.pressure = [[120, 40], [0, 160]]
+        BeginState(deflate=2.0, inflate=0.9, settle=1.0).reach(GuardedArm(arm), np.random.default_rng(seed))
+        assert arm.valves == [[0, 0], [0, 0]]
+        assert arm.calls[-1] == ("wait", 1.0)
+        assert 3.0 <= arm.time <= 3.9 + 1e-9
+        reached.append(np.ravel(arm.pressure))
+    # Each muscle is inflated for a time of its own, uniform in 0..0.9 s.
+    assert np.min(reached, axis=0) == pytest.approx(np.zeros(4), abs=25)
+    assert np.max(reached, axis=0) == pytest.approx(np.full(4, 0.9 * 166), abs=25)
+    assert np.abs(np.corrcoef(np.transpose(reached)) - np.eye(4)).max() < 0.5
+
+
+def test_begin_states_respect_the_pressure_limit(smallest_arm):
+    arm = smallest_arm(max_pressure=0.3)
+    BeginState().reach(GuardedArm(arm), np.random.default_rng(1))
+    assert np.max(arm.pressure) < 0.3 * 166 + 166 / 30 + 1

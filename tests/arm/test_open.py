@@ -1,0 +1,46 @@
+import pytest
+
+from pneumarm.arm import open_arm
+from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters
+from pneumarm.errors import UnusableInput
+
+USER = """
+from pneumarm.arm.virtual import VirtualArm
+
+def mine():
+    return VirtualArm(name="mine")
+
+def nothing():
+    return 3
+"""
+
+
+def test_virtual_arms_by_name():
+    assert isinstance(open_arm("virtual"), VirtualArm)
+    assert open_arm("virtual:seed=7").parameters == draw_parameters(7)
+    assert open_arm("virtual:seed=7").spec.name == "virtual:seed=7"
+    assert open_arm("virtual:preset=A").parameters == preset_parameters("A")
+    assert open_arm("virtual", seed=1).get_state() != open_arm("virtual", seed=2).get_state()
+
+
+def test_a_users_arm(tmp_path, monkeypatch):
+    (tmp_path / "their_arm.py").write_text(USER)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert open_arm("python:their_arm:mine").spec.name == "mine"
+    with pytest.raises(UnusableInput, match="it returned int"):
+        open_arm("python:their_arm:nothing")
+    with pytest.raises(UnusableInput, match="expected a module and a callable"):
+        open_arm("python:their_arm:absent")
+
+
+@pytest.mark.parametrize(
+    "name", ["", "robot", "virtual:seed=x", "virtual:seed=-1", "virtual:color=red", "simulation:"]
+)
+def test_unknown_names_are_refused_with_what_is_expected(name):
+    with pytest.raises(UnusableInput, match="expected virtual, virtual:seed=7"):
+        open_arm(name)
+
+
+def test_an_unknown_preset_is_refused():
+    with pytest.raises(UnusableInput, match="preset 'Z': expected one of A, B, C"):
+        open_arm("virtual:preset=Z")

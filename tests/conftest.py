@@ -1,0 +1,16 @@
+"""A small run of the whole job, made once and used by the tests of everything that comes after it."""
+
+from pathlib import Path
+
+import pytest
+
+from pneumarm.run import Run
+from small import SMALL
+
+
+@pytest.fixture(scope="session")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a finished small run; tests must not change it."""
+    folder = tmp_path_factory.mktemp("runs") / "small"
+    Run(folder, SMALL).do()
+    return folder

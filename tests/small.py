@@ -1,0 +1,16 @@
+"""The settings of a small run of the whole job."""
+
+from pneumarm.control import TransferSettings
+from pneumarm.learning import Shaping, TrainSettings
+from pneumarm.run import RunSettings
+from pneumarm.simulation import FitSettings
+
+SMALL = RunSettings(
+    arm="virtual:seed=3",
+    seed=5,
+    transitions=6_000,
+    test_episodes=300,
+    fit=FitSettings(epochs=10),
+    train=TrainSettings(agents=2, max_episodes=3_000, validation_episodes=100, shaping=Shaping(episodes=100)),
+    transfer=TransferSettings(episodes=30, test_episodes=20),
+)

@@ -1,0 +1,139 @@
+"""The cache of compiled kernels serves neither stale nor broken code, and no code at all it cannot keep."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pneumarm.kernels import kernel, sources_hash
+
+LEFT = """
+from pneumarm.kernels import kernel
+@kernel
+def factor(x):
+    return x * {factor}
+"""
+
+RIGHT = """
+from pneumarm.kernels import kernel
+from left import factor
+@kernel
+def result(x):
+    return factor(x) + 1.0
+"""
+
+# The package's own folder decides the name of the cache's folder, so the modules lie in a copy of its ground.
+SCRIPT = """
+import sys
+from pneumarm.right import result
+print(result(2.0), sum(result.stats.cache_hits.values()), sum(result.stats.cache_misses.values()))
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package ``pneumarm`` of kernels.py and two files, one of which calls a kernel of the other."""
+    import pneumarm.kernels
+
+    folder = tmp_path / "source" / "pneumarm"
+    folder.mkdir(parents=True)
+    (folder / "__init__.py").write_text("")
+    (folder / "kernels.py").write_bytes(Path(pneumarm.kernels.__file__).read_bytes())
+    (folder / "left.py").write_text(LEFT.format(factor=3.0))
+    (folder / "right.py").write_text(RIGHT.replace("from left", "from pneumarm.left"))
+    return folder
+
+
+@pytest.fixture
+def run(package, tmp_path):
+    """Call the kernel in a process of its own; returns its result, cache hits and misses."""
+
+    def call(cache=tmp_path / "cache", **environment):
+        done = subprocess.run(
+            [sys.executable, "-c", SCRIPT],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            env={**os.environ, "PYTHONPATH": str(package.parent), "PNEUMARM_CACHE": str(cache), **environment},
+        )
+        assert done.returncode == 0, done.stderr
+        value, hits, misses = done.stdout.split()
+        return float(value), int(hits), int(misses)
+
+    return call
+
+
+@pytest.fixture
+def compiled(run, tmp_path):
+    """The cache's folder after a first process."""
+    run()
+    return tmp_path / "cache"
+
+
+def entries(folder, pattern):
+    return sorted(folder.rglob(pattern))
+
+
+def test_a_change_in_another_files_kernel_is_seen(run, package, tmp_path):
+    assert run() == (7.0, 0, 1)
+    left = package / "left.py"
+    before = left.stat()
+    left.write_text(LEFT.format(factor=5.0))
+    os.utime(left, ns=(before.st_atime_ns, before.st_mtime_ns))  # not even the time of the file tells
+    assert run()[0] == 11.0
+    left.write_text(LEFT.format(factor=3.0))
+    assert run() == (7.0, 1, 0)  # going back finds what was compiled then
+
+
+@pytest.mark.parametrize(
+    ("pattern", "damage"),
+    [
+        ("*.nbi", lambda data: b""),
+        ("*.nbi", lambda data: b"\x80" + data[::-1]),
+        ("*.nbc", lambda data: data[: len(data) // 2]),
+    ],
+)
+def test_damaged_entries_are_compiled_again(run, compiled, pattern, damage):
+    found = entries(compiled, pattern)
+    assert found
+    for entry in found:
+        entry.write_bytes(damage(entry.read_bytes()))
+    assert run() == (7.0, 0, 1)
+    assert run() == (7.0, 1, 0)  # and what replaced them is whole
+
+
+def test_a_cache_that_cannot_be_written_does_not_stop_anything(run, tmp_path):
+    file = tmp_path / "a-file"
+    file.write_text("")
+    assert run(cache=file / "below", TMPDIR=str(tmp_path))[0] == 7.0
+
+
+def test_folders_of_old_sources_are_forgotten(run, tmp_path):
+    cache = tmp_path / "cache"
+    for age in range(5):
+        (cache / str(age)).mkdir(parents=True)
+        os.utime(cache / str(age), (1e9 - age, 1e9 - age))
+    run()
+    left = {folder.name for folder in cache.iterdir()}
+    assert len(left) == 3
+    assert left > {"0", "1"}
+
+
+def test_the_hash_is_of_kernel_sources_only(package):
+    before = sources_hash(package)
+    (package / "notes.py").write_text("x = 1\n")
+    assert sources_hash(package) == before
+    (package / "more.py").write_text("from pneumarm.kernels import kernel\n")
+    assert sources_hash(package) != before
+
+
+def test_division_follows_numpy():
+    @kernel
+    def divide(a, b):
+        return a / b
+
+    assert divide(1.0, 0.0) == np.inf
+    assert np.isnan(divide(0.0, 0.0))

@@ -1,0 +1,144 @@
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pneumarm.errors import UnusableInput
+from pneumarm.run import Run
+from pneumarm.transitions import Store
+from small import SMALL
+
+TIMES = ("seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
+STAGES = ("collect", "simulation", "training", "test", "transfer")
+
+
+def results_of(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "results.json").read_text())
+    return found
+
+
+def without_times(value: Any, inside: str = "") -> Any:
+    """Drop what the machine's clock decides; seconds on the arm's clock stay."""
+    if isinstance(value, dict):
+        timed = ("seconds",) if inside in ("before", "after", "collect") else ()
+        return {k: without_times(v, k) for k, v in value.items() if k not in TIMES or k in timed}
+    return value
+
+
+def test_results_have_the_keys_that_are_promised(small_run: Path) -> None:
+    results = results_of(small_run)
+    assert results["collect"]["transitions"] >= SMALL.transitions
+    assert results["collect"]["seconds"] > SMALL.transitions / 30
+    assert {"kept", "cells_occupied"} <= results["filter"].keys()
+    quantities = {"angle", "velocity", "pressure_1", "pressure_2"}
+    assert results["simulation"]["std"].keys() == quantities
+    assert {"episodes", "steps", "seconds", "steps_per_second"} <= results["training"].keys()
+    figures = {"episodes", "reward", "success_rate", "actions", "switches"}
+    assert figures <= results["test"].keys()
+    assert figures <= results["transfer"]["before"].keys()
+    assert figures <= results["transfer"]["after"].keys()
+    assert results["transfer"]["episodes"] == SMALL.transfer.episodes
+    assert results["transfer"]["learning_rate"] == SMALL.transfer.learning_rate
+
+
+def test_the_ledger_agrees_with_the_episodes(small_run: Path) -> None:
+    with open(small_run / "episodes.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    transfer = results_of(small_run)["transfer"]
+    assert [r["phase"] for r in rows] == ["before"] * 20 + ["learning"] * 30 + ["after"] * 20
+    before = [r for r in rows if r["phase"] == "before"]
+    assert sum(float(r["reward"]) for r in before) / 20 == pytest.approx(transfer["before"]["reward"])
+    for row in rows:
+        missed = abs(float(row["angle_end"]) - float(row["goal"]))
+        reached = missed <= 25 and abs(float(row["velocity_end"])) <= 1
+        assert reached == (row["success"] == "1")
+        paid = (50 if reached else -1) - (int(row["actions"]) - 1) - 8 * int(row["switches"])
+        assert float(row["reward"]) == paid
+        assert reached or int(row["actions"]) == 100
+
+
+def test_both_tests_on_the_arm_have_the_same_goals(small_run: Path) -> None:
+    with open(small_run / "episodes.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    goals = {phase: [r["goal"] for r in rows if r["phase"] == phase] for phase in ("before", "after")}
+    assert goals["before"] == goals["after"]
+
+
+def test_the_movements_are_in_the_store(small_run: Path) -> None:
+    with Store.open(small_run / "transitions.db") as store:
+        episodes = [entry for entry in store.catalogue() if entry.kind == "episode"]
+        assert len(episodes) == 70
+        assert all(entry.transitions == entry.info["actions"] for entry in episodes)
+        store.check()
+
+
+def test_a_finished_run_is_not_done_again(small_run: Path) -> None:
+    before = (small_run / "results.json").stat().st_mtime_ns
+    assert Run(small_run, SMALL).do() == results_of(small_run)
+    assert (small_run / "results.json").stat().st_mtime_ns == before
+
+
+def test_a_folder_is_resumed_with_the_same_settings_only(small_run: Path) -> None:
+    with pytest.raises(UnusableInput, match=r"other settings \(transitions was 6000, is 7000\)"):
+        Run(small_run, replace(SMALL, transitions=7_000))
+
+
+def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(UnusableInput, match="is not empty"):
+        Run(tmp_path, SMALL)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_nothing_is_left_behind_by_settings_that_cannot_be_used(tmp_path: Path) -> None:
+    with pytest.raises(UnusableInput, match="expected virtual"):
+        Run(tmp_path / "run", replace(SMALL, arm="wirtual"))
+    with pytest.raises(UnusableInput, match="2,000 transitions"):
+        replace(SMALL, transitions=100)
+    with pytest.raises(UnusableInput, match="1 joint"):
+        Run(tmp_path / "run", replace(SMALL, joints=2))
+    with pytest.raises(UnusableInput, match="does not exist"):
+        Run(tmp_path / "no" / "run", SMALL)
+    assert not list(tmp_path.iterdir())
+
+
+def started(folder: Path) -> subprocess.Popen[bytes]:
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1]); from small import SMALL; from pathlib import Path;"
+        "from pneumarm.run import Run; Run(Path(sys.argv[2]), SMALL).do()"
+    )
+    return subprocess.Popen([sys.executable, "-c", code, str(Path(__file__).parent), str(folder)])
+
+
+def killed_in(stage: str, folder: Path, after: float) -> None:
+    """Start the run and kill it ``after`` seconds into ``stage``."""
+    process = started(folder)
+    before = STAGES[: STAGES.index(stage)]
+    while process.poll() is None:
+        done = folder / "results.json"
+        reached = not before or (done.exists() and before[-1] in results_of(folder))
+        if reached and (before or (folder / "transitions.db").exists()):
+            break
+        time.sleep(0.01)
+    time.sleep(after)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def test_a_run_killed_in_every_stage_ends_as_if_nothing_had_happened(small_run: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "killed"
+    for stage, after in zip(STAGES, (0.1, 0.3, 0.3, 0.05, 0.2), strict=True):
+        killed_in(stage, folder, after)
+    assert started(folder).wait() == 0
+    assert without_times(results_of(folder)) == without_times(results_of(small_run))
+    assert (folder / "episodes.csv").read_text() == (small_run / "episodes.csv").read_text()
+    for name in ("agent.safetensors", "adapted.safetensors", "simulation.safetensors"):
+        assert (folder / name).read_bytes() == (small_run / name).read_bytes()

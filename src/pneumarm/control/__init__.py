@@ -1,7 +1,10 @@
 """Controllers on an arm: agents, movements, transfer and adaptation."""
 
 from pneumarm.control.agent import AgentController
+from pneumarm.control.bound import BoundSettings, Planned, measure_bound
 from pneumarm.control.movement import LearningController, Movement, move
+from pneumarm.control.planner import PhysicsModel, Planner, SimulationModel
+from pneumarm.control.search import PlanSettings
 from pneumarm.control.transfer import (
     BEGIN,
     Episode,
@@ -15,11 +18,18 @@ from pneumarm.control.transfer import (
 __all__ = [
     "BEGIN",
     "AgentController",
+    "BoundSettings",
     "Episode",
     "LearningController",
     "Movement",
+    "PhysicsModel",
+    "PlanSettings",
+    "Planned",
+    "Planner",
+    "SimulationModel",
     "TransferSettings",
     "Transferred",
+    "measure_bound",
     "move",
     "transfer",
     "transfer_into",

@@ -91,14 +91,16 @@ def measure_bound(
         progress: called with what is done and the total.
 
     """
-    rivals: list[Rival] = ["open_loop", "closed_loop"] + (["simulated"] if simulation else [])
+    rivals: list[Rival] = ["open_loop", "closed_loop"]
+    if simulation is not None:
+        rivals.append("simulated")
     total, results = len(rivals) * settings.episodes, {}
     for number, rival in enumerate(rivals):
         parameters = parameters_of.parameters
         if rival == "open_loop":
             parameters = without_noise(parameters)
         with VirtualArm(parameters, seed=seed, name=parameters_of.spec.name) as arm:
-            model: Model = PhysicsModel(arm, settings.plan)
+            model: Model = PhysicsModel(arm, settings.plan, foresight=rival == "open_loop")
             if simulation and rival == "simulated":
                 model = SimulationModel(simulation, settings.plan)
             planner = Planner(model, settings.plan, reward, replan=rival != "open_loop")

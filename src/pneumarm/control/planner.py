@@ -11,9 +11,9 @@ closed loop               true physics         every turn  the same with the arm
 simulated                 learned simulation   every turn  what planning makes of a simulation, as any rival may
 ========================  ===================  ==========  ==========================================================
 
-A planner that knows the true physics and the commands has little to learn from noisy sensors, so it is given the true
-state at each reading. What it is not given is the noise to come: whether the goal is reached is judged by the readings,
-and turns end late. The fluctuation of the supply is foreseen by both.
+A planner that knows the true physics and the commands has little to learn from noisy sensors, so it is given the
+true state at each reading. What it does not know in closed loop is the noise to come: whether the goal is reached is
+judged by noisy readings, turns end late, and the supply fluctuates. In open loop even that fluctuation is foreseen.
 """
 
 from collections.abc import Callable
@@ -26,14 +26,17 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.guard import GuardedArm
 from pneumarm.arm.seam import Arm, ArmSpec, Reading
-from pneumarm.arm.valves import to_actions
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
 from pneumarm.control.search import Found, PlanSettings, find, problem, room_of, tree
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Reward, StateTracker
+from pneumarm.random import random_state
 from pneumarm.simulation.rollout import look_simulated, simulated_states, simulated_world
 from pneumarm.simulation.simulation import Simulation
+
+_OWN_SUPPLY = 0
+"""Seed of the supply's fluctuation in plans that do not foresee the true one."""
 
 
 class Model(Protocol):
@@ -57,8 +60,8 @@ class Model(Protocol):
 class PhysicsModel:
     """The true physics of a virtual arm, from its true state."""
 
-    def __init__(self, arm: Arm, settings: PlanSettings = PlanSettings()) -> None:
-        """Follow ``arm``, a virtual one, which may stand behind a guard.
+    def __init__(self, arm: Arm, settings: PlanSettings = PlanSettings(), *, foresight: bool = False) -> None:
+        """Follow ``arm``, a virtual one, which may stand behind a guard; with ``foresight`` know its supply to come.
 
         Raises:
             UnusableInput: another kind of arm, whose physics nobody knows.
@@ -66,8 +69,9 @@ class PhysicsModel:
         """
         inner = arm.arm if isinstance(arm, GuardedArm) else arm
         if not isinstance(inner, VirtualArm):
-            raise UnusableInput(f"{arm.spec.name}: only a virtual arm's true physics are known; plan with a simulation")
+            raise UnusableInput(f"{arm.spec.name}: not virtual: its true physics are unknown; plan with a simulation")
         self._arm = inner
+        self._random = None if foresight else random_state(_OWN_SUPPLY)
         self.spec = inner.spec
         self.world = physics_of(inner)
         self.states = physics_states(self.world, room_of(settings, self.spec.joints))
@@ -80,6 +84,8 @@ class PhysicsModel:
     def follow(self, reading: Reading) -> None:
         """Copy the arm's state; turns end where the control cycle's do, at equal distances from the first one."""
         capture(self._arm, self.world, self.states, 0)
+        if self._random is not None:
+            self.states.random[0] = self._random
         period = self.spec.period
         due = reading.time if self._due is None else self._due + period
         if reading.time - due > period / 2:
@@ -131,8 +137,8 @@ class Planner:
     """
 
     model: Model
-    settings: PlanSettings = PlanSettings()
-    reward: Reward = Reward()
+    settings: PlanSettings = field(default_factory=PlanSettings)
+    reward: Reward = field(default_factory=Reward)
     replan: bool = True
     clock: Callable[[], float] = perf_counter
     """Tells the time of a decision [s]."""

@@ -35,7 +35,7 @@ from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy
 
 _ADVANCE = {PhysicsStates: advance_physics, SimulatedStates: advance_simulated}
 _COPY = {PhysicsStates: copy_physics, SimulatedStates: copy_simulated}
-_OPTIONS = {"nogil": True, "error_model": "numpy"}
+_OPTIONS: Any = {"nogil": True, "error_model": "numpy"}  # as in :mod:`pneumarm.kernels`
 
 
 def advance(world: Any, states: Any, i: int, valves: NDArray[np.int8]) -> None:

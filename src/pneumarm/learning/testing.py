@@ -82,8 +82,8 @@ def test(
     agent: Agent,
     simulation: Simulation,
     begin_states: BeginStates,
-    episodes: int = 10_000,  # noqa: PT028 - this is no test case
-    seed: int = 0,  # noqa: PT028
+    episodes: int = 10_000,
+    seed: int = 0,
 ) -> TestResult:
     """Let ``agent`` move greedily and without learning, from all begin states to all goals.
 

@@ -71,7 +71,6 @@ def batch(environment: Environment, n: int, threads: int) -> Batch:
 
 def outcome(n: int, size: int) -> Outcome:
     """Return room for the outcome of a step of ``n`` movements with observations of ``size``."""
-    flags = (np.zeros(n, bool) for _ in range(2))
     return Outcome(
         observation=np.zeros((n, size), np.float32),
         reward=np.zeros(n),

@@ -10,8 +10,9 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.arm.valves import VALVES
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, without_noise
+from pneumarm.arm.virtual.rollout import advance_physics
 from pneumarm.control import Movement, PhysicsModel, Planner, PlanSettings, SimulationModel, move
-from pneumarm.control.search import find, problem, room_of, tree
+from pneumarm.control.search import find, problem, room_of, tree, within
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Reward
 from pneumarm.simulation import NoiseSettings, SimulationArm
@@ -168,17 +169,47 @@ def test_only_virtual_arms_have_true_physics() -> None:
 
 
 @pytest.mark.parametrize(
-    ("reward", "settings"),
+    "reward",
     [
-        (Reward(action=0.0), PlanSettings()),
-        (Reward(switch=1.0), PlanSettings()),
-        (Reward(), PlanSettings(angle_margin=25.0)),
-        (Reward(), PlanSettings(velocity_margin=1.0)),
+        Reward(action=0.0),
+        Reward(switch=1.0),
     ],
 )
-def test_problems_without_a_shortest_path_are_refused(reward: Reward, settings: PlanSettings) -> None:
-    with pytest.raises(UnusableInput):
-        problem(np.zeros(1), reward, settings)
+def test_problems_without_a_shortest_path_are_refused(reward: Reward) -> None:
+    with pytest.raises(UnusableInput, match="planning"):
+        problem(np.zeros(1), reward, PlanSettings())
+
+
+@pytest.mark.parametrize("std", [0.5, 3.0, 40.0])
+def test_the_probability_of_success_is_that_of_a_normal_deviate(std: float) -> None:
+    random = np.random.default_rng(0)
+    for value in (-30.0, 0.0, 24.0, 26.0, 70.0):
+        drawn = np.mean(np.abs(value + std * random.standard_normal(200_000)) <= 25)
+        assert within(value, 25.0, std) == pytest.approx(drawn, abs=5e-3)
+        assert within(value, 25.0, 0.0) == (abs(value) <= 25)
+
+
+def test_an_uncertain_plan_ends_deeper_within_the_tolerance() -> None:
+    """With a price on missing the goal the planned end has better odds, for a few more actions."""
+    arm = quiet_arm(10)
+    ends: dict[float, list[float]] = {0.0: [], 6.0: []}
+    costs: dict[float, list[float]] = {0.0: [], 6.0: []}
+    for std in ends:
+        settings = PlanSettings(angle_std=std, failure_cost=20.0)
+        for goal in np.linspace(250.0, 780.0, 12):
+            planner = open_loop(arm, settings)
+            carried_out(arm, planner, goal)
+            found = planner.found
+            assert found is not None
+            replayed = open_loop(arm)
+            replayed.model.reset()
+            replayed.model.follow(arm.read())
+            for action in found.actions:
+                advance_physics(replayed.model.world, replayed.model.states, 0, VALVES[action].reshape(1, 2))
+            ends[std].append(float(abs(replayed.model.states.angle[0, 0] - goal)))
+            costs[std].append(len(found.actions) + 8.0 * np.count_nonzero(np.diff(found.actions)))
+    assert np.mean(ends[6.0]) < np.mean(ends[0.0]) - 3
+    assert np.mean(costs[6.0]) >= np.mean(costs[0.0])
 
 
 def simulated_best(begin: np.ndarray, goal: np.ndarray, settings: PlanSettings) -> float:

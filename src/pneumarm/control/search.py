@@ -29,13 +29,15 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
 from pneumarm.learning.settings import Reward
 from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
 
 _ADVANCE = {PhysicsStates: advance_physics, SimulatedStates: advance_simulated}
 _COPY = {PhysicsStates: copy_physics, SimulatedStates: copy_simulated}
-_OPTIONS: Any = {"nogil": True, "error_model": "numpy"}  # as in :mod:`pneumarm.kernels`
+_UNLIKELY = 0.05
+"""A plan that is less likely to succeed is none."""
+_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": True}  # as a kernel's part
 
 
 def advance(world: Any, states: Any, i: int, valves: NDArray[np.int8]) -> None:
@@ -77,18 +79,21 @@ class PlanSettings:
     """Most actions of a plan (thesis section 5.4.2: 100)."""
     nodes: int = 100_000
     """Most states kept at a time; when they do not suffice, the best plan is not proven to be so."""
-    angle_margin: float = 0.0
-    """A plan is to end so far inside the tolerated distance from the goal [counts]: room for the sensors' noise."""
-    velocity_margin: float = 0.0
-    """A plan is to end so far below the tolerated speed [counts/ms]."""
+    angle_std: float = 0.0
+    """How uncertain the angle at the end of a plan is [counts], as a standard deviation."""
+    velocity_std: float = 0.0
+    """How uncertain the velocity at the end of a plan is [counts/ms]."""
+    failure_cost: float = 8.0
+    """What it costs to miss the goal at the end of a plan and to plan again, in units of reward."""
 
     def __post_init__(self) -> None:
         valid = {
             "switches": self.switches >= 0,
             "cutoff": self.cutoff >= 1,
             "nodes": self.nodes >= 1,
-            "angle_margin": 0 <= self.angle_margin < math.inf,
-            "velocity_margin": 0 <= self.velocity_margin < math.inf,
+            "angle_std": 0 <= self.angle_std < math.inf,
+            "velocity_std": 0 <= self.velocity_std < math.inf,
+            "failure_cost": 0 <= self.failure_cost < math.inf,
         }
         for name, is_valid in valid.items():
             if not is_valid:
@@ -108,6 +113,11 @@ class Problem(NamedTuple):
     """[counts]"""
     velocity_tolerance: float
     """[counts/ms]"""
+    angle_std: float
+    """[counts]"""
+    velocity_std: float
+    """[counts/ms]"""
+    failure_cost: float
     action_cost: float
     switch_cost: float
     switches: int
@@ -151,15 +161,11 @@ def problem(goal: NDArray[np.float64], reward: Reward, settings: PlanSettings) -
     """Return the problem of moving to ``goal`` (joints,) [counts] for ``reward``.
 
     Raises:
-        UnusableInput: an action or a switch is rewarded, or the margins leave no tolerance.
+        UnusableInput: an action or a switch is rewarded.
 
     """
     if reward.action >= 0 or reward.switch > 0:
         raise UnusableInput("planning needs actions that cost something and switches that are not rewarded")
-    angle = reward.angle_tolerance - settings.angle_margin
-    velocity = reward.velocity_tolerance - settings.velocity_margin
-    if angle <= 0 or velocity <= 0:
-        raise UnusableInput("the margins of a plan must be smaller than the tolerances of the reward")
     actions = np.array(list(product(range(ACTIONS), repeat=len(goal))))
     switched = (actions[:, None] != actions[None]).sum(axis=2)
     begin = np.zeros((1, len(actions)), np.int64)
@@ -167,8 +173,11 @@ def problem(goal: NDArray[np.float64], reward: Reward, settings: PlanSettings) -
         commands=np.ascontiguousarray(VALVES[actions]),
         switched=np.concatenate([switched, begin]),
         goal=np.array(goal, np.float64),
-        angle_tolerance=angle,
-        velocity_tolerance=velocity,
+        angle_tolerance=float(reward.angle_tolerance),
+        velocity_tolerance=float(reward.velocity_tolerance),
+        angle_std=float(settings.angle_std),
+        velocity_std=float(settings.velocity_std),
+        failure_cost=float(settings.failure_cost),
         action_cost=-float(reward.action),
         switch_cost=-float(reward.switch),
         switches=settings.switches,
@@ -202,17 +211,17 @@ def find(world: Any, states: Any, sought: Problem, room: Tree, last: int = -1) -
     return Found(room.plan[:length].copy(), cost, math.isfinite(cost), proven, simulated)
 
 
-@kernel
-def permitted(world, states, i, valves):  # type: ignore[no-untyped-def]
-    """Return whether the guard would set ``valves`` (joints, 2) as they are in state ``i``."""
-    for j in range(valves.shape[0]):
+@part
+def permitted(world, states, i, sought, action):  # type: ignore[no-untyped-def]
+    """Return whether the guard would set the valves of ``action`` as they are in state ``i``."""
+    for j in range(sought.commands.shape[1]):
         for m in range(2):
-            if valves[j, m] > 0 and states.pressure[i, j, m] > world.limit:
+            if sought.commands[action, j, m] > 0 and states.pressure[i, j, m] > world.limit:
                 return False
     return True
 
 
-@kernel
+@part
 def misses(states, i, sought):  # type: ignore[no-untyped-def]
     """Return by how much state ``i`` misses the goal, in tolerances; 1 or less is success (thesis eq. 5.1, 5.2)."""
     worst = 0.0
@@ -222,13 +231,33 @@ def misses(states, i, sought):  # type: ignore[no-untyped-def]
     return worst
 
 
-@kernel
+@part
+def within(value, tolerance, std):  # type: ignore[no-untyped-def]
+    """Return the probability that a normal deviate around ``value`` is not farther from 0 than ``tolerance``."""
+    if std == 0.0:
+        return 1.0 if abs(value) <= tolerance else 0.0
+    scale = 1.0 / (math.sqrt(2.0) * std)
+    return 0.5 * (math.erf((tolerance - value) * scale) + math.erf((tolerance + value) * scale))
+
+
+@part
+def success(states, i, sought):  # type: ignore[no-untyped-def]
+    """Return the probability that the goal is reached in state ``i``."""
+    probability = 1.0
+    for j in range(sought.goal.shape[0]):
+        away = states.angle[i, j] - sought.goal[j]
+        probability *= within(away, sought.angle_tolerance, sought.angle_std)
+        probability *= within(states.velocity[i, j], sought.velocity_tolerance, sought.velocity_std)
+    return probability
+
+
+@part
 def last_action(room, i):  # type: ignore[no-untyped-def]
     """Return the action that led to node ``i``."""
     return room.held[i, room.holds[i] - 1, 0]
 
 
-@kernel
+@part
 def descend(world, states, sought, room, i, parent, action):  # type: ignore[no-untyped-def]
     """Make node ``i`` what ``action`` makes of ``parent``, which may be the same; return by how much it misses."""
     if i != parent:
@@ -248,7 +277,7 @@ def descend(world, states, sought, room, i, parent, action):  # type: ignore[no-
     return misses(states, i, sought)
 
 
-@kernel
+@part
 def write_plan(room, i):  # type: ignore[no-untyped-def]
     """Write the actions that led to node ``i`` into the plan; return how many they are."""
     for k in range(1, room.holds[i]):
@@ -298,7 +327,7 @@ def search(world, states, sought, room, begin):  # type: ignore[no-untyped-def]
         for action in range(first, last):
             if branches and action == last_action(room, i):
                 continue
-            if not permitted(world, states, i, sought.commands[action]):
+            if not permitted(world, states, i, sought, action):
                 continue
             if room.switches[i] + sought.switched[last_action(room, i), action] > sought.switches:
                 continue
@@ -306,13 +335,15 @@ def search(world, states, sought, room, begin):  # type: ignore[no-untyped-def]
             child = room.free[left]
             miss = descend(world, states, sought, room, child, i, action)
             simulated += 1
-            is_reached = miss <= 1.0
-            if (is_reached and room.cost[child] < best) or (best == math.inf and miss < nearest):
+            probability = success(states, child, sought)
+            expected = room.cost[child] + sought.failure_cost * (1.0 - probability)
+            if probability > _UNLIKELY and expected < best:
+                best = expected
+                length = write_plan(room, child)
+            elif best == math.inf and miss < nearest:
                 nearest = miss
                 length = write_plan(room, child)
-                if is_reached:
-                    best = room.cost[child]
-            if is_reached or room.depth[child] == sought.cutoff:
+            if expected <= room.cost[child] or room.depth[child] == sought.cutoff:
                 room.free[left] = child
                 left += 1
             else:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import part
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
     SimulationParameters,
@@ -75,19 +75,18 @@ def simulated_states(world: SimulatedWorld, n: int) -> SimulatedStates:
     )
 
 
-@kernel
+@part
 def look_simulated(world, states, i):  # type: ignore[no-untyped-def]
     """Set the readings of state ``i`` to what its vector says."""
-    x = states.x[i]
+    x, unit = states.x, world.unit
     for j in range(states.angle.shape[1]):
-        unit = world.unit[j]
-        states.angle[i, j] = unit[0, 0] + unit[0, 1] * x[4 * j]
-        states.velocity[i, j] = unit[1, 0] + unit[1, 1] * x[4 * j + 1]
+        states.angle[i, j] = unit[j, 0, 0] + unit[j, 0, 1] * x[i, 4 * j]
+        states.velocity[i, j] = unit[j, 1, 0] + unit[j, 1, 1] * x[i, 4 * j + 1]
         for m in range(2):
-            states.pressure[i, j, m] = unit[2 + m, 0] + unit[2 + m, 1] * x[4 * j + 2 + m]
+            states.pressure[i, j, m] = unit[j, 2 + m, 0] + unit[j, 2 + m, 1] * x[i, 4 * j + 2 + m]
 
 
-@kernel
+@part
 def copy_simulated(states, to, source):  # type: ignore[no-untyped-def]
     """Copy state ``source`` to the place ``to``."""
     for k in range(states.x.shape[1]):
@@ -99,7 +98,7 @@ def copy_simulated(states, to, source):  # type: ignore[no-untyped-def]
             states.pressure[to, j, m] = states.pressure[source, j, m]
 
 
-@kernel
+@part
 def advance_simulated(world, states, i, valves):  # type: ignore[no-untyped-def]
     """Let one control period pass in state ``i`` with ``valves`` (joints, 2)."""
     for j in range(states.angle.shape[1]):

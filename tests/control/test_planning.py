@@ -12,7 +12,7 @@ from pneumarm.arm.valves import VALVES
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, without_noise
 from pneumarm.arm.virtual.rollout import advance_physics
 from pneumarm.control import Movement, PhysicsModel, Planner, PlanSettings, SimulationModel, move
-from pneumarm.control.search import find, problem, room_of, tree, within
+from pneumarm.control.search import Uncertainty, find, problem, room_of, tree, within
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Reward
 from pneumarm.simulation import NoiseSettings, SimulationArm
@@ -194,10 +194,12 @@ def test_an_uncertain_plan_ends_deeper_within_the_tolerance() -> None:
     arm = quiet_arm(10)
     ends: dict[float, list[float]] = {0.0: [], 6.0: []}
     costs: dict[float, list[float]] = {0.0: [], 6.0: []}
+    settings = PlanSettings(failure_cost=20.0)
     for std in ends:
-        settings = PlanSettings(angle_std=std, failure_cost=20.0)
         for goal in np.linspace(250.0, 780.0, 12):
-            planner = open_loop(arm, settings)
+            model = PhysicsModel(arm, settings, foresight=True)
+            model.uncertainty = Uncertainty(std, 0.0)
+            planner = Planner(model, settings, replan=False)
             carried_out(arm, planner, goal)
             found = planner.found
             assert found is not None

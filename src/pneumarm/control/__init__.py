@@ -3,7 +3,7 @@
 from pneumarm.control.agent import AgentController
 from pneumarm.control.bound import BoundSettings, Planned, measure_bound
 from pneumarm.control.movement import LearningController, Movement, move
-from pneumarm.control.planner import PhysicsModel, Planner, SimulationModel
+from pneumarm.control.planner import PhysicsModel, Planner, SimulationModel, physics_planner, simulated_planner
 from pneumarm.control.search import PlanSettings
 from pneumarm.control.transfer import (
     BEGIN,
@@ -31,6 +31,8 @@ __all__ = [
     "Transferred",
     "measure_bound",
     "move",
+    "physics_planner",
+    "simulated_planner",
     "transfer",
     "transfer_into",
     "write_episodes",

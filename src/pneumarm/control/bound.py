@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ControlCycle, guarded
 from pneumarm.arm.virtual import VirtualArm, without_noise
 from pneumarm.control.movement import move
-from pneumarm.control.planner import Model, PhysicsModel, Planner, SimulationModel
+from pneumarm.control.planner import Planner, physics_planner, simulated_planner
 from pneumarm.control.search import PlanSettings
 from pneumarm.control.transfer import BEGIN, Episode, draw_movement, summary
 from pneumarm.errors import UnusableInput
@@ -100,10 +100,10 @@ def measure_bound(
         if rival == "open_loop":
             parameters = without_noise(parameters)
         with VirtualArm(parameters, seed=seed, name=parameters_of.spec.name) as arm:
-            model: Model = PhysicsModel(arm, settings.plan, foresight=rival == "open_loop")
-            if simulation and rival == "simulated":
-                model = SimulationModel(simulation, settings.plan)
-            planner = Planner(model, settings.plan, reward, replan=rival != "open_loop")
+            if simulation is not None and rival == "simulated":
+                planner = simulated_planner(simulation, reward)
+            else:
+                planner = physics_planner(arm, reward, settings.plan, open_loop=rival == "open_loop")
 
             def report(done: int, before: int = number * settings.episodes) -> None:
                 if progress is not None:

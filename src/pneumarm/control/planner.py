@@ -16,6 +16,7 @@ true state at each reading. What it does not know in closed loop is the noise to
 judged by noisy readings, turns end late, and the supply fluctuates. In open loop even that fluctuation is foreseen.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -28,7 +29,7 @@ from pneumarm.arm.guard import GuardedArm
 from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
-from pneumarm.control.search import Found, PlanSettings, find, problem, room_of, tree
+from pneumarm.control.search import CERTAIN, Found, PlanSettings, Uncertainty, find, problem, room_of, tree
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Reward, StateTracker
 from pneumarm.random import random_state
@@ -39,6 +40,16 @@ _OWN_SUPPLY = 0
 """Seed of the supply's fluctuation in plans that do not foresee the true one."""
 
 
+_STILL = 2.0
+"""Readings of an arm that stands still differ by so much [counts]."""
+
+
+_PATIENCE = 3
+"""Turns after which a planner with a simulation sees that the arm sticks where the simulation drifts on."""
+SIMULATED = PlanSettings(nodes=20_000)
+"""Settings with which a decision takes milliseconds at most."""
+
+
 class Model(Protocol):
     """What a planner plans with: it follows an arm, and can be rolled out from where the arm is."""
 
@@ -46,6 +57,8 @@ class Model(Protocol):
     world: Any
     states: Any
     """Room for a search; the first state is where the arm is."""
+    uncertainty: Uncertainty
+    """How far readings are from what the model says."""
 
     def reset(self) -> None:
         """Begin a movement: the next reading is one at rest."""
@@ -75,6 +88,7 @@ class PhysicsModel:
         self.spec = inner.spec
         self.world = physics_of(inner)
         self.states = physics_states(self.world, room_of(settings, self.spec.joints))
+        self.uncertainty = CERTAIN if foresight else _sensor_noise(inner)
         self._due: float | None = None
 
     def reset(self) -> None:
@@ -97,6 +111,15 @@ class PhysicsModel:
         """Do nothing: the arm knows its valves."""
 
 
+def _sensor_noise(arm: VirtualArm) -> Uncertainty:
+    """Return how far readings of ``arm`` are from those of sensors that only quantise."""
+    sensors, period = arm.parameters.sensors, 1e3 * arm.spec.period
+    # The variance of a median is pi/2 times that of a mean for many conversions, and not far from it for few.
+    share = math.sqrt(math.pi / 2 / sensors.conversions) if sensors.conversions > 1 else 1.0
+    angle = share * sensors.angle_noise
+    return Uncertainty(angle, math.sqrt(2) * angle / period)
+
+
 class SimulationModel:
     """A learned simulation, from the state window of what was read."""
 
@@ -112,6 +135,8 @@ class SimulationModel:
         self.spec = simulation.spec
         self.world = simulated_world(simulation)
         self.states = simulated_states(self.world, room_of(settings, self.spec.joints))
+        angle, velocity = simulation.error_std[:, :2].max(axis=0).tolist()
+        self.uncertainty = Uncertainty(angle, velocity)
         self._tracker = StateTracker(simulation.window, simulation.scaling)
 
     def reset(self) -> None:
@@ -140,6 +165,8 @@ class Planner:
     settings: PlanSettings = field(default_factory=PlanSettings)
     reward: Reward = field(default_factory=Reward)
     replan: bool = True
+    patience: int = 0
+    """Turns without any effect after which an action is given up, whatever the model says of it; 0 for never."""
     clock: Callable[[], float] = perf_counter
     """Tells the time of a decision [s]."""
     seconds: list[float] = field(default_factory=list, init=False)
@@ -153,28 +180,71 @@ class Planner:
         joints = self.model.spec.joints
         self._room = tree(self.settings, joints)
         self._places = 9 ** np.arange(joints)[::-1]
-        self._problem = problem(np.zeros(joints), self.reward, self.settings)
+        self._problem = problem(np.zeros(joints), self.reward, self.settings, self.model.uncertainty)
         self._turn = 0
         self._last = -1
+        self._still = 0
+        self._since: Reading | None = None
 
     def reset(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts]."""
         self._problem.goal[:] = goal
         self.model.reset()
         self.found, self._turn, self._last = None, 0, -1
+        self._still, self._since = 0, None
 
     def act(self, reading: Reading) -> NDArray[np.int8]:
         """Return the valves (joints, 2) to set after ``reading``."""
         began = self.clock()
         if self.found is None or self.replan:
             self.model.follow(reading)
-            self.found = find(self.model.world, self.model.states, self._problem, self._room, self._last)
+            may_hold = not self._is_stuck(reading)
+            self.found = find(self.model.world, self.model.states, self._problem, self._room, self._last, may_hold)
             self.unproven += not self.found.proven
             self._turn = 0
         plan = self.found.actions
         action = int(plan[min(self._turn, len(plan) - 1)])
-        self._turn, self._last = self._turn + 1, action
+        self._turn += 1
+        if action != self._last:
+            self._last, self._since = action, reading
+            self._still = 0
         valves: NDArray[np.int8] = self._problem.commands[action]
         self.model.commanded(valves)
         self.seconds.append(self.clock() - began)
         return valves.copy()
+
+    def _is_stuck(self, reading: Reading) -> bool:
+        """Return whether the last action has had no effect for some turns: neither angles nor pressures changed."""
+        since = self._since
+        if since is None or not self.patience:
+            return False
+        moved = max(np.abs(reading.angle - since.angle).max(), np.abs(reading.pressure - since.pressure).max())
+        if moved > _STILL:
+            self._still, self._since = 0, reading
+        else:
+            self._still += 1
+        return self._still >= self.patience
+
+
+def physics_planner(
+    arm: Arm, reward: Reward = Reward(), settings: PlanSettings = PlanSettings(), *, open_loop: bool = False
+) -> Planner:
+    """Return the planner with the true physics of ``arm``, a virtual one; in ``open_loop`` it plans once, foreseeing.
+
+    Raises:
+        UnusableInput: another kind of arm.
+
+    """
+    return Planner(PhysicsModel(arm, settings, foresight=open_loop), settings, reward, replan=not open_loop)
+
+
+def simulated_planner(
+    simulation: Simulation, reward: Reward = Reward(), settings: PlanSettings = SIMULATED
+) -> Planner:
+    """Return the planner with a learned ``simulation``: a controller of an arm that needs no training.
+
+    Raises:
+        UnusableInput: the simulation was fitted to continuous commands.
+
+    """
+    return Planner(SimulationModel(simulation, settings), settings, reward, patience=_PATIENCE)

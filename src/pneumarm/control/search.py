@@ -79,25 +79,32 @@ class PlanSettings:
     """Most actions of a plan (thesis section 5.4.2: 100)."""
     nodes: int = 100_000
     """Most states kept at a time; when they do not suffice, the best plan is not proven to be so."""
-    angle_std: float = 0.0
-    """How uncertain the angle at the end of a plan is [counts], as a standard deviation."""
-    velocity_std: float = 0.0
-    """How uncertain the velocity at the end of a plan is [counts/ms]."""
-    failure_cost: float = 8.0
-    """What it costs to miss the goal at the end of a plan and to plan again, in units of reward."""
+    failure_cost: float = 12.0
+    """What it costs to miss the goal at the end of a plan and to plan again, in units of reward; where the model is
+    uncertain, plans end where the odds are better."""
 
     def __post_init__(self) -> None:
         valid = {
             "switches": self.switches >= 0,
             "cutoff": self.cutoff >= 1,
             "nodes": self.nodes >= 1,
-            "angle_std": 0 <= self.angle_std < math.inf,
-            "velocity_std": 0 <= self.velocity_std < math.inf,
             "failure_cost": 0 <= self.failure_cost < math.inf,
         }
         for name, is_valid in valid.items():
             if not is_valid:
                 raise UnusableInput(f"PlanSettings: {name} cannot be {getattr(self, name)!r}; see its documentation")
+
+
+class Uncertainty(NamedTuple):
+    """Standard deviation of what is read at the end of a plan from what was planned."""
+
+    angle: float
+    """[counts]"""
+    velocity: float
+    """[counts/ms]"""
+
+
+CERTAIN = Uncertainty(0.0, 0.0)
 
 
 class Problem(NamedTuple):
@@ -157,7 +164,9 @@ class Found(NamedTuple):
     """Control periods that were simulated."""
 
 
-def problem(goal: NDArray[np.float64], reward: Reward, settings: PlanSettings) -> Problem:
+def problem(
+    goal: NDArray[np.float64], reward: Reward, settings: PlanSettings, uncertainty: Uncertainty = CERTAIN
+) -> Problem:
     """Return the problem of moving to ``goal`` (joints,) [counts] for ``reward``.
 
     Raises:
@@ -175,8 +184,8 @@ def problem(goal: NDArray[np.float64], reward: Reward, settings: PlanSettings) -
         goal=np.array(goal, np.float64),
         angle_tolerance=float(reward.angle_tolerance),
         velocity_tolerance=float(reward.velocity_tolerance),
-        angle_std=float(settings.angle_std),
-        velocity_std=float(settings.velocity_std),
+        angle_std=uncertainty.angle,
+        velocity_std=uncertainty.velocity,
         failure_cost=float(settings.failure_cost),
         action_cost=-float(reward.action),
         switch_cost=-float(reward.switch),
@@ -204,10 +213,13 @@ def room_of(settings: PlanSettings, joints: int) -> int:
     return settings.nodes + int(ACTIONS**joints) + 1
 
 
-def find(world: Any, states: Any, sought: Problem, room: Tree, last: int = -1) -> Found:
-    """Return the best plan from state 0 of ``states``, after the action ``last`` (-1 at the begin of a movement)."""
+def find(world: Any, states: Any, sought: Problem, room: Tree, last: int = -1, may_hold: bool = True) -> Found:
+    """Return the best plan from state 0 of ``states``, after the action ``last`` (-1 at the begin of a movement).
+
+    Unless it ``may_hold``, the plan begins with another action than ``last``.
+    """
     begin = len(sought.commands) if last < 0 else last
-    length, cost, proven, simulated = search(world, states, sought, room, begin)
+    length, cost, proven, simulated = search(world, states, sought, room, begin, may_hold)
     return Found(room.plan[:length].copy(), cost, math.isfinite(cost), proven, simulated)
 
 
@@ -292,8 +304,8 @@ def write_plan(room, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def search(world, states, sought, room, begin):  # type: ignore[no-untyped-def]
-    """Seek the best plan from state 0 after the action ``begin``.
+def search(world, states, sought, room, begin, may_hold):  # type: ignore[no-untyped-def]
+    """Seek the best plan from state 0 after the action ``begin``, which goes on only if it ``may_hold``.
 
     Returns the length of the plan in ``room.plan``, its cost, whether it is proven, and the periods simulated.
     """
@@ -305,7 +317,7 @@ def search(world, states, sought, room, begin):  # type: ignore[no-untyped-def]
     room.depth[0], room.switches[0], room.cost[0], room.holds[0] = 0, 0, 0.0, 1
     room.held[0, 0, 0], room.held[0, 0, 1] = begin, 0
     # Entries are cost, a number that settles ties, and 2 * node + 1 to branch or + 0 to hold.
-    queue = [(sought.action_cost, 0, 1 if begin == actions else 0)]
+    queue = [(sought.action_cost, 0, 0 if may_hold and begin < actions else 1)]
     order, simulated, proven, length = 1, 0, True, 0
     best, nearest = math.inf, math.inf
     while len(queue) > 0:

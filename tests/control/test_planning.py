@@ -1,5 +1,6 @@
 """Plans: as good as trying everything, never worse than simple ones, and carried out as foreseen."""
 
+import json
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -11,7 +12,16 @@ from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.arm.valves import VALVES
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, without_noise
 from pneumarm.arm.virtual.rollout import advance_physics
-from pneumarm.control import Movement, PhysicsModel, Planner, PlanSettings, SimulationModel, move
+from pneumarm.control import (
+    Movement,
+    PhysicsModel,
+    Planner,
+    PlanSettings,
+    SimulationModel,
+    move,
+    physics_planner,
+    simulated_planner,
+)
 from pneumarm.control.search import Uncertainty, find, problem, room_of, tree, within
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Reward
@@ -293,3 +303,49 @@ def test_a_simulation_of_continuous_commands_is_refused() -> None:
     simulation = replace(synthetic_simulation(), valves=False)
     with pytest.raises(UnusableInput, match="valves"):
         SimulationModel(simulation)
+
+
+class Stuck(SimulationArm):
+    """An arm that nothing moves until its valves have changed a few times."""
+
+    changes = 0
+
+    def set_valves(self, valves: np.ndarray) -> None:
+        self.changes += bool((valves != self._valves).any())
+        super().set_valves(valves)
+
+    def wait(self, seconds: float) -> None:
+        state = json.loads(self.get_state())
+        super().wait(seconds)
+        if self.changes < 4:
+            after = json.loads(self.get_state())
+            self.set_state(json.dumps(after | {"x": state["x"]}).encode())
+
+
+@pytest.mark.parametrize("patience", [0, 2])
+def test_a_patient_planner_gives_up_what_has_no_effect(patience: int) -> None:
+    simulation = synthetic_simulation()
+    arm = Stuck(simulation, seed=0, noise=NoiseSettings(kind="none"))
+    settings = PlanSettings(nodes=20_000)
+    planner = Planner(SimulationModel(simulation, settings), settings, patience=patience)
+    movement = move(ControlCycle(guarded(arm)), planner, np.array([640.0]), REWARD)
+    assert movement.success == (patience > 0)
+    assert (movement.switches[0] == 0) == (patience == 0)
+
+
+def test_planners_with_their_defaults() -> None:
+    simulation = synthetic_simulation()
+    arm = SimulationArm(simulation, seed=1)
+    planner = simulated_planner(simulation)
+    assert planner.model.uncertainty == (4.0, 0.12)
+    cycle = ControlCycle(guarded(arm))
+    for goal in (420.0, 600.0, 480.0):
+        assert move(cycle, planner, np.array([goal]), REWARD).success
+    virtual = VirtualArm(draw_parameters(11), seed=0)
+    assert physics_planner(virtual, open_loop=True).model.uncertainty == (0.0, 0.0)
+    closed = physics_planner(virtual)
+    assert closed.replan
+    # A median of five conversions varies less than one of them, and two angles make a velocity.
+    assert 0.4 < closed.model.uncertainty.angle / virtual.parameters.sensors.angle_noise < 0.7
+    ratio = closed.model.uncertainty.angle / closed.model.uncertainty.velocity
+    assert ratio == pytest.approx(1e3 * virtual.spec.period / np.sqrt(2))

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup run test lint bench soak clean
+.PHONY: setup run test lint bench judge soak clean
 
 setup: $(READY)
 
@@ -14,6 +14,7 @@ $(READY): pyproject.toml
 	touch $(READY)
 
 run: setup  ## the whole job on the virtual arm, into runs/first
+	mkdir -p runs
 	$(BIN)/pneumarm run --out runs/first
 
 test: setup
@@ -27,8 +28,11 @@ lint: setup
 bench: setup
 	$(BIN)/python -m benchmarks
 
+judge: setup  ## the whole job on the ten judging arms; takes about ten minutes
+	$(BIN)/python -m benchmarks judging
+
 soak: setup  ## fault injection that takes minutes: kills, power cuts, full disks
-	$(BIN)/python -m pytest -m soak
+	$(BIN)/python -m pytest -m soak -s
 
 clean:
 	rm -rf $(VENV) runs .pytest_cache .ruff_cache .mypy_cache

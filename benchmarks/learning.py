@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from pneumarm.arm import Reading
+from pneumarm.control import AgentController
 from pneumarm.kernels import kernel
 from pneumarm.learning import TrainSettings, test, train
 from pneumarm.learning.environment import Environment, environment, episode
@@ -254,3 +256,18 @@ def measure() -> Iterator[str]:
         f"{results['steps_per_second_per_core'] / 1e6:.2f} M steps/s a core; an agent takes "
         f"{trained.core_seconds / agents:.2f} s of a core, its test of 10,000 movements {tested:.2f} s"
     )
+    yield _decisions(trained.agent)
+
+
+def _decisions(agent: Any) -> str:
+    """Time decisions from a reading to valves, as a controller on an arm makes them."""
+    controller, random = AgentController(agent), np.random.default_rng(0)
+    controller.reset(np.array([500.0]))
+    times = np.empty(5_000)
+    for k in range(len(times)):
+        reading = Reading(k / 30, random.uniform(400, 600, 1), random.uniform(0, 100, (1, 2)))
+        began = time.perf_counter()
+        controller.act(reading)
+        times[k] = time.perf_counter() - began
+    half, most = np.percentile(1e6 * times[100:], (50, 99))
+    return f"a decision from reading to valves: {half:.0f} us, 99 % within {most:.0f} us"

@@ -14,9 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from pneumarm.arm import ArmSpec
+from pneumarm.simulation import FitSettings, fit_store
 from pneumarm.transitions import Recorded, Store, Window, filter_transitions
 
 ACTIONS = 200
+EPOCHS = 15
 
 
 def measure() -> Iterator[str]:
@@ -62,6 +64,11 @@ def _measure(path: Path, joints: int, count: int) -> Iterator[str]:
         seconds = time.perf_counter() - begun
         count = 0 if apart is None else len(apart.sequence)
         yield f"  {count:,} of those left out drawn in {seconds:.1f} s"
+        if joints == 1:
+            begun = time.perf_counter()
+            fitted = fit_store(store, FitSettings(epochs=EPOCHS))
+            seconds = time.perf_counter() - begun
+            yield f"  filtered and fitted ({fitted.result.rows:,} kept) {seconds:14.1f} s, a fit of {EPOCHS} epochs"
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     yield f"  most memory of the process so far {peak:12,.0f} MiB"
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from pneumarm.console import peak_memory
 from pneumarm.run import Run
 from small import SMALL
 
@@ -14,3 +15,7 @@ def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "small"
     Run(folder, SMALL).do()
     return folder
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    terminalreporter.write_line(f"at most {peak_memory():.0f} MB of memory")

@@ -16,7 +16,7 @@ from pneumarm.run import Run
 from pneumarm.transitions import Store
 from small import SMALL
 
-TIMES = ("seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
+TIMES = ("peak_memory_mb", "seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
 STAGES = ("collect", "simulation", "training", "test", "transfer")
 
 
@@ -101,7 +101,7 @@ def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> Non
 def test_nothing_is_left_behind_by_settings_that_cannot_be_used(tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match="expected virtual"):
         Run(tmp_path / "run", replace(SMALL, arm="wirtual"))
-    with pytest.raises(UnusableInput, match="2,000 transitions"):
+    with pytest.raises(UnusableInput, match="at least 2,000"):
         replace(SMALL, transitions=100)
     with pytest.raises(UnusableInput, match="1 joint"):
         Run(tmp_path / "run", replace(SMALL, joints=2))

@@ -11,6 +11,7 @@ from pneumarm.console import complain
 from pneumarm.errors import PneumarmError
 
 COMMANDS = {
+<<<<<<< HEAD
     "run": "Do the whole job: collect, fit, train, test, transfer, report. Resumable.",
     "collect": "Make an arm move about and record it.",
     "import": "Import a recording made elsewhere.",
@@ -22,8 +23,50 @@ COMMANDS = {
     "transfer": "Move an agent onto an arm and let it adapt there.",
     "bound": "Say what can be achieved on a virtual arm at all.",
     "report": "Write the report of a finished run again.",
+=======
+    "run": (
+        "Do the whole job: collect, fit, train, test, transfer, report. Resumable.",
+        "pneumarm run --arm virtual:seed=7 --out runs/seven --transitions 20000",
+    ),
+    "collect": (
+        "Make an arm move about and record it.",
+        "pneumarm collect virtual arm.db --transitions 20000",
+    ),
+    "import": (
+        "Import a recording made elsewhere.",
+        "pneumarm import recording.csv arm.db --mapping examples/recordings/mpi_pam.toml",
+    ),
+    "coverage": (
+        "Say which part of its space a store covers, and whether it is enough.",
+        "pneumarm coverage arm.db",
+    ),
+    "fit": (
+        "Fit a simulation to a store.",
+        "pneumarm fit arm.db --out arm.sim --history 3 --hidden 10",
+    ),
+    "analyse": (
+        "Draw how good a simulation is.",
+        "pneumarm analyse arm.db arm.sim --out quality",
+    ),
+    "train": (
+        "Train an agent in a simulation.",
+        "pneumarm train arm.sim arm.db --out arm.agent --method sarsa --agents 16",
+    ),
+    "test": (
+        "Test an agent in a simulation.",
+        "pneumarm test arm.agent arm.sim arm.db --episodes 10000",
+    ),
+    "transfer": (
+        "Move an agent onto an arm and let it adapt there.",
+        "pneumarm transfer arm.agent --arm virtual:seed=7 --episodes 500 --out adapted",
+    ),
+    "report": (
+        "Write the report of a finished run again.",
+        "pneumarm report runs/first",
+    ),
+>>>>>>> main
 }
-"""Every command with its one-line help."""
+"""Every command with its one-line help and an example."""
 
 app = App(
     name="pneumarm",
@@ -31,8 +74,8 @@ app = App(
     version=__version__,
     suppress_keyboard_interrupt=False,
 )
-for _name, _help in COMMANDS.items():
-    app.command(f"pneumarm.commands.{_name}_:{_name}_", name=_name, help=_help)
+for _name, (_help, _example) in COMMANDS.items():
+    app.command(f"pneumarm.commands.{_name}_:{_name}_", name=_name, help=_help, help_epilogue=f"Example: {_example}")
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import resource
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -63,6 +64,12 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Any]], title: str = "")
     for row in rows:
         built.add_row(*[_short(value) for value in row])
     return built
+
+
+def peak_memory() -> float:
+    """Return the most memory that this process has held so far [MB]."""
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(most / (1e6 if sys.platform == "darwin" else 1e3), 1)
 
 
 def jsonable(value: Any) -> Any:

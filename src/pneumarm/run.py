@@ -15,7 +15,7 @@ from typing import Any
 
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
-from pneumarm.console import Report, jsonable
+from pneumarm.console import Report, jsonable, peak_memory
 from pneumarm.control import TransferSettings, transfer, write_episodes
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
@@ -24,7 +24,7 @@ from pneumarm.learning import test as test_agent
 from pneumarm.records import demonstrate, test_record, training_record
 from pneumarm.report import save_movement, save_spec, write_report
 from pneumarm.simulation import FitSettings, Simulation, fit_store
-from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectSettings, Store, collect
+from pneumarm.transitions import KINDS, CollectSettings, Store, collect, require_enough
 
 Progress = Callable[[str], AbstractContextManager[Report]]
 
@@ -55,8 +55,7 @@ class RunSettings:
     transfer: TransferSettings = field(default_factory=TransferSettings)
 
     def __post_init__(self) -> None:
-        if self.transitions < FEWEST_TRANSITIONS:
-            raise UnusableInput(f"a run needs at least {FEWEST_TRANSITIONS:,} transitions, got {self.transitions:,}")
+        require_enough(self.transitions)
         if self.test_episodes < 1:
             raise UnusableInput(f"a run needs at least 1 test episode, got {self.test_episodes}")
 
@@ -121,6 +120,7 @@ class Run:
                 wall = {name: round(time.perf_counter() - began, 3)}
                 self.results |= figures
                 self.results["wall_seconds"] = self.results.get("wall_seconds", {}) | wall
+                self.results["peak_memory_mb"] = max(peak_memory(), self.results.get("peak_memory_mb", 0.0))
                 write_json(self._results_file, jsonable(self.results))
         if not (self.folder / "report.html").exists():
             with self.progress("report") as report:

@@ -7,11 +7,14 @@ from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarde
 from pneumarm.arm.seam import checked
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters
 from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.simulation import SimulationArm
+from simple_simulation import simulation
 
 ARMS = {
     "virtual": lambda smallest: VirtualArm(seed=1),
     "virtual, supply of 2 bar": lambda smallest: VirtualArm(preset_parameters("C"), seed=1),
     "virtual, drawn": lambda smallest: VirtualArm(draw_parameters(7), seed=1, name="virtual:seed=7"),
+    "simulated": lambda smallest: SimulationArm(simulation(), seed=1),
     "a user's": lambda smallest: smallest(),
     "a user's with two joints": lambda smallest: smallest(joints=2),
 }
@@ -163,6 +166,10 @@ def test_closing_closes_the_valves_also_twice_and_after_an_error(arm):
         arm.wait(1.0)
         assert (arm._muscles["open"] == 0).all()
         assert arm.pressure == pytest.approx(before, abs=3000)
+    elif isinstance(arm, SimulationArm):
+        before = arm.read().pressure
+        arm.wait(1.0)
+        assert arm.read().pressure == pytest.approx(before, abs=10)
     else:
         assert arm.closed == 2
         assert arm.valves == all_valves(arm, 0).tolist()

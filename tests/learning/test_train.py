@@ -15,7 +15,6 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning import CURVES, BeginStates, Shaping, Training, TrainSettings, test, train
-from pneumarm.learning.testing import wilson
 from pneumarm.simulation.simulation import Simulation
 
 SHORT = TrainSettings(agents=3, max_episodes=2_250, validation_episodes=50)
@@ -202,11 +201,5 @@ def test_a_test_adds_up(full: Training, simulation: Simulation, begin: BeginStat
     low, high = simulation.goal_range[0]
     assert low <= result.goal.min() < low + 5
     assert high - 5 < result.goal.max() <= high
-    for name, (below, above) in result.intervals().items():
+    for name, (below, above) in result.results()["intervals"].items():
         assert below <= result.results()[name] <= above
-
-
-def test_wilson_interval() -> None:
-    """Against the closed form for no failure, n/(n + z^2), and a value tabulated for 5 of 10."""
-    assert wilson(100, 100) == (pytest.approx(100 / (100 + 1.96**2)), 1.0)
-    assert wilson(5, 10) == pytest.approx((0.2366, 0.7634), abs=1e-3)

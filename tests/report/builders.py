@@ -136,7 +136,7 @@ def movement(name="large displacement", goal=70.0, joints=1, n=45, reached=True)
         pressure=np.repeat(pressure[:, None], joints, axis=1),
         valves=valves,
         goal=np.full(joints, 512 + spec.counts_per_degree * (goal - 30)),
-        end=float(t[22]) if reached else None,
+        end=float(t[min(22, n - 1)]) if reached else None,
         name=name,
     )
 
@@ -154,16 +154,18 @@ def results():
     }
 
 
-def run(joints=1):
+def run(joints=1, small=False):
+    """A whole run; a ``small`` one is drawn faster."""
+    part = 20 if small else 1
     name = "virtual" if joints == 1 else "two joints"
     return RunData(
         spec=ArmSpec(joints=joints, name=name),
         results=results(),
-        coverage=coverage(joints=joints),
-        quality=quality(joints=joints),
+        coverage=coverage(20_000 // part, joints),
+        quality=quality(12_000 // part, joints),
         training=training(),
-        test=episodes(10_000, joints, on_arm=False, success=0.995),
-        transfer=transfer(joints),
+        test=episodes(10_000 // part, joints, on_arm=False, success=0.995),
+        transfer=transfer(joints, (500 // part, 1500 // part, 500 // part)),
         movements=(
             movement("large displacement", 70.0, joints),
             movement("typical displacement", 30.0, joints),

@@ -3,41 +3,12 @@
 import numpy as np
 import pytest
 
-from pneumarm.arm import Arm, ArmSpec
+from pneumarm.arm import Arm
 from pneumarm.arm.cycle import ControlCycle
 from pneumarm.arm.guard import guarded
 from pneumarm.errors import UnusableInput
-from pneumarm.networks.network import Network
 from pneumarm.simulation.arm import SimulationArm
-from pneumarm.simulation.noise import NoiseSettings
-from pneumarm.simulation.simulation import Scaling, Simulation
-from pneumarm.transitions.window import Window
-
-PERIOD = 0.04
-QUIET = NoiseSettings(kind="none")
-
-
-def simulation(joints: int = 1, latency: float = 0.0, valves: bool = True) -> Simulation:
-    """Return an arm whose pressures change by 10 counts a period and whose angle follows their difference."""
-    window = Window(joints)
-    direct = np.zeros((window.input_size, 3 * joints))
-    for joint in range(joints):
-        command = window.state_size + 2 * joint
-        direct[4 * joint, 3 * joint] = -0.2
-        direct[[4 * joint + 2, 4 * joint + 3], 3 * joint] = 0.1, -0.1
-        direct[command, 3 * joint + 1] = direct[command + 1, 3 * joint + 2] = 0.1
-    none = np.zeros((window.input_size, 0)), np.zeros(0), np.zeros((0, 3 * joints)), np.zeros(3 * joints)
-    return Simulation(
-        ArmSpec(joints=joints, period=PERIOD, latency=latency, name="made up"),
-        window,
-        Scaling(np.tile([500.0, 0, 100, 100], joints), np.tile([400.0, 5, 100, 100], joints), np.ones(2 * joints)),
-        (Network(*none, direct),),
-        "derived",
-        np.tile([5.0, 0.1, 2, 2], (joints, 1)),
-        np.tile([400.0, 600.0], (joints, 1)),
-        np.tile([[0.0, 1023.0], [-31.0, 31.0], [0.0, 200.0], [0.0, 200.0]], (joints, 1, 1)),
-        valves,
-    )
+from simple_simulation import PERIOD, QUIET, simulation
 
 
 def moved(arm: Arm, valves: list[list[int]], waits: list[float]) -> np.ndarray:

@@ -64,7 +64,7 @@ def made_up(
         velocity,  # type: ignore[arg-type]
         np.tile([4.0, 0.12, 1.0, 1.0], (joints, 1)),
         np.tile([300.0, 700.0], (joints, 1)),
-        np.tile([[0.0, 1023.0], [-9.0, 9.0], [0.0, 190.0], [0.0, 190.0]], (joints, 1, 1)),
+        np.tile([0.0, 190.0], (joints, 2, 1)),
     )
 
 
@@ -81,7 +81,6 @@ def reference(simulation: Simulation, sigma: NDArray, command: NDArray) -> NDArr
     new[:, quantities] += change * scaling.observation_scale.reshape(joints, 4)[:, quantities]
     new[:, 0] = np.clip(new[:, 0], *simulation.spec.angle_range)
     new[:, 2:] = np.clip(new[:, 2:], 0, 190)
-    new[:, 1] = np.clip(new[:, 1], -9, 9)
     if simulation.velocity == "derived":
         new[:, 1] = (new[:, 0] - old[:, 0]) / (1e3 * simulation.spec.period)
     observations = np.concatenate([new.ravel(), sigma[: (h - 1) * o]])

@@ -14,8 +14,6 @@ from pneumarm.transitions import Store
 def analyse_(db: Path, sim: Path, /, *, out: Path, json: Json = False) -> None:
     """Draw how good a simulation is: coverage, residues, isoplots, error propagation (thesis section 3.3).
 
-    Example: ``pneumarm analyse arm.db arm.sim --out quality``
-
     Parameters
     ----------
     db

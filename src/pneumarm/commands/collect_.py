@@ -7,7 +7,8 @@ from typing import Annotated
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
-from pneumarm.transitions import CollectSettings, Store, collect
+from pneumarm.control import open_controller
+from pneumarm.transitions import CollectSettings, Store, collect, require_enough
 
 
 def collect_(
@@ -17,12 +18,11 @@ def collect_(
     *,
     transitions: int = 200_000,
     seed: int = 0,
+    controller: str = "random",
     settings: Annotated[CollectSettings, Settings] = CollectSettings(),
     json: Json = False,
 ) -> None:
     """Make an arm move about and record it, sequence after sequence; a second call goes on.
-
-    Example: ``pneumarm collect virtual arm.db --transitions 20000``
 
     Parameters
     ----------
@@ -34,9 +34,17 @@ def collect_(
         How many to record in all (thesis section 3.2.2: 200,000, two hours).
     seed
         Seed of the random begin states and actions, and of a virtual arm's noise.
+    controller
+        What acts: random, keyboard, a CSV file of valves, or an agent (thesis section 3.2.2).
     json
         Print one JSON object on stdout and nothing else there.
     """
-    with open_arm(arm, seed) as opened, Store.for_arm(db, opened.spec) as store, progress("collecting") as report:
-        result = collect(opened, store, transitions, seed, settings=settings, progress=report)
+    require_enough(transitions)
+    with (
+        open_arm(arm, seed) as opened,
+        open_controller(controller, opened) as player,
+        Store.for_arm(db, opened.spec) as store,
+        progress("collecting") as report,
+    ):
+        result = collect(opened, store, transitions, seed, progress=report, settings=settings, controller=player)
     show(asdict(result), json, lambda: [table(("collected", ""), list(asdict(result).items()))])

@@ -10,8 +10,6 @@ from pneumarm.transitions import Store, Window, enough_data
 def coverage_(db: Path, /, *, json: Json = False) -> None:
     """Say which part of its space a store covers, and whether its second half still found anything new.
 
-    Example: ``pneumarm coverage arm.db``
-
     Parameters
     ----------
     db

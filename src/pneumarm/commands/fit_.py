@@ -15,8 +15,6 @@ def fit_(
 ) -> None:
     """Fit a simulation to a store and say how well it predicts sequences that it was not fitted to.
 
-    Example: ``pneumarm fit arm.db --out arm.sim --history 3 --hidden 10``
-
     Parameters
     ----------
     db

@@ -11,8 +11,6 @@ from pneumarm.transitions import import_recording
 def import_(csv: Path, db: Path, /, *, mapping: Path, json: Json = False) -> None:
     """Import a recording made elsewhere; a mapping file says what its columns are.
 
-    Example: ``pneumarm import recording.csv arm.db --mapping examples/recordings/mpi_pam.toml``
-
     Parameters
     ----------
     csv

@@ -10,8 +10,6 @@ from pneumarm.report import write_report
 def report_(folder: Path, /, *, json: Json = False) -> None:
     """Write the report of a finished run again.
 
-    Example: ``pneumarm report runs/first``
-
     Parameters
     ----------
     folder

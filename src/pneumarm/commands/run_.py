@@ -20,8 +20,6 @@ def run_(
 
     A second call with the same folder goes on where the first was interrupted.
 
-    Example: ``pneumarm run --arm virtual:seed=7 --out runs/seven --transitions 20000``
-
     Parameters
     ----------
     out
@@ -37,4 +35,5 @@ def run_(
     }
     rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
     show(results, json, lambda: [table(("", *COLUMNS), rows, title="Ledger")])
-    say(f"report: {out / 'report.html'}")
+    seconds = sum(results["wall_seconds"].values())
+    say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory")

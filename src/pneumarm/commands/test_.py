@@ -13,8 +13,6 @@ from pneumarm.transitions import Store
 def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: int = 0, json: Json = False) -> None:
     """Test an agent in a simulation: greedy, not learning, from all begin states to all goals.
 
-    Example: ``pneumarm test arm.agent arm.sim arm.db --episodes 10000``
-
     Parameters
     ----------
     agent

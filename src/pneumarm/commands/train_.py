@@ -23,8 +23,6 @@ def train_(
 ) -> None:
     """Train agents in a simulation and keep the best.
 
-    Example: ``pneumarm train arm.sim arm.db --out arm.agent --method sarsa --agents 16``
-
     Parameters
     ----------
     sim

@@ -22,8 +22,6 @@ def transfer_(
 ) -> None:
     """Move an agent onto an arm: test it there, let it learn there, test it again. A second call goes on.
 
-    Example: ``pneumarm transfer arm.agent --arm virtual:seed=7 --episodes 500 --out adapted``
-
     Parameters
     ----------
     agent

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import Movement, move
-from pneumarm.errors import UnusableInput
+from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder, write_text
 from pneumarm.learning import Agent, OnlineLearner
 from pneumarm.statistics import summarise
@@ -34,7 +34,7 @@ class TransferSettings:
 
     episodes: int = 1500
     """Movements while learning (thesis section 5.5.1: progress is seen after some 750)."""
-    learning_rate: float = 0.05
+    learning_rate: float = 0.01
     """Learning rate on the arm (thesis section 5.5.1: 0, 0.05 and 0.10 were compared)."""
     test_episodes: int = 500
     """Greedy movements before and again after learning; at least 500 for figures to be compared."""
@@ -181,24 +181,32 @@ def transfer(
         store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
         waiting.clear()
 
-    for phase in PHASES:
-        count = settings.movements(phase)
-        greedy = phase != "learning"
-        shown = mean.agent if mean.count else learner.agent
-        controller = AgentController(agent, OnlineLearner(shown) if greedy else learner)
-        for i in range(sum(e.phase == phase for e in done), count):
-            random, goal = begin_and_goal(agent, seed, greedy, i)
-            BEGIN.reach(cycle.arm, random)
-            movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
-            if phase == "learning" and i >= (1 - settings.averaged) * count:
-                mean.add(learner.agent.weights())
-            episode = Episode.of(phase, movement)
-            done.append(episode)
-            waiting.append((episode, movement))
-            if len(waiting) == _TOGETHER or i == count - 1:
-                keep()
-            if progress is not None:
-                progress(len(done), total)
+    try:
+        for phase in PHASES:
+            count = settings.movements(phase)
+            greedy = phase != "learning"
+            shown = mean.agent if mean.count else learner.agent
+            controller = AgentController(agent, OnlineLearner(shown) if greedy else learner)
+            for i in range(sum(e.phase == phase for e in done), count):
+                random, goal = begin_and_goal(agent, seed, greedy, i)
+                BEGIN.reach(cycle.arm, random)
+                movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
+                if phase == "learning" and i >= (1 - settings.averaged) * count:
+                    mean.add(learner.agent.weights())
+                episode = Episode.of(phase, movement)
+                done.append(episode)
+                waiting.append((episode, movement))
+                if len(waiting) == _TOGETHER or i == count - 1:
+                    keep()
+                if progress is not None:
+                    progress(len(done), total)
+    except PneumarmError:
+        raise
+    except Exception as error:
+        raise ArmFailure(
+            f"{arm.spec.name}: failed in movement {len(done) + 1} ({type(error).__name__}: {error}); "
+            "see to the arm and run the same command again"
+        ) from error
     return Transferred(done, mean.agent if mean.count else learner.agent, settings.learning_rate)
 
 

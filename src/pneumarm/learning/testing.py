@@ -1,6 +1,5 @@
 """The testing phase of section 5.2: many greedy movements in the noisy simulation, nothing learned."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +15,9 @@ from pneumarm.learning.settings import TrainSettings
 from pneumarm.learning.values import learner
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.statistics import summarise
 
 _TEST, _NOISE = 3, 4  # streams of random numbers; training uses others
-_NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -46,36 +45,7 @@ class TestResult:
 
     def results(self) -> dict[str, Any]:
         """Return what ``results.json`` holds of a test; ``switches`` is a list where there are several joints."""
-        switches = self.switches.mean(axis=0).tolist()
-        return {
-            "episodes": len(self.reward),
-            "reward": float(self.reward.mean()),
-            "success_rate": float(self.success.mean()),
-            "actions": float(self.actions.mean()),
-            "switches": switches[0] if len(switches) == 1 else switches,
-        }
-
-    def intervals(self) -> dict[str, tuple[float, float]]:
-        """Return 95 % confidence intervals of the means of ``results``; Wilson's for the rate of success."""
-        intervals = {"success_rate": wilson(int(self.success.sum()), len(self.success))}
-        measured = {"reward": self.reward, "actions": self.actions, "switches": self.switches.sum(axis=1)}
-        for name, values in measured.items():
-            mean = float(values.mean())
-            half = _NORMAL_95 * float(values.std()) / math.sqrt(len(values))
-            intervals[name] = (mean - half, mean + half)
-        return intervals
-
-
-def wilson(successes: int, n: int) -> tuple[float, float]:
-    """Return the 95 % interval of a rate; within 0..1 and of some width even if all succeed.
-
-    Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference", J. Am. Stat.
-    Assoc. 22, 1927.
-    """
-    z2 = _NORMAL_95**2
-    middle = (successes + z2 / 2) / (n + z2)
-    half = _NORMAL_95 / (n + z2) * math.sqrt(successes * (n - successes) / n + z2 / 4)
-    return max(0.0, middle - half), min(1.0, middle + half)
+        return summarise(self.reward, self.success, self.actions, self.switches)
 
 
 def test(

@@ -332,6 +332,8 @@ def read_episodes(path: Path) -> dict[str, Episodes]:
         phases.setdefault(row["phase"], []).append(row)
     try:
         return {phase: _episodes(group) for phase, group in phases.items()}
+    except UnusableInput as error:
+        raise UnusableInput(f"{path}: {error}") from error
     except (ValueError, TypeError, AttributeError) as error:
         raise UnusableInput(f"{path}: a cell is not what its column says ({error})") from error
 

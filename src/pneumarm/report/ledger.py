@@ -11,7 +11,7 @@ from pneumarm.report import thesis
 from pneumarm.report.data import Episodes, QualityData, TransferData
 from pneumarm.report.figures import expectation
 from pneumarm.report.page import Table
-from pneumarm.report.statistics import Estimate, mean_estimate, rate_estimate
+from pneumarm.statistics import Estimate, mean_estimate, rate_estimate
 
 MISSING = "–"
 _PHASES = {"before": "on arrival", "learning": "while learning", "after": "after adaptation"}

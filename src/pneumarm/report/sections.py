@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
@@ -111,8 +112,14 @@ def classifications(data: QualityData, joint: int, spec: ArmSpec) -> list[Classi
         Classification(velocity.in_counts(), data.observation[:, joint, 1]),
         Classification(angle.in_counts(), data.observation[:, joint, 0]),
         acted,
-        Classification("time since the begin [min]", data.time / 60),
+        _times(data.time),
     ]
+
+
+def _times(time: NDArray[np.float64]) -> Classification:
+    if len(time) and time.max() < 120:
+        return Classification("time since the begin [s]", time)
+    return Classification("time since the begin [min]", time / 60)
 
 
 def predicted(data: QualityData, spec: ArmSpec) -> Section:

@@ -14,9 +14,10 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from pneumarm.arm.seam import ArmSpec
 
@@ -74,12 +75,14 @@ _Arguments = ParamSpec("_Arguments")
 
 
 def styled(draw: Callable[_Arguments, Figure]) -> Callable[_Arguments, Figure]:
-    """Let the function ``draw`` build its figure in the style of the report."""
+    """Let the function ``draw`` build its figure in the style of the report, laid out for good."""
 
     @functools.wraps(draw)
     def drawn(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> Figure:
         with _style():
-            return draw(*args, **kwargs)
+            figure = draw(*args, **kwargs)
+            _freeze(figure)
+            return figure
 
     return drawn
 
@@ -101,6 +104,28 @@ def svg(figure: Figure) -> str:
     with _style():
         figure.savefig(buffer, format="svg", dpi=RASTER_DPI, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
+
+
+def _freeze(figure: Figure) -> None:
+    """Lay ``figure`` out once and for all.
+
+    The layout makes room for tick labels, and the ticks depend on the room: fixed after a first layout, they make
+    the second one final. Positions are rounded, because the solver leaves differences in the last bits from call
+    to call, and ids in the SVG are made of them.
+    """
+    engine = figure.get_layout_engine()
+    if engine is None:
+        return
+    engine.execute(figure)
+    for axes in figure.axes:
+        for axis in (a for part in (axes, *axes.child_axes) for a in (part.xaxis, part.yaxis)):
+            if axis.get_scale() != "log":
+                axis.set_major_locator(FixedLocator([float(v) for v in axis.get_majorticklocs()]))
+    engine.execute(figure)
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        x, y, width, height = (round(float(v), 5) for v in axes.get_position().bounds)
+        axes.set_position((x, y, width, height))
 
 
 @dataclass(frozen=True)
@@ -162,6 +187,11 @@ def scatter(axes: Axes, x: Any, y: Any, **options: Any) -> None:
     x, y = x[thin], y[thin]
     settings = {"s": 5, "color": DARK, "linewidths": 0, "alpha": 0.35, **options}
     axes.scatter(x, y, rasterized=len(x) > _MANY, **settings)
+
+
+def counts_norm(count: Any) -> LogNorm:
+    """Return a logarithmic scale of colours from 1 to the largest ``count``, at least to 2."""
+    return LogNorm(1, max(2.0, float(np.max(count))))
 
 
 def whole_ticks(axes: Axes, which: str = "x") -> None:

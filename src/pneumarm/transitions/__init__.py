@@ -1,7 +1,7 @@
 """Transitions: the store, collecting, the state window, the grid filter, import of recordings."""
 
 from pneumarm.transitions.choice import held_out
-from pneumarm.transitions.collect import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, collect
+from pneumarm.transitions.collect import KINDS, CollectResult, CollectSettings, collect, require_enough
 from pneumarm.transitions.filtering import Enough, Filter, Filtered, enough_data, filter_transitions
 from pneumarm.transitions.grid import Coverage, Grid, GridSettings
 from pneumarm.transitions.players import Keyboard, Trajectory
@@ -11,7 +11,6 @@ from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
 
 __all__ = [
-    "FEWEST_TRANSITIONS",
     "KINDS",
     "QUANTITIES",
     "CollectResult",
@@ -34,5 +33,6 @@ __all__ = [
     "filter_transitions",
     "held_out",
     "import_recording",
+    "require_enough",
     "transitions",
 ]

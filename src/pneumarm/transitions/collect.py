@@ -181,11 +181,16 @@ def collect(
     )
 
 
-def _check(arm: Arm, store: Store, transitions: int, seed: int) -> None:
+def require_enough(transitions: int) -> None:
+    """Raise UnusableInput where so few transitions are asked for that nothing can be learned from them."""
     if transitions < FEWEST_TRANSITIONS:
         raise UnusableInput(
-            f"{transitions} transitions are too few to learn from; ask for at least {FEWEST_TRANSITIONS:,}"
+            f"{transitions:,} transitions are too few to learn from; ask for at least {FEWEST_TRANSITIONS:,}"
         )
+
+
+def _check(arm: Arm, store: Store, transitions: int, seed: int) -> None:
+    require_enough(transitions)
     if seed < 0:
         raise UnusableInput(f"a seed must be 0 or more, got {seed}")
     if not store.valves:

@@ -4,7 +4,6 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -14,6 +13,7 @@ from pneumarm.report.style import (
     DENSITY,
     INK,
     MIDDLE,
+    counts_norm,
     nothing,
     of_joint,
     panels,
@@ -57,7 +57,7 @@ def projections(observation: Array, spec: ArmSpec) -> Figure:
             ends[:, 1] = np.where(ends[:, 1] > ends[:, 0], ends[:, 1], ends[:, 0] + 1)
             count, xs, ys = np.histogram2d(seen[:, i], seen[:, j], _BINS, range=ends)
             image = place.pcolormesh(
-                xs, ys, np.ma.masked_equal(count.T, 0), cmap=DENSITY, norm=LogNorm(), rasterized=True
+                xs, ys, np.ma.masked_equal(count.T, 0), cmap=DENSITY, norm=counts_norm(count), rasterized=True
             )
             bar = figure.colorbar(image, ax=place, location="top", aspect=30, pad=0.02)
             bar.set_label("observations")

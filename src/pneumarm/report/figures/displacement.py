@@ -5,7 +5,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.statistics import running_median
 from pneumarm.report.style import (
     INK,
     MIDDLE,
@@ -18,6 +17,7 @@ from pneumarm.report.style import (
     styled,
     whole_ticks,
 )
+from pneumarm.statistics import running_median
 
 Array = NDArray[np.float64]
 

@@ -1,13 +1,24 @@
 """Predicted against observed change (thesis section 3.3, figures 3.3 to 3.5)."""
 
 import numpy as np
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.statistics import slope
-from pneumarm.report.style import DENSITY, INK, MIDDLE, key, nothing, of_joint, panels, quantities, scatter, styled
+from pneumarm.report.style import (
+    DENSITY,
+    INK,
+    MIDDLE,
+    counts_norm,
+    key,
+    nothing,
+    of_joint,
+    panels,
+    quantities,
+    scatter,
+    styled,
+)
+from pneumarm.statistics import slope
 
 Array = NDArray[np.float64]
 
@@ -40,7 +51,7 @@ def isoplot(observed: Array, simulated: Array, spec: ArmSpec, *, density: bool =
             if density:
                 count, xs, ys = np.histogram2d(x, y, _BINS, range=[(-limit, limit)] * 2)
                 image = place.pcolormesh(
-                    xs, ys, np.ma.masked_equal(count.T, 0), cmap=DENSITY, norm=LogNorm(vmin=1), rasterized=True
+                    xs, ys, np.ma.masked_equal(count.T, 0), cmap=DENSITY, norm=counts_norm(count), rasterized=True
                 )
                 figure.colorbar(image, ax=place, aspect=25, pad=0.02).set_label("transitions")
             else:
@@ -49,20 +60,21 @@ def isoplot(observed: Array, simulated: Array, spec: ArmSpec, *, density: bool =
             middle = float(y.mean() - inclined * x.mean())
             ends = np.array([-limit, limit])
             place.plot(ends, ends, color=INK, ls="--", lw=1)
+            keys, labels = [key(INK, "--", lw=1)], ["ideal, 45°"]
             if np.isfinite(inclined):
+                keys.append(key(MIDDLE, lw=1.2))
+                labels.append(f"slope {inclined:.3f}")
                 place.plot(ends, middle + inclined * ends, color=MIDDLE, lw=1.2)
             place.set(xlim=ends, ylim=ends)
             place.set_title(kind.name + of_joint(joint, joints))
-            place.legend(
-                [key(INK, "--", lw=1), key(MIDDLE, lw=1.2)], ["ideal, 45°", f"slope {inclined:.3f}"], loc="upper left"
-            )
+            place.legend(keys, labels, loc="upper left")
     return figure
 
 
 def isoplot_alt(observed: Array, simulated: Array, spec: ArmSpec) -> str:
     """Say in words what :func:`isoplot` shows."""
-    if len(observed) == 0:
-        return "There are no transitions to compare."
+    if len(observed) < 2:
+        return f"There are too few transitions to compare: {len(observed)}."
     parts = []
     for joint in range(observed.shape[1]):
         for i, kind in enumerate(quantities(spec)):

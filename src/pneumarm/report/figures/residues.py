@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS, VALVES
-from pneumarm.report.statistics import Bins, binned, by_group
 from pneumarm.report.style import (
     DARK,
     INK,
@@ -23,6 +22,7 @@ from pneumarm.report.style import (
     second_unit,
     styled,
 )
+from pneumarm.statistics import Bins, binned, by_group
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from pneumarm.report.statistics import Moving, moving_mean, moving_rate
 from pneumarm.report.style import (
     DARK,
     INK,
@@ -20,6 +19,7 @@ from pneumarm.report.style import (
     panels,
     styled,
 )
+from pneumarm.statistics import Moving, moving_mean, moving_rate
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pneumarm.report.statistics import (
+from pneumarm.statistics import (
     binned,
     mean_estimate,
     moving_mean,

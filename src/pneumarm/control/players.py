@@ -1,0 +1,56 @@
+"""Who collects: controllers by their name on the command line."""
+
+import csv
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from pneumarm.arm import Arm, Controller
+from pneumarm.control.agent import AgentController
+from pneumarm.control.transfer import check_fit
+from pneumarm.errors import UnusableInput
+from pneumarm.learning import Agent
+from pneumarm.transitions import Keyboard, Trajectory
+
+
+@contextmanager
+def open_controller(name: str, arm: Arm) -> Iterator[Controller | None]:
+    """Give the controller called ``name`` for ``arm`` (thesis section 3.2.2 names all of these).
+
+    ``random`` is None, random actions; ``keyboard`` a person at the terminal; a CSV file predefined trajectories, a
+    column a muscle of -1, 0, +1 and a row a control period; any other file an agent, to be improved.
+
+    Raises:
+        UnusableInput: there is no such controller, or it is for another arm.
+
+    """
+    if name == "random":
+        yield None
+    elif name == "keyboard":
+        with Keyboard(arm.spec.joints) as keyboard:
+            yield keyboard
+    elif name.endswith(".csv"):
+        yield read_trajectory(Path(name), arm.spec.joints)
+    else:
+        agent = Agent.load(Path(name))
+        check_fit(agent, arm)
+        yield AgentController(agent)
+
+
+def read_trajectory(path: Path, joints: int) -> Trajectory:
+    """Return the trajectory in a CSV file with ``2 * joints`` columns of valves and no header.
+
+    Raises:
+        UnusableInput: the file cannot be read or holds something else.
+
+    """
+    expected = f"{path}: expected {2 * joints} columns of valves -1, 0 or 1, a row a control period"
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            rows = [[int(cell) for cell in row] for row in csv.reader(file) if row]
+        valves = np.array(rows, np.int64).reshape(len(rows), joints, 2)
+        return Trajectory(valves)
+    except (OSError, ValueError, csv.Error, UnusableInput) as error:
+        raise UnusableInput(f"{expected}; {error}") from error

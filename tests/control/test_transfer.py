@@ -1,0 +1,116 @@
+"""Transfer: resumable, comparable, and the adapted agent is what was averaged."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pneumarm
+from pneumarm.arm import Reading, open_arm
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.control import TransferSettings, transfer, transfer_into
+from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.learning import Agent
+from pneumarm.transitions import Store
+
+SHORT = TransferSettings(episodes=12, test_episodes=6)
+
+
+@pytest.fixture
+def agent(small_run: Path) -> Agent:
+    return Agent.load(small_run / "agent.safetensors")
+
+
+class Interrupted(VirtualArm):
+    """A virtual arm that fails at a certain reading."""
+
+    left = 10**9
+
+    def read(self) -> Reading:
+        self.left -= 1
+        if self.left < 0:
+            raise OSError("cable")
+        return super().read()
+
+
+def test_a_transfer_that_failed_goes_on_as_if_nothing_had_happened(agent: Agent, tmp_path: Path) -> None:
+    (tmp_path / "whole").mkdir()
+    whole = transfer_into(tmp_path / "whole", agent, VirtualArm(seed=3), SHORT, seed=1)
+    folder = tmp_path / "broken"
+    for left in (150, 400):
+        arm = Interrupted(seed=3)
+        arm.left = left
+        with pytest.raises(ArmFailure, match="OSError: cable"):
+            transfer_into(folder, agent, arm, SHORT, seed=1)
+    assert transfer_into(folder, agent, Interrupted(seed=3), SHORT, seed=1) == whole
+    for name in ("episodes.csv", "adapted.safetensors"):
+        assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_learning_changes_the_agent_and_not_learning_does_not(agent: Agent, tmp_path: Path) -> None:
+    def adapted(rate: float) -> Agent:
+        settings = TransferSettings(episodes=6, test_episodes=1, learning_rate=rate)
+        transfer_into(tmp_path / f"rate {rate}", agent, VirtualArm(seed=3), settings)
+        return Agent.load(tmp_path / f"rate {rate}" / "adapted.safetensors")
+
+    assert np.array_equal(adapted(0.0).weights(), agent.weights())
+    assert not np.array_equal(adapted(0.05).weights(), agent.weights())
+
+
+def test_other_settings_need_another_folder(agent: Agent, tmp_path: Path) -> None:
+    transfer_into(tmp_path / "t", agent, VirtualArm(), TransferSettings(episodes=0, test_episodes=1))
+    with pytest.raises(UnusableInput, match="other settings"):
+        transfer_into(tmp_path / "t", agent, VirtualArm(), TransferSettings(episodes=5, test_episodes=1))
+
+
+def test_the_mean_is_taken_over_the_share_that_was_asked_for(agent: Agent, tmp_path: Path) -> None:
+    made = []
+    for averaged in (0.0, 0.5, 1.0):
+        with Store.create(tmp_path / f"{averaged}.db", agent.spec) as store:
+            settings = TransferSettings(episodes=4, test_episodes=1, averaged=averaged)
+            moved = transfer(agent, VirtualArm(seed=3), store, settings)
+            made.append(moved.agent.weights())
+            seen = np.frombuffer((store.state("mean") or b"")[:8], np.int64)[0]
+            assert seen == round(4 * averaged)
+    assert not np.array_equal(made[0], made[1])
+    assert not np.array_equal(made[1], made[2])
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"episodes": -1}, "0 or more episodes"),
+        ({"test_episodes": 0}, "at least 1 test episode"),
+        ({"learning_rate": 2.0}, "learning rate"),
+        ({"averaged": 1.5}, "averaged"),
+    ],
+)
+def test_impossible_settings_are_refused(settings: dict[str, float], words: str) -> None:
+    with pytest.raises(UnusableInput, match=words):
+        TransferSettings(**settings)  # type: ignore[arg-type]
+
+
+def test_a_loaded_controller_needs_readings_only(small_run: Path) -> None:
+    controller = pneumarm.load_controller(small_run / "agent.safetensors")
+    with pytest.raises(UnusableInput, match=r"reset\(goal\)"):
+        controller.act(Reading(0.0, np.array([500.0]), np.zeros((1, 2))))
+    with pytest.raises(UnusableInput, match="1 finite angle"):
+        controller.reset(np.array([np.nan]))
+    with open_arm("virtual:seed=3") as arm:
+        controller.reset(np.array([650.0]))
+        for _ in range(20):
+            valves = controller.act(arm.read())
+            assert valves.shape == (1, 2)
+            assert set(np.unique(valves)) <= {-1, 0, 1}
+            arm.set_valves(valves)
+            arm.wait(arm.spec.period)
+        reading = arm.read()
+        assert np.array_equal(controller.act(reading), controller.act(reading))
+
+
+def test_the_episodes_file_tells_the_time_on_the_arm(small_run: Path) -> None:
+    results = json.loads((small_run / "results.json").read_text())
+    before = results["transfer"]["before"]
+    assert 20 * 3 < before["seconds"] < 20 * 12
+    assert before["intervals"]["success_rate"][0] <= before["success_rate"] <= before["intervals"]["success_rate"][1]

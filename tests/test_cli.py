@@ -1,0 +1,243 @@
+import json
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pneumarm.cli import COMMANDS, main
+
+README = Path(__file__).parent.parent / "README.md"
+
+
+class Outcome:
+    """What a command left: exit code, stdout, stderr."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str], *arguments: object) -> None:
+        with pytest.raises(SystemExit) as ended:
+            main([str(argument) for argument in arguments])
+        self.code = ended.value.code
+        self.out, self.err = capsys.readouterr()
+
+    def is_refused(self, *words: str) -> bool:
+        """Return whether it was refused with one line on stderr that holds ``words``."""
+        return (
+            self.code == 2
+            and self.out == ""
+            and self.err.startswith("pneumarm: ")
+            and self.err.count("\n") == 1
+            and all(word in self.err for word in words)
+        )
+
+
+@pytest.fixture
+def store(small_run: Path) -> Path:
+    return small_run / "transitions.db"
+
+
+@pytest.fixture
+def sim(small_run: Path) -> Path:
+    return small_run / "simulation.safetensors"
+
+
+@pytest.fixture
+def agent(small_run: Path) -> Path:
+    return small_run / "agent.safetensors"
+
+
+@pytest.fixture
+def missing(tmp_path: Path) -> Path:
+    return tmp_path / "missing" / "file"
+
+
+def test_help_answers_at_once_and_without_the_heavy_libraries() -> None:
+    code = (
+        "import sys; from pneumarm.cli import app; app(['--help'], result_action='return_value');"
+        "sys.exit(len({'numba', 'numpy', 'matplotlib', 'scipy'} & sys.modules.keys()))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+    assert all(command in done.stdout for command in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    outcome = Outcome(capsys, command, "--help")
+    assert outcome.code == 0
+    assert f"pneumarm {command} " in outcome.out.replace("\n", " ")
+    assert "Example:" in outcome.out
+    assert "--json" in outcome.out
+
+
+def test_wrong_commands_and_options_are_refused(capsys: pytest.CaptureFixture[str], store: Path, sim: Path) -> None:
+    assert Outcome(capsys, "fitt", store).is_refused("fitt")
+    assert Outcome(capsys, "fit", store).is_refused("--out")
+    assert Outcome(capsys, "fit", store, "--out", "x", "--hidden", "many").is_refused("--hidden", "many")
+    assert Outcome(capsys, "fit", store, "--out", "x", "--history", 0).is_refused("history cannot be 0")
+    train = ("train", sim, store, "--out", "x")
+    assert Outcome(capsys, *train, "--method", "dqn").is_refused("--method", "sarsa")
+    assert Outcome(capsys, *train, "--agents", 0).is_refused("agents cannot be 0")
+    assert Outcome(capsys, *train, "--learning-rate", "nan").is_refused("learning_rate cannot be nan")
+    assert not Path("x").exists()
+
+
+def test_a_missing_parent_folder_is_refused_before_any_work(
+    capsys: pytest.CaptureFixture[str], store: Path, sim: Path, agent: Path, missing: Path
+) -> None:
+    for arguments in (
+        ("run", "--out", missing),
+        ("collect", "virtual", missing),
+        ("fit", store, "--out", missing),
+        ("analyse", store, sim, "--out", missing),
+        ("train", sim, store, "--out", missing),
+        ("transfer", agent, "--arm", "virtual", "--out", missing),
+    ):
+        assert Outcome(capsys, *arguments).is_refused(str(missing.parent), "does not exist"), arguments
+
+
+def test_files_of_another_kind_are_refused(
+    capsys: pytest.CaptureFixture[str], store: Path, sim: Path, agent: Path, tmp_path: Path
+) -> None:
+    text = tmp_path / "notes.txt"
+    text.write_text("no store, no simulation, no agent\n" * 100)
+    out = tmp_path / "out"
+    for arguments in (
+        ("fit", text, "--out", out),
+        ("coverage", text),
+        ("analyse", text, sim, "--out", out),
+        ("analyse", store, text, "--out", out),
+        ("train", text, store, "--out", out),
+        ("train", sim, text, "--out", out),
+        ("train", agent, store, "--out", out),
+        ("test", sim, sim, store),
+        ("test", agent, agent, store),
+        ("transfer", text, "--arm", "virtual", "--out", out),
+        ("report", text),
+        ("import", text, out, "--mapping", text),
+        ("collect", "virtual", text),
+    ):
+        assert Outcome(capsys, *arguments).is_refused(), arguments
+    assert not out.exists()
+    assert text.read_text().startswith("no store")
+
+
+def test_too_little_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path, agent: Path) -> None:
+    assert Outcome(capsys, "collect", "virtual", tmp_path / "a.db", "--transitions", 1999).is_refused("2,000")
+    assert Outcome(capsys, "run", "--out", tmp_path / "run", "--transitions", 100).is_refused("2,000")
+    asked = ("transfer", agent, "--arm", "virtual", "--out", tmp_path / "t")
+    assert Outcome(capsys, *asked, "--test-episodes", 0).is_refused("at least 1 test episode")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unknown_arm_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for arm in ("wirtual", "virtual:seed=x", "virtual:preset=Z", "simulation:none", "python:os", "python:os:nothing"):
+        assert Outcome(capsys, "collect", arm, tmp_path / "a.db").is_refused(), arm
+
+
+def test_an_arm_that_fails_in_the_middle_costs_nothing_that_was_stored(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "my_arm.py").write_text(
+        "from pneumarm.arm.virtual import VirtualArm\n"
+        "class Failing(VirtualArm):\n"
+        "    reads = 0\n"
+        "    def read(self):\n"
+        "        self.reads += 1\n"
+        "        if self.reads > 1500:\n"
+        "            raise OSError('cable')\n"
+        "        return super().read()\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    db = tmp_path / "a.db"
+    outcome = Outcome(capsys, "collect", "python:my_arm:Failing", db, "--transitions", 5000)
+    assert outcome.code == 1
+    assert "OSError: cable" in outcome.err
+    assert "run the same command again" in outcome.err
+    kept = json.loads(Outcome(capsys, "coverage", db, "--json").out)["seen"]
+    assert 1000 <= kept < 1500
+
+
+def test_anyone_can_collect(
+    capsys: pytest.CaptureFixture[str], agent: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trajectory = tmp_path / "up and down.csv"
+    trajectory.write_text("1,-1\n" * 20 + "0,0\n" * 20 + "-1,1\n" * 20)
+    for controller in (agent, trajectory):
+        db = tmp_path / f"{controller.stem}.db"
+        outcome = Outcome(
+            capsys, "collect", "virtual:seed=3", db, "--transitions", 2000, "--controller", controller, "--json"
+        )
+        assert json.loads(outcome.out)["transitions"] == 2000
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("1,2,3\n")
+    asked = ("collect", "virtual", tmp_path / "no.db", "--controller")
+    assert Outcome(capsys, *asked, wrong).is_refused("2 columns of valves")
+    with open("/dev/null") as nobody:
+        monkeypatch.setattr("sys.stdin", nobody)
+        assert Outcome(capsys, *asked, "keyboard").is_refused("needs a terminal")
+    assert not (tmp_path / "no.db").exists()
+
+
+def test_the_agent_of_another_arm_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, agent: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "other_arm.py").write_text(
+        "from dataclasses import replace\n"
+        "from pneumarm.arm.virtual import VirtualArm\n"
+        "def slow():\n"
+        "    arm = VirtualArm()\n"
+        "    arm.spec = replace(arm.spec, period=0.05)\n"
+        "    return arm\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    asked = ("transfer", agent, "--arm", "python:other_arm:slow", "--out", tmp_path / "t")
+    assert Outcome(capsys, *asked).is_refused("period")
+
+
+def test_json_is_one_object_on_stdout_and_nothing_else(
+    capsys: pytest.CaptureFixture[str], store: Path, sim: Path, agent: Path, tmp_path: Path
+) -> None:
+    quantities = {"angle", "velocity", "pressure_1", "pressure_2"}
+    figures = {"episodes", "reward", "success_rate", "actions", "switches"}
+
+    def asked(*arguments: object) -> dict[str, object]:
+        outcome = Outcome(capsys, *arguments, "--json")
+        assert outcome.code == 0, outcome.err
+        assert outcome.out.count("\n") == 1
+        found: dict[str, object] = json.loads(outcome.out)
+        return found
+
+    fitted = asked("fit", store, "--out", tmp_path / "sim", "--epochs", 3)
+    assert set(fitted["std"]) == set(fitted["relative_error"]) == quantities  # type: ignore[call-overload]
+    trained = asked("train", sim, store, "--out", tmp_path / "agent", "--agents", 1, "--max-episodes", 500)
+    assert {"episodes", "steps", "seconds", "steps_per_second_per_core"} <= trained.keys()
+    assert figures <= asked("test", agent, sim, store, "--episodes", 50).keys()
+    out = ("--out", tmp_path / "t", "--episodes", 3, "--test-episodes", 4)
+    moved = asked("transfer", agent, "--arm", "virtual:seed=3", *out)
+    assert figures <= moved["before"].keys()  # type: ignore[attr-defined]
+    assert "verdict" in asked("coverage", store)
+    asked("analyse", store, sim, "--out", tmp_path / "quality")
+    assert (tmp_path / "quality" / "analysis.html").exists()
+    asked("collect", "simulation:" + str(sim), tmp_path / "s.db", "--transitions", 2000)
+
+
+def blocks(language: str) -> Iterator[str]:
+    yield from re.findall(rf"```{language}\n(.*?)```", README.read_text(), re.S)
+
+
+def test_the_commands_and_the_program_of_the_readme_run(tmp_path: Path) -> None:
+    lines = [shlex.split(line, comments=True) for block in blocks("sh") for line in block.splitlines()]
+    commands = [line for line in lines if line and line[0] == "pneumarm"]
+    assert len(commands) >= 7
+    for command in commands:
+        done = subprocess.run(
+            [sys.executable, "-m", "pneumarm.cli", *command[1:]], cwd=tmp_path, capture_output=True, text=True
+        )
+        assert done.returncode == 0, (command, done.stderr)
+    (program,) = blocks("python")
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    degrees = float(np.asarray(re.findall(r"-?\d+\.\d+", done.stdout)[0]))
+    assert abs(degrees - (650 - 511.5) / 11.378) < 15

@@ -11,19 +11,6 @@ from pneumarm.console import complain
 from pneumarm.errors import PneumarmError
 
 COMMANDS = {
-<<<<<<< HEAD
-    "run": "Do the whole job: collect, fit, train, test, transfer, report. Resumable.",
-    "collect": "Make an arm move about and record it.",
-    "import": "Import a recording made elsewhere.",
-    "coverage": "Say which part of its space a store covers, and whether it is enough.",
-    "fit": "Fit a simulation to a store.",
-    "analyse": "Draw how good a simulation is.",
-    "train": "Train an agent in a simulation.",
-    "test": "Test an agent in a simulation.",
-    "transfer": "Move an agent onto an arm and let it adapt there.",
-    "bound": "Say what can be achieved on a virtual arm at all.",
-    "report": "Write the report of a finished run again.",
-=======
     "run": (
         "Do the whole job: collect, fit, train, test, transfer, report. Resumable.",
         "pneumarm run --arm virtual:seed=7 --out runs/seven --transitions 20000",
@@ -60,11 +47,14 @@ COMMANDS = {
         "Move an agent onto an arm and let it adapt there.",
         "pneumarm transfer arm.agent --arm virtual:seed=7 --episodes 500 --out adapted",
     ),
+    "bound": (
+        "Say what can be achieved on a virtual arm at all, by planning with its true physics.",
+        "pneumarm bound --arm virtual:seed=7 --episodes 500",
+    ),
     "report": (
         "Write the report of a finished run again.",
         "pneumarm report runs/first",
     ),
->>>>>>> main
 }
 """Every command with its one-line help and an example."""
 

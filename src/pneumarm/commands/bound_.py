@@ -22,8 +22,6 @@ def bound_(
 ) -> None:
     """Say what can be achieved on a virtual arm at all, by planning with its true physics.
 
-    Example: ``pneumarm bound --arm virtual:seed=7 --episodes 500``
-
     Parameters
     ----------
     arm

@@ -3,12 +3,9 @@
 from pneumarm.control.agent import AgentController
 from pneumarm.control.bound import BoundSettings, Planned, measure_bound
 from pneumarm.control.movement import LearningController, Movement, move
-<<<<<<< HEAD
 from pneumarm.control.planner import PhysicsModel, Planner, SimulationModel, physics_planner, simulated_planner
-from pneumarm.control.search import PlanSettings
-=======
 from pneumarm.control.players import open_controller
->>>>>>> main
+from pneumarm.control.search import PlanSettings
 from pneumarm.control.transfer import (
     BEGIN,
     Episode,
@@ -35,12 +32,9 @@ __all__ = [
     "Transferred",
     "measure_bound",
     "move",
-<<<<<<< HEAD
+    "open_controller",
     "physics_planner",
     "simulated_planner",
-=======
-    "open_controller",
->>>>>>> main
     "transfer",
     "transfer_into",
     "write_episodes",

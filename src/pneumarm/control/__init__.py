@@ -3,6 +3,7 @@
 from pneumarm.control.agent import AgentController
 from pneumarm.control.bound import BoundSettings, Planned, measure_bound
 from pneumarm.control.movement import LearningController, Movement, move
+from pneumarm.control.plan_agent import PlanAgent
 from pneumarm.control.planner import PhysicsModel, Planner, SimulationModel, physics_planner, simulated_planner
 from pneumarm.control.players import open_controller
 from pneumarm.control.search import PlanSettings
@@ -24,6 +25,7 @@ __all__ = [
     "LearningController",
     "Movement",
     "PhysicsModel",
+    "PlanAgent",
     "PlanSettings",
     "Planned",
     "Planner",

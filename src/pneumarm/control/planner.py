@@ -145,7 +145,10 @@ class SimulationModel:
 
     def follow(self, reading: Reading) -> None:
         """Put the first state to the window of the last readings."""
-        state = self._tracker.reading(reading)
+        self.put(self._tracker.reading(reading))
+
+    def put(self, state: NDArray[np.float32]) -> None:
+        """Put the first state to the scaled window ``state`` (state_size,)."""
         self.states.x[0, : len(state)] = state
         look_simulated(self.world, self.states, 0)
 
@@ -179,12 +182,11 @@ class Planner:
     def __post_init__(self) -> None:
         joints = self.model.spec.joints
         self._room = tree(self.settings, joints)
-        self._places = 9 ** np.arange(joints)[::-1]
         self._problem = problem(np.zeros(joints), self.reward, self.settings, self.model.uncertainty)
         self._turn = 0
         self._last = -1
         self._still = 0
-        self._since: Reading | None = None
+        self._since: NDArray[np.float64] | None = None
 
     def reset(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts]."""
@@ -198,7 +200,15 @@ class Planner:
         began = self.clock()
         if self.found is None or self.replan:
             self.model.follow(reading)
-            may_hold = not self._is_stuck(reading)
+        valves = self.choose_valves()
+        self.model.commanded(valves)
+        self.seconds.append(self.clock() - began)
+        return valves
+
+    def choose_valves(self) -> NDArray[np.int8]:
+        """Return the valves (joints, 2) to set where the model is."""
+        if self.found is None or self.replan:
+            may_hold = not self._is_stuck()
             self.found = find(self.model.world, self.model.states, self._problem, self._room, self._last, may_hold)
             self.unproven += not self.found.proven
             self._turn = 0
@@ -206,21 +216,21 @@ class Planner:
         action = int(plan[min(self._turn, len(plan) - 1)])
         self._turn += 1
         if action != self._last:
-            self._last, self._since = action, reading
-            self._still = 0
-        valves: NDArray[np.int8] = self._problem.commands[action]
-        self.model.commanded(valves)
-        self.seconds.append(self.clock() - began)
-        return valves.copy()
+            self._last, self._still = action, 0
+            self._since = self._read()
+        valves: NDArray[np.int8] = self._problem.commands[action].copy()
+        return valves
 
-    def _is_stuck(self, reading: Reading) -> bool:
+    def _read(self) -> NDArray[np.float64]:
+        """Return angles and pressures where the model is [counts]."""
+        return np.concatenate([self.model.states.angle[0], self.model.states.pressure[0].ravel()])
+
+    def _is_stuck(self) -> bool:
         """Return whether the last action has had no effect for some turns: neither angles nor pressures changed."""
-        since = self._since
-        if since is None or not self.patience:
+        if self._since is None or not self.patience:
             return False
-        moved = max(np.abs(reading.angle - since.angle).max(), np.abs(reading.pressure - since.pressure).max())
-        if moved > _STILL:
-            self._still, self._since = 0, reading
+        if np.abs(self._read() - self._since).max() > _STILL:
+            self._still, self._since = 0, self._read()
         else:
             self._still += 1
         return self._still >= self.patience

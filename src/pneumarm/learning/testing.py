@@ -17,7 +17,8 @@ from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.statistics import summarise
 
-_TEST, _NOISE = 3, 4  # streams of random numbers; training uses others
+TEST, NOISE = 3, 4
+"""Streams of random numbers of tests; training uses others."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def test(
     if not all(np.array_equal(getattr(scaling, name), getattr(other, name)) for name in vars(scaling)):
         raise UnusableInput("the agent was trained in another simulation: its inputs are scaled differently")
     env = environment(simulation, begin_states, agent.settings)
-    return run_test(env, agent.weights(), agent.settings, episodes, (seed, _TEST))
+    return run_test(env, agent.weights(), agent.settings, episodes, (seed, TEST))
 
 
 test.__test__ = False  # type: ignore[attr-defined]
@@ -81,7 +82,7 @@ def run_test(
     """Test the networks ``weights`` in ``env``; begin states and goals are drawn by ``seed``, and so is the noise."""
     if episodes < 1:
         raise UnusableInput(f"a test needs at least one episode, got {episodes}")
-    one = episode(env, random_state((*seed, _NOISE)))
+    one = episode(env, random_state((*seed, NOISE)))
     record = movements(episodes, one.goal.size)
     test_episodes(env, learner(weights, settings), one, room(one), random_state(seed), record)
     return TestResult(*record)

@@ -31,7 +31,7 @@ def analyse_(db: Path, sim: Path, /, *, out: Path, json: Json = False) -> None:
         analysis = analyse(store, simulation)
     out.mkdir(exist_ok=True)
     analysis.save(out)
-    page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality)
+    page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality, analysis.figures)
     say(f"page: {page}")
     errors = analysis.figures["held_out"]
     rows = [(name, *figures.values()) for name, figures in errors.items()]

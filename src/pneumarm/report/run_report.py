@@ -1,6 +1,7 @@
 """The report of a run: from the files in its folder to one HTML page."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
@@ -46,10 +47,12 @@ def write_report(folder: Path) -> Path:
     return path
 
 
-def write_analysis(folder: Path, spec: ArmSpec, coverage: CoverageData, quality: QualityData) -> Path:
+def write_analysis(
+    folder: Path, spec: ArmSpec, coverage: CoverageData, quality: QualityData, found: Mapping[str, Any]
+) -> Path:
     """Write ``analysis.html``, the part of the report on a store and a simulation, to ``folder``."""
     path = folder / ANALYSIS
-    sections = [collected(coverage, spec), predicted(quality, spec), propagated(quality, spec)]
+    sections = [collected(coverage, spec), predicted(quality, spec), propagated(quality, spec, found)]
     summary = [f"{spec.name}: what was collected, and how well the simulation predicts what it was not fitted to."]
     write_text(path, render(f"The simulation of {spec.name}", summary, sections))
     return path

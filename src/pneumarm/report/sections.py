@@ -38,7 +38,10 @@ def all_sections(run: RunData) -> list[Section]:
     if run.coverage is not None:
         sections.append(collected(run.coverage, run.spec))
     if run.quality is not None:
-        sections += [predicted(run.quality, run.spec), propagated(run.quality, run.spec)]
+        sections += [
+            predicted(run.quality, run.spec),
+            propagated(run.quality, run.spec, run.results.get("simulation", {})),
+        ]
     if run.training is not None:
         sections.append(trained(run.training, run.spec))
     if run.test is not None:
@@ -171,8 +174,11 @@ def predicted(data: QualityData, spec: ArmSpec) -> Section:
     )
 
 
-def propagated(data: QualityData, spec: ArmSpec) -> Section:
-    """Return the error over many steps and, where there is one, the importance of the inputs."""
+def propagated(data: QualityData, spec: ArmSpec, figures_found: Mapping[str, Any]) -> Section:
+    """Return the error over many steps and, where there is one, the importance of the inputs.
+
+    ``figures_found`` are those of an analysis: what it says of invalid predictions is told (thesis section 3.4).
+    """
     pictures = [
         Picture(
             figures.error_propagation(data.propagation, spec),
@@ -197,9 +203,24 @@ def propagated(data: QualityData, spec: ArmSpec) -> Section:
         (
             "Small errors add up over a movement. Above the dashed line errors of successive steps are alike and add "
             "up faster than chance; below it the arm's own dynamics pull the simulation back.",
+            *_invalid(figures_found),
         ),
         pictures,
     )
+
+
+def _invalid(found: Mapping[str, Any]) -> list[str]:
+    if "invalid" not in found or "propagation" not in found:
+        return []
+    invalid, spread = found["invalid"], found["propagation"]
+    before, remedied = (np.atleast_1d(spread[name]["angle"]) for name in ("measured", "resynchronised"))
+    errors = " and ".join(f"from {a:.1f} to {b:.1f}" for a, b in zip(before, remedied, strict=True))
+    return [
+        f"After {spread['steps']} simulated steps {invalid['simulated']:.1%} of the states lie in cells of the "
+        f"filter's grid that hold no data, and {invalid['recorded']:.1%} of the recorded ones do. Replacing the state by the "
+        f"most similar one of the database every ten steps changes the error of the angle then {errors} counts "
+        "(invalid predictions and their remedy, thesis section 3.4)."
+    ]
 
 
 def trained(data: TrainingData, spec: ArmSpec) -> Section:

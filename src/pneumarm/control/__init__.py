@@ -1,8 +1,12 @@
 """Controllers on an arm: agents, movements, transfer and adaptation."""
 
 from pneumarm.control.agent import AgentController
+from pneumarm.control.bound import BoundSettings, Planned, measure_bound
 from pneumarm.control.movement import LearningController, Movement, move
+from pneumarm.control.plan_agent import PlanAgent
+from pneumarm.control.planner import PhysicsModel, Planner, SimulationModel, physics_planner, simulated_planner
 from pneumarm.control.players import open_controller
+from pneumarm.control.search import PlanSettings
 from pneumarm.control.transfer import (
     BEGIN,
     Episode,
@@ -16,13 +20,23 @@ from pneumarm.control.transfer import (
 __all__ = [
     "BEGIN",
     "AgentController",
+    "BoundSettings",
     "Episode",
     "LearningController",
     "Movement",
+    "PhysicsModel",
+    "PlanAgent",
+    "PlanSettings",
+    "Planned",
+    "Planner",
+    "SimulationModel",
     "TransferSettings",
     "Transferred",
+    "measure_bound",
     "move",
     "open_controller",
+    "physics_planner",
+    "simulated_planner",
     "transfer",
     "transfer_into",
     "write_episodes",

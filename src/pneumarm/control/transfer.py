@@ -100,12 +100,19 @@ class Episode:
 def begin_and_goal(
     agent: AnyAgent, seed: int, test: bool, number: int
 ) -> tuple[np.random.Generator, NDArray[np.float64]]:
-    """Return the random numbers of movement ``number`` and its goal.
+    """Return the random numbers of movement ``number`` of ``agent`` and its goal."""
+    return draw_movement(agent.goal_range, seed, test, number)
+
+
+def draw_movement(
+    goal_range: NDArray[np.float64], seed: int, test: bool, number: int
+) -> tuple[np.random.Generator, NDArray[np.float64]]:
+    """Return the random numbers of movement ``number`` and its goal within ``goal_range`` (joints, 2) [counts].
 
     Both tests use the same begin states and goals, and so does every rival with the same seed.
     """
     random = np.random.default_rng([seed, 0 if test else 1, number])
-    low, high = agent.goal_range.T
+    low, high = goal_range.T
     return random, random.uniform(low, high)
 
 

@@ -10,6 +10,7 @@ from pneumarm.arm.virtual.parameters import (
     RoomParameters,
     SensorParameters,
     preset_parameters,
+    without_noise,
 )
 
 __all__ = [
@@ -25,4 +26,5 @@ __all__ = [
     "figures",
     "preset_parameters",
     "resting_angle",
+    "without_noise",
 ]

@@ -3,13 +3,13 @@
 import hashlib
 import math
 import struct
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Arm, ArmSpec, Reading
-from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, constants
+from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, Constants, constants
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
 from pneumarm.arm.virtual.rest import pass_time, static_angle
 from pneumarm.arm.virtual.sensors import MOST_CONVERSIONS, sense
@@ -29,6 +29,19 @@ LONGEST_WAIT = 1e8
 _SUPPLY, _SENSORS, _JITTER = range(3)
 _HEADER = struct.Struct("<8sI16s")
 _MAGIC, _VERSION = b"pneumarm", 1
+
+
+class Records(NamedTuple):
+    """The arm's own state records, not copies: read them, and leave them alone."""
+
+    muscles: NDArray[Any]
+    """MUSCLE, shape (joints, 2)."""
+    joints: NDArray[Any]
+    """JOINT, shape (joints,)."""
+    surroundings: NDArray[Any]
+    """SURROUNDINGS, shape (1,)."""
+    supply_random: NDArray[np.uint64]
+    """Random state of the supply's fluctuation, shape (4,)."""
 
 
 class VirtualArm(Arm):
@@ -88,6 +101,16 @@ class VirtualArm(Arm):
             self._scratch,
         )
         start(*self._physics)
+
+    @property
+    def constants(self) -> Constants:
+        """The arm's parameters as records for kernels."""
+        return self._constants
+
+    @property
+    def records(self) -> Records:
+        """The arm's true state as records for kernels."""
+        return Records(self._muscles, self._joints, self._surroundings, self._random[_SUPPLY])
 
     @property
     def time(self) -> float:

@@ -244,6 +244,12 @@ class ArmParameters:
         _check(self, {"jitter"}, {"joints", "air", "room", "sensors"})
 
 
+def without_noise(parameters: ArmParameters) -> ArmParameters:
+    """Return the same arm with sensors that only quantise and a control cycle that is never late."""
+    sensors = replace(parameters.sensors, angle_noise=0.0, pressure_noise=0.0, dropout=0.0)
+    return replace(parameters, sensors=sensors, jitter=0.0)
+
+
 def preset_parameters(preset: str = "B") -> ArmParameters:
     """Return the arm of one of three readings of the thesis' "2 bar" and "0 to 1200 ms".
 

@@ -1,0 +1,59 @@
+"""``pneumarm bound``."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pneumarm.arm import open_arm
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.commands.common import Json, Settings
+from pneumarm.console import progress, show, table
+from pneumarm.control.bound import BoundSettings, bound_results, measure_bound, measured_goal_range
+from pneumarm.errors import UnusableInput
+from pneumarm.simulation import Simulation
+
+
+def bound_(
+    *,
+    arm: str,
+    sim: Path | None = None,
+    seed: int = 0,
+    settings: Annotated[BoundSettings, Settings] = BoundSettings(),
+    json: Json = False,
+) -> None:
+    """Say what can be achieved on a virtual arm at all, by planning with its true physics.
+
+    Parameters
+    ----------
+    arm
+        virtual, virtual:seed=N or virtual:preset=A; nobody knows the true physics of another.
+    sim
+        A simulation of this arm: goals are drawn from its range, and it is planned with as well. Without one the
+        range of goals is measured by a short collecting.
+    seed
+        Of the begin states, the goals and the noise; those of ``pneumarm transfer`` with the same seed.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    opened = open_arm(arm, seed)
+    if not isinstance(opened, VirtualArm):
+        opened.close()
+        raise UnusableInput(f"arm {arm!r}: the bound needs a virtual arm, whose true physics are known")
+    simulation = None if sim is None else Simulation.load(sim)
+    goal_range = measured_goal_range(opened, seed) if simulation is None else simulation.goal_range
+    with progress("planning") as report:
+        planned = measure_bound(opened, goal_range, settings, seed=seed, simulation=simulation, progress=report)
+    result = bound_results(opened, goal_range, settings, planned)
+    columns = ("reward", "success_rate", "actions", "switches")
+
+    def rows() -> list[tuple[object, ...]]:
+        shown = []
+        for rival in planned:
+            figures = result[rival]
+            ranges = [figures["intervals"][name] for name in columns]
+            means = [f"{figures[n]:.3f} ({r[0]:.3f} to {r[1]:.3f})" for n, r in zip(columns, ranges, strict=True)]
+            times = figures["decision_ms"]
+            shown.append((rival.replace("_", " "), *means, times["median"], times["p99"]))
+        return shown
+
+    header = ("planner", *columns, "decision, median [ms]", "p99 [ms]")
+    show(result, json, lambda: [table(header, rows(), f"{arm}, {settings.episodes} movements, 95 % intervals")])

@@ -1,0 +1,194 @@
+"""Make environments by the name of an arm."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import ArrayLike
+
+from pneumarm.arm import Arm, open_arm
+from pneumarm.errors import UnusableInput
+from pneumarm.gym.on_arm import ArmPointToPoint
+from pneumarm.gym.simulated import SimulatedPointToPoint
+from pneumarm.gym.spaces import nominal_goals, nominal_scaling
+from pneumarm.gym.vector import PointToPointVector
+from pneumarm.learning.begin import BeginStates, begin_states
+from pneumarm.learning.settings import Reward, TrainSettings
+from pneumarm.simulation.noise import NoiseSettings
+from pneumarm.simulation.simulation import Simulation
+from pneumarm.transitions import Store
+from pneumarm.transitions.window import Window
+
+_SIMULATION = "simulation:"
+
+
+def point_to_point(
+    arm: str | Arm | Simulation = "virtual",
+    transitions: str | Path | BeginStates | None = None,
+    like: str | Path | Simulation | None = None,
+    goals: ArrayLike | None = None,
+    reward: Reward = Reward(),
+    cutoff: int = 100,
+    noise: NoiseSettings = NoiseSettings(),
+    seed: int = 0,
+) -> gymnasium.Env[Any, Any]:
+    """Return an environment in which an arm of pneumatic muscles is to be moved to a goal and stopped there.
+
+    ``gymnasium.make("pneumarm/PointToPoint-v0", arm="virtual:seed=7")``
+
+    ## Description
+    A joint is turned by two antagonistic pneumatic muscles with on/off valves. From rest at a random angle it is to
+    reach a goal angle and be slow there, in few control periods and with few changes of the valves (thesis chapters 4
+    and 5). The arm is a learned simulation of one, a virtual arm, or a real one.
+
+    ## Action Space
+    ``Discrete(9)``; ``MultiDiscrete([9] * joints)`` with several joints. Action ``3 * (v1 + 1) + (v2 + 1)`` sets the
+    valves of muscle 1 and 2, each -1 (air out), 0 (closed) or +1 (air in), for a control period of 1/30 s:
+
+    | Num | muscle 1 | muscle 2 |   | Num | muscle 1 | muscle 2 |   | Num | muscle 1 | muscle 2 |
+    |-----|----------|----------|---|-----|----------|----------|---|-----|----------|----------|
+    | 0   | out      | out      |   | 3   | closed   | out      |   | 6   | in       | out      |
+    | 1   | out      | closed   |   | 4   | closed   | closed   |   | 7   | in       | closed   |
+    | 2   | out      | in       |   | 5   | closed   | in       |   | 8   | in       | in       |
+
+    On an arm, inlets stay closed while their muscle reads over the pressure limit.
+
+    ## Observation Space
+    ``Box`` of float32: the state window of thesis eq. 3.5 and the goal (eq. 4.12), scaled to about -1..1. With the
+    history h (3 in the thesis) and one joint it holds, newest first,
+
+    | Num        | Observation                                           |
+    |------------|-------------------------------------------------------|
+    | 4 i        | angle, i = 0..h-1 periods ago                         |
+    | 4 i + 1    | angular velocity                                      |
+    | 4 i + 2, 3 | pressures of muscle 1 and 2                           |
+    | 4 h + 2 i  | valves of muscle 1 and 2, i+1 = 1..h-1 periods ago    |
+    | last       | goal, scaled as an angle                              |
+
+    The scaling is that of the simulation, or of ``like``, so that an agent trained in a simulation can be put onto
+    the arm; without either it is by the sensors' ranges.
+
+    ## Rewards
+    -1 for each action, +50 instead for the one that reaches the goal, and -8 for each joint whose action differs from
+    the one before it in the episode (thesis eq. 4.2, section 5.4.1). ``reward`` changes these.
+
+    ## Starting State
+    At rest with closed valves: in a simulation one of the recorded resting states; on an arm all muscles are vented
+    for 2 s, inflated for up to 1.5 s each, and closed for 1 s (section 5.5). The goal is uniform in the range of
+    goals, or ``reset(options={"goal": [counts]})``.
+
+    ## Episode End
+    Termination: every joint is within 25 counts of its goal and not faster than 1 count/ms (eq. 5.1, 5.2), judged
+    after each action. Truncation: 100 actions were taken. ``info["is_success"]`` tells the one from the other.
+
+    ## Arguments
+    * ``arm``: ``"simulation:FILE"`` or a ``Simulation`` (fast, needs ``transitions``), or any arm: ``"virtual"``,
+      ``"virtual:seed=N"``, ``"python:module:callable"``, or an ``Arm``.
+    * ``transitions``: the store that a simulation's begin states are taken from.
+    * ``like``: on an arm, the simulation whose state window, scaling and goals are used.
+    * ``goals``: lowest and highest goal (joints, 2) [counts]; by default those of the simulation, or the inner 80 %
+      of the angle's range.
+    * ``reward``, ``cutoff``, ``noise``: as in :class:`pneumarm.learning.TrainSettings`; noise in a simulation only.
+    * ``seed``: of a virtual arm's noise.
+
+    ## Version History
+    * v0: the definitions of pneumarm 0.1
+
+    Raises:
+        UnusableInput: no such arm or file, or arguments that do not go together.
+
+    """
+    simulation = _simulation(arm)
+    if simulation is not None:
+        if like is not None:
+            raise UnusableInput("like= is for arms; a simulation has a state window of its own")
+        settings = TrainSettings(reward=reward, cutoff=cutoff, noise=noise, shaping=None)
+        return SimulatedPointToPoint(_with_goals(simulation, goals), _begin(simulation, transitions), settings)
+    if transitions is not None:
+        raise UnusableInput("transitions= is for simulations; an arm is brought to its begin states")
+    opened = arm if isinstance(arm, Arm) else open_arm(str(arm), seed)
+    window, scaling, range_ = Window(opened.spec.joints), nominal_scaling(opened.spec), nominal_goals(opened.spec)
+    if like is not None:
+        model = like if isinstance(like, Simulation) else Simulation.load(Path(like))
+        if model.window.joints != opened.spec.joints:
+            opened.close()
+            raise UnusableInput(f"like= has {model.window.joints} joint(s), the arm has {opened.spec.joints}")
+        window, scaling, range_ = model.window, model.scaling, model.goal_range
+    if goals is not None:
+        range_ = _goals(goals, window.joints)
+    return ArmPointToPoint(opened, window, scaling, range_, reward, cutoff)
+
+
+def point_to_point_vector(
+    arm: str | Simulation,
+    transitions: str | Path | BeginStates,
+    num_envs: int = 1,
+    goals: ArrayLike | None = None,
+    reward: Reward = Reward(),
+    cutoff: int = 100,
+    noise: NoiseSettings = NoiseSettings(),
+    threads: int | None = None,
+    autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+    copy: bool = True,
+) -> PointToPointVector:
+    """Return ``num_envs`` environments like :func:`point_to_point` in one compiled step, over a simulation only.
+
+    ``gymnasium.make_vec("pneumarm/PointToPoint-v0", 4096, vectorization_mode="vector_entry_point",
+    arm="simulation:arm.sim", transitions="arm.db")``; the arguments are described there and in
+    :class:`PointToPointVector`.
+
+    Raises:
+        UnusableInput: no simulation, or arguments that do not go together.
+
+    """
+    simulation = _simulation(arm)
+    if simulation is None:
+        raise UnusableInput(f"arm {arm!r}: only simulations are vectorised; give simulation:FILE")
+    return PointToPointVector(
+        _with_goals(simulation, goals),
+        _begin(simulation, transitions),
+        num_envs,
+        TrainSettings(reward=reward, cutoff=cutoff, noise=noise, shaping=None),
+        threads=threads,
+        autoreset_mode=autoreset_mode,
+        copy=copy,
+    )
+
+
+def _simulation(arm: str | Arm | Simulation) -> Simulation | None:
+    """Return the simulation that is meant, or None for an arm."""
+    if isinstance(arm, Simulation):
+        return arm
+    if isinstance(arm, str) and arm.startswith(_SIMULATION):
+        return Simulation.load(Path(arm.removeprefix(_SIMULATION)))
+    return None
+
+
+def _begin(simulation: Simulation, transitions: str | Path | BeginStates | None) -> BeginStates:
+    if isinstance(transitions, BeginStates):
+        return transitions
+    if transitions is None:
+        raise UnusableInput(
+            "a simulation knows no begin states: give transitions=, the store of the recordings that it was fitted to"
+        )
+    with Store.open(Path(transitions)) as store:
+        return begin_states(store.blocks(), simulation.window, simulation.scaling)
+
+
+def _goals(goals: ArrayLike, joints: int) -> Any:
+    range_ = np.asarray(goals, np.float64)
+    if range_.size != 2 * joints or not np.isfinite(range_).all():
+        raise UnusableInput(f"goals= needs a lowest and a highest angle for {joints} joint(s), got {goals!r}")
+    range_ = range_.reshape(joints, 2)
+    if not (range_[:, 0] <= range_[:, 1]).all():
+        raise UnusableInput(f"goals= needs the lowest angle first, got {goals!r}")
+    return range_
+
+
+def _with_goals(simulation: Simulation, goals: ArrayLike | None) -> Simulation:
+    if goals is None:
+        return simulation
+    return replace(simulation, goal_range=_goals(goals, simulation.window.joints))

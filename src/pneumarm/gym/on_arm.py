@@ -1,0 +1,125 @@
+"""A single movement on an arm, turn by turn as the control cycle makes them."""
+
+from typing import Any, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import Space
+from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
+
+from pneumarm.arm import Arm, BeginState, Reading, guarded
+from pneumarm.arm.valves import to_valves
+from pneumarm.errors import UnusableInput
+from pneumarm.gym.spaces import action_space, observation_space, scaled_goal, sensor_ranges
+from pneumarm.learning.settings import Reward
+from pneumarm.learning.tracker import StateTracker
+from pneumarm.simulation.simulation import Scaling
+from pneumarm.transitions.window import Window
+
+Observation = NDArray[np.float32]
+
+
+class ArmPointToPoint(gymnasium.Env[Observation, Any]):
+    """The task of :func:`pneumarm.gym.point_to_point` on an arm.
+
+    Between movements the arm is brought to a random begin state at rest, which takes some five seconds of its time.
+    The pressure limit holds: switches are counted between valves as they are applied.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium wants it
+
+    def __init__(
+        self,
+        arm: Arm,
+        window: Window,
+        scaling: Scaling,
+        goals: NDArray[np.float64],
+        reward: Reward = Reward(),
+        cutoff: int = 100,
+        begin: BeginState = BeginState(),
+    ) -> None:
+        """Move ``arm`` to goals within ``goals`` (joints, 2) [counts]; it is closed with the environment."""
+        self.arm = guarded(arm)
+        self._fresh = self.arm.get_state()
+        self._goals, self._reward, self._cutoff, self._begin = goals, reward, cutoff, begin
+        self._tracker, self._scaling = StateTracker(window, scaling), scaling
+        self.action_space = action_space(window.joints)
+        space = observation_space(window, scaling, sensor_ranges(arm.spec), goals)
+        self.observation_space = cast("Space[Observation]", space)
+        self._low, self._high = space.low, space.high
+        self._closed = np.zeros((arm.spec.joints, 2), np.int8)
+        self._over = True
+        self._goal = goals.mean(axis=1)
+        self._applied: NDArray[np.int8] | None = None
+        self._reading: Reading
+        self._due = 0.0
+        self._count = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Bring the arm to a begin state; ``options={"goal": [counts]}`` chooses the goal.
+
+        The seed decides where the arm begins and the goal. An arm that can be put into a saved state is then as it
+        was when the environment was made, so that its movements repeat; no seed decides a real arm's noise.
+        """
+        super().reset(seed=seed)
+        if seed is not None and self._fresh is not None:
+            self.arm.set_state(self._fresh)
+        low, high = self._goals.T
+        goal = self.np_random.uniform(low, high)
+        if options and "goal" in options:
+            goal = np.asarray(options["goal"], np.float64).reshape(-1)
+            if goal.shape != low.shape or not ((low <= goal) & (goal <= high)).all():
+                raise UnusableInput(f"a goal needs {low.size} angle(s) in counts within {low} to {high}, got {goal}")
+        self._goal = goal
+        self._begin.reach(self.arm, self.np_random)
+        self._reading = self.arm.read()
+        self._due, self._count, self._applied, self._over = self._reading.time, 0, None, False
+        self._tracker.reset()
+        return self._observation(self._reading), {"goal": goal.copy()}
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Take ``action`` for a control period."""
+        if self._over:
+            raise ResetNeeded("the movement is over; call reset() to begin another")
+        actions = np.asarray(action)
+        if not self.action_space.contains(actions if actions.ndim else int(actions)):
+            raise UnusableInput(f"actions must be in {self.action_space}, got {action!r}")
+        applied, before = self._turn(to_valves(actions.reshape(-1))), self._reading
+        self._reading = reading = self.arm.read()
+        if reading.time - self._due > self.arm.spec.period / 2:
+            self._due = reading.time  # as the control cycle does after a lost period
+        switched = 0 if self._applied is None else int((applied != self._applied).any(axis=1).sum())
+        self._applied = applied
+        self._tracker.commanded(applied)
+        observation = self._observation(reading)
+        velocity = (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
+        self._count += 1
+        reached = self._reward.reached(reading.angle, velocity, self._goal)
+        truncated = not reached and self._count >= self._cutoff
+        self._over = reached or truncated
+        if self._over:
+            self.arm.set_valves(self._closed)
+        paid = (self._reward.goal if reached else self._reward.action) + self._reward.switch * switched
+        return observation, paid, reached, truncated, {"is_success": reached}
+
+    def _turn(self, valves: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Let a turn pass with ``valves`` (joints, 2); return them as applied."""
+        spec = self.arm.spec
+        self._due += spec.period
+        if spec.latency:
+            self.arm.wait(spec.latency)
+        self.arm.set_valves(valves)
+        self.arm.wait_until(self._due)
+        return self.arm.applied
+
+    def _observation(self, reading: Reading) -> Observation:
+        state = self._tracker.reading(reading)
+        observed = np.concatenate([state, scaled_goal(self._goal, self._scaling)]).astype(np.float32)
+        return np.clip(observed, self._low, self._high)
+
+    def close(self) -> None:
+        """Close the arm."""
+        self.arm.close()

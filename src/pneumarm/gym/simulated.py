@@ -1,0 +1,138 @@
+"""A single movement in a simulation."""
+
+from typing import Any, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import Space
+from gymnasium.error import ResetNeeded
+from gymnasium.spaces import Box
+from numba import types
+from numba.experimental import structref
+from numpy.typing import NDArray
+
+from pneumarm.errors import UnusableInput
+from pneumarm.gym.batch import act, batch, begin_movement, observe, outcome
+from pneumarm.gym.spaces import action_space, observation_space, sensor_ranges
+from pneumarm.kernels import kernel
+from pneumarm.learning.begin import BeginStates
+from pneumarm.learning.environment import environment
+from pneumarm.learning.settings import TrainSettings
+from pneumarm.random import random_state
+from pneumarm.simulation.simulation import Simulation
+from pneumarm.transitions.window import QUANTITIES
+
+Observation = NDArray[np.float32]
+
+
+@structref.register
+class _HandleType(types.StructRef):
+    """Numba's type of a :class:`_Handle`."""
+
+
+class _Handle(structref.StructRefProxy):
+    """The dozens of arrays of a movement as one reference: handing them over singly takes longer than a step."""
+
+
+structref.define_proxy(_Handle, _HandleType, ["environment", "many", "result"])
+
+
+@kernel
+def _handle(environment, many, result):  # type: ignore[no-untyped-def]
+    return _Handle(environment, many, result)
+
+
+@kernel
+def _begin(handle):  # type: ignore[no-untyped-def]
+    environment, many = handle.environment, handle.many
+    begin_movement(environment, many, 0, 0)
+    observe(environment, many, 0, handle.result.observation)
+
+
+@kernel
+def _step(handle, actions):  # type: ignore[no-untyped-def]
+    """Take ``actions`` (1, joints); return the reward, whether the goal is reached, and whether it is cut off."""
+    environment, many, result = handle.environment, handle.many, handle.result
+    act(environment, many, 0, 0, actions, result)
+    observe(environment, many, 0, result.observation)
+    return result.reward[0], result.terminated[0], result.truncated[0]
+
+
+class SimulatedPointToPoint(gymnasium.Env[Observation, Any]):
+    """The task of :func:`pneumarm.gym.point_to_point` in a simulation."""
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium wants it
+
+    def __init__(
+        self, simulation: Simulation, begin: BeginStates, settings: TrainSettings = TrainSettings(shaping=None)
+    ) -> None:
+        """Move in ``simulation`` from ``begin`` states; of ``settings`` reward, cut-off and noise are used."""
+        self.simulation = simulation
+        world = environment(simulation, begin, settings)
+        window = simulation.window
+        self._many = batch(world, 1, 1)
+        self._result = outcome(1, window.state_size + window.joints)
+        self._handle = _handle(world, self._many, self._result)
+        self._task = world.task
+        self._over = True
+        self.action_space = action_space(window.joints)
+        self.observation_space = cast("Space[Observation]", simulated_space(simulation, begin))
+        self._scalar = window.joints == 1
+        self._actions = np.zeros((1, window.joints), np.int64)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin a movement; ``options={"goal": [counts]}`` chooses its goal."""
+        first = self._np_random is None
+        super().reset(seed=seed)
+        if seed is not None:
+            self._many.random[0] = random_state(seed)
+        elif first:
+            self._many.random[0] = random_state(int(self.np_random.integers(2**63)))
+        _begin(self._handle)
+        if options and "goal" in options:
+            self._set_goal(np.asarray(options["goal"], np.float64).reshape(-1))
+        self._over = False
+        return self._result.observation[0].copy(), {"goal": self._many.goal[0].copy()}
+
+    def _set_goal(self, goal: NDArray[np.float64]) -> None:
+        low, high = self._task.goal_range.T
+        if goal.shape != low.shape or not ((low <= goal) & (goal <= high)).all():
+            raise UnusableInput(f"a goal needs {low.size} angle(s) in counts within {low} to {high}, got {goal}")
+        scaled = (goal - self._task.unit[:, 0]) / self._task.unit[:, 1]
+        place = self._task.goal_place
+        self._many.goal[0] = goal
+        self._many.x[0, place : place + goal.size] = scaled
+        self._result.observation[0, -goal.size :] = scaled
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Take ``action`` for a control period."""
+        if self._over:
+            raise ResetNeeded("the movement is over; call reset() to begin another")
+        if self._scalar:
+            # A plain number is checked in a tenth of the time that the space takes.
+            number = int(action)
+            if not 0 <= number < 9 or number != action:
+                raise UnusableInput(f"an action must be one of 0 to 8, got {action!r}")
+            self._actions[0, 0] = number
+        else:
+            if not self.action_space.contains(np.asarray(action)):
+                raise UnusableInput(f"actions must be in {self.action_space}, got {action!r}")
+            self._actions[0] = action
+        reward, terminated, truncated = _step(self._handle, self._actions)
+        self._over = terminated or truncated
+        return self._result.observation[0].copy(), reward, terminated, truncated, {"is_success": terminated}
+
+
+def simulated_space(simulation: Simulation, begin: BeginStates) -> Box:
+    """Return the space of what can be observed in ``simulation``."""
+    window, scaling = simulation.window, simulation.scaling
+    ranges = sensor_ranges(simulation.spec).reshape(window.joints, len(QUANTITIES), 2)
+    ranges[:, 2:] = simulation.pressure_range
+    recorded = begin.states[:, : window.history * window.observation_size].reshape(-1, window.observation_size)
+    raw = recorded * scaling.observation_scale + scaling.observation_offset
+    flat = ranges.reshape(-1, 2)
+    flat[:, 0] = np.minimum(flat[:, 0], raw.min(axis=0))
+    flat[:, 1] = np.maximum(flat[:, 1], raw.max(axis=0))
+    return observation_space(window, scaling, flat, simulation.goal_range)

@@ -1,0 +1,76 @@
+"""Spaces of observations and actions: the state window of thesis eq. 4.12, scaled, and the actions of every joint."""
+
+import numpy as np
+from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.valves import ACTIONS
+from pneumarm.simulation.simulation import Scaling
+from pneumarm.transitions.window import QUANTITIES, Window
+
+Array = NDArray[np.float64]
+
+_PRESSURE_MARGIN = 2.0  # a closed muscle that is moved reads over the limit, but not twice as much
+_TYPICAL_SPEED = 5.0  # counts/ms; twice the standard deviation of an arm that is moved at random
+_ROUNDING = 1e-3  # of the scaled unit; observations are float32
+_EDGE = 0.1  # of the angle's range, on either side, where no goals lie on an arm of which nothing is recorded
+
+
+def action_space(joints: int) -> Discrete | MultiDiscrete:
+    """Return the nine valve settings of each of ``joints``."""
+    return Discrete(ACTIONS) if joints == 1 else MultiDiscrete([ACTIONS] * joints)
+
+
+def nominal_scaling(spec: ArmSpec) -> Scaling:
+    """Return a scaling by the sensors' ranges, for an arm of which nothing is recorded."""
+    low, high = spec.angle_range
+    pressure = spec.max_pressure_counts / 2
+    offset, scale = (
+        [(low + high) / 2, 0.0, pressure, pressure],
+        [(high - low) / 2, _TYPICAL_SPEED, pressure, pressure],
+    )
+    joints = spec.joints
+    return Scaling(np.tile(offset, joints), np.tile(scale, joints), np.ones(2 * joints))
+
+
+def nominal_goals(spec: ArmSpec) -> Array:
+    """Return goals (joints, 2) [counts] within the inner part of the angle's range."""
+    low, high = spec.angle_range
+    edge = _EDGE * (high - low)
+    return np.tile([low + edge, high - edge], (spec.joints, 1))
+
+
+def sensor_ranges(spec: ArmSpec) -> Array:
+    """Return lowest and highest angle, velocity and pressures of each joint, shape (4 joints, 2) [sensor units]."""
+    low, high = spec.angle_range
+    fastest = (high - low) / (1e3 * spec.period)
+    most = _PRESSURE_MARGIN * spec.max_pressure_counts
+    ranges = [[low, high], [-fastest, fastest], [0.0, most], [0.0, most]]
+    return np.tile(np.array(ranges, np.float64), (spec.joints, 1))
+
+
+def observation_space(window: Window, scaling: Scaling, ranges: ArrayLike, goals: ArrayLike) -> Box:
+    """Return the space of scaled states with goals.
+
+    Args:
+        window: which observations and actions are in a state.
+        scaling: of the observations and of the goal, which is scaled as an angle is.
+        ranges: of the observations, shape (4 joints, 2) [sensor units].
+        goals: lowest and highest, shape (joints, 2) [counts].
+
+    """
+    offset, scale = scaling.observation_offset[:, None], scaling.observation_scale[:, None]
+    observed = (np.asarray(ranges, np.float64) - offset) / scale
+    commanded = np.array([[-1.0, 1.0]]) / scaling.command_scale[:, None]
+    wanted = scaled_goal(np.asarray(goals, np.float64).T, scaling).T
+    parts = [observed] * window.history + [commanded] * (window.history - 1) + [wanted]
+    bounds = np.concatenate(parts)
+    return Box((bounds[:, 0] - _ROUNDING).astype(np.float32), (bounds[:, 1] + _ROUNDING).astype(np.float32))
+
+
+def scaled_goal(goal: Array, scaling: Scaling) -> Array:
+    """Return goals (..., joints) [counts] scaled as angles are."""
+    angle = slice(None, None, len(QUANTITIES))
+    scaled: Array = (goal - scaling.observation_offset[angle]) / scaling.observation_scale[angle]
+    return scaled

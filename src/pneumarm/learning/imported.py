@@ -1,0 +1,203 @@
+"""A policy that was learned with another library on the same observations: dense layers, and the highest output wins.
+
+The file holds plain numbers, as all files here, so that nothing of that library is needed to use it. Actions are
+taken greedily; it does not go on learning on an arm.
+"""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal, Self
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.valves import ACTIONS
+from pneumarm.errors import UnusableInput
+from pneumarm.files import read_arrays, write_arrays
+from pneumarm.learning.acting import test_acting
+from pneumarm.learning.begin import BeginStates
+from pneumarm.learning.environment import environment
+from pneumarm.learning.settings import TrainSettings
+from pneumarm.learning.testing import TestResult
+from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.transitions.window import Window
+
+KIND = "pneumarm imported policy"
+Activation = Literal["tanh", "relu"]
+Array = NDArray[np.float32]
+
+_SCALING = ("observation_offset", "observation_scale", "command_scale")
+_MOST_LAYERS = 64
+
+
+class _Settings(msgspec.Struct, forbid_unknown_fields=True):
+    spec: ArmSpec
+    window: Window
+    activation: Activation
+    layers: int
+    settings: TrainSettings
+
+
+@dataclass(frozen=True)
+class ImportedPolicy:
+    """Dense layers from the scaled state with the goal (thesis eq. 4.12) to a value for each action of each joint."""
+
+    spec: ArmSpec
+    window: Window
+    scaling: Scaling
+    goal_range: NDArray[np.float64]
+    """Goals that it has learned to reach, shape (joints, 2) [counts]."""
+    layers: tuple[tuple[Array, Array], ...]
+    """Weights (inputs, outputs) and biases (outputs,); the last has 9 outputs a joint."""
+    activation: Activation = "tanh"
+    """Between the layers."""
+    settings: TrainSettings = field(default_factory=TrainSettings)
+    """Of these the reward, the cut-off and the noise of a test are used: nothing is trained here."""
+
+    def __post_init__(self) -> None:
+        sizes = [self.window.state_size + self.window.joints]
+        for weights, bias in self.layers:
+            if weights.shape != (sizes[-1], bias.size):
+                raise UnusableInput(
+                    f"a layer of {weights.shape} with {bias.size} biases does not fit to {sizes[-1]} inputs"
+                )
+            sizes.append(bias.size)
+        if len(sizes) == 1 or sizes[-1] != ACTIONS * self.window.joints:
+            raise UnusableInput(f"a policy needs {ACTIONS} outputs a joint, this one has {sizes[-1]}")
+
+    @property
+    def learns(self) -> bool:
+        """It does not learn on an arm."""
+        return False
+
+    def values(self, inputs: ArrayLike) -> Array:
+        """Return a value for each action (..., joints, 9) of states with goals ``inputs`` (..., inputs)."""
+        x = np.asarray(inputs, np.float32)
+        for number, (weights, bias) in enumerate(self.layers):
+            x = x @ weights + bias
+            if number < len(self.layers) - 1:
+                x = np.tanh(x) if self.activation == "tanh" else np.maximum(x, np.float32(0))
+        values: Array = x.reshape(*x.shape[:-1], self.window.joints, ACTIONS)
+        return values
+
+    def weights(self) -> Array:
+        """Return a copy of all weights, one after the other."""
+        return np.concatenate([part.ravel() for layer in self.layers for part in layer])
+
+    def with_weights(self, weights: Array) -> Self:
+        """Return the policy with other ``weights``, as of :meth:`weights`.
+
+        Raises:
+            UnusableInput: not as many as it has.
+
+        """
+        sizes = np.cumsum([part.size for layer in self.layers for part in layer])
+        if weights.shape != (sizes[-1],):
+            raise UnusableInput(f"expected {sizes[-1]} weights, got {weights.shape}")
+        parts = iter(np.split(weights.astype(np.float32), sizes[:-1]))
+        layers = tuple((next(parts).reshape(w.shape), next(parts).copy()) for w, _ in self.layers)
+        return replace(self, layers=layers)
+
+    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> "ImportedActor":
+        """Return it acting greedily; it neither learns nor explores, whatever is asked."""
+        return ImportedActor(self)
+
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> TestResult:
+        """Let it move in ``simulation``; ``seed`` decides begin states and goals."""
+        return test_acting(self.actor(), environment(simulation, begin, self.settings), episodes, seed)
+
+    def save(self, path: Path) -> None:
+        """Write it to ``path``, whole or not at all.
+
+        Raises:
+            UnusableInput: ``path`` cannot be written.
+
+        """
+        settings = _Settings(self.spec, self.window, self.activation, len(self.layers), self.settings)
+        arrays: dict[str, NDArray[np.floating]] = {name: getattr(self.scaling, name) for name in _SCALING}
+        arrays["goal_range"] = self.goal_range
+        for number, (weights, bias) in enumerate(self.layers):
+            arrays[f"weights_{number}"], arrays[f"bias_{number}"] = weights, bias
+        write_arrays(path, KIND, msgspec.to_builtins(settings), arrays)
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Return the policy in ``path``.
+
+        Raises:
+            UnusableInput: ``path`` is no such policy, is damaged, or does not fit together.
+
+        """
+        read, arrays = read_arrays(path, KIND)
+        try:
+            known = msgspec.convert(read, _Settings)
+            joints, size = known.window.joints, known.window.observation_size
+            if known.spec.joints != joints or not 1 <= known.layers <= _MOST_LAYERS:
+                raise UnusableInput(f"{known.layers} layers for {joints} of {known.spec.joints} joints are no policy")
+            expected = {"goal_range": (joints, 2), "command_scale": (2 * joints,)}
+            expected |= {"observation_offset": (size,), "observation_scale": (size,)}
+            for name, shape in expected.items():
+                if arrays[name].shape != shape or arrays[name].dtype != np.float64:
+                    raise UnusableInput(f"{name} must be {shape} of float64, it is {arrays[name].shape}")
+            if not all((arrays[name] > 0).all() for name in ("observation_scale", "command_scale")):
+                raise UnusableInput("scales must be positive")
+            layers = tuple(
+                (_layer(arrays, "weights", k, 2), _layer(arrays, "bias", k, 1)) for k in range(known.layers)
+            )
+            scaling = Scaling(*(arrays[name] for name in _SCALING))
+            return cls(
+                known.spec, known.window, scaling, arrays["goal_range"], layers, known.activation, known.settings
+            )
+        except (msgspec.ValidationError, UnusableInput, KeyError) as error:
+            raise UnusableInput(f"{path}: expected an imported policy; {error}") from error
+
+
+def _layer(arrays: dict[str, NDArray[np.generic]], name: str, number: int, dimensions: int) -> Array:
+    array = arrays[f"{name}_{number}"]
+    if array.ndim != dimensions or array.dtype != np.float32:
+        raise UnusableInput(f"{name}_{number} must have {dimensions} dimensions of float32")
+    return array.astype(np.float32)
+
+
+class ImportedActor:
+    """An :class:`ImportedPolicy` acting step by step, greedily."""
+
+    def __init__(self, policy: ImportedPolicy) -> None:
+        self._policy = policy
+        self._inputs = np.zeros(policy.window.state_size + policy.window.joints, np.float32)
+
+    def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
+        """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
+        scaling = self._policy.scaling
+        angles = slice(None, None, 4)
+        scaled = (np.asarray(goal) - scaling.observation_offset[angles]) / scaling.observation_scale[angles]
+        self._inputs[self._policy.window.state_size :] = scaled
+        self.follow(state)
+
+    def act(self) -> NDArray[np.int64]:
+        """Return the actions (joints,) of the current state."""
+        actions: NDArray[np.int64] = self._policy.values(self._inputs).argmax(axis=-1)
+        return actions
+
+    def follow(self, next_state: ArrayLike) -> None:
+        """Go on in ``next_state``."""
+        self._inputs[: self._policy.window.state_size] = next_state
+
+    def observe(self, reward: ArrayLike, next_state: ArrayLike, terminal: bool) -> None:
+        """Go on in ``next_state``; nothing is learned."""
+        self.follow(next_state)
+
+    def weights(self) -> Array:
+        """Return a copy of the weights."""
+        return self._policy.weights()
+
+    def get_state(self) -> bytes:
+        """Return nothing: between movements there is nothing to remember."""
+        return b""
+
+    def set_state(self, state: bytes) -> None:
+        """Take up a state of :meth:`get_state`."""
+        if state:
+            raise UnusableInput("this state is not of an imported policy")

@@ -112,7 +112,6 @@ def test_files_of_another_kind_are_refused(
         ("train", text, store, "--out", out),
         ("train", sim, text, "--out", out),
         ("train", agent, store, "--out", out),
-        ("test", sim, sim, store),
         ("test", agent, agent, store),
         ("transfer", text, "--arm", "virtual", "--out", out),
         ("report", text),
@@ -222,6 +221,17 @@ def test_json_is_one_object_on_stdout_and_nothing_else(
     asked("analyse", store, sim, "--out", tmp_path / "quality")
     assert (tmp_path / "quality" / "analysis.html").exists()
     asked("collect", "simulation:" + str(sim), tmp_path / "s.db", "--transitions", 2000)
+
+
+def test_the_file_of_a_simulation_is_an_agent_that_plans_in_it(
+    capsys: pytest.CaptureFixture[str], store: Path, sim: Path, tmp_path: Path
+) -> None:
+    tested = Outcome(capsys, "test", sim, sim, store, "--episodes", 20, "--json")
+    assert json.loads(tested.out)["success_rate"] > 0.5
+    out = ("--out", tmp_path / "t", "--episodes", 0, "--test-episodes", 3)
+    assert (
+        json.loads(Outcome(capsys, "transfer", sim, "--arm", "virtual:seed=3", *out, "--json").out)["episodes"] == 0
+    )
 
 
 def blocks(language: str) -> Iterator[str]:

@@ -12,6 +12,6 @@ __version__ = "0.1.0"
 def load_controller(agent: str | Path) -> "AgentController":
     """Return the greedy controller in the file ``agent``: ``reset(goal)``, then ``act(reading) -> valves``."""
     from pneumarm.control.agent import AgentController
-    from pneumarm.learning import load_agent
+    from pneumarm.control.open_agent import open_agent
 
-    return AgentController(load_agent(Path(agent)))
+    return AgentController(open_agent(Path(agent)))

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from pneumarm.commands.common import Json
 from pneumarm.console import show, table
-from pneumarm.learning import begin_states, load_agent
+from pneumarm.control import open_agent
+from pneumarm.learning import begin_states
 from pneumarm.learning import test as test_agent
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
@@ -28,7 +29,7 @@ def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: 
     json
         Print one JSON object on stdout and nothing else there.
     """
-    trained, simulation = load_agent(agent), Simulation.load(sim)
+    trained, simulation = open_agent(agent), Simulation.load(sim)
     with Store.open(db) as store:
         begin = begin_states(store, simulation.window, simulation.scaling)
     tested = test_agent(trained, simulation, begin, episodes, seed)

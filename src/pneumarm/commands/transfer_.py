@@ -6,8 +6,7 @@ from typing import Annotated
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
-from pneumarm.control import TransferSettings, transfer_into
-from pneumarm.learning import load_agent
+from pneumarm.control import TransferSettings, open_agent, transfer_into
 
 
 def transfer_(
@@ -35,7 +34,7 @@ def transfer_(
     json
         Print one JSON object on stdout and nothing else there.
     """
-    trained = load_agent(agent)
+    trained = open_agent(agent)
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
         result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
     say(f"adapted agent: {out / 'adapted.safetensors'}")

@@ -3,6 +3,7 @@
 from pneumarm.control.agent import AgentController
 from pneumarm.control.bound import BoundSettings, Planned, measure_bound
 from pneumarm.control.movement import LearningController, Movement, move
+from pneumarm.control.open_agent import open_agent
 from pneumarm.control.plan_agent import PlanAgent
 from pneumarm.control.planner import PhysicsModel, Planner, SimulationModel, physics_planner, simulated_planner
 from pneumarm.control.players import open_controller
@@ -34,6 +35,7 @@ __all__ = [
     "Transferred",
     "measure_bound",
     "move",
+    "open_agent",
     "open_controller",
     "physics_planner",
     "simulated_planner",

@@ -9,9 +9,9 @@ import numpy as np
 
 from pneumarm.arm import Arm, Controller
 from pneumarm.control.agent import AgentController
+from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Agent
 from pneumarm.transitions import Keyboard, Trajectory
 
 
@@ -34,7 +34,7 @@ def open_controller(name: str, arm: Arm) -> Iterator[Controller | None]:
     elif name.endswith(".csv"):
         yield read_trajectory(Path(name), arm.spec.joints)
     else:
-        agent = Agent.load(Path(name))
+        agent = open_agent(Path(name))
         check_fit(agent, arm)
         yield AgentController(agent)
 

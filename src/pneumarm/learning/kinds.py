@@ -24,6 +24,8 @@ from pneumarm.learning.fleet.agent import PolicyAgent
 from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
 from pneumarm.learning.fleet.training import FleetTraining, train_policy
 from pneumarm.learning.fleet.value_training import train_batched
+from pneumarm.learning.imported import KIND as IMPORTED
+from pneumarm.learning.imported import ImportedPolicy
 from pneumarm.learning.settings import TrainSettings, check
 from pneumarm.learning.testing import TEST, TestResult
 from pneumarm.learning.training import Progress, Training
@@ -145,6 +147,8 @@ def load_agent(path: Path) -> AnyAgent:
         return PolicyAgent.load(path)
     if kind == ACTION_VALUES:
         return Agent.load(path)
+    if kind == IMPORTED:
+        return ImportedPolicy.load(path)
     raise UnusableInput(f"{path}: expected an agent written by pneumarm train, its kind is {kind!r}")
 
 

@@ -26,7 +26,7 @@ from pneumarm.transitions.window import QUANTITIES, Transitions, Window
 
 Velocity = Literal["derived", "network"]
 
-_KIND = "pneumarm simulation 1"
+KIND = "pneumarm simulation 1"
 _ANGLE, _VELOCITY = QUANTITIES.index("angle"), QUANTITIES.index("velocity")
 
 
@@ -135,7 +135,7 @@ class Simulation:
 
         """
         header, arrays = self.parts()
-        write_arrays(Path(path), _KIND, header, arrays)
+        write_arrays(Path(path), KIND, header, arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -146,7 +146,7 @@ class Simulation:
 
         """
         path = Path(path)
-        settings, arrays = read_arrays(path, _KIND)
+        settings, arrays = read_arrays(path, KIND)
         try:
             return cls.of_parts(settings, arrays)
         except (msgspec.ValidationError, UnusableInput, ValueError, KeyError) as error:

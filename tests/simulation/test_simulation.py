@@ -14,7 +14,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.networks import Network
 from pneumarm.simulation import FitResult, Scaling, Simulation
-from pneumarm.simulation.simulation import _KIND
+from pneumarm.simulation.simulation import KIND
 from pneumarm.transitions.window import Transitions, Window
 
 Fitted = tuple[FitResult, Transitions]
@@ -120,13 +120,13 @@ def file(tmp_path: Path) -> Path:
 
 
 def change_settings(path: Path, **changes: Any) -> None:
-    settings, arrays = read_arrays(path, _KIND)
-    write_arrays(path, _KIND, {**settings, **changes}, arrays)
+    settings, arrays = read_arrays(path, KIND)
+    write_arrays(path, KIND, {**settings, **changes}, arrays)
 
 
 def change_array(path: Path, name: str, array: NDArray[Any]) -> None:
-    settings, arrays = read_arrays(path, _KIND)
-    write_arrays(path, _KIND, settings, {**arrays, name: array})
+    settings, arrays = read_arrays(path, KIND)
+    write_arrays(path, KIND, settings, {**arrays, name: array})
 
 
 @pytest.mark.parametrize(

@@ -128,6 +128,8 @@ def spread_of_agents(reward: Array, success: Array, chosen: int) -> Figure:
         place.margins(y=0.15)
     if len(order):
         axes[0, 0].legend(loc="lower left")
+    if len(order):
+        axes[0, 1].set_ylim(top=100.5)  # there is nothing above 100 %, and a mark at it is seen whole
     return figure
 
 

@@ -95,7 +95,7 @@ def measure() -> Iterator[str]:
     for change, found in gains.items():
         gain, reached = np.mean(found, axis=0)
         lowest = min(one[0] for one in found)
-        yield f"{change}: gain {gain:+.2f} (of an arm {lowest:+.2f} at least), on goals within the reach {reached:+.2f}"
+        yield f"{change}: gain {gain:+.2f} (of an arm at least {lowest:+.2f}), on goals within reach {reached:+.2f}"
 
 
 def trained(folder: Path, arm: int) -> AnyAgent:
@@ -115,7 +115,12 @@ def adapted(agent: AnyAgent, arm: int, change: str, settings: TransferSettings) 
     low, high = np.minimum(low, lowest), np.maximum(high, highest)
     before, last, after, unadapted = (
         rewards(phase)
-        for phase in (moved.phase("before"), moved.phase("learning")[-100:], moved.phase("after"), fixed.phase("after"))
+        for phase in (
+            moved.phase("before"),
+            moved.phase("learning")[-100:],
+            moved.phase("after"),
+            fixed.phase("after"),
+        )
     )
     inside = np.array([bool(np.all((low <= one.goal) & (one.goal <= high))) for one in moved.phase("after")])
     gained = after - unadapted

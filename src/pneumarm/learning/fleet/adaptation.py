@@ -96,7 +96,9 @@ class Adaptation:
         With too few rows for the fit to be determined, nothing happens.
         """
         self.tried = movements
-        simulation = adapted_simulation(self.agent.simulation, self._origin.simulation, rows, self._settings, self._seed)
+        simulation = adapted_simulation(
+            self.agent.simulation, self._origin.simulation, rows, self._settings, self._seed
+        )
         if simulation is None:
             return
         self.accepted += 1
@@ -182,12 +184,13 @@ def adapted_simulation(
 def adapted_policy(
     agent: PolicyAgent, simulation: Simulation, begin: BeginStates, settings: AdaptationSettings, seed: int
 ) -> NDArray[np.float32]:
-    """Return the weights of the policy of ``agent`` after learning in ``simulation``, or as they were if better there."""
-    rates = {"updates": settings.warm_up + settings.updates, "learning_rate": settings.learning_rate}
-    learner = _Tuner(simulation, begin, replace(agent.settings, **rates), seed, settings.warm_up)
+    """Return the weights of ``agent`` after learning in ``simulation``, or as they were where those are better."""
+    updates = settings.warm_up + settings.updates
+    tuned = replace(agent.settings, updates=updates, learning_rate=settings.learning_rate)
+    learner = _Tuner(simulation, begin, tuned, seed, settings.warm_up)
     learner.policy.flat[:] = agent.policy
     before = learner.validate(agent.settings.validation_episodes).reward.mean()
-    learner.learn(settings.warm_up + settings.updates)
+    learner.learn(updates)
     after = learner.validate(agent.settings.validation_episodes).reward.mean()
     return learner.policy.flat if after > before else agent.policy
 
@@ -226,7 +229,7 @@ def rehearse(origin: Simulation, known: Transitions, count: int, random: np.rand
     for _ in range(_REHEARSED_STEPS):
         drawn = random.integers(len(VALVES), size=actions.shape)
         actions = np.where(random.random(actions.shape) < _SWITCHES, drawn, actions)
-        command = VALVES[actions].reshape(lanes, -1).astype(np.float32)
+        command = VALVES[actions].reshape(lanes, window.command_size).astype(np.float32)
         inputs.append(np.concatenate([sigma, command], axis=1))
         target.append(origin.predict(inputs[-1]).astype(np.float32))
         observed, commanded = sigma[:, : window.history * size], sigma[:, window.history * size :]
@@ -276,4 +279,4 @@ def _last_sequences(rows: Rows, count: int) -> Rows:
 
 
 def _part(found: Transitions, chosen: NDArray[np.bool_]) -> Transitions:
-    return Transitions(*(values[chosen] for values in found))
+    return Transitions(**{name: values[chosen] for name, values in found._asdict().items()})

@@ -9,6 +9,7 @@ PNEUMARM_ADAPTATION_ARMS       seeds of virtual arms, "1,2,3,4,5" by default; th
 PNEUMARM_ADAPTATION_CHANGES    names from CHANGES; all by default
 PNEUMARM_ADAPTATION_MOVEMENTS  movements while learning, 300
 PNEUMARM_ADAPTATION_TESTS      movements before and after, 200
+PNEUMARM_ADAPTATION_SEED       added to the seeds of begin states and goals, 0
 PNEUMARM_ADAPTATION_FOLDER     where stores, simulations and agents are kept; a temporary folder by default
 """
 
@@ -145,7 +146,9 @@ def moved_on(
             BEGIN.reach(guarded(opened), random)
         opened.rest(NIGHT)
     with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", opened.spec) as store:
-        moved = transfer(agent, opened, store, settings, seed=arm)
+        moved = transfer(
+            agent, opened, store, settings, seed=arm + int(os.environ.get("PNEUMARM_ADAPTATION_SEED", "0"))
+        )
         angles = np.concatenate([rows.angle for rows in store.blocks()])
     return moved, angles.min(axis=0), angles.max(axis=0)
 

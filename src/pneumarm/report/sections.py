@@ -319,8 +319,8 @@ def transferred(data: TransferData, test: Episodes | None) -> Section:
     return Section(
         "Transfer to the arm",
         (
-            f"The controller on the arm: first as it arrives, then {learning}, then as it has become. The step between "
-            "the dashed line and the first phase is the reality gap.",
+            f"The controller on the arm: first as it arrives, then {learning}, then as it has become. The step "
+            "between the dashed line and the first phase is the reality gap.",
         ),
         (
             Picture(

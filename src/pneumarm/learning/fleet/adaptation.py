@@ -9,7 +9,7 @@ these a fit to a policy's movements, which use few of the actions, forgets the r
 forgetting, rehearsal and pseudorehearsal", Connection Science 7(2), 1995).
 
 The newest movements of all are kept out of the fit. They decide whether it is an improvement, and how much noise the
-simulation gets. So an arm that is as it was keeps the agent that it has.
+simulation gets. So an agent whose simulation cannot be improved stays as it is.
 """
 
 import math

@@ -1,6 +1,7 @@
 """Transfer: resumable, comparable, and the adapted agent is what was averaged."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,9 @@ from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import TransferSettings, transfer, transfer_into
 from pneumarm.errors import ArmFailure, UnusableInput
-from pneumarm.learning import Agent
-from pneumarm.transitions import Store
+from pneumarm.learning import AdaptationSettings, Agent, AnyAgent, PolicySettings, begin_states, train
+from pneumarm.simulation import Simulation
+from pneumarm.transitions import KINDS, Store
 
 SHORT = TransferSettings(episodes=12, test_episodes=6)
 
@@ -46,6 +48,62 @@ def test_a_transfer_that_failed_goes_on_as_if_nothing_had_happened(agent: Agent,
     assert transfer_into(folder, agent, Interrupted(seed=3), SHORT, seed=1) == whole
     for name in ("episodes.csv", "adapted.safetensors"):
         assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+@pytest.fixture(scope="module")
+def policy(small_run: Path) -> AnyAgent:
+    settings = PolicySettings(
+        agents=1, updates=10, arms=32, steps=16, hidden=(8,), validation_episodes=50, lookahead=8
+    )
+    simulation = Simulation.load(small_run / "simulation.safetensors")
+    with Store.open(small_run / "transitions.db") as store:
+        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+    return train(simulation, begin, settings).agent
+
+
+POLICY = TransferSettings(
+    episodes=12, test_episodes=60, adaptation=AdaptationSettings(every=4, judged=0.1, updates=2, warm_up=1)
+)
+
+
+def test_a_policy_that_was_interrupted_while_adapting_goes_on_as_if_nothing_had_happened(
+    policy: AnyAgent, tmp_path: Path
+) -> None:
+    (tmp_path / "whole").mkdir()
+    whole = transfer_into(tmp_path / "whole", policy, VirtualArm(seed=4), POLICY, seed=1)
+    assert whole["adaptations"] > 0
+    folder, readings = tmp_path / "broken", 0
+    for _ in range(50):
+        arm = Interrupted(seed=4)
+        arm.left = 400 + readings
+        readings += 150
+        try:
+            result = transfer_into(folder, policy, arm, POLICY, seed=1)
+            break
+        except ArmFailure:
+            continue
+    assert readings > 300  # it was interrupted
+    assert result == whole
+    for name in ("episodes.csv", "adapted.safetensors"):
+        assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    assert (folder / "adapted.safetensors").read_bytes() != _saved(policy, tmp_path)
+
+
+def _saved(agent: AnyAgent, folder: Path) -> bytes:
+    agent.save(folder / "agent")
+    return (folder / "agent").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [replace(POLICY, learning_rate=0.0), replace(POLICY, adaptation=AdaptationSettings(every=0))],
+)
+def test_a_policy_that_is_not_to_adapt_stays_as_it_is(
+    policy: AnyAgent, tmp_path: Path, settings: TransferSettings
+) -> None:
+    result = transfer_into(tmp_path / "t", policy, VirtualArm(seed=4), replace(settings, test_episodes=40), seed=1)
+    assert result["adaptations"] == 0
+    assert (tmp_path / "t" / "adapted.safetensors").read_bytes() == _saved(policy, tmp_path)
 
 
 def test_learning_changes_the_agent_and_not_learning_does_not(agent: Agent, tmp_path: Path) -> None:

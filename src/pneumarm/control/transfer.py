@@ -4,7 +4,7 @@ import csv
 import hashlib
 import io
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,9 +16,10 @@ from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import Movement, move
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder, write_text
-from pneumarm.learning import AnyAgent
+from pneumarm.learning import AdaptationSettings, AnyAgent, adaptation
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
+from pneumarm.transitions.rows import joined
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
@@ -44,6 +45,8 @@ class TransferSettings:
     A difference from the thesis, which keeps the last weights (0 does): with a constant learning rate they go on
     fluctuating, and where they happen to stand at the end decides how good the agent is (B. T. Polyak and
     A. B. Juditsky, "Acceleration of stochastic approximation by averaging", SIAM J. Control Optim. 30, 1992)."""
+    adaptation: AdaptationSettings = field(default_factory=AdaptationSettings)
+    """How a policy adapts between movements; with a learning rate of 0 it does not."""
     close_while_computing: bool = False
     """Close the valves between reading and acting (thesis figure 2.8: left as they are)."""
 
@@ -125,6 +128,8 @@ class Transferred:
     agent: AnyAgent
     """The agent as it is after learning."""
     learning_rate: float
+    adaptations: int = 0
+    """How often a policy has adapted, see :class:`~pneumarm.learning.Adaptation`."""
 
     def phase(self, phase: Phase) -> list[Episode]:
         """Return the movements of a phase."""
@@ -137,6 +142,7 @@ class Transferred:
             "after": summary(self.phase("after")),
             "episodes": len(self.phase("learning")),
             "learning_rate": self.learning_rate,
+            "adaptations": self.adaptations,
         }
 
 
@@ -168,26 +174,48 @@ def transfer(
     rate = settings.learning_rate if agent.learns else 0.0
     learner = agent.actor(rate, explores=agent.learns, seed=seed)
     mean = _Mean(agent)
+    adapting = adaptation(agent, settings.adaptation, seed) if settings.learning_rate > 0 else None
     if done:
         learner.set_state(store.state("learner") or learner.get_state())
         mean.set_state(store.state("mean") or mean.get_state())
+        if adapting is not None:
+            adapting.set_state(store.state("adaptation") or adapting.get_state())
     total = sum(settings.movements(phase) for phase in PHASES)
     cycle = ControlCycle(guarded(arm), settings.close_while_computing)
     waiting: list[tuple[Episode, Movement]] = []
 
     def keep() -> None:
         state = {"learner": learner.get_state(), "mean": mean.get_state(), "arm": arm.get_state()}
+        if adapting is not None:
+            state["adaptation"] = adapting.get_state()
         recorded = [replace(m.recorded, info=asdict(episode)) for episode, m in waiting]
         store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
         waiting.clear()
+
+    def adapt(movements: int) -> bool:
+        """Let the agent adapt where that is due after so many movements while learning; whether it was."""
+        if adapting is None or not adapting.is_due(movements):
+            return False
+        keep()  # it learns from what is stored, so that an interruption changes nothing
+        made = [entry.number for entry in store.catalogue(number)][-settings.adaptation.newest :]
+        adapting.learn(joined(store.blocks(sequences=lambda numbers: np.isin(numbers, made))), movements)
+        return True
+
+    def shown() -> AnyAgent:
+        if adapting is not None:
+            return adapting.agent
+        return mean.agent if mean.count else agent.with_weights(learner.weights())
 
     try:
         for phase in PHASES:
             count = settings.movements(phase)
             greedy = phase != "learning"
-            shown = mean.agent if mean.count else agent.with_weights(learner.weights())
-            controller = AgentController(agent, shown.actor() if greedy else learner)
+            if phase == "after" and settings.episodes > 0:
+                adapt(settings.episodes)
+            controller = AgentController(agent, learner if not greedy and adapting is None else shown().actor())
             for i in range(sum(e.phase == phase for e in done), count):
+                if phase == "learning" and adapt(i):
+                    controller = AgentController(agent, shown().actor())
                 random, goal = begin_and_goal(agent, seed, greedy, i)
                 BEGIN.reach(cycle.arm, random)
                 movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
@@ -207,8 +235,7 @@ def transfer(
             f"{arm.spec.name}: failed in movement {len(done) + 1} ({type(error).__name__}: {error}); "
             "see to the arm and run the same command again"
         ) from error
-    adapted = mean.agent if mean.count else agent.with_weights(learner.weights())
-    return Transferred(done, adapted, rate)
+    return Transferred(done, shown(), rate, 0 if adapting is None else adapting.accepted)
 
 
 class _Mean:

@@ -2,6 +2,7 @@
 
 from pneumarm.learning.agent import Agent
 from pneumarm.learning.begin import BeginStates, begin_states
+from pneumarm.learning.fleet.adaptation import Adaptation, AdaptationSettings
 from pneumarm.learning.fleet.agent import PolicyAgent
 from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
 from pneumarm.learning.fleet.side_by_side import FLEET_CURVES
@@ -14,6 +15,7 @@ from pneumarm.learning.kinds import (
     Method,
     Settings,
     Trained,
+    adaptation,
     load_agent,
     test,
     train,
@@ -29,6 +31,8 @@ __all__ = [
     "FLEET_CURVES",
     "METHODS",
     "Actor",
+    "Adaptation",
+    "AdaptationSettings",
     "Agent",
     "AnyAgent",
     "BatchedSettings",
@@ -49,6 +53,7 @@ __all__ = [
     "TrainSettings",
     "Trained",
     "Training",
+    "adaptation",
     "begin_states",
     "load_agent",
     "test",

@@ -19,6 +19,7 @@ from pneumarm.learning.agent import KIND as ACTION_VALUES
 from pneumarm.learning.agent import Agent
 from pneumarm.learning.begin import BeginStates
 from pneumarm.learning.environment import TaskSettings
+from pneumarm.learning.fleet.adaptation import Adaptation, AdaptationSettings, can_adapt
 from pneumarm.learning.fleet.agent import KIND as POLICY
 from pneumarm.learning.fleet.agent import PolicyAgent
 from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
@@ -133,6 +134,12 @@ class AnyAgent(Protocol):
 
     def save(self, path: Path) -> None:
         """Write it to ``path``, whole or not at all."""
+
+
+def adaptation(agent: AnyAgent, settings: AdaptationSettings, seed: int = 0) -> Adaptation | None:
+    """Return how ``agent`` adapts to an arm between movements; None for kinds that do not, or learn while moving."""
+    adapts = isinstance(agent, PolicyAgent) and settings.every > 0 and can_adapt(agent)
+    return Adaptation(agent, settings, seed) if isinstance(agent, PolicyAgent) and adapts else None
 
 
 def load_agent(path: Path) -> AnyAgent:

@@ -287,6 +287,8 @@ class TransferData:
     after: Episodes
     """Greedy, after adaptation."""
     learning_rate: float = 0.0
+    adaptations: int = 0
+    """How often a policy adapted to the arm."""
 
     @property
     def phases(self) -> dict[str, Episodes]:

@@ -104,7 +104,9 @@ def _read_transfer(path: Path, results: dict[str, Any]) -> TransferData | None:
     phases = read_episodes(path)
     joints = next(iter(phases.values())).goal.shape[1] if phases else 1
     before, learning, after = (phases.get(name) or Episodes.none(joints) for name in ("before", "learning", "after"))
-    return TransferData(before, learning, after, float(results.get("transfer", {}).get("learning_rate", 0.0)))
+    found = results.get("transfer", {})
+    rate, adaptations = float(found.get("learning_rate", 0.0)), int(found.get("adaptations", 0))
+    return TransferData(before, learning, after, rate, adaptations)
 
 
 def _read_spec(path: Path) -> ArmSpec:

@@ -313,12 +313,14 @@ def transferred(data: TransferData, test: Episodes | None) -> Section:
     """Return the curves of the transfer."""
     phases = phases_of(data)
     reference = levels(test) if test is not None else {}
+    learning = f"learning with a rate of {data.learning_rate:g}"
+    if data.adaptations:
+        learning = f"adapting between movements ({data.adaptations} time(s) the arm was found to differ)"
     return Section(
         "Transfer to the arm",
         (
-            "The controller on the arm: first as it arrives, then learning with a rate of "
-            f"{data.learning_rate:g}, then as it has become. The step between the dashed line and the first phase is "
-            "the reality gap.",
+            f"The controller on the arm: first as it arrives, then {learning}, then as it has become. The step "
+            "between the dashed line and the first phase is the reality gap.",
         ),
         (
             Picture(

@@ -1,7 +1,7 @@
 """Rows of the store as arrays: what was measured, raw, and what was commanded, in order of time."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,12 @@ class Rows:
 
     def __len__(self) -> int:
         return len(self.sequence)
+
+
+def joined(blocks: Iterable[Rows]) -> Rows:
+    """Return ``blocks``, at least one, as a single one."""
+    parts = list(blocks)
+    return Rows(**{one.name: np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Rows)})
 
 
 @dataclass(frozen=True)

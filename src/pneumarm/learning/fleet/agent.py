@@ -79,7 +79,7 @@ class PolicyAgent:
 
     @property
     def learns(self) -> bool:
-        """It does not learn on an arm."""
+        """It does not learn while it moves an arm; between movements it can adapt."""
         return False
 
     def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> PolicyActor:

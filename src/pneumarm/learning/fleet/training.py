@@ -136,9 +136,13 @@ class PolicyLearner(Learner):
         """Act for a batch of steps and learn from them."""
         now, counts, (environment, limits, inputs) = self._rule, self.counts, self.mind[:3]
         seen: tuple[int, int, float] = collect(environment, limits, inputs, now, self.policy, self.fleet, self._batch)
-        rate = self._settings.learning_rate * (1 - counts[0] / self._settings.updates)
-        counts[1] = improve(now, self.policy, self.value, self._batch, (rate, rate), counts[1], self.random)
+        counts[1] = improve(now, self.policy, self.value, self._batch, self.rates(), counts[1], self.random)
         return seen
+
+    def rates(self) -> tuple[float, float]:
+        """Return the learning rates of policy and values."""
+        rate = self._settings.learning_rate * (1 - self.counts[0] / self._settings.updates)
+        return rate, rate
 
     def validate(self, episodes: int) -> TestResult:
         """Return greedy movements, without lookahead."""

@@ -35,6 +35,7 @@ from pneumarm.simulation.simulation import Simulation
 _WEIGHTS, _TRAINING, _VALIDATION = 0, 1, 2  # streams of random numbers
 _CHECKPOINT = "pneumarm training"
 _CHECKPOINT_EVERY = 2.0  # s
+_CACHE_LINE = 128  # bytes; processors that fetch lines in pairs need two of 64
 _CHUNK_WITHOUT_SHAPING = 500  # episodes
 CURVES = ("episodes", "deviation", "criterium", "performance", "epsilon", "temperature")
 """Columns of the training curves."""
@@ -210,13 +211,16 @@ def _chunk(
     now = stage(agents.deviation[a], settings, simulation.spec)
     most = settings.shaping.episodes if settings.shaping else _CHUNK_WITHOUT_SHAPING
     count = min(most, settings.max_episodes - int(agents.episodes[a]))
-    one = episode(env, agents.random[a])
-    worker = learner(agents.weights[a], settings)
+    # What threads write must not lie on a cache line together, or each slows the other down.
+    one = _apart(episode(env, agents.random[a]))
+    worker = _apart(learner(agents.weights[a], settings))
+    remembered = _apart(room(one))
     began = time.thread_time()
     performance, steps = train_episodes(
-        env, worker, now.schedule, one, room(one), count, float(agents.performance[a])
+        env, worker, now.schedule, one, remembered, count, float(agents.performance[a])
     )
     spent = time.thread_time() - began
+    agents.random[a], agents.weights[a] = one.state.random, worker.weights
     agents.performance[a] = performance
     agents.episodes[a] += count
     agents.steps[a] += steps
@@ -224,6 +228,19 @@ def _chunk(
     row = [agents.episodes[a], agents.deviation[a], now.criterium, performance, *now.schedule[1:3]]
     agents.deviation[a] = adjusted(agents.deviation[a], performance, settings, simulation.spec)
     return row, spent
+
+
+def _apart(value: Any) -> Any:
+    """Return a copy of ``value``, an array or named tuples of them, each with a cache line of nothing around it."""
+    if isinstance(value, tuple):
+        return type(value)(*(_apart(part) for part in value))
+    if not isinstance(value, np.ndarray):
+        return value
+    line = _CACHE_LINE // value.itemsize
+    spacious = np.zeros(value.size + 2 * line, value.dtype)
+    copy = spacious[line : line + value.size].reshape(value.shape)
+    copy[...] = value
+    return copy
 
 
 def _validate(env: Environment, agents: _Agents, settings: TrainSettings, seed: int, a: int) -> TestResult:

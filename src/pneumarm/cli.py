@@ -89,7 +89,7 @@ def _run(arguments: list[str]) -> int:
         complain(error)
         return error.exit_code
     except KeyboardInterrupt:
-        complain("interrupted; the same command goes on where it was")
+        complain("interrupted; run, collect and transfer go on where they were when called again")
         return 1
     except BrokenPipeError:
         sys.stderr.close()

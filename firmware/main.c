@@ -1,0 +1,43 @@
+/* The microcontroller's program: it measures, it holds the valves, and it vents where it must. See PROTOCOL.md.
+ *
+ * Three things go on at once. The converter's interrupt samples all sensors and cuts over-pressure off. The tick, once
+ * a millisecond, looks after the dead-man and the converter. The main loop answers the host; nothing that
+ * protects the arm waits for it, and if it hangs the watchdog resets the program, which vents. */
+#include <avr/interrupt.h>
+#include <avr/wdt.h>
+
+#include "clock.h"
+#include "converter.h"
+#include "latches.h"
+#include "reset.h"
+#include "session.h"
+#include "uart.h"
+#include "valves.h"
+
+ISR(TIMER1_COMPA_vect)
+{
+	clock_tick();
+	latches_tick();
+	/* The medians take longer than the line's two bytes of patience. */
+	sei();
+	converter_tick();
+}
+
+int main(void)
+{
+	valves_start();
+	clock_start();
+	converter_start();
+	uart_start();
+	sei();
+	reset_count();
+	for (;;) {
+		uint8_t byte;
+		/* Fed only when the tick lives: without it there would be no dead-man. */
+		if (clock_ticked())
+			wdt_reset();
+		/* No request is begun whose reply has no room; the others wait in their ring. */
+		if (uart_has_room() && uart_receive(&byte))
+			session_byte(byte);
+	}
+}

@@ -1,0 +1,234 @@
+#include "session.h"
+
+#include <stdbool.h>
+
+#include "clock.h"
+#include "converter.h"
+#include "frame.h"
+#include "latches.h"
+#include "protocol.h"
+#include "reset.h"
+#include "uart.h"
+#include "valves.h"
+
+#ifndef FIRMWARE
+#error "FIRMWARE, the hash of the sources, is given by the Makefile"
+#endif
+
+/* What decide() says of a request that is not refused. */
+#define ACCEPTED 0
+#define LONGEST_CONTENT (HEADER_LENGTH + READING_LENGTH + CRC_LENGTH)
+
+static struct receiver receiver;
+static bool connected, configured;
+static uint32_t session;
+/* The last accepted request: a retry of it is answered alike. */
+static uint16_t last_sequence;
+static uint8_t last_type, last_reason;
+static uint16_t seen; /* flags to be told with the next reply */
+
+static uint16_t u16(const uint8_t *bytes)
+{
+	return bytes[0] | (uint16_t)bytes[1] << 8;
+}
+
+static uint32_t u32(const uint8_t *bytes)
+{
+	return u16(bytes) | (uint32_t)u16(bytes + 2) << 16;
+}
+
+/* A reply being written. */
+static uint8_t content[LONGEST_CONTENT], content_length;
+
+static void put8(uint8_t value)
+{
+	content[content_length++] = value;
+}
+
+static void put16(uint16_t value)
+{
+	put8(value);
+	put8(value >> 8);
+}
+
+static void put32(uint32_t value)
+{
+	put16(value);
+	put16(value >> 16);
+}
+
+static void begin(uint8_t type, uint16_t sequence)
+{
+	content_length = 0;
+	put8(type);
+	put16(sequence);
+}
+
+static void put_state(uint16_t more)
+{
+	if (uart_overrun())
+		more |= OVERRUN_SEEN;
+	put16(latches_flags() | (configured ? CONFIGURED : 0) | seen | more);
+	put8(valves_applied());
+	seen = 0;
+}
+
+static void send(void)
+{
+	static uint8_t frame[LONGEST_CONTENT + 2];
+	_Static_assert(sizeof frame <= LONGEST_FRAME, "a reply fits a frame");
+	uart_send(frame, frame_encode(frame, content, content_length));
+}
+
+static void hello(uint16_t sequence)
+{
+	begin(HELLO, sequence);
+	put8(VERSION);
+	put32(FIRMWARE);
+	put32(session);
+	put8(reset_cause());
+	put16(reset_boots());
+	send();
+}
+
+static void refused(uint16_t sequence, uint8_t reason, uint16_t more)
+{
+	begin(REFUSED, sequence);
+	put8(reason);
+	put_state(more);
+	send();
+}
+
+static void status(uint16_t sequence, uint16_t more)
+{
+	begin(STATUS, sequence);
+	put32(clock_microseconds());
+	put_state(more);
+	send();
+}
+
+static void reading(uint16_t sequence, uint16_t more)
+{
+	struct sample sample;
+	converter_read(&sample);
+	begin(READING, sequence);
+	put32(sample.time);
+	put_state(more);
+	for (uint8_t i = 0; i < JOINTS; i++)
+		put16(sample.angle[i]);
+	for (uint8_t i = 0; i < MUSCLES; i++)
+		put16(sample.pressure[i]);
+	for (uint8_t i = 0; i < JOINTS; i++)
+		put16(sample.velocity[i]);
+	for (uint8_t i = 0; i < EXTRAS; i++)
+		put16(sample.extra[i]);
+	send();
+}
+
+static void connect(uint16_t sequence, const uint8_t *payload)
+{
+	if (payload[0] != VERSION) {
+		refused(sequence, WRONG_VERSION, 0);
+		return;
+	}
+	latches_disarm();
+	connected = true;
+	configured = false; /* whoever connects says what the limits are */
+	session = u32(payload + 1);
+	last_sequence = sequence;
+	last_type = CONNECT;
+	hello(sequence);
+}
+
+static uint8_t configure(const uint8_t *payload)
+{
+	uint8_t conversions = payload[0], velocity_ms = payload[1];
+	uint16_t limits[MUSCLES];
+	if (latches_armed())
+		return STILL_ARMED;
+	if (conversions != 5 && conversions != 7 && conversions != 9)
+		return BAD_VALUE;
+	if (velocity_ms < 1 || velocity_ms > MOST_VELOCITY_MS)
+		return BAD_VALUE;
+	for (uint8_t i = 0; i < MUSCLES; i++) {
+		limits[i] = u16(payload + 2 + 2 * i);
+		if (limits[i] < 1 || limits[i] > 0x3ff)
+			return BAD_VALUE;
+	}
+	converter_configure(conversions, velocity_ms, limits);
+	configured = true;
+	return ACCEPTED;
+}
+
+static uint8_t arm(const uint8_t *payload)
+{
+	if (u32(payload) != session)
+		return WRONG_SESSION;
+	if (!configured)
+		return NOT_CONFIGURED;
+	return latches_arm() ? ACCEPTED : CAUSE_REMAINS;
+}
+
+static uint8_t exchange(uint8_t codes)
+{
+	if (!latches_armed())
+		return NOT_ARMED;
+	if (!valves_known(codes))
+		return BAD_VALUE;
+	return latches_valves(codes) ? ACCEPTED : NOT_ARMED;
+}
+
+/* Do what a fresh request asks; return why not, or ACCEPTED. */
+static uint8_t act(uint8_t type, const uint8_t *payload)
+{
+	switch (type) {
+	case CONFIGURE: return configure(payload);
+	case ARM: return arm(payload);
+	case DISARM: latches_disarm(); return ACCEPTED;
+	case EXCHANGE: return exchange(payload[0]);
+	default: return ACCEPTED; /* READ does nothing but read */
+	}
+}
+
+static void take(const uint8_t *request)
+{
+	uint8_t type = request[0];
+	uint16_t sequence = u16(request + 1);
+	const uint8_t *payload = request + HEADER_LENGTH;
+	uint16_t repeated = 0;
+
+	if (type == CONNECT) {
+		connect(sequence, payload);
+		return;
+	}
+	if (!connected) {
+		refused(sequence, NOT_CONNECTED, 0);
+		return;
+	}
+	uint16_t ahead = sequence - last_sequence;
+	if (ahead == 0 && type == last_type) {
+		repeated = REPEATED;
+	} else if (ahead == 0 || ahead > 0x7fff) {
+		seen |= STALE_SEEN;
+		return;
+	} else {
+		last_sequence = sequence;
+		last_type = type;
+		last_reason = act(type, payload);
+	}
+	if (last_reason)
+		refused(sequence, last_reason, repeated);
+	else if (type == EXCHANGE || type == READ)
+		reading(sequence, repeated);
+	else
+		status(sequence, repeated);
+}
+
+void session_byte(uint8_t byte)
+{
+	switch (frame_receive(&receiver, byte)) {
+	case FRAME_TAKEN: take(receiver.bytes); break;
+	case FRAME_CORRUPT: seen |= CORRUPT_SEEN; break;
+	case FRAME_NONE: break;
+	}
+}

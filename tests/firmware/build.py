@@ -1,0 +1,71 @@
+"""Build what the tests of the firmware run: the .hex itself, the simulated board, the decoder for this machine."""
+
+import fcntl
+import functools
+import hashlib
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+HERE = Path(__file__).parent
+FIRMWARE = HERE.parents[1] / "firmware"
+BUILD = FIRMWARE / "build"
+PACKAGES = "gcc-avr avr-libc libsimavr-dev libelf-dev make gcc"
+
+
+def missing() -> str:
+    """Return what the simulated board lacks on this machine; empty where it can be built."""
+    lacks = [tool for tool in ("avr-gcc", "make", "cc") if shutil.which(tool) is None]
+    if not any(Path(root, "simavr/sim_avr.h").exists() for root in ("/usr/include", "/usr/local/include")):
+        lacks.append("libsimavr")
+    return f"{', '.join(lacks)} missing; Debian packages: {PACKAGES}" if lacks else ""
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Let no other process build at the same time."""
+    BUILD.mkdir(exist_ok=True)
+    with (BUILD / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _run(*command: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
+
+
+@functools.cache
+def hex_file() -> Path:
+    """Return the firmware as it is flashed."""
+    with _alone():
+        _run("make", "-C", str(FIRMWARE))
+    return BUILD / "pneumarm.hex"
+
+
+def _library(source: Path, others: tuple[Path, ...], flags: tuple[str, ...]) -> Path:
+    digest = hashlib.sha256(" ".join(flags).encode())
+    for path in (source, *others):
+        digest.update(path.read_bytes())
+    library = BUILD / f"{source.stem}-{digest.hexdigest()[:12]}.so"
+    with _alone():
+        if not library.exists():
+            _run("cc", "-std=gnu11", "-shared", "-fPIC", "-O2", "-o", str(library), str(source), *flags)
+    return library
+
+
+
+@functools.cache
+def shim() -> Path:
+    """Return the simulated board as a library."""
+    return _library(HERE / "shim.c", (), ("-lsimavr", "-lelf"))
+
+
+@functools.cache
+def decoder() -> Path:
+    """Return the firmware's frames, compiled for this machine, as a library."""
+    headers = (FIRMWARE / "frame.h", FIRMWARE / "protocol.h")
+    return _library(FIRMWARE / "frame.c", headers, ("-Wall", "-Wextra", "-Werror"))

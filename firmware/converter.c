@@ -13,8 +13,6 @@
 #define RUN (_BV(ADEN) | _BV(ADIE) | _BV(ADPS2) | _BV(ADPS0))
 #define REFERENCE _BV(REFS0) /* the supply, which also feeds the potentiometers: its drift cancels */
 
-/* Sweeps that are kept: the longest median and time enough to take it while sampling goes on. A power of two. */
-#define SWEEPS 16
 #define MOST_CONVERSIONS 9
 #define NO_MUSCLE 0xff
 
@@ -25,18 +23,28 @@ static const uint8_t ANGLE_OF[JOINTS] = {ANGLE_1, ANGLE_2};
 static const uint8_t PRESSURE_OF[MUSCLES] = {PRESSURE_1, PRESSURE_2, PRESSURE_3, PRESSURE_4};
 static const uint8_t EXTRA_OF[EXTRAS] = {EXTRA_1, EXTRA_2};
 
-static volatile uint16_t sweeps[SWEEPS][CHANNELS];
-static volatile uint8_t sweep, channel;
+/* The last conversions of a channel, in the order of time and in the order of size. Kept sorted all the time: a median
+ * costs nothing when it is asked for, and the reply is soon on its way. */
+struct window {
+	uint16_t recent[MOST_CONVERSIONS];
+	uint16_t sorted[MOST_CONVERSIONS];
+};
+static struct window windows[CHANNELS];
+static volatile uint8_t channel, sweep;
+static volatile uint8_t conversions = 5;
+static volatile uint8_t oldest; /* place in `recent` of all channels */
+/* Windows that are still to be filled, with one value each, when the conversions begin or their number changes. */
+static volatile uint8_t unfilled = CHANNELS;
+
 static volatile uint8_t over[MUSCLES];
 static volatile uint16_t limit[MUSCLES] = {0x3ff, 0x3ff, 0x3ff, 0x3ff}; /* nothing is over the highest count */
-
-static volatile uint8_t conversions = 5, velocity_ms = 1;
 
 /* Medians of the angles, one a millisecond; `newest` is where the last one is. */
 #define PAST (MOST_VELOCITY_MS + 1)
 static volatile uint16_t past[JOINTS][PAST];
 static volatile uint8_t newest;
-static volatile bool filled;
+static volatile uint8_t velocity_ms = 1;
+static volatile bool no_past = true;
 
 void converter_start(void)
 {
@@ -44,6 +52,40 @@ void converter_start(void)
 	DIDR0 = 0x3f; /* no digital inputs on the analog pins: less noise */
 	ADCSRB = 0;
 	ADCSRA = RUN | _BV(ADSC);
+}
+
+static void fill(struct window *window, uint16_t value)
+{
+	for (uint8_t i = 0; i < MOST_CONVERSIONS; i++)
+		window->recent[i] = window->sorted[i] = value;
+}
+
+/* Put `value` in the place of the oldest one. */
+static inline void renew(struct window *window, uint16_t value)
+{
+	uint16_t *replaced = &window->recent[oldest];
+	uint16_t old = *replaced;
+	uint16_t *place = window->sorted;
+	if (value == old)
+		return;
+	*replaced = value;
+	/* What lies between the old value and the new one moves by one place. The new one, or the old one, ends the
+	 * search, so that no end has to be looked for but where the new one is the highest or the lowest. */
+	if (value > old) {
+		uint16_t *last = place + conversions - 1;
+		while (*place != old)
+			place++;
+		for (; place != last && place[1] < value; place++)
+			*place = place[1];
+	} else {
+		uint16_t *first = place;
+		place += conversions - 1;
+		while (*place != old)
+			place--;
+		for (; place != first && place[-1] > value; place--)
+			*place = place[-1];
+	}
+	*place = value;
 }
 
 ISR(ADC_vect)
@@ -57,53 +99,49 @@ ISR(ADC_vect)
 	ADCSRA = RUN | _BV(ADSC);
 	channel = next;
 
-	sweeps[sweep][done] = value;
-	if (next == 0)
-		sweep = (sweep + 1) & (SWEEPS - 1);
+	if (unfilled) {
+		unfilled--;
+		fill(&windows[done], value);
+	} else {
+		renew(&windows[done], value);
+	}
+	if (next == 0) {
+		sweep++;
+		uint8_t after = oldest + 1;
+		oldest = after >= conversions ? 0 : after;
+	}
 
+	/* Last, so that the interrupt has no registers to save over the call. */
 	uint8_t muscle = MUSCLE_OF[done];
-	if (muscle == NO_MUSCLE)
-		return;
-	if (value <= limit[muscle])
-		over[muscle] = 0;
-	else if (over[muscle] < OVER_PRESSURE_SAMPLES && ++over[muscle] == OVER_PRESSURE_SAMPLES)
-		latch_over_pressure(muscle);
+	if (muscle != NO_MUSCLE) {
+		if (value <= limit[muscle])
+			over[muscle] = 0;
+		else if (over[muscle] < OVER_PRESSURE_SAMPLES && ++over[muscle] == OVER_PRESSURE_SAMPLES)
+			latch_over_pressure(muscle);
+	}
 }
 
-/* Return the median of the last conversions of `of` before the sweep `end`.
- *
- * The interrupt writes to `end` and what follows it, so that these values stay for SWEEPS - MOST_CONVERSIONS sweeps,
- * 1.6 ms: nothing needs to be locked, and the channels belong together. */
-static uint16_t median(uint8_t of, uint8_t end)
+static uint16_t median(uint8_t of)
 {
-	uint16_t sorted[MOST_CONVERSIONS];
-	uint8_t count = conversions;
-	for (uint8_t i = 0; i < count; i++) {
-		end = (end - 1) & (SWEEPS - 1);
-		uint16_t value = sweeps[end][of];
-		uint8_t place = i;
-		for (; place && sorted[place - 1] > value; place--)
-			sorted[place] = sorted[place - 1];
-		sorted[place] = value;
-	}
-	return sorted[count / 2];
+	uint16_t value;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+		value = windows[of].sorted[conversions / 2];
+	return value;
 }
 
 void converter_tick(void)
 {
-	uint8_t end = sweep;
 	uint8_t next = newest + 1 == PAST ? 0 : newest + 1;
 	for (uint8_t joint = 0; joint < JOINTS; joint++) {
-		uint16_t value = median(ANGLE_OF[joint], end);
+		uint16_t value = median(ANGLE_OF[joint]);
 		past[joint][next] = value;
-		/* Until the sweeps have come round once there is no past: the arm is taken to have been at rest. */
-		if (!filled)
+		/* Without a past the arm is taken to have been at rest. */
+		if (no_past)
 			for (uint8_t i = 0; i < PAST; i++)
 				past[joint][i] = value;
 	}
 	newest = next;
-	if (end >= MOST_CONVERSIONS)
-		filled = true;
+	no_past = unfilled;
 }
 
 static int16_t velocity(uint8_t joint)
@@ -117,22 +155,25 @@ static int16_t velocity(uint8_t joint)
 		then = now >= over_ms ? now - over_ms : now + PAST - over_ms;
 		change = past[joint][now] - past[joint][then];
 	}
-	int32_t scaled = (int32_t)change * VELOCITY_SCALE;
-	/* Rounded, so that it is as right forwards as backwards. */
-	scaled = (scaled + (change < 0 ? -(over_ms / 2) : over_ms / 2)) / over_ms;
-	return scaled > INT16_MAX ? INT16_MAX : scaled < -INT16_MAX ? -INT16_MAX : scaled;
+	/* Unsigned in 16 bits, which the highest count times the scale just fits: the signed division of 32 bits takes
+	 * longer than the whole rest of a reading. Rounded alike forwards and backwards. */
+	_Static_assert(0x3ffUL * VELOCITY_SCALE + MOST_VELOCITY_MS / 2 <= UINT16_MAX, "the quotient must not wrap");
+	uint16_t scaled = change < 0 ? -change : change;
+	scaled = (uint16_t)(scaled * VELOCITY_SCALE + over_ms / 2) / over_ms;
+	if (scaled > INT16_MAX)
+		scaled = INT16_MAX;
+	return change < 0 ? -(int16_t)scaled : (int16_t)scaled;
 }
 
 void converter_read(struct sample *sample)
 {
-	uint8_t end = sweep;
 	sample->time = clock_microseconds();
 	for (uint8_t i = 0; i < JOINTS; i++)
-		sample->angle[i] = median(ANGLE_OF[i], end);
+		sample->angle[i] = median(ANGLE_OF[i]);
 	for (uint8_t i = 0; i < MUSCLES; i++)
-		sample->pressure[i] = median(PRESSURE_OF[i], end);
+		sample->pressure[i] = median(PRESSURE_OF[i]);
 	for (uint8_t i = 0; i < EXTRAS; i++)
-		sample->extra[i] = median(EXTRA_OF[i], end);
+		sample->extra[i] = median(EXTRA_OF[i]);
 	for (uint8_t i = 0; i < JOINTS; i++)
 		sample->velocity[i] = velocity(i);
 }
@@ -142,7 +183,10 @@ void converter_configure(uint8_t of, uint8_t over_ms, const uint16_t limits[MUSC
 	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 	{
 		conversions = of;
+		oldest = 0;
+		unfilled = CHANNELS;
 		velocity_ms = over_ms;
+		no_past = true;
 		memcpy((void *)limit, limits, sizeof limit);
 		memset((void *)over, 0, sizeof over);
 	}

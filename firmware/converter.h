@@ -25,10 +25,10 @@ void converter_configure(uint8_t conversions, uint8_t velocity_ms, const uint16_
 /* Return all sensors as they are now. */
 void converter_read(struct sample *sample);
 
-/* Keep the medians of the angles for the velocity: once a millisecond, interrupts may be on. */
+/* Keep the medians of the angles for the velocity: once a millisecond. */
 void converter_tick(void);
 
-/* Return the number of sweeps over all channels, modulo 16: a converter that works makes four a millisecond. */
+/* Return the number of sweeps over all channels, modulo 256: a converter that works makes four a millisecond. */
 uint8_t converter_sweeps(void);
 
 /* Return whether the last conversion of any muscle's pressure was over its limit. */

@@ -2,21 +2,26 @@
 
 #include <stdbool.h>
 
-/* CRC-16/X-25 four bits at a time: the remainders of the polynomial 0x1021, reflected. */
-static const uint16_t REMAINDERS[16] = {
-	0x0000, 0x1081, 0x2102, 0x3183, 0x4204, 0x5285, 0x6306, 0x7387,
-	0x8408, 0x9489, 0xa50a, 0xb58b, 0xc60c, 0xd68d, 0xe70e, 0xf78f,
-};
+#define CRC_INITIAL 0xffff
+#define CRC_FINAL 0xffff
+
+/* Return the CRC-16/X-25 after one more byte, but for its final exclusive-or.
+ *
+ * The polynomial 0x1021, reflected, has terms at 0, 5 and 12: eight of its steps at once are three shifts of the byte
+ * that leaves. */
+static uint16_t crc_step(uint16_t crc, uint8_t byte)
+{
+	uint8_t out = byte ^ (uint8_t)crc;
+	out ^= out << 4;
+	return (crc >> 8) ^ (uint16_t)out << 8 ^ (uint16_t)out << 3 ^ out >> 4;
+}
 
 uint16_t crc16(const uint8_t *bytes, uint8_t length)
 {
-	uint16_t crc = 0xffff;
-	while (length--) {
-		uint8_t byte = *bytes++;
-		crc = (crc >> 4) ^ REMAINDERS[(crc ^ byte) & 0x0f];
-		crc = (crc >> 4) ^ REMAINDERS[(crc ^ (byte >> 4)) & 0x0f];
-	}
-	return crc ^ 0xffff;
+	uint16_t crc = CRC_INITIAL;
+	while (length--)
+		crc = crc_step(crc, *bytes++);
+	return crc ^ CRC_FINAL;
 }
 
 uint8_t cobs_decode(uint8_t *bytes, uint8_t length)
@@ -83,21 +88,36 @@ enum frame_event frame_receive(struct receiver *receiver, uint8_t byte)
 	return FRAME_TAKEN;
 }
 
-uint8_t frame_encode(uint8_t *frame, uint8_t *content, uint8_t length)
+void frame_begin(struct sender *sender, void (*out)(const uint8_t *bytes, uint8_t length))
 {
-	uint16_t crc = crc16(content, length);
-	content[length++] = crc;
-	content[length++] = crc >> 8;
-	uint8_t code_at = 0, written = 1;
-	for (uint8_t i = 0; i < length; i++) {
-		if (content[i]) {
-			frame[written++] = content[i];
-		} else {
-			frame[code_at] = written - code_at;
-			code_at = written++;
-		}
+	sender->crc = CRC_INITIAL;
+	sender->length = 1;
+	sender->out = out;
+}
+
+static void put(struct sender *sender, uint8_t byte)
+{
+	if (byte) {
+		sender->block[sender->length++] = byte;
+	} else {
+		sender->block[0] = sender->length;
+		sender->out(sender->block, sender->length);
+		sender->length = 1;
 	}
-	frame[code_at] = written - code_at;
-	frame[written++] = 0;
-	return written;
+}
+
+void frame_put(struct sender *sender, uint8_t byte)
+{
+	sender->crc = crc_step(sender->crc, byte);
+	put(sender, byte);
+}
+
+void frame_end(struct sender *sender)
+{
+	uint16_t crc = sender->crc ^ CRC_FINAL;
+	put(sender, crc);
+	put(sender, crc >> 8);
+	sender->block[0] = sender->length;
+	sender->block[sender->length++] = 0;
+	sender->out(sender->block, sender->length);
 }

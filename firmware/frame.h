@@ -30,6 +30,16 @@ enum frame_event frame_receive(struct receiver *receiver, uint8_t byte);
 /* Decode COBS in place; return the decoded length, or 0 where `bytes` are no COBS. */
 uint8_t cobs_decode(uint8_t *bytes, uint8_t length);
 
-/* Write the frame of `content` to `frame`; return the frame's length, its 0x00 included.
- * `content` has room for the CRC behind it, `frame` for two bytes more than content and CRC. */
-uint8_t frame_encode(uint8_t *frame, uint8_t *content, uint8_t length);
+/* A frame being sent. It leaves in COBS blocks, each as soon as it is known: the line is busy with the first
+ * one while the others are made. */
+struct sender {
+	uint8_t block[LONGEST_FRAME]; /* its code, then its bytes */
+	uint8_t length;
+	uint16_t crc;
+	void (*out)(const uint8_t *bytes, uint8_t length);
+};
+
+/* Send a frame of at most LONGEST_FRAME bytes on the line to `out`: begin, its content byte by byte, end. */
+void frame_begin(struct sender *sender, void (*out)(const uint8_t *bytes, uint8_t length));
+void frame_put(struct sender *sender, uint8_t byte);
+void frame_end(struct sender *sender);

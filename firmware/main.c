@@ -18,8 +18,6 @@ ISR(TIMER1_COMPA_vect)
 {
 	clock_tick();
 	latches_tick();
-	/* The medians take longer than the line's two bytes of patience. */
-	sei();
 	converter_tick();
 }
 

@@ -17,7 +17,6 @@
 
 /* What decide() says of a request that is not refused. */
 #define ACCEPTED 0
-#define LONGEST_CONTENT (HEADER_LENGTH + READING_LENGTH + CRC_LENGTH)
 
 static struct receiver receiver;
 static bool connected, configured;
@@ -37,12 +36,11 @@ static uint32_t u32(const uint8_t *bytes)
 	return u16(bytes) | (uint32_t)u16(bytes + 2) << 16;
 }
 
-/* A reply being written. */
-static uint8_t content[LONGEST_CONTENT], content_length;
+static struct sender sender;
 
 static void put8(uint8_t value)
 {
-	content[content_length++] = value;
+	frame_put(&sender, value);
 }
 
 static void put16(uint16_t value)
@@ -59,7 +57,7 @@ static void put32(uint32_t value)
 
 static void begin(uint8_t type, uint16_t sequence)
 {
-	content_length = 0;
+	frame_begin(&sender, uart_send);
 	put8(type);
 	put16(sequence);
 }
@@ -73,13 +71,6 @@ static void put_state(uint16_t more)
 	seen = 0;
 }
 
-static void send(void)
-{
-	static uint8_t frame[LONGEST_CONTENT + 2];
-	_Static_assert(sizeof frame <= LONGEST_FRAME, "a reply fits a frame");
-	uart_send(frame, frame_encode(frame, content, content_length));
-}
-
 static void hello(uint16_t sequence)
 {
 	begin(HELLO, sequence);
@@ -88,7 +79,7 @@ static void hello(uint16_t sequence)
 	put32(session);
 	put8(reset_cause());
 	put16(reset_boots());
-	send();
+	frame_end(&sender);
 }
 
 static void refused(uint16_t sequence, uint8_t reason, uint16_t more)
@@ -96,7 +87,7 @@ static void refused(uint16_t sequence, uint8_t reason, uint16_t more)
 	begin(REFUSED, sequence);
 	put8(reason);
 	put_state(more);
-	send();
+	frame_end(&sender);
 }
 
 static void status(uint16_t sequence, uint16_t more)
@@ -104,7 +95,7 @@ static void status(uint16_t sequence, uint16_t more)
 	begin(STATUS, sequence);
 	put32(clock_microseconds());
 	put_state(more);
-	send();
+	frame_end(&sender);
 }
 
 static void reading(uint16_t sequence, uint16_t more)
@@ -122,7 +113,7 @@ static void reading(uint16_t sequence, uint16_t more)
 		put16(sample.velocity[i]);
 	for (uint8_t i = 0; i < EXTRAS; i++)
 		put16(sample.extra[i]);
-	send();
+	frame_end(&sender);
 }
 
 static void connect(uint16_t sequence, const uint8_t *payload)

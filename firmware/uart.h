@@ -11,7 +11,7 @@ bool uart_receive(uint8_t *byte);
 /* Return whether a whole frame can be sent now without waiting. */
 bool uart_has_room(void);
 
-/* Send a frame; call it only where uart_has_room(). */
+/* Send bytes; a frame only where uart_has_room(). */
 void uart_send(const uint8_t *bytes, uint8_t length);
 
 /* Return whether bytes were lost since the last call. */

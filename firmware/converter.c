@@ -48,6 +48,7 @@ static volatile bool no_past = true;
 
 void converter_start(void)
 {
+	ADCSRA = 0; /* gives up a conversion that never ends */
 	ADMUX = REFERENCE | channel;
 	DIDR0 = 0x3f; /* no digital inputs on the analog pins: less noise */
 	ADCSRB = 0;

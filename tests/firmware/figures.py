@@ -1,0 +1,143 @@
+"""The figures of the firmware that people rely on, measured; tests hold them to their limits, a benchmark prints them."""
+
+import random
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import perf_counter
+from typing import NamedTuple
+
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from tests.firmware import wire
+from tests.firmware.board import SimulatedBoard, single_conversions
+from tests.firmware.chip import FREQUENCY, Chip
+from tests.firmware.host import LIMIT, Host
+from tests.firmware.wire import CONSTANT
+
+ANALOG = 8
+"""Analog channels."""
+_CONVERSION = 13 * 32
+"""Cycles of a conversion."""
+
+
+@contextmanager
+def armed(**configuration: int) -> Iterator[Host]:
+    """Give a host with an armed board, all valves closed, nothing at its inputs."""
+    with Chip() as chip:
+        yield Host(chip).ready(**configuration)
+
+
+def noise(chip: Chip, rng: random.Random, seconds: float, amplitude: int = 5) -> None:
+    """Let time pass [s] with another noise at each input in every conversion or so: medians have work."""
+    for _ in range(round(seconds / 0.25e-3)):
+        for channel in range(ANALOG):
+            chip.set_count(channel, 500 + rng.randint(-amplitude, amplitude))
+        chip.run(0.25e-3)
+
+
+class RoundTrip(NamedTuple):
+    """Times since the request's first bit began [ms]."""
+
+    valves: list[float]
+    """Until the last pin had its level."""
+    reply: list[float]
+    """Until the reply's last bit had come."""
+
+
+def round_trip(exchanges: int = 200, conversions: int = 9, seed: int = 0) -> RoundTrip:
+    """Measure exchanges that change all muscles' valves, at random moments, with noise at all inputs."""
+    rng = random.Random(seed)
+    times = RoundTrip([], [])
+    with armed(conversions=conversions) as host:
+        for i in range(exchanges):
+            noise(host.chip, rng, 2.5e-3)
+            host.chip.run_until(host.chip.cycle + rng.randrange(16_000))
+            host.exchange(*["IN" if i % 2 else "OUT"] * CONSTANT["MUSCLES"])
+            times.valves.append(host.since_begun(host.chip.changes[-1].cycle))
+            times.reply.append(host.since_begun(host.ended))
+    return times
+
+
+def _next_change(host: Host, wait: float) -> int:
+    """Wait [s]; return the cycle at which the first pin of a valve changed meanwhile."""
+    chip = host.chip
+    before, known = chip.valve_pins, len(chip.changes)
+    chip.run(wait)
+    return next(change.cycle for change in chip.changes[known:] if change.pins & 0xFF != before)
+
+
+def dead_man(repeats: int = 20, seed: int = 0) -> list[float]:
+    """Measure the time [ms] from the last bit of an EXCHANGE, the host's last, until the first valve vents."""
+    rng = random.Random(seed)
+    times = []
+    with armed() as host:
+        for _ in range(repeats):
+            assert host.arm().has("ARMED")
+            host.chip.run_until(host.chip.cycle + rng.randrange(32_000))
+            host.exchange("IN", "IN", "IN", "IN")
+            fed = host.begun + len(wire.request("EXCHANGE", 1, 0)) * wire.CYCLES_PER_BYTE
+            times.append(1e3 * (_next_change(host, 0.26) - fed) / FREQUENCY)
+            assert host.chip.valve_pins == 0
+    return times
+
+
+class OverPressure(NamedTuple):
+    """Times until the muscle's inlet closes [ms]."""
+
+    since_third_sample: list[float]
+    since_onset: list[float]
+
+
+def over_pressure(repeats: int = 40, seed: int = 0) -> OverPressure:
+    """Measure how long a muscle over its limit is inflated, the muscles in turn, at random moments."""
+    rng = random.Random(seed)
+    times = OverPressure([], [])
+    channels = [1, 2, 4, 5]
+    with armed() as host:
+        chip = host.chip
+        chip.log_samples()
+        for i in range(repeats):
+            channel = channels[i % len(channels)]
+            assert host.arm().has("ARMED")
+            host.exchange("IN", "IN", "IN", "IN")
+            chip.run_until(chip.cycle + rng.randrange(32_000))
+            chip.samples.clear()
+            onset = chip.cycle
+            chip.set_count(channel, LIMIT + 1)
+            cut = _next_change(host, 5e-3)
+            begun = [cycle for cycle, converted in chip.samples if converted == channel and cycle >= onset]
+            third = begun[CONSTANT["OVER_PRESSURE_SAMPLES"] - 1] + _CONVERSION
+            times.since_third_sample.append(1e3 * (cut - third) / FREQUENCY)
+            times.since_onset.append(1e3 * (cut - onset) / FREQUENCY)
+            chip.set_count(channel, 0)
+            chip.run(2e-3)
+    return times
+
+
+def watchdog(repeats: int = 5, *, interrupts: bool = True, seed: int = 0) -> list[float]:
+    """Measure the time [ms] from a hang of the main loop until all outputs are off."""
+    rng = random.Random(seed)
+    times = []
+    for _ in range(repeats):
+        with armed() as host:
+            host.exchange("IN", "IN", "IN", "IN")
+            host.chip.run_until(host.chip.cycle + rng.randrange(32_000))
+            begin = host.chip.cycle
+            host.chip.hang(interrupts=interrupts)
+            host.chip.run(0.2)
+            off = next(change.cycle for change in host.chip.changes if change.cycle > begin and change.pins & 0xFF == 0)
+            times.append(1e3 * (off - begin) / FREQUENCY)
+    return times
+
+
+def speed(seconds: float = 2.0, seed: int = 1) -> float:
+    """Return how many times faster than real time the board runs with a virtual arm, 30 exchanges a second."""
+    board = SimulatedBoard(single_conversions(VirtualArm(draw_parameters(seed))))
+    with board:
+        board.wait(0.05)  # compiles the physics
+        host = Host(board.chip).ready()
+        begin = perf_counter()
+        first = board.time
+        for turn in range(round(30 * seconds)):
+            board.write(wire.request("EXCHANGE", host.sequence + 1 + turn, wire.valves("IN" if turn & 8 else "OUT")))
+            board.wait(1 / 30)
+        return (board.time - first) / (perf_counter() - begin)

@@ -1,0 +1,147 @@
+"""The line to the real .hex: round trip, split, merged and damaged frames, lost bytes."""
+
+import random
+
+import pytest
+
+from tests.firmware import wire
+from tests.firmware.build import missing
+from tests.firmware.figures import armed, round_trip
+from tests.firmware.host import Host
+from tests.firmware.mutations import is_request, mutated, random_request
+from tests.firmware.wire import CODE, CONSTANT, FLAG
+
+pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+
+
+def test_round_trip() -> None:
+    """With the longest medians, every valve changing, noise at all inputs, at all phases of the interrupts."""
+    times = round_trip(exchanges=150)
+    print(f"valves within {max(times.valves):.3f} ms, reply within {max(times.reply):.3f} ms of the first byte")
+    assert max(times.valves) <= 0.5
+    assert max(times.reply) <= 1.5
+
+
+def test_frames_split_anywhere() -> None:
+    with armed() as host:
+        for cut in range(1, 8):
+            frame = wire.request("EXCHANGE", host.sequence + 1, wire.valves("IN"))
+            host.sequence += 1
+            assert host.send(frame[:cut], wait=0.02) == []
+            (reply,) = host.send(frame[cut:])
+            assert reply.valves == wire.valves("IN")
+
+
+def test_frames_one_after_the_other_are_all_answered() -> None:
+    with armed() as host:
+        names = list(CODE)
+        frames = [wire.request("EXCHANGE", host.sequence + 1 + i, wire.valves(names[i % 3])) for i in range(8)]
+        replies = host.send(b"".join(frames), wait=0.02)
+        assert [reply.valves for reply in replies] == [wire.valves(names[i % 3]) for i in range(8)]
+        assert not any(reply.has("OVERRUN_SEEN") or reply.has("CORRUPT_SEEN") for reply in replies)
+
+
+def test_zeros_between_frames_mean_nothing() -> None:
+    with armed() as host:
+        frame = wire.request("READ", host.sequence + 1)
+        (reply,) = host.send(b"\0\0\0" + frame + b"\0\0")
+        host.sequence += 1
+        assert not reply.has("CORRUPT_SEEN")
+
+
+@pytest.mark.parametrize("length", [1, 7, 62, 63, 64, 65, 100, 200, 1000])
+def test_garbage_of_any_length_costs_itself_only(length: int) -> None:
+    rng = random.Random(length)
+    with armed() as host:
+        garbage = bytes(rng.randint(1, 255) for _ in range(length))
+        replies = host.send(garbage + b"\0" + wire.request("READ", host.sequence + 1), wait=length * 20e-6 + 0.004)
+        assert [reply.has("CORRUPT_SEEN") for reply in replies] == [True]
+        host.sequence += 1
+        assert not host.ask("READ").has("CORRUPT_SEEN")
+
+
+def test_too_many_requests_at_once_are_lost_and_said_to_be() -> None:
+    with armed() as host:
+        frames = [wire.request("READ", host.sequence + 1 + i) for i in range(200)]
+        replies = host.send(b"".join(frames), wait=0.2)
+        assert 20 < len(replies) < 200
+        assert any(reply.has("OVERRUN_SEEN") for reply in replies)
+        host.sequence = 0x4000
+        host.send(b"\0")  # ends the frame whose end was lost
+        reply = host.ask("READ")
+        assert reply.name == "READING"
+        assert not host.ask("READ").has("OVERRUN_SEEN")
+
+
+class Model:
+    """What the board must do with what comes: a dozen lines of the protocol, for EXCHANGE and READ of an armed board."""
+
+    def __init__(self, host: Host) -> None:
+        self.last = (host.sequence, wire.REQUEST["ARM"])
+        self.valves = 0
+        self.refused = False
+
+    def take(self, content: bytes) -> int | None:
+        """Return the sequence of the reply, or None where none may come."""
+        kind, sequence = content[0], int.from_bytes(content[1:3], "little")
+        ahead = (sequence - self.last[0]) & 0xFFFF
+        if (sequence, kind) != self.last:
+            if not 1 <= ahead <= 0x7FFF:
+                return None
+            self.last = (sequence, kind)
+            if kind == wire.REQUEST["EXCHANGE"]:
+                codes = content[3]
+                if all(codes >> 2 * m & 3 in CODE.values() for m in range(CONSTANT["MUSCLES"])):
+                    self.valves = codes
+        return sequence
+
+
+def fuzz(count: int, seed: int) -> dict[str, int]:
+    """Send damaged frames, two good ones after each; compare all replies and the pins with the model's."""
+    rng = random.Random(seed)
+    tally = {"damaged": 0, "accepted": 0, "one good frame lost": 0}
+    codes = [wire.valves(*names) for names in ([a, b, c, d] for a in CODE for b in CODE for c in CODE for d in CODE)]
+    with armed() as host:
+        model = Model(host)
+        others = [random_request(rng, rng.randrange(65536)) for _ in range(16)]
+        sent = {frame[:-1] for frame in others}
+        for turn in range(count):
+            frame = wire.request("EXCHANGE", host.sequence + 1, rng.choice(codes))
+            others[turn % len(others)] = frame
+            damaged = mutated(frame, rng, [other for other in others if other[1] != wire.REQUEST["CONNECT"]])
+            good = [wire.request("EXCHANGE", host.sequence + 2 + i, rng.choice(codes)) for i in range(2)]
+            stream = damaged + b"".join(good)
+            chunks = [chunk for chunk in stream.split(b"\0") if chunk]
+            contents = [is_request(chunk) for chunk in chunks]
+            kinds = {content[0] for content in contents if content}
+            if kinds - {wire.REQUEST["EXCHANGE"], wire.REQUEST["READ"]}:
+                continue  # another request as it was sent: no damage, and not the model's
+            expected = [model.take(content) for content in contents if content]
+            replies = host.send(stream, wait=0.0045)
+            assert [reply.sequence for reply in replies] == [sequence for sequence in expected if sequence is not None]
+            assert host.chip.valve_pins == wire.pins_of(model.valves)
+            assert replies, "not resynchronised within one frame"
+            assert replies[-1].sequence == (host.sequence + 3) & 0xFFFF
+            assert replies[-1].valves == model.valves
+            assert replies[-1].values["flags"] & FLAG["ARMED"]
+            tally["damaged"] += 1
+            tally["one good frame lost"] += contents[-2] is None
+            sent.update(chunk[:-1] for chunk in (frame, *good))
+            for chunk, content in zip(chunks, contents, strict=True):
+                tally["accepted"] += content is not None and chunk not in sent
+            host.sequence = (model.last[0]) & 0xFFFF
+        assert not [c for c in host.chip.changes if c.pins & 0x55 & ~(c.pins >> 1)]
+    return tally
+
+
+def test_two_thousand_damaged_frames() -> None:
+    tally = fuzz(2_000, seed=3)
+    assert tally["damaged"] > 1_700
+    assert tally["accepted"] == 0
+
+
+@pytest.mark.soak
+def test_hundred_thousand_damaged_frames() -> None:
+    tally = fuzz(100_000, seed=4)
+    print(f"frames damaged on the line to the board: {tally}")
+    assert tally["accepted"] == 0

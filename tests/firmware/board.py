@@ -17,7 +17,7 @@ from pneumarm.arm.virtual import VirtualArm
 from tests.firmware.chip import FREQUENCY, VALVE_PINS, Chip
 
 STEP = 0.25e-3
-"""Time for which a voltage is held [s]: about one sweep of the converter, so that noise differs between conversions."""
+"""Time for which a voltage is held [s]: about one sweep of the converter, so that each conversion has its noise."""
 _STEP_CYCLES = round(STEP * FREQUENCY)
 _SLICE = 800
 """Cycles between two looks at the line while something waits for it."""

@@ -57,7 +57,6 @@ def _library(source: Path, others: tuple[Path, ...], flags: tuple[str, ...]) -> 
     return library
 
 
-
 @functools.cache
 def shim() -> Path:
     """Return the simulated board as a library."""

@@ -1,16 +1,22 @@
-"""The figures of the firmware that people rely on, measured; tests hold them to their limits, a benchmark prints them."""
+"""The figures of the firmware that people rely on: tests hold them to their limits, a benchmark prints them."""
 
+import os
 import random
+import select
+import subprocess
+import sys
+import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
-from time import perf_counter
+from pathlib import Path
+from time import perf_counter, process_time, sleep
 from typing import NamedTuple
 
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from tests.firmware import wire
 from tests.firmware.board import SimulatedBoard, single_conversions
 from tests.firmware.chip import FREQUENCY, Chip
-from tests.firmware.host import LIMIT, Host
+from tests.firmware.host import LIMIT, SESSION, Host
 from tests.firmware.wire import CONSTANT
 
 ANALOG = 8
@@ -124,20 +130,75 @@ def watchdog(repeats: int = 5, *, interrupts: bool = True, seed: int = 0) -> lis
             begin = host.chip.cycle
             host.chip.hang(interrupts=interrupts)
             host.chip.run(0.2)
-            off = next(change.cycle for change in host.chip.changes if change.cycle > begin and change.pins & 0xFF == 0)
+            off = next(
+                change.cycle for change in host.chip.changes if change.cycle > begin and change.pins & 0xFF == 0
+            )
             times.append(1e3 * (off - begin) / FREQUENCY)
     return times
 
 
 def speed(seconds: float = 2.0, seed: int = 1) -> float:
-    """Return how many times faster than real time the board runs with a virtual arm, 30 exchanges a second."""
+    """Return how many times real time the board runs with a virtual arm on a core, 30 exchanges a second."""
     board = SimulatedBoard(single_conversions(VirtualArm(draw_parameters(seed))))
     with board:
         board.wait(0.05)  # compiles the physics
         host = Host(board.chip).ready()
-        begin = perf_counter()
+        begin = process_time()
         first = board.time
         for turn in range(round(30 * seconds)):
             board.write(wire.request("EXCHANGE", host.sequence + 1 + turn, wire.valves("IN" if turn & 8 else "OUT")))
             board.wait(1 / 30)
-        return (board.time - first) / (perf_counter() - begin)
+        return (board.time - first) / (process_time() - begin)
+
+
+@contextmanager
+def pseudo_terminal(arm: str = "virtual:seed=1") -> Iterator[str]:
+    """Give the path of a line to a board with an arm, in a process of its own and in real time."""
+    root = Path(__file__).parents[2]
+    environment = {**os.environ, "PYTHONPATH": f"{root / 'src'}{os.pathsep}{root}"}
+    command = [sys.executable, "-m", "tests.firmware.pty_board", "--arm", arm]
+    with subprocess.Popen(command, cwd=root, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            yield process.stdout.readline().strip()
+        finally:
+            process.terminate()
+
+
+class Port:
+    """A serial line, opened as an operating system gives it."""
+
+    def __init__(self, path: str) -> None:
+        self._line = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self._line)
+
+    def ask(self, name: str, sequence: int, *values: int, timeout: float = 2.0) -> wire.Reply:
+        """Send a request and return its reply."""
+        os.write(self._line, wire.request(name, sequence, *values))
+        frame = b""
+        while not frame.endswith(b"\0"):
+            if not select.select([self._line], [], [], timeout)[0]:
+                raise TimeoutError(f"no reply to {name}")
+            frame += os.read(self._line, 64)
+        return wire.reply(frame[:-1])
+
+    def close(self) -> None:
+        """Close the line."""
+        os.close(self._line)
+
+
+def round_trip_in_real_time(exchanges: int = 300, period: float = 0.01) -> list[float]:
+    """Measure round trips [ms] over a pseudo-terminal, the operating system and the simulator's own pace included."""
+    with pseudo_terminal() as path:
+        port = Port(path)
+        port.ask("CONNECT", 1, CONSTANT["VERSION"], SESSION)
+        port.ask("CONFIGURE", 2, 5, 16, *[LIMIT] * CONSTANT["MUSCLES"])
+        port.ask("ARM", 3, SESSION)
+        times = []
+        for turn in range(exchanges):
+            begin = perf_counter()
+            port.ask("EXCHANGE", 4 + turn, wire.valves("IN" if turn & 8 else "OUT"))
+            times.append(1e3 * (perf_counter() - begin))
+            sleep(max(0.0, period - (perf_counter() - begin)))
+        port.close()
+    return times

@@ -44,7 +44,7 @@ class Host:
         return [wire.reply(frame) for frame in frames]
 
     def ask(self, name: str, *values: int, sequence: int | None = None, wait: float = LONGEST_REPLY) -> Any:
-        """Send a request, and return its reply, or None where none came."""
+        """Send a request, and return its reply, or None where none came: Any spares the tests a check each time."""
         if sequence is None:
             self.sequence = sequence = (self.sequence + 1) & 0xFFFF
         replies = self.send(wire.request(name, sequence, *values), wait)

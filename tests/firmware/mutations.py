@@ -4,8 +4,6 @@ import random
 
 from tests.firmware import wire
 
-SETTLED = b"\0\0"
-
 
 def mutated(frame: bytes, rng: random.Random, others: list[bytes]) -> bytes:
     """Return ``frame`` with bits turned, bytes changed, lost, inserted, swapped, or mixed with another frame."""

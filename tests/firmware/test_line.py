@@ -74,12 +74,11 @@ def test_too_many_requests_at_once_are_lost_and_said_to_be() -> None:
 
 
 class Model:
-    """What the board must do with what comes: a dozen lines of the protocol, for EXCHANGE and READ of an armed board."""
+    """What the board must do with what comes: the protocol, for EXCHANGE and READ of an armed board."""
 
     def __init__(self, host: Host) -> None:
         self.last = (host.sequence, wire.REQUEST["ARM"])
         self.valves = 0
-        self.refused = False
 
     def take(self, content: bytes) -> int | None:
         """Return the sequence of the reply, or None where none may come."""
@@ -118,7 +117,9 @@ def fuzz(count: int, seed: int) -> dict[str, int]:
                 continue  # another request as it was sent: no damage, and not the model's
             expected = [model.take(content) for content in contents if content]
             replies = host.send(stream, wait=0.0045)
-            assert [reply.sequence for reply in replies] == [sequence for sequence in expected if sequence is not None]
+            assert [reply.sequence for reply in replies] == [
+                sequence for sequence in expected if sequence is not None
+            ]
             assert host.chip.valve_pins == wire.pins_of(model.valves)
             assert replies, "not resynchronised within one frame"
             assert replies[-1].sequence == (host.sequence + 3) & 0xFFFF

@@ -4,6 +4,7 @@ import random
 import re
 import statistics
 import subprocess
+from itertools import pairwise
 
 import pytest
 
@@ -31,7 +32,11 @@ def values(reading: wire.Reply) -> list[int]:
 def test_every_count_of_every_channel(conversions: int) -> None:
     rng = random.Random(conversions)
     with armed(conversions=conversions, limit=1023) as host:
-        for counts in ([0] * ANALOG, [1023] * ANALOG, *([rng.randrange(1024) for _ in range(ANALOG)] for _ in range(40))):
+        for counts in (
+            [0] * ANALOG,
+            [1023] * ANALOG,
+            *([rng.randrange(1024) for _ in range(ANALOG)] for _ in range(40)),
+        ):
             for channel, count in enumerate(counts):
                 host.chip.set_count(channel, count)
             host.chip.run(0.003)
@@ -61,7 +66,8 @@ def test_each_value_is_the_median_of_the_last_conversions(conversions: int) -> N
             found = values(host.ask("READ"))  # and meanwhile the inputs stay
             for channel in range(ANALOG):
                 possible = {
-                    statistics.median((given[channel] + [counts[channel]] * since)[-conversions:]) for since in range(3)
+                    statistics.median((given[channel] + [counts[channel]] * since)[-conversions:])
+                    for since in range(3)
                 }
                 assert found[channel] in possible
                 given[channel] += [counts[channel]] * sum(c == channel for _, c in chip.samples[noted:])
@@ -171,4 +177,4 @@ def test_time_wraps_after_32_bits() -> None:
         times = [host.exchange("IN").time for _ in range(4)]
         assert times[0] > 2**32 - 5000
         assert times[-1] < 20_000
-        assert all(3000 < (b - a) % 2**32 < 5000 for a, b in zip(times, times[1:], strict=False))
+        assert all(3000 < (b - a) % 2**32 < 5000 for a, b in pairwise(times))

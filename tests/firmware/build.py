@@ -15,10 +15,18 @@ BUILD = FIRMWARE / "build"
 PACKAGES = "gcc-avr avr-libc libsimavr-dev libelf-dev make gcc"
 
 
+def _has_header(compiler: str, header: str) -> bool:
+    command = [compiler, "-E", "-", "-o", "/dev/null"]
+    return subprocess.run(command, input=f"#include <{header}>", capture_output=True, text=True).returncode == 0
+
+
+@functools.cache
 def missing() -> str:
     """Return what the simulated board lacks on this machine; empty where it can be built."""
     lacks = [tool for tool in ("avr-gcc", "make", "cc") if shutil.which(tool) is None]
-    if not any(Path(root, "simavr/sim_avr.h").exists() for root in ("/usr/include", "/usr/local/include")):
+    if "avr-gcc" not in lacks and not _has_header("avr-gcc", "stdlib.h"):
+        lacks.append("avr-libc")
+    if "cc" not in lacks and not _has_header("cc", "simavr/sim_avr.h"):
         lacks.append("libsimavr")
     return f"{', '.join(lacks)} missing; Debian packages: {PACKAGES}" if lacks else ""
 

@@ -2,6 +2,8 @@
 
 import random
 
+from cobs import cobs
+
 from tests.firmware import wire
 
 
@@ -32,15 +34,23 @@ def mutated(frame: bytes, rng: random.Random, others: list[bytes]) -> bytes:
     return bytes(data)
 
 
+def fits(chunk: bytes) -> bytes | None:
+    """Return what lies between two 0x00, decoded, where a request has its type and length, whatever its CRC."""
+    try:
+        decoded = bytes(cobs.decode(chunk))
+    except cobs.DecodeError:
+        return None
+    name = next((name for name, number in wire.REQUEST.items() if decoded[:1] == bytes([number])), None)
+    return decoded if name is not None and len(decoded) == 5 + wire.layout(name).size else None
+
+
 def is_request(chunk: bytes) -> bytes | None:
     """Return the content of what lies between two 0x00 where it is a request; judged by other people's COBS."""
-    try:
-        content = wire.content_of(chunk)
-    except ValueError:
+    decoded = fits(chunk)
+    if decoded is None or len(chunk) >= wire.CONSTANT["LONGEST_FRAME"]:
         return None
-    name = next((name for name, number in wire.REQUEST.items() if number == content[0]), None)
-    known = name is not None and len(content) == 3 + wire.layout(name).size
-    return content if known and len(chunk) < wire.CONSTANT["LONGEST_FRAME"] else None
+    content, crc = decoded[:-2], int.from_bytes(decoded[-2:], "little")
+    return content if wire.crc(content) == crc else None
 
 
 def random_request(rng: random.Random, sequence: int) -> bytes:

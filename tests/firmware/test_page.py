@@ -1,6 +1,10 @@
 """The constants in C are those of the protocol's page."""
 
 import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -44,3 +48,10 @@ def test_flags_and_types_are_different() -> None:
     for kind in (wire.FLAG, {**wire.REQUEST, **wire.REPLY}, wire.REASON, wire.CAUSE, wire.CODE):
         assert len(set(kind.values())) == len(kind)
     assert sum(wire.FLAG.values()) == max(wire.FLAG.values()) * 2 - 1  # one bit each
+
+
+def test_drawing_is_the_one_of_the_page(tmp_path: Path) -> None:
+    shutil.copy(FIRMWARE / "PROTOCOL.md", tmp_path)
+    shutil.copy(FIRMWARE / "wiring.py", tmp_path)
+    subprocess.run([sys.executable, str(tmp_path / "wiring.py")], check=True)
+    assert (tmp_path / "wiring.svg").read_text() == (FIRMWARE / "wiring.svg").read_text()

@@ -91,6 +91,17 @@ def test_dead_man_disarms_until_armed_again(ready: Host) -> None:
     assert ready.exchange("IN").valves == wire.valves("IN")
 
 
+@pytest.mark.parametrize("stall", [0.1, 0.24, 0.26, 3.0])
+def test_host_that_stalls_has_to_arm_again(ready: Host, stall: float) -> None:
+    ready.exchange("IN", wait=0.005)
+    ready.chip.run(stall - 0.005)
+    reply = ready.exchange("OUT", "IN")
+    if stall < 0.25:
+        assert reply.valves == wire.valves("OUT", "IN")
+    else:
+        assert (reply.why, ready.chip.valve_pins) == ("NOT_ARMED", 0)
+
+
 def test_dead_man_is_fed_by_exchanges_only(ready: Host) -> None:
     for _ in range(100):
         assert not ready.exchange("IN").has("DEAD_MAN")

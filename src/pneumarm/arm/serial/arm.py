@@ -1,0 +1,280 @@
+"""An arm behind a microcontroller that speaks the protocol."""
+
+import secrets
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import Arm, ArmSpec, Reading
+from pneumarm.arm.serial.clock import ControllerClock
+from pneumarm.arm.serial.line import Line
+from pneumarm.arm.serial.link import Answer, Link
+from pneumarm.arm.serial.protocol import (
+    ANY_OVER_PRESSURE,
+    HIGHEST_COUNT,
+    JOINTS,
+    LATCHES,
+    MUSCLES,
+    OVER_PRESSURE,
+    SEQUENCES,
+    VELOCITY_SCALE,
+    VERSION,
+    Cause,
+    Flag,
+    Hello,
+    Reason,
+    Refused,
+    Reply,
+    Request,
+    Sensors,
+    Status,
+    pack_valves,
+    unpack_valves,
+)
+from pneumarm.errors import ArmFailure, UnusableInput
+
+CONVERSIONS = 5
+"""Conversions of which the controller sends the median (thesis A.1.3)."""
+VELOCITY_MS = 16
+"""Time over which the controller averages the velocity [ms] (thesis 5.1, 7.3)."""
+CUT_OFF = 1.5
+"""The controller cuts a muscle off at so many times ``spec.max_pressure``; moving closed ones compresses them."""
+FED = 0.1
+"""While waiting the valves are sent again this often [s], so that the controller does not take us for dead."""
+BOOT = 3.0
+"""Longest time to wait for a controller that opening the port has reset [s]."""
+KNOCK = 0.15
+"""Time between two CONNECTs to a controller that may still be booting [s]."""
+
+
+class SerialArm(Arm):
+    """An arm on a serial line. It is connected, configured and armed on opening; closing vents it.
+
+    Whatever the controller does by itself (vents a muscle over its limit, vents all when the host is silent, begins
+    anew) makes the next :meth:`set_valves` fail and stays until :meth:`rearm`, or until :meth:`make_ready` before
+    a movement where only the silence of this host was the cause.
+
+    Args:
+        line: to the controller.
+        spec: what the arm is.
+        conversions: 5, 7 or 9, of which each value is the median.
+        velocity_ms: time over which the controller averages the velocity [ms].
+        cut_off: pressure [bar] at which the controller cuts a muscle off; 1.5 times ``spec.max_pressure`` by default.
+
+    Raises:
+        UnusableInput: more joints than the controller has pins for, or a controller of another protocol.
+        ArmFailure: no controller answers, or it finds the arm unfit to move.
+
+    """
+
+    def __init__(
+        self,
+        line: Line,
+        spec: ArmSpec,
+        *,
+        conversions: int = CONVERSIONS,
+        velocity_ms: int = VELOCITY_MS,
+        cut_off: float | None = None,
+    ) -> None:
+        if spec.joints > JOINTS:
+            raise UnusableInput(f"{spec.name}: a controller has pins for {JOINTS} joints, not for {spec.joints}")
+        self.spec = spec
+        self.link = Link(line, spec.period, spec.name, secrets.randbelow(SEQUENCES))
+        self.hello: Hello | None = None
+        """What the controller said of itself when it was connected."""
+        self._line = line
+        self._clock = ControllerClock()
+        self._valves = np.zeros((spec.joints, 2), np.int8)
+        self._fed = line.now()
+        self._closed = False
+        limit = min(round((cut_off or CUT_OFF * spec.max_pressure) * spec.counts_per_bar), HIGHEST_COUNT)
+        self._settings = (conversions, velocity_ms, *[limit] * MUSCLES)
+        self._limit = limit / spec.counts_per_bar
+        self._session = 0
+        try:
+            self._connect()
+            self._arm()
+        except BaseException:
+            line.close()
+            raise
+
+    def read(self) -> Reading:
+        """Return the sensors of one moment, and that moment on the host's clock.
+
+        Raises:
+            ArmFailure: the link is lost, or the controller began anew.
+
+        """
+        return self._reading(self.link.ask(Request.READ))
+
+    def set_valves(self, valves: NDArray[np.int8]) -> None:
+        """Set the valves (joints, 2) of -1, 0, +1.
+
+        Raises:
+            ArmFailure: the controller did not do so, and why.
+
+        """
+        self._exchange(np.asarray(valves, np.int8).reshape(self._valves.shape))
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass [s] on the host's clock; the valves hold."""
+        self.wait_until(self._line.now() + seconds)
+
+    def wait_until(self, time: float) -> None:
+        """Let time pass until ``time`` [s] on the host's clock; the valves hold."""
+        while True:
+            due = self._fed + FED
+            if due >= time or not self._armed:
+                break
+            self._line.sleep_until(due)
+            self._exchange(self._valves)
+        self._line.sleep_until(time)
+
+    def make_ready(self) -> None:
+        """Arm the controller if it vented the arm only because nobody moved it for a while.
+
+        Raises:
+            ArmFailure: it was something else.
+
+        """
+        flags = self._status(self.link.ask(Request.READ))
+        if flags & LATCHES & ~Flag.DEAD_MAN:
+            self._fail(flags)
+        if not flags & Flag.ARMED:
+            self._arm()
+
+    def rearm(self) -> None:
+        """Connect again if the link was lost or the controller began anew, and arm: a person has looked at the arm.
+
+        Raises:
+            ArmFailure: a cause remains.
+
+        """
+        self.link.begin()
+        self._connect()
+        self._arm()
+
+    def close(self) -> None:
+        """Vent all muscles, disarm, and let go of the line."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            if self.link.lost is None:
+                self.link.ask(Request.DISARM)
+        except ArmFailure:
+            pass  # who is not heard lets the controller vent by itself
+        finally:
+            self._line.close()
+
+    def _connect(self) -> None:
+        """Have a controller that may still be booting answer, then configure it."""
+        self._armed = False
+        self._session = secrets.randbits(32)
+        try:
+            self._line.write(b"\0")  # ends whatever an earlier host left unfinished
+        except OSError as error:
+            raise ArmFailure(f"{self.spec.name}: the line is gone ({error})") from error
+        begun = self._line.now()
+        while True:
+            self.link.begin()
+            try:
+                answer = self.link.ask(Request.CONNECT, VERSION, self._session, give_up=KNOCK)
+                break
+            except ArmFailure as error:
+                if self._line.now() - begun >= BOOT:
+                    raise ArmFailure(
+                        f"{self.spec.name}: nobody answered for {BOOT:g} s; is this the right port, is the controller "
+                        "powered, is pneumarm's firmware on it?"
+                    ) from error
+        if answer.frame.kind != Reply.HELLO:
+            raise UnusableInput(
+                f"{self.spec.name}: the controller speaks another protocol than version {VERSION}; "
+                "flash the firmware that came with this pneumarm"
+            )
+        self.hello = Hello(*answer.frame.values)
+        self._clock = ControllerClock()
+        self._status(self.link.ask(Request.CONFIGURE, *self._settings))
+
+    def _arm(self) -> None:
+        self._status(self.link.ask(Request.ARM, self._session))
+        self._armed = True
+        self._valves = np.zeros_like(self._valves)
+        self._fed = self._line.now()
+
+    def _exchange(self, valves: NDArray[np.int8]) -> None:
+        packed = pack_valves(valves)
+        answer = self.link.ask(Request.EXCHANGE, packed)
+        flags = self._status(answer)
+        sensors = Sensors.of(answer.frame.values)
+        if flags & LATCHES:
+            self._fail(flags)
+        if sensors.valves != packed:
+            applied = unpack_valves(sensors.valves, self.spec.joints)
+            raise ArmFailure(f"{self.spec.name}: valves {valves.tolist()} were asked, {applied} are set")
+        self._valves = valves
+        self._fed = answer.sent
+
+    def _reading(self, answer: Answer) -> Reading:
+        self._status(answer)
+        sensors = Sensors.of(answer.frame.values)
+        joints = self.spec.joints
+        return Reading(
+            self._clock.map(sensors.time, answer.sent, answer.received),
+            np.array(sensors.angle[:joints], np.float64),
+            np.array(sensors.pressure[: 2 * joints], np.float64).reshape(joints, 2),
+            np.array(sensors.velocity[:joints]) / VELOCITY_SCALE,
+        )
+
+    def _status(self, answer: Answer) -> Flag:
+        """Return the flags of an answer that is no refusal."""
+        kind, values = answer.frame.kind, answer.frame.values
+        if kind == Reply.REFUSED:
+            self._refused(Refused(*values))
+        if kind == Reply.STATUS:
+            return Flag(Status(*values).flags)
+        if kind == Reply.READING:
+            return Flag(values[1])
+        return Flag(0)
+
+    def _refused(self, refused: Refused) -> NoReturn:
+        flags = Flag(refused.flags)
+        if refused.reason in (Reason.NOT_CONNECTED, Reason.NOT_ARMED):
+            self._armed = False
+        if refused.reason == Reason.NOT_CONNECTED:
+            raise ArmFailure(
+                f"{self.spec.name}: the controller began anew while in use, all muscles are vented; "
+                "look at its power, its plug and, after a hang, its firmware"
+            )
+        if flags & LATCHES or refused.reason == Reason.CAUSE_REMAINS:
+            self._fail(flags)
+        why = Reason(refused.reason).name.lower().replace("_", " ") if refused.reason in Reason else refused.reason
+        raise ArmFailure(f"{self.spec.name}: the controller refused: {why}")
+
+    def _fail(self, flags: Flag) -> NoReturn:
+        """Raise what a latch means."""
+        if flags & ANY_OVER_PRESSURE:
+            muscles = [
+                f"muscle {muscle % 2 + 1} of joint {muscle // 2 + 1}"
+                for muscle, flag in enumerate(OVER_PRESSURE)
+                if flags & flag
+            ]
+            raise ArmFailure(
+                f"{self.spec.name}: the controller cut off {' and '.join(muscles)}, which read over "
+                f"{self._limit:.2f} bar; look at its inlet valve and at the supply"
+            )
+        if flags & Flag.CONVERTER:
+            raise ArmFailure(f"{self.spec.name}: the controller's converter stopped, all muscles are vented")
+        self._armed = False
+        raise ArmFailure(
+            f"{self.spec.name}: the controller heard nothing for a quarter of a second and vented all muscles; "
+            "this computer was too busy, or asleep"
+        )
+
+    def reset_causes(self) -> list[str]:
+        """Return why the controller last began anew, in words; several may be true."""
+        causes = Cause(self.hello.reset_cause) if self.hello is not None else Cause(0)
+        words = {Cause.POWER_ON: "power on", Cause.EXTERNAL: "reset pin", Cause.BROWN_OUT: "supply too low"}
+        words[Cause.WATCHDOG] = "its program hung"
+        return [text for cause, text in words.items() if causes & cause]

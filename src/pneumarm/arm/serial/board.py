@@ -1,0 +1,296 @@
+"""A controller in pure Python, with any arm on it: the same bytes and the same rules as the firmware's."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import Arm, Reading
+from pneumarm.arm.serial.line import Line
+from pneumarm.arm.serial.protocol import (
+    DEAD_MAN_MS,
+    EXTRAS,
+    HIGHEST_COUNT,
+    JOINTS,
+    LATCHES,
+    MOST_VELOCITY_MS,
+    MUSCLES,
+    NEWEST_AHEAD,
+    OVER_PRESSURE,
+    OVER_PRESSURE_SAMPLES,
+    SEQUENCES,
+    VELOCITY_SCALE,
+    VERSION,
+    WATCHDOG_MS,
+    Cause,
+    Flag,
+    Frame,
+    Reason,
+    Reply,
+    Request,
+    Sensors,
+    Splitter,
+    encode,
+    pack_valves,
+    unpack_valves,
+)
+from pneumarm.errors import UnusableInput
+
+SAMPLE = 1e-3
+"""Time between two looks at a pressure that is near its limit [s]; the firmware looks five times as often."""
+SELDOM = 10e-3
+"""The same while all pressures are far below their limits [s]."""
+NEAR = 0.75
+"""A pressure over this share of its limit is near it: no inlet fills the rest of it within SELDOM."""
+FIRMWARE = 0x50594D55
+"""What this board gives as the hash of its firmware."""
+_SEEN = Flag.STALE_SEEN | Flag.CORRUPT_SEEN | Flag.OVERRUN_SEEN
+
+
+class EmulatedBoard:
+    """A board whose time is that of the arm on it: it passes only in :meth:`run_until`.
+
+    Args:
+        arm: what is moved; valves, sensors and time are its own.
+
+    Raises:
+        UnusableInput: the arm has more joints than the board.
+
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        if arm.spec.joints > JOINTS:
+            raise UnusableInput(f"a board has pins for {JOINTS} joints, {arm.spec.name} has {arm.spec.joints}")
+        self.arm = arm
+        self.boots = 0
+        self._hung = False
+        self.reset(Cause.POWER_ON)
+
+    @property
+    def time(self) -> float:
+        """The arm's time [s]."""
+        return self._time
+
+    @property
+    def armed(self) -> bool:
+        """Whether the valves follow EXCHANGE."""
+        return bool(self._flags & Flag.ARMED)
+
+    def reset(self, cause: Cause = Cause.EXTERNAL) -> None:
+        """Begin anew, vented."""
+        self._time = self._booted = self.arm.read().time
+        self._cause = cause
+        self._hung = False
+        self.boots = (self.boots + 1) % SEQUENCES
+        self._splitter = Splitter()
+        self._corrupt = 0
+        self._flags = Flag(0)
+        self._session: int | None = None
+        self._last: Frame | None = None
+        self._last_reason: Reason | None = None
+        self._limits = [HIGHEST_COUNT] * MUSCLES
+        self._over = [0] * MUSCLES
+        self._velocity_s = SAMPLE
+        self._asked = np.full((self.arm.spec.joints, 2), -1, np.int8)
+        self._fed = self._time
+        self._apply()
+        self._earlier = self._now = self._look()
+
+    def hang(self) -> None:
+        """Stop answering, as a program does that hangs; the watchdog begins it anew."""
+        self._hung = True
+        self._hung_at = self._time
+
+    def run_until(self, time: float) -> None:
+        """Let time pass until ``time`` [s], with the dead-man and the limits watched; the arm may wake a little late."""
+        while self._time < time:
+            near = bool((self._now.pressure.ravel() > NEAR * np.array(self._limits[: self._now.pressure.size])).any())
+            step = min(self._time + (SAMPLE if near else SELDOM), time)
+            velocity_from = time - self._velocity_s
+            if self._time < velocity_from < step:
+                step = velocity_from  # the velocity is that of the last few milliseconds
+            if self.armed:
+                step = min(step, max(self._fed + DEAD_MAN_MS / 1e3, self._time))
+            if self._hung:
+                step = min(step, max(self._hung_at + WATCHDOG_MS / 1e3, self._time))
+            if step == time:
+                self.arm.wait_until(step)
+            else:
+                self.arm.wait(step - self._time)
+            self._look_again(velocity_from)
+            if self._hung and self._time >= self._hung_at + WATCHDOG_MS / 1e3 - 1e-9:
+                self.reset(Cause.WATCHDOG)
+            if self.armed and self._time >= self._fed + DEAD_MAN_MS / 1e3 - 1e-9:
+                self._vent(Flag.DEAD_MAN)
+
+    def receive(self, data: bytes) -> bytes:
+        """Return the answers to what is in ``data``, however it was cut."""
+        if self._hung:
+            return b""
+        return b"".join(self._answered(frame) for frame in self._splitter.feed(data))
+
+    def _look(self) -> Reading:
+        reading = self.arm.read()
+        self._time = reading.time
+        return reading
+
+    def _look_again(self, velocity_from: float) -> None:
+        before = self._now
+        self._now = self._look()
+        if before.time <= velocity_from + 1e-9 or self._earlier.time < velocity_from - MOST_VELOCITY_MS / 1e3:
+            self._earlier = before
+        limits = self._limits
+        for muscle, pressure in enumerate(self._now.pressure.ravel().tolist()):
+            self._over[muscle] = self._over[muscle] + 1 if pressure > limits[muscle] else 0
+            if self._over[muscle] >= OVER_PRESSURE_SAMPLES and self._flags & Flag.CONFIGURED:
+                self._flags |= OVER_PRESSURE[muscle]
+                self._apply()
+
+    def _vent(self, latch: Flag = Flag(0)) -> None:
+        self._flags = (self._flags | latch) & ~Flag.ARMED
+        self._apply()
+
+    def _applied(self) -> NDArray[np.int8]:
+        """Return the valves (joints, 2) as they are now."""
+        if not self.armed:
+            return np.full_like(self._asked, -1)
+        latched = [bool(self._flags & OVER_PRESSURE[muscle]) for muscle in range(self._asked.size)]
+        return np.where(np.reshape(latched, self._asked.shape), -1, self._asked).astype(np.int8)
+
+    def _apply(self) -> None:
+        self.arm.set_valves(self._applied())
+
+    def _answered(self, frame: Frame) -> bytes:
+        """Return the answer to ``frame``; nothing to one that is stale."""
+        if frame.kind not in Request:
+            self._splitter.corrupt += 1
+            return b""
+        if frame.kind == Request.CONNECT:
+            return self._connected(frame)
+        ahead = 1 if self._last is None else (frame.sequence - self._last.sequence) % SEQUENCES
+        if self._last is not None and ahead == 0 and frame.kind == self._last.kind:
+            return self._reply(frame, self._last_reason, Flag.REPEATED)
+        if not 1 <= ahead <= NEWEST_AHEAD:
+            self._flags |= Flag.STALE_SEEN
+            return b""
+        if self._session is None:
+            return self._reply(frame, Reason.NOT_CONNECTED)
+        self._last, self._last_reason = frame, self._act(frame)
+        return self._reply(frame, self._last_reason)
+
+    def _connected(self, frame: Frame) -> bytes:
+        version, session = frame.values
+        if version != VERSION:
+            return self._reply(frame, Reason.WRONG_VERSION)
+        self._vent()
+        self._flags &= ~Flag.CONFIGURED
+        self._session, self._last, self._last_reason = session, frame, None
+        return encode(Reply.HELLO, frame.sequence, VERSION, FIRMWARE, session, self._cause, self.boots)
+
+    def _act(self, frame: Frame) -> Reason | None:
+        """Do what a fresh request asks; return why not, if so."""
+        values = frame.values
+        if frame.kind == Request.CONFIGURE:
+            return self._configure(values)
+        if frame.kind == Request.ARM:
+            return self._arm(values[0])
+        if frame.kind == Request.DISARM:
+            self._vent()
+        if frame.kind == Request.EXCHANGE:
+            if not self.armed:
+                return Reason.NOT_ARMED
+            valves = unpack_valves(values[0], self.arm.spec.joints)
+            if valves is None:
+                return Reason.BAD_VALUE
+            self._asked, self._fed = valves, self._time
+            self._apply()
+        return None
+
+    def _configure(self, values: tuple[int, ...]) -> Reason | None:
+        conversions, velocity_ms, *limits = values
+        if self.armed:
+            return Reason.STILL_ARMED
+        inside = all(1 <= limit <= HIGHEST_COUNT for limit in limits) and 1 <= velocity_ms <= MOST_VELOCITY_MS
+        if not inside or conversions not in (5, 7, 9):
+            return Reason.BAD_VALUE
+        self._limits, self._velocity_s = limits, velocity_ms * 1e-3
+        self._earlier = self._now
+        self._flags |= Flag.CONFIGURED
+        return None
+
+    def _arm(self, session: int) -> Reason | None:
+        if session != self._session:
+            return Reason.WRONG_SESSION
+        if not self._flags & Flag.CONFIGURED:
+            return Reason.NOT_CONFIGURED
+        self._now = self._look()
+        pressures = self._now.pressure.ravel().tolist()
+        if any(p > limit for p, limit in zip(pressures, self._limits, strict=False)):
+            return Reason.CAUSE_REMAINS
+        self._flags = (self._flags & ~LATCHES) | Flag.ARMED
+        self._over = [0] * MUSCLES
+        self._asked = np.zeros_like(self._asked)
+        self._fed = self._time
+        self._apply()
+        return None
+
+    def _reply(self, frame: Frame, reason: Reason | None, extra: Flag = Flag(0)) -> bytes:
+        if self._splitter.corrupt > self._corrupt:
+            self._corrupt = self._splitter.corrupt
+            self._flags |= Flag.CORRUPT_SEEN
+        flags = self._flags | extra
+        self._flags &= ~_SEEN
+        valves = pack_valves(self._applied())
+        for muscle in range(self._asked.size, MUSCLES):
+            valves |= pack_valves(np.array([0 if self.armed else -1], np.int8)) << 2 * muscle
+        if reason is not None:
+            return encode(Reply.REFUSED, frame.sequence, reason, flags, valves)
+        now = self._look()
+        time = round(1e6 * (now.time - self._booted)) % (1 << 32)
+        if frame.kind not in (Request.EXCHANGE, Request.READ):
+            return encode(Reply.STATUS, frame.sequence, time, flags, valves)
+        return encode(Reply.READING, frame.sequence, *self._sensors(now, time, flags, valves).packed())
+
+    def _sensors(self, now: Reading, time: int, flags: Flag, valves: int) -> Sensors:
+        missing = JOINTS - len(now.angle)
+        angle = [_count(value) for value in now.angle.tolist()] + [0] * missing
+        pressure = [_count(value) for value in now.pressure.ravel().tolist()] + [0, 0] * missing
+        since = 1e3 * (now.time - self._earlier.time)
+        velocity = [0] * JOINTS
+        if since > 0:
+            for joint, change in enumerate((now.angle - self._earlier.angle).tolist()):
+                velocity[joint] = min(max(round(VELOCITY_SCALE * change / since), -32767), 32767)
+        return Sensors(time, flags, valves, tuple(angle), tuple(pressure), tuple(velocity), (0,) * EXTRAS)
+
+
+def _count(value: float) -> int:
+    return min(max(round(value), 0), HIGHEST_COUNT)
+
+
+class BoardLine(Line):
+    """A line to a board in the same process, whose time is the arm's: as fast as the arm can be computed."""
+
+    def __init__(self, board: EmulatedBoard) -> None:
+        self.board = board
+        self._came = b""
+
+    def write(self, data: bytes) -> None:
+        """Have the board take ``data``, in no time."""
+        self._came += self.board.receive(data)
+
+    def read(self, timeout: float) -> bytes:
+        """Return the board's answers; time passes only where there are none."""
+        if not self._came and timeout > 0:
+            self.board.run_until(self.board.time + timeout)
+        came, self._came = self._came, b""
+        return came
+
+    def now(self) -> float:
+        """Return the arm's time [s]."""
+        return self.board.time
+
+    def sleep_until(self, time: float) -> None:
+        """Let the arm's time pass until ``time`` [s]."""
+        self.board.run_until(time)
+
+    def close(self) -> None:
+        """Close the arm."""
+        self.board.arm.close()

@@ -1,0 +1,75 @@
+"""The controller's clock on the host's: unwrapped, and mapped by what is known of when its readings were made."""
+
+from collections import deque
+from typing import NamedTuple
+
+WRAP = 1 << 32
+"""The controller's clock begins again after so many microseconds, 71.6 minutes."""
+STRETCH = 1.0
+"""Of the exchanges of a stretch [s] the quickest is kept: its reading is known best."""
+STRETCHES = 30
+"""So many stretches tell the rate: a ceramic resonator is off by up to 0.5 %, and drifts with its temperature."""
+MOST_OFF = 0.02
+"""No clock is taken to be wrong by more than this share."""
+
+
+class _Exchange(NamedTuple):
+    controller: float
+    """Unwrapped time of the reading [s]."""
+    host: float
+    """Middle between sending and receiving [s]."""
+    round_trip: float
+    """[s]"""
+
+
+class ControllerClock:
+    """Maps times of the controller to times of the host, from exchanges of which both are known.
+
+    The reading of an exchange was made between sending the request and receiving the reply; the quicker the
+    exchange, the better its time is known. A straight line through the quickest of each second gives rate and
+    offset. Mapped times never go back.
+    """
+
+    def __init__(self) -> None:
+        self._kept: deque[_Exchange] = deque(maxlen=STRETCHES)
+        self._raw: int | None = None
+        self._wraps = 0
+        self._last: tuple[float, float] | None = None
+        self.rate = 1.0
+        """Seconds of the host per second of the controller."""
+        self._origin = (0.0, 0.0)
+
+    def map(self, raw: int, sent: float, received: float) -> float:
+        """Return the host's time [s] of a reading made at ``raw`` [us] in an exchange between two host times [s]."""
+        controller = self._unwrapped(raw)
+        if self._last is not None and controller == self._last[0]:
+            return self._last[1]
+        self._keep(_Exchange(controller, (sent + received) / 2, received - sent))
+        mapped = self._origin[1] + self.rate * (controller - self._origin[0])
+        mapped = min(max(mapped, sent), received)  # it was made then, whatever the line says
+        if self._last is not None:
+            mapped = max(mapped, self._last[1])
+        self._last = (controller, mapped)
+        return mapped
+
+    def _unwrapped(self, raw: int) -> float:
+        if self._raw is not None and raw < self._raw:
+            self._wraps += 1
+        self._raw = raw
+        return 1e-6 * (raw + self._wraps * WRAP)
+
+    def _keep(self, exchange: _Exchange) -> None:
+        kept = self._kept
+        if not kept or exchange.host // STRETCH > kept[-1].host // STRETCH:
+            kept.append(exchange)
+        elif exchange.round_trip <= kept[-1].round_trip:
+            kept[-1] = exchange
+        else:
+            return
+        n = len(kept)
+        controller, host = sum(e.controller for e in kept) / n, sum(e.host for e in kept) / n
+        spread = sum((e.controller - controller) ** 2 for e in kept)
+        together = sum((e.controller - controller) * (e.host - host) for e in kept)
+        rate = together / spread if spread > STRETCH**2 / 4 else 1.0
+        self.rate = min(max(rate, 1 - MOST_OFF), 1 + MOST_OFF)
+        self._origin = (controller, host)

@@ -1,0 +1,130 @@
+"""A line that loses, doubles, delays and spoils frames, as real ones do (thesis A.1.4), or is pulled out."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from pneumarm.arm.serial.line import Line
+from pneumarm.errors import UnusableInput
+
+
+@dataclass(frozen=True)
+class LineFaults:
+    """How often what happens to a frame, in both directions; shares of 1."""
+
+    dropped: float = 0.0
+    doubled: float = 0.0
+    """The frame comes again at once."""
+    late: float = 0.0
+    """The frame comes ``lateness`` later, after newer ones."""
+    corrupted: float = 0.0
+    """Some bytes of the frame are changed, cut or inserted."""
+    claims_empty: float = 0.0
+    """Share of reads for which the driver says that nothing came, though something did (thesis A.1.4)."""
+    lateness: float = 0.05
+    """[s]"""
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for field in fields(self)[:5]:
+            if not 0 <= getattr(self, field.name) <= 1:
+                raise UnusableInput(f"LineFaults: {field.name} is a share of 0 to 1, got {getattr(self, field.name)}")
+
+
+class FaultyLine(Line):
+    """``line`` with faults, which may be changed at any time by assigning to ``faults``."""
+
+    def __init__(self, line: Line, faults: LineFaults | None = None) -> None:
+        self.line = line
+        self.faults = faults or LineFaults()
+        self.unplugged = False
+        """Whether the plug is out: every use fails, as with a port that is gone."""
+        self.cut = False
+        """Whether the wire is cut: nothing arrives, and nobody is told."""
+        self.sent_late = 0
+        """Requests that were delivered after their time."""
+        self._random = np.random.default_rng(self.faults.seed)
+        self._late_out: list[tuple[float, bytes]] = []
+        self._late_in: list[tuple[float, bytes]] = []
+        self._rest = b""
+
+    def write(self, data: bytes) -> None:
+        """Send what is left of ``data``."""
+        self._check()
+        self._deliver_late()
+        for frame in data.split(b"\0")[:-1]:
+            for whole in self._treated(frame + b"\0", self._late_out):
+                self.line.write(whole)
+
+    def read(self, timeout: float) -> bytes:
+        """Return what is left of what came."""
+        self._check()
+        self._deliver_late()
+        data = self.line.read(timeout)
+        self._check()
+        if data and self._random.random() < self.faults.claims_empty:
+            self._late_in.append((self.line.now(), data))  # it is still there, for another time
+            return b""
+        *frames, self._rest = (self._rest + data).split(b"\0")
+        came = b"".join(b"".join(self._treated(frame + b"\0", self._late_in)) for frame in frames)
+        now = self.line.now()
+        due = [frame for time, frame in self._late_in if time <= now]
+        self._late_in = [(time, frame) for time, frame in self._late_in if time > now]
+        return came + b"".join(due)
+
+    def now(self) -> float:
+        """Return the host's time [s]."""
+        return self.line.now()
+
+    def sleep_until(self, time: float) -> None:
+        """Let time pass."""
+        self.line.sleep_until(time)
+        self._deliver_late()
+
+    def close(self) -> None:
+        """Close the line."""
+        self.line.close()
+
+    def _check(self) -> None:
+        if self.unplugged:
+            raise OSError("no such device")
+
+    def _deliver_late(self) -> None:
+        now = self.line.now()
+        due = [frame for time, frame in self._late_out if time <= now]
+        self._late_out = [(time, frame) for time, frame in self._late_out if time > now]
+        if not self.cut and not self.unplugged:
+            for frame in due:
+                self.sent_late += 1
+                self.line.write(frame)
+
+    def _treated(self, frame: bytes, late: list[tuple[float, bytes]]) -> list[bytes]:
+        """Return what arrives now of ``frame``: nothing, itself, itself twice, or something spoilt."""
+        faults, chance = self.faults, self._random.random
+        if self.cut or chance() < faults.dropped:
+            return []
+        if chance() < faults.late:
+            late.append((self.line.now() + faults.lateness, frame))
+            return []
+        if chance() < faults.corrupted:
+            frame = spoilt(frame, self._random)
+        return [frame, frame] if chance() < faults.doubled else [frame]
+
+
+def spoilt(frame: bytes, random: np.random.Generator) -> bytes:
+    """Return ``frame`` with one to four bytes changed, inserted or cut; it never stays as it is."""
+    while True:
+        data = bytearray(frame)
+        for _ in range(random.integers(1, 4, endpoint=True)):
+            place = int(random.integers(len(data))) if data else 0
+            what = random.integers(4)
+            if what == 0 and data:
+                data[place] ^= 1 << int(random.integers(8))
+            elif what == 1 and data:
+                data[place] = int(random.integers(256))
+            elif what == 2:
+                data.insert(place, int(random.integers(256)))
+            elif data:
+                del data[place : place + int(random.integers(1, 4, endpoint=True))]
+        if bytes(data) != frame:
+            return bytes(data)

@@ -1,0 +1,113 @@
+"""A line over a serial port, USB or not."""
+
+import os
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import serial
+from serial.tools import list_ports
+
+from pneumarm.arm.serial.line import Line
+from pneumarm.arm.serial.protocol import BAUD
+from pneumarm.errors import UnusableInput
+
+
+class SerialPort(Line):
+    """The serial port at ``path``, for this process alone.
+
+    Raises:
+        UnusableInput: there is no such port, it may not be opened, or another program has it.
+
+    """
+
+    def __init__(self, path: str) -> None:
+        holder = _holder(path)
+        if holder is not None:
+            raise UnusableInput(f"serial:{path}: in use by {holder}; end that first")
+        try:
+            # exclusive: two programs on one port would each get half of the other's replies.
+            self._port = serial.Serial(path, BAUD, timeout=0, exclusive=True)
+        except (serial.SerialException, ValueError, OSError) as error:
+            raise UnusableInput(f"serial:{path}: {_advice(path, error)}") from error
+        _lower_latency(path, self._port)
+
+    def write(self, data: bytes) -> None:
+        """Send ``data``."""
+        try:
+            self._port.write(data)
+        except serial.SerialException as error:
+            raise OSError(str(error)) from error
+
+    def read(self, timeout: float) -> bytes:
+        """Return what came, waiting up to ``timeout`` [s] for the first byte."""
+        try:
+            self._port.timeout = timeout
+            first = self._port.read(1)
+            return first + self._port.read(self._port.in_waiting) if first else b""
+        except (serial.SerialException, TypeError) as error:  # TypeError: closed by another thread
+            raise OSError(str(error)) from error
+
+    def now(self) -> float:
+        """Return the monotonic time [s]."""
+        return time.monotonic()
+
+    def sleep_until(self, time_: float) -> None:
+        """Return at ``time_`` [s] or a little later."""
+        remaining = time_ - time.monotonic()
+        if remaining > 0:
+            time.sleep(remaining)
+
+    def close(self) -> None:
+        """Close the port."""
+        with suppress(OSError, serial.SerialException):
+            self._port.close()
+
+
+def _lower_latency(path: str, port: serial.Serial) -> None:
+    """Have bytes delivered at once where the driver can: an FTDI chip else keeps them for up to 16 ms."""
+    with suppress(OSError, ValueError, AttributeError, NotImplementedError):
+        port.set_low_latency_mode(True)
+    timer = Path("/sys/bus/usb-serial/devices") / Path(path).resolve().name / "latency_timer"
+    with suppress(OSError):
+        timer.write_text("1")
+
+
+def _holder(path: str) -> str | None:
+    """Return the name of another process that has ``path`` open, where the system tells."""
+    try:
+        wanted = os.stat(path)
+    except OSError:
+        return None
+    if not path.startswith("/dev/tty"):
+        return None  # a pseudo-terminal is always open at its other end
+    for process in Path("/proc").glob("[0-9]*"):
+        if int(process.name) == os.getpid():
+            continue
+        with suppress(OSError):
+            for descriptor in (process / "fd").iterdir():
+                with suppress(OSError):
+                    found = descriptor.stat()
+                    if (found.st_dev, found.st_ino) == (wanted.st_dev, wanted.st_ino):
+                        name = (process / "comm").read_text().strip()
+                        return f"process {process.name} ({name})"
+    return None
+
+
+def _advice(path: str, error: Exception) -> str:
+    """Return what to do about ``error``."""
+    if not os.path.exists(path):
+        found = ", ".join(port.device for port in list_ports.comports()) or "none"
+        return f"no such port; ports found: {found}. Is the controller plugged in?"
+    if isinstance(error, PermissionError) or "Permission" in str(error):
+        group = ""
+        if sys.platform != "win32":
+            import grp
+
+            with suppress(KeyError):
+                group = f" (group {grp.getgrgid(os.stat(path).st_gid).gr_name})"
+        return f"you may not open it; become a member of the group that owns it{group}, and log in again"
+    if "lock" in str(error) or "busy" in str(error).lower():
+        return "in use by another program; end that first"
+    return f"cannot be opened ({error})"

@@ -9,6 +9,7 @@ from cyclopts import App, CycloptsError
 from pneumarm import __version__
 from pneumarm.console import complain
 from pneumarm.errors import PneumarmError
+from pneumarm.leaving import leave_by_exceptions
 
 COMMANDS = {
     "run": (
@@ -69,18 +70,13 @@ for _name, (_help, _example) in COMMANDS.items():
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; exit with 0 done, 2 unusable input, 1 anything else."""
-    # A polite kill leaves through the same doors as Ctrl-C: arms are closed, files are whole.
-    signal.signal(signal.SIGTERM, _interrupt)
+    """Run the command line; exit with 0 done, 2 unusable input, 128 + N ended by signal N, 1 anything else."""
     sys.exit(_run(sys.argv[1:] if arguments is None else arguments))
-
-
-def _interrupt(signal_number: int, frame: object) -> None:
-    raise KeyboardInterrupt
 
 
 def _run(arguments: list[str]) -> int:
     try:
+        leave_by_exceptions()
         app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         complain(f"{error} See pneumarm --help.")
@@ -88,9 +84,12 @@ def _run(arguments: list[str]) -> int:
     except PneumarmError as error:
         complain(error)
         return error.exit_code
-    except KeyboardInterrupt:
-        complain("interrupted; run, collect and transfer go on where they were when called again")
-        return 1
+    except KeyboardInterrupt as error:
+        told = f" ({error})" if str(error) else ""
+        complain(
+            f"interrupted{told}; the arm is closed; run, collect and transfer go on where they were, called again"
+        )
+        return getattr(error, "exit_code", 128 + signal.SIGINT)
     except BrokenPipeError:
         sys.stderr.close()
         return 1

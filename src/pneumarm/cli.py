@@ -52,6 +52,18 @@ COMMANDS = {
         "Say what can be achieved on a virtual arm at all, by planning with its true physics.",
         "pneumarm bound --arm virtual:seed=7 --episodes 500",
     ),
+    "arm check": (
+        "Move an arm gently and say in plain words what is wrong with it.",
+        "pneumarm arm check virtual:seed=7 --out checkup",
+    ),
+    "arm calibrate": (
+        "Measure an arm's sensors and write what everything else needs to know of it.",
+        "pneumarm arm calibrate virtual:seed=7 --out arm.toml",
+    ),
+    "arm valves": (
+        "Click every valve, one by one, saying which; before the air is on.",
+        "pneumarm arm valves virtual",
+    ),
     "report": (
         "Write the report of a finished run again.",
         "pneumarm report runs/first",
@@ -65,8 +77,17 @@ app = App(
     version=__version__,
     suppress_keyboard_interrupt=False,
 )
+_groups = {"arm": App(name="arm", help="Check an arm, calibrate it, try its valves.")}
+for _group in _groups.values():
+    app.command(_group)
 for _name, (_help, _example) in COMMANDS.items():
-    app.command(f"pneumarm.commands.{_name}_:{_name}_", name=_name, help=_help, help_epilogue=f"Example: {_example}")
+    _file, _, _part = _name.partition(" ")
+    _groups.get(_file, app).command(
+        f"pneumarm.commands.{_file}_:{_part or _file}_",
+        name=_part or _file,
+        help=_help,
+        help_epilogue=f"Example: {_example}",
+    )
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -208,9 +208,9 @@ class GuardedArm(Arm):
         self._inflation.valves = values = valves.ravel().tolist()
         self._inflating = 1 in values
 
-    def _look(self) -> None:
-        """Read, and close the inlets that are at a limit now."""
-        self.read()
+    def watch(self) -> Reading:
+        """Return a reading, after closing the valves that are at a limit now."""
+        reading = self.read()
         if self._over is not None or self._outward is not None or self._inflation.spent:
             before = self._interventions
             self._interventions = replace(before)
@@ -219,20 +219,21 @@ class GuardedArm(Arm):
                 self._interventions = before
             else:
                 self._set(now)
+        return reading
 
     def wait(self, seconds: float) -> None:
         """Let time pass, looking at the limits every control period while an inlet is open."""
         while seconds > self.spec.period and self._inflating:
             self.arm.wait(self.spec.period)
             seconds -= self.spec.period
-            self._look()
+            self.watch()
         self.arm.wait(seconds)
 
     def wait_until(self, time: float) -> None:
         """Let time pass until the arm's clock shows ``time`` [s], looking at the limits as :meth:`wait` does."""
         while time - self._time > 2 * self.spec.period and self._inflating:
             self.arm.wait(self.spec.period)
-            self._look()
+            self.watch()
         self.arm.wait_until(time)
 
     def get_state(self) -> bytes | None:

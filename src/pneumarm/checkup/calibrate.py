@@ -22,7 +22,8 @@ WORST_RESIDUAL = 2.5
 """Largest residual of a linearised potentiometer [degrees]."""
 _CURVATURES = (-12.0, 12.0)
 """Range in which k is sought; an audio potentiometer has about 4."""
-_MARGIN = 0.02  # of the range, either side: the noise and the swing of a moving arm
+_LEAST_SWEEP = 0.05  # of the sensor's range
+_ROUNDING = 0.01  # counts
 _STEADY = 0.02  # a muscle is full when its pressure rises by less than this share in the last 0.2 s
 _REACTION = 2.0  # a period must be so many times the 99th percentile of setting and reading
 
@@ -61,27 +62,33 @@ def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
     """
     spec = checkup.spec
     lines = [_linearised(checkup, j) for j in range(len(checkup.joints))]
-    ends = np.array([(line.angle.min(), line.angle.max()) for line in lines])
-    if (np.diff(ends) < _MARGIN * np.diff(spec.angle_range)).any():
+    ends = np.array([line.ends for line in lines])
+    if (np.diff(ends) < _LEAST_SWEEP * np.diff(spec.angle_range)).any():
         raise UnusableInput(f"{spec.name}: its angle hardly moves; run `pneumarm arm check` and mend what it finds")
     per_degree, angle_range = spec.counts_per_degree, spec.angle_range
+    scales = [(0.0, 0.0, 1.0)] * len(
+        lines
+    )  # where a joint's 0 degrees are, where they go, and how they are stretched
     if known.angles is not None:
-        low, high = known.angles
-        per_degree = float(np.mean(np.diff(ends)) / (high - low))
-        zeros = ends[:, 0] - low * per_degree
-        reach = (1 + _MARGIN) * max(-low, high) * per_degree
-        middle = float(zeros.mean())
+        each = np.diff(ends)[:, 0] / np.diff(known.angles)
+        zeros = ends[:, 0] - known.angles[0] * each
+        per_degree, middle = float(each.mean()), float(zeros.mean())
+        reach = max(middle - spec.angle_range[0], spec.angle_range[1] - middle)
         angle_range = (middle - reach, middle + reach)
-    zero, per_bar = _pressures(checkup, known)
+        scales = [(float(z), middle, per_degree / float(e)) for z, e in zip(zeros, each, strict=True)]
+    at_rest, per_bar = _pressures(checkup, known)
     mean_per_bar = float(per_bar.mean())
-    tables = [line.table for line in lines]
-    straight = all(table is None for table in tables)
-    identity = tuple(np.linspace(*spec.angle_range, POINTS).tolist())
+    raw = np.linspace(*spec.angle_range, POINTS)
+    true = [
+        middle + stretch * (straightened(raw, line.curvature, *spec.angle_range) - zero)
+        for line, (zero, middle, stretch) in zip(lines, scales, strict=True)
+    ]
+    straight = np.allclose(true, raw, atol=_ROUNDING)
     correction = Correction(
-        pressure_zero=_pairs(zero),
+        pressure_zero=_pairs(at_rest),
         pressure_gain=_pairs(mean_per_bar / per_bar),
-        angle_raw=() if straight else tuple(table[0] if table else identity for table in tables),
-        angle_true=() if straight else tuple(table[1] if table else identity for table in tables),
+        angle_raw=() if straight else (tuple(raw.tolist()),) * len(lines),
+        angle_true=() if straight else tuple(tuple(np.round(t, 3).tolist()) for t in true),
     )
     needed = _REACTION * float(np.quantile(checkup.timing.set_and_read, 0.99))
     period = max(spec.period, math.ceil(1e3 * needed) / 1e3)
@@ -122,36 +129,34 @@ def _pressures(checkup: Checkup, known: Known) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class _Line:
-    """The sweep's angles put right, and how."""
+    """How a joint's potentiometer is put right."""
 
-    angle: Array
-    table: tuple[tuple[float, ...], tuple[float, ...]] | None
+    ends: Array
+    """Linearised angles with muscle 2 full and with muscle 1 full, shape (2,) [counts]."""
+    curvature: float
     residual: float | None
 
 
 def _linearised(checkup: Checkup, j: int) -> _Line:
     test, spec = checkup.joints[j], checkup.spec
     ratio = halves(test)
+    ends = np.array([np.median(cut(test.muscles[m], checkup)[1].angle) for m in (1, 0)])
     if math.isnan(ratio):
         raise UnusableInput(
             f"{spec.name}: joint {j + 1} does not turn as its pressures say; run `pneumarm arm check` and mend it"
         )
     if 1 / LOGARITHMIC < ratio < LOGARITHMIC:
-        return _Line(test.sweep.angle, None, None)
+        return _Line(ends, 0.0, None)
     low, high = spec.angle_range
     curvature = _curvature(test, low, high)
     angle = straightened(test.sweep.angle, curvature, low, high)
-    share = (angle.max() - angle.min()) / (high - low)
-    per_degree = spec.counts_per_degree if share > 0 else math.nan
-    residual = asymmetry(test, angle) / per_degree
+    residual = asymmetry(test, angle) / spec.counts_per_degree
     if residual > WORST_RESIDUAL:
         raise UnusableInput(
             f"{spec.name}: the potentiometer of joint {j + 1} is not linear, and linearised as a logarithmic one "
             f"it is still off by {residual:.1f} degrees; put in a linear one"
         )
-    raw = np.linspace(low, high, POINTS)
-    true = straightened(raw, curvature, low, high)
-    return _Line(angle, (tuple(raw.tolist()), tuple(np.round(true, 3).tolist())), residual)
+    return _Line(straightened(ends, curvature, low, high), curvature, residual)
 
 
 def straightened(raw: Array, curvature: float, low: float, high: float) -> Array:

@@ -19,18 +19,18 @@ MOVED = 0.10
 WHITE = 0.25
 """Noise whose autocorrelation at any of the first lags exceeds this is not white."""
 LAGS = 20
-LEAK = 15.0
+LEAK = 12.0
 """A muscle leaks if it loses more than so many percent of its pressure a minute."""
 LOW_SUPPLY = 0.75
 """The supply is low if a full muscle reads less than this share of the pressure limit."""
 LEAP = 0.08
 """A sensor is at the valve's side if its reading leaps by so much [bar] when the valve opens and falls back."""
-LOGARITHMIC = 1.6
+LOGARITHMIC = 1.3
 """A potentiometer is logarithmic if one half of the sweep turns it so many times further than the other half."""
 WORN = 6.0
 """A place of the potentiometer is worn if its readings are off by so many counts there (root mean square)."""
 _BIN = 10.0  # counts: about a degree
-_EVEN = 0.35  # share of a full muscle's rise that a healthy muscle always exceeds
+_EVEN = 0.35  # bar: what a filled muscle always exceeds, and one that is merely stretched never reaches
 
 Kind = Literal[
     "muscles swapped", "pressure sensors swapped", "valves swapped", "inlet stuck closed", "inlet stuck open",
@@ -150,6 +150,10 @@ def detrended(time: Array, values: Array) -> Array:
     return values - np.polyval(np.polyfit(scaled, values, 4), scaled)
 
 
+_NOTHING = 1e-6
+"""A variance below this [counts^2] is that of rounding."""
+
+
 def autocorrelation(values: Array) -> Array:
     """Return the autocorrelation at lags 0..LAGS; zeros where nothing varies.
 
@@ -158,7 +162,7 @@ def autocorrelation(values: Array) -> Array:
     """
     spectrum = np.abs(np.fft.rfft(values - values.mean(), 2 * len(values))) ** 2
     covariance = np.fft.irfft(spectrum)[: LAGS + 1]
-    return covariance / covariance[0] if covariance[0] > 0 else np.zeros(LAGS + 1)
+    return covariance / covariance[0] if covariance[0] > _NOTHING * len(values) else np.zeros(LAGS + 1)
 
 
 def ljung_box(correlation: Array, count: int) -> float:
@@ -246,7 +250,7 @@ def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
     rose = np.array([_rise(test.muscles[m], checkup) for m in range(2)]) / bar  # [muscle filled, sensor]
     own, other = rose.diagonal(), rose[:, ::-1].diagonal()
     turned = np.array([m.turned for m in figures.muscles])
-    crossed = bool((own < MOVED).all() and (other > _EVEN).all())
+    crossed = bool((other > _EVEN).all() and (own < 0.5 * other).all())
     reversed_ = bool(turned[0] < -5 and turned[1] > 5)
     yield from _of_sensors(checkup, j, name)
     before = test.before.pressure
@@ -271,14 +275,19 @@ def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
         yield Finding("angle reversed", name, told, "Swap the outer wires of the potentiometer")
     if crossed or swapped_pair:
         return
-    yield from _of_valves(figures, own, stays, checkup, name)
+    frozen = [_is_frozen(test, m) for m in range(2)]
+    valves = list(_of_valves(figures, rose, stays, frozen, checkup, name))
+    yield from valves
+    if not any("stuck" in finding.kind for finding in valves):
+        yield from _of_noise(checkup, j, name)  # while air flows, readings at rest are no noise
     yield from _of_potentiometer(checkup, test, figures, name)
 
 
 def _of_valves(
-    figures: JointFigures, own: Array, stays: NDArray[np.bool_], checkup: Checkup, name: str
+    figures: JointFigures, rose: Array, stays: NDArray[np.bool_], frozen: list[bool], checkup: Checkup, name: str
 ) -> Iterator[Finding]:
     limit = checkup.spec.max_pressure
+    own, other = rose.diagonal(), rose[::-1].diagonal()[::-1]  # by its own inlet, by the other muscle's
     full = np.array([m.full for m in figures.muscles])
     if (own < MOVED).all():
         yield Finding("low supply", name, "no muscle fills", "Turn the air on; see to the valves' power")
@@ -286,24 +295,27 @@ def _of_valves(
     if (np.maximum(full, own) < LOW_SUPPLY * limit).all():
         told = f"full muscles reach {full[0]:.2f} and {full[1]:.2f} bar of {limit:.2f}"
         yield Finding("low supply", name, told, "See to the reducer, the buffer and the filters")
+    most = np.nanmax([LEAK, *(muscle.leak for muscle in figures.muscles)])  # where one sags, the other is stretched
     for m, muscle in enumerate(figures.muscles):
         where = f"{name}, muscle {m + 1}"
+        if frozen[m]:
+            continue  # nothing is known of its valves
         if own[m] < MOVED:
             told = f"it gains {own[m]:.2f} bar when its inlet opens"
             yield Finding("inlet stuck closed", where, told, "See to the inlet valve, its wire and its hose")
         elif stays[m]:
             told = "its pressure does not fall when its exhaust opens"
             yield Finding("exhaust stuck closed", where, told, "See to the exhaust valve, its wire and its silencer")
-        elif muscle.full < _EVEN * own[m]:
+        elif muscle.full < 0.4 * own[m]:
             told = f"of {own[m]:.2f} bar it keeps {muscle.full:.2f} when its valves close"
             yield Finding("exhaust stuck open", where, told, "See to the exhaust valve; or the muscle has burst")
-        elif muscle.leak < -LEAK:
-            told = f"closed, it gains {-muscle.leak:.0f} % a minute"
+        elif other[m] > _EVEN or muscle.leak < -LEAK:
+            told = "its pressure rises while its valves are closed"
             yield Finding("inlet stuck open", where, told, "See to the inlet valve: dirt in its seat, or it sticks")
-        elif muscle.leak > LEAK:
+        elif muscle.leak > max(LEAK, 0.5 * most):
             told = f"closed, it loses {muscle.leak:.0f} % a minute"
             yield Finding("leak", where, told, "Look for the leak with soap water: clamps, hose, exhaust valve")
-        if muscle.leap > LEAP:
+        elif muscle.leap > LEAP:
             told = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
             remedy = "Move the pressure sensor to the far end of the muscle (thesis A.1.1)"
             yield Finding("pressure at the valve's side", where, told, remedy)
@@ -319,10 +331,13 @@ def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
         told = f"it reads {everything[0]:.0f} whatever moves"
         yield Finding("angle dead" if dead else "angle frozen", name, told, remedy)
     for m in range(2):
-        pressures = np.concatenate([trace.pressure[:, m] for o in test.muscles for trace in (o.whole, o.pulse)])
-        if np.ptp(pressures) == 0:
-            told = f"it reads {pressures[0]:.0f} whatever moves"
+        if _is_frozen(test, m):
+            told = f"it reads {test.rest.pressure[0, m]:.0f} whatever moves"
             yield Finding("pressure frozen", f"{name}, muscle {m + 1}", told, "See to the pressure sensor's wires")
+
+
+def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
+    test = checkup.joints[j]
     for what, values in (
         ("angle", test.rest.angle),
         *((f"pressure {m + 1}", test.rest.pressure[:, m]) for m in (0, 1)),
@@ -354,6 +369,12 @@ def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, 
         told = f"readings are off by up to {off.max():.0f} counts at {degrees} degrees"
         remedy = "Put in a new potentiometer, and mount it so that nothing presses on its axis (thesis A.1.2)"
         yield Finding("angle worn", name, told, remedy)
+
+
+def _is_frozen(test: JointTest, m: int) -> bool:
+    """Return whether the pressure sensor of muscle ``m`` never says anything else."""
+    pressures = np.concatenate([trace.pressure[:, m] for o in test.muscles for trace in (o.whole, o.pulse)])
+    return bool(np.ptp(pressures) == 0)
 
 
 def _rise(test: MuscleTest, checkup: Checkup) -> Array:

@@ -45,6 +45,10 @@ class CorrectedArm(Arm):
         """Let time pass until the arm's clock shows ``time`` [s]."""
         self.arm.wait_until(time)
 
+    def make_ready(self) -> None:
+        """Prepare to move after a pause."""
+        self.arm.make_ready()
+
     def get_state(self) -> bytes | None:
         """Return the state of the arm."""
         return self.arm.get_state()

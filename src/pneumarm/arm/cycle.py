@@ -113,6 +113,7 @@ class BeginState:
     def reach(self, arm: GuardedArm, random: np.random.Generator) -> None:
         """Vent, inflate every muscle for a time uniform in 0..``inflate``, and wait."""
         valves = np.full_like(arm.applied, -1)
+        arm.make_ready()
         arm.read()
         arm.set_valves(valves)
         arm.wait(self.deflate)

@@ -236,6 +236,10 @@ class GuardedArm(Arm):
             self.watch()
         self.arm.wait_until(time)
 
+    def make_ready(self) -> None:
+        """Prepare to move after a pause."""
+        self.arm.make_ready()
+
     def get_state(self) -> bytes | None:
         """Return the state of the arm behind."""
         return self.arm.get_state()

@@ -2,12 +2,15 @@
 
 import importlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
-from pneumarm.arm.seam import Arm
+from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.errors import UnusableInput
 
-_FORMS = "virtual, virtual:seed=7, virtual:preset=A, simulation:FILE or python:module:callable"
+_FORMS = (
+    "virtual, virtual:seed=7, virtual:preset=A, simulation:FILE, serial:PORT, emulated:ARM or python:module:callable"
+)
 _SPEC = ",spec="
 
 
@@ -15,7 +18,9 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     """Return the arm called ``name``; ``seed`` seeds the noise of its sensors and of its surroundings.
 
     ``virtual`` is the nominal virtual arm, ``virtual:seed=N`` another one from the distribution of arms;
-    ``simulation:FILE`` a fitted simulation; ``python:module:callable`` calls ``callable()`` for the arm.
+    ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
+    ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
+    ``python:module:callable`` calls ``callable()`` for the arm.
     ``spec`` is a file from ``pneumarm arm calibrate``, which any name may also end in: ``NAME,spec=arm.toml``.
     The arm is not guarded: see :func:`pneumarm.arm.guarded`.
 
@@ -29,7 +34,7 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
         from pneumarm.arm.spec_file import load_arm_file
 
         known = load_arm_file(spec or file)
-        arm = _open(name, seed)
+        arm = _open(name, seed, known.spec)
         try:
             return CorrectedArm(arm, known)
         except UnusableInput:
@@ -38,7 +43,7 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     return _open(name, seed)
 
 
-def _open(name: str, seed: int) -> Arm:
+def _open(name: str, seed: int, spec: ArmSpec | None = None) -> Arm:
     kind, _, rest = name.partition(":")
     if kind == "virtual":
         from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters
@@ -54,6 +59,16 @@ def _open(name: str, seed: int) -> Arm:
         from pneumarm.simulation import Simulation, SimulationArm
 
         return SimulationArm(Simulation.load(Path(rest)), seed=seed)
+    elif kind == "serial" and rest:
+        from pneumarm.arm.serial.arm import SerialArm
+        from pneumarm.arm.serial.port import SerialPort
+
+        return SerialArm(SerialPort(rest), spec or ArmSpec(name=name))
+    elif kind == "emulated" and rest:
+        from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
+
+        inner = _open(rest, seed)
+        return SerialArm(BoardLine(EmulatedBoard(inner)), replace(spec or inner.spec, name=name))
     elif kind == "python" and rest.count(":") == 1:
         return _from_python(rest)
     raise UnusableInput(f"arm {name!r}: expected {_FORMS}")

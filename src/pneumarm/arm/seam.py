@@ -123,6 +123,12 @@ class Arm(ABC):
         if remaining > 0:
             self.wait(remaining)
 
+    def make_ready(self) -> None:  # noqa: B027 - most arms are always ready
+        """Prepare to move after a pause, in which hardware may have vented the arm because nobody moved it.
+
+        Called before each movement; an arm that was vented for any other reason raises.
+        """
+
     def get_state(self) -> bytes | None:
         """Return everything that the arm's future depends on, or None where that cannot be had (hardware).
 

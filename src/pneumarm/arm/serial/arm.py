@@ -249,7 +249,8 @@ class SerialArm(Arm):
             )
         if flags & LATCHES or refused.reason == Reason.CAUSE_REMAINS:
             self._fail(flags)
-        why = Reason(refused.reason).name.lower().replace("_", " ") if refused.reason in Reason else refused.reason
+        reasons = {int(reason): reason.name.lower().replace("_", " ") for reason in Reason}
+        why = reasons.get(refused.reason, f"reason {refused.reason}")
         raise ArmFailure(f"{self.spec.name}: the controller refused: {why}")
 
     def _fail(self, flags: Flag) -> NoReturn:

@@ -16,6 +16,7 @@ from pneumarm.arm.serial.protocol import (
     NEWEST_AHEAD,
     OVER_PRESSURE,
     OVER_PRESSURE_SAMPLES,
+    REQUESTS,
     SEQUENCES,
     VELOCITY_SCALE,
     VERSION,
@@ -160,7 +161,7 @@ class EmulatedBoard:
 
     def _answered(self, frame: Frame) -> bytes:
         """Return the answer to ``frame``; nothing to one that is stale."""
-        if frame.kind not in Request:
+        if frame.kind not in REQUESTS:
             self._splitter.corrupt += 1
             return b""
         if frame.kind == Request.CONNECT:

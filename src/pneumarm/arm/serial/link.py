@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from pneumarm.arm.serial.line import Line
-from pneumarm.arm.serial.protocol import DEAD_MAN_MS, SEQUENCES, Frame, Reply, Request, Splitter, encode
+from pneumarm.arm.serial.protocol import DEAD_MAN_MS, REPLIES, SEQUENCES, Frame, Request, Splitter, encode
 from pneumarm.errors import ArmFailure
 
 GIVE_UP = DEAD_MAN_MS / 1e3
@@ -104,7 +104,7 @@ class Link:
             received = self.line.now()
             answer = None
             for reply in self._splitter.feed(data):
-                if reply.kind in Reply and reply.sequence == self._sequence and answer is None:
+                if reply.kind in REPLIES and reply.sequence == self._sequence and answer is None:
                     answer = Answer(reply, sent, received)
                 else:
                     self.counts.foreign += 1

@@ -117,6 +117,8 @@ PAYLOAD: dict[int, struct.Struct] = {
     Reply.REFUSED: struct.Struct("<BHB"),
 }
 """Layout of each payload."""
+REQUESTS = frozenset(map(int, Request))
+REPLIES = frozenset(map(int, Reply))
 _HEAD = struct.Struct("<BH")
 _CRC = struct.Struct("<H")
 

@@ -17,7 +17,7 @@ from pneumarm.transitions import Store
 from small import SMALL
 
 TIMES = ("peak_memory_mb", "seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
-STAGES = ("collect", "simulation", "training", "test", "transfer")
+STAGES = ("collect", "simulation", "training", "test", "transfer", "bound")
 
 
 def results_of(folder: Path) -> dict[str, Any]:
@@ -135,7 +135,7 @@ def killed_in(stage: str, folder: Path, after: float) -> None:
 
 def test_a_run_killed_in_every_stage_ends_as_if_nothing_had_happened(small_run: Path, tmp_path: Path) -> None:
     folder = tmp_path / "killed"
-    for stage, after in zip(STAGES, (0.1, 0.3, 0.3, 0.05, 0.2), strict=True):
+    for stage, after in zip(STAGES, (0.1, 0.3, 0.3, 0.05, 0.2, 0.1), strict=True):
         killed_in(stage, folder, after)
     assert started(folder).wait() == 0
     assert without_times(results_of(folder)) == without_times(results_of(small_run))

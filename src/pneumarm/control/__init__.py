@@ -1,7 +1,7 @@
 """Controllers on an arm: agents, movements, transfer and adaptation."""
 
 from pneumarm.control.agent import AgentController
-from pneumarm.control.bound import BoundSettings, Planned, measure_bound
+from pneumarm.control.bound import BoundSettings, Planned, known_bound, measure_bound
 from pneumarm.control.movement import LearningController, Movement, move
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.plan_agent import PlanAgent
@@ -33,6 +33,7 @@ __all__ = [
     "SimulationModel",
     "TransferSettings",
     "Transferred",
+    "known_bound",
     "measure_bound",
     "move",
     "open_agent",

@@ -8,6 +8,7 @@ from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
 from pneumarm.learning.fleet.side_by_side import FLEET_CURVES
 from pneumarm.learning.fleet.training import FleetTraining
 from pneumarm.learning.kinds import (
+    LOOKING_AHEAD,
     METHODS,
     Actor,
     AnyAgent,
@@ -18,6 +19,8 @@ from pneumarm.learning.kinds import (
     adaptation,
     load_agent,
     test,
+    test_ahead,
+    tested_results,
     train,
 )
 from pneumarm.learning.online import OnlineLearner
@@ -29,6 +32,7 @@ from pneumarm.learning.training import CURVES, Progress, Training
 __all__ = [
     "CURVES",
     "FLEET_CURVES",
+    "LOOKING_AHEAD",
     "METHODS",
     "Actor",
     "Adaptation",
@@ -57,5 +61,7 @@ __all__ = [
     "begin_states",
     "load_agent",
     "test",
+    "test_ahead",
+    "tested_results",
     "train",
 ]

@@ -41,6 +41,9 @@ Settings = PolicySettings | BatchedSettings | TrainSettings
 """Settings of a training; their type says which method is meant."""
 Trained = FleetTraining[PolicyAgent] | FleetTraining[Agent] | Training
 
+LOOKING_AHEAD = 500
+"""Movements of a test that looks ahead; they take seconds."""
+
 
 @dataclass(frozen=True)
 class LearnSettings:
@@ -195,18 +198,52 @@ def test(
 ) -> TestResult:
     """Let ``agent`` move greedily and without learning, from all begin states to all goals.
 
-    Begin states and goals depend on ``seed`` alone, not on what the agent does, so rivals get the same ones.
+    A policy moves as it says at once; what looking ahead adds on an arm is told by :func:`test_ahead`. Begin states
+    and goals depend on ``seed`` alone, not on what the agent does, so rivals get the same ones.
 
     Raises:
         UnusableInput: the agent was made for an arm or a window of another kind, or there is no episode.
 
     """
+    _check_made_for(agent, simulation)
+    return agent.test(simulation, begin_states, episodes, (seed, TEST))
+
+
+test.__test__ = False  # type: ignore[attr-defined]
+
+
+def test_ahead(
+    agent: AnyAgent,
+    simulation: Simulation,
+    begin_states: BeginStates,
+    episodes: int = LOOKING_AHEAD,  # noqa: PT028 - this is no test case
+    seed: int = 0,  # noqa: PT028
+) -> TestResult | None:
+    """Let ``agent`` make the first movements of :func:`test` as it makes them on an arm, looking ahead.
+
+    None for an agent that acts on an arm as it does in :func:`test`: there is nothing to add.
+
+    Raises:
+        UnusableInput: the agent was made for an arm or a window of another kind, or there is no episode.
+
+    """
+    _check_made_for(agent, simulation)
+    if not isinstance(agent, PolicyAgent):
+        return None
+    return agent.test_ahead(simulation, begin_states, episodes, (seed, TEST))
+
+
+test_ahead.__test__ = False  # type: ignore[attr-defined]
+
+
+def tested_results(tested: TestResult, ahead: TestResult | None) -> dict[str, Any]:
+    """Return what ``results.json`` holds of :func:`test` and, under ``lookahead``, of :func:`test_ahead`."""
+    return {**tested.results(), "lookahead": None if ahead is None else ahead.results()}
+
+
+def _check_made_for(agent: AnyAgent, simulation: Simulation) -> None:
     if agent.window != simulation.window:
         raise UnusableInput(f"an agent for {agent.window} cannot be tested on a simulation of {simulation.window}")
     scaling, other = agent.scaling, simulation.scaling
     if not all(np.array_equal(getattr(scaling, name), getattr(other, name)) for name in vars(scaling)):
         raise UnusableInput("the agent was trained in another simulation: its inputs are scaled differently")
-    return agent.test(simulation, begin_states, episodes, (seed, TEST))
-
-
-test.__test__ = False  # type: ignore[attr-defined]

@@ -145,4 +145,11 @@ def _summary(run: RunData) -> list[str]:
         ]
         if parts:
             text.append("On the arm it reaches " + " and ".join(parts) + ".")
+    bound = run.results.get("bound", {})
+    if "after" in bound.get("distance", {}):
+        below = bound["distance"]["after"]["open_loop"]["reward"]
+        text.append(
+            f"The best that planning with the arm's true physics finds there is {bound['open_loop']['reward']:.2f}; "
+            f"the controller is {abs(below):.2f} {'below' if below >= 0 else 'above'} it after adaptation."
+        )
     return text

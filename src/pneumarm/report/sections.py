@@ -20,7 +20,7 @@ from pneumarm.report.data import (
     TransferData,
 )
 from pneumarm.report.figures import Classification, Phase
-from pneumarm.report.ledger import beside_thesis, ledger
+from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import of_joint, quantities
 
@@ -65,16 +65,20 @@ def all_sections(run: RunData) -> list[Section]:
 
 def overview(run: RunData) -> Section:
     """Return the ledger and the comparison with the thesis."""
+    bound = run.results.get("bound", {})
+    text = [
+        "The first table is what counts: how well the controller moves in the simulation it was trained in, on the "
+        "arm as it arrives there, and after it went on learning on the arm. The last table puts our figures beside "
+        "those of the thesis."
+    ]
+    if "missing" in bound:
+        text.append(f"What could be achieved on this arm at all is not told: {bound['missing']}.")
     return Section(
         "Results",
-        (
-            "The first table is what counts: how well the controller moves in the simulation it was "
-            "trained in, on the "
-            "arm as it arrives there, and after it went on learning on the arm. The second table puts our figures "
-            "beside those of the thesis.",
-        ),
+        text,
         tables=(
-            ledger(run.test, run.transfer),
+            ledger(run.test, run.transfer, run.results.get("test", {}).get("lookahead")),
+            *([bound_table(bound)] if "distance" in bound else []),
             beside_thesis(run.results, run.quality, run.test, run.transfer, run.spec),
         ),
     )

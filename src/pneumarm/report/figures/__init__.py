@@ -19,6 +19,7 @@ from pneumarm.report.figures.residues import (
     residue_by_class,
     residue_by_class_alt,
 )
+from pneumarm.report.figures.rivals import Rival, rivals, rivals_alt
 from pneumarm.report.figures.training import (
     shaping_curves,
     shaping_curves_alt,
@@ -30,6 +31,7 @@ from pneumarm.report.figures.transfer import Phase, transfer_curves, transfer_cu
 __all__ = [
     "Classification",
     "Phase",
+    "Rival",
     "against_displacement",
     "against_displacement_alt",
     "cells",
@@ -54,6 +56,8 @@ __all__ = [
     "residue_alt",
     "residue_by_class",
     "residue_by_class_alt",
+    "rivals",
+    "rivals_alt",
     "shaping_curves",
     "shaping_curves_alt",
     "spread_of_agents",

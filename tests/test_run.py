@@ -49,6 +49,20 @@ def test_results_have_the_keys_that_are_promised(small_run: Path) -> None:
     assert results["transfer"]["learning_rate"] == SMALL.transfer.learning_rate
 
 
+def test_the_bound_is_told_for_the_movements_of_the_tests(small_run: Path) -> None:
+    results = results_of(small_run)
+    bound = results["bound"]
+    with open(small_run / "episodes.csv", newline="") as file:
+        rows = [r for r in csv.DictReader(file) if r["phase"] == "after"][: SMALL.bound_episodes]
+    paid = sum(float(r["reward"]) for r in rows) / len(rows)
+    for planner in ("open_loop", "closed_loop"):
+        assert bound[planner]["episodes"] == SMALL.bound_episodes
+        lost = bound["distance"]["after"][planner]
+        assert lost["reward"] == pytest.approx(bound[planner]["reward"] - paid)
+        assert lost["reward"] > 0  # 30 movements of learning make no planner
+    assert "planning with the arm's true physics" in (small_run / "report.html").read_text().replace("&#39;", "'")
+
+
 def test_the_ledger_agrees_with_the_episodes(small_run: Path) -> None:
     with open(small_run / "episodes.csv", newline="") as file:
         rows = list(csv.DictReader(file))

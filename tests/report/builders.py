@@ -4,6 +4,8 @@ import numpy as np
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.report import CoverageData, Episodes, Movement, QualityData, RunData, TrainingData, TransferData
+from pneumarm.report.figures import Rival
+from pneumarm.statistics import Estimate
 from pneumarm.transitions.window import QUANTITIES, Window
 
 
@@ -150,8 +152,38 @@ def results():
             "seconds": 1.9,
         },
         "training": {"episodes": 280_000, "steps": 9_000_000, "seconds": 4.2, "steps_per_second": 2.1e6},
+        "test": {"lookahead": tested(37.4)},
         "transfer": {"learning_rate": 0.05},
+        "bound": {
+            "open_loop": tested(40.2),
+            "closed_loop": tested(39.9),
+            "distance": {
+                phase: {planner: below(by) for planner, by in (("open_loop", 2.1), ("closed_loop", 1.8))}
+                for phase in ("before", "after")
+            },
+        },
     }
+
+
+def tested(reward):
+    means = {"reward": reward, "success_rate": 0.998, "actions": 8.9, "switches": 0.31}
+    return {"episodes": 500, **means, "intervals": {name: [0.99 * v, 1.002 * v] for name, v in means.items()}}
+
+
+def below(by):
+    return {"episodes": 150, "reward": by, "interval": [by - 0.5, by + 0.5]}
+
+
+def rivals(agents=3, seed=0):
+    """Methods that were trained, each with some agents, and levels that need no training."""
+    random = np.random.default_rng(seed)
+    trained = []
+    for name, seconds, reward in (("policy", 4.0, 38.0), ("sarsa", 2.0, 21.0), ("ppo", 60.0, 35.0))[: agents and 3]:
+        means = reward + random.normal(0, 2, agents)
+        spent = seconds * random.uniform(0.8, 1.2, agents)
+        mean = Estimate(float(means.mean()), float(means.mean()) - 0.6, float(means.mean()) + 0.6, 500 * agents)
+        trained.append(Rival(name, spent, means, mean))
+    return trained, {"open loop": Estimate(40.2, 39.6, 40.8, 500), "planning": Estimate(38.8, 38.0, 39.6, 500)}
 
 
 def run(joints=1, small=False):

@@ -28,6 +28,7 @@ from pneumarm.report import (
 )
 from pneumarm.report.data import COLUMNS
 from pneumarm.report.ledger import beside_thesis, ledger
+from pneumarm.report.sections import overview
 
 VOID = {"meta", "img", "link", "br", "hr", "input"}
 MOST_BYTES = 6e6
@@ -260,3 +261,15 @@ def test_success_may_be_written_as_a_word(tmp_path):
     row = "after,600,1,2,500,601,0.2,10,1,33,{}\n"
     path.write_text(",".join(COLUMNS) + "\n" + row.format("True") + row.format("False"))
     assert read_episodes(path)["after"].success.tolist() == [True, False]
+
+
+def test_the_distance_to_the_bound_is_told_or_why_it_is_not(html):
+    text = " ".join(Page(html).text).replace("\u00a0", " ")
+    assert "planning with the arm's true physics finds there is 40.20; the controller is 2.10 below it" in text
+    assert "1.80 (1.30 to 2.30)" in text
+    assert "37.40 (37.03 to 37.47)" in text  # looking ahead
+    unknown = {"bound": {"missing": "mine is no virtual arm: its true physics is not known"}}
+    told = overview(RunData(ArmSpec(), unknown))
+    assert "mine is no virtual arm" in told.text[-1]
+    for results in (unknown, {}):
+        assert len(overview(RunData(ArmSpec(), results)).tables) == len(overview(builders.run(small=True)).tables) - 1

@@ -17,7 +17,8 @@ PNEUMARM_RIVALS_FOLDER     what was measured so far, from where a killed run goe
 
 The folder holds ``rivals.jsonl`` (a row an agent, every movement on the arm in it), ``rivals.html`` and
 ``rivals.png``, and what was collected and fitted. Training is timed after everything is compiled: wall time, and
-processor time of all threads together. Rivals of other libraries run on one thread.
+processor time of all threads together. Rivals of other libraries run on one thread. p99 is the processor time of a
+decision at the 99th percentile; wall time where the true physics is planned with.
 """
 
 import functools

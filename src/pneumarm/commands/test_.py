@@ -42,7 +42,7 @@ def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: 
     result = tested_results(tested, ahead)
 
     def rows() -> list[tuple[object, ...]]:
-        shown = [("as it decides at once", result)] + ([("looking ahead", result["lookahead"])] if ahead else [])
+        shown = [("in the simulation", result)] + ([("looking ahead", result["lookahead"])] if ahead else [])
         return [(name, *[figures[column] for column in COLUMNS]) for name, figures in shown]
 
     show(result, json, lambda: [table(("tested", *COLUMNS), rows())])

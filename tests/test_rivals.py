@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks.rivals import METHODS, Wanted, append, each, known
-from benchmarks.rivals.table import below, by_method, floor, line, pooled, write_page
+from benchmarks.rivals.table import below, by_method, curves, floor, line, pooled, write_page
 
 from pneumarm.errors import UnusableInput
 from pneumarm.statistics import summarise
@@ -24,7 +24,8 @@ def row(arm: int, method: str, seed: int = 0) -> dict:
     trained = method in ("policy", "ppo")
     return {
         "arm": arm, "method": method, "seed": seed, "wanted": vars(WANTED),
-        "wall": 3.0 * trained, "cpu": 5.0 * trained, "curve": [],
+        "wall": 3.0 * trained, "cpu": 5.0 * trained,
+        "curve": [[50_000, 6.0, 20.0 + seed], [100_000, 12.0, 30.0]] if method == "ppo" else [],
         "simulation": summarise(reward, reward > -1000, actions, switches) if trained else None,
         "reward": reward.tolist(), "success": [1] * len(reward), "actions": actions.tolist(),
         "switches": switches.tolist(), "p99_ms": 0.5, "memory_mb": 300.0,
@@ -80,9 +81,15 @@ def test_the_table_tells_every_method_and_the_floor() -> None:
         assert float(told[1]) == pytest.approx(gain, abs=0.0051)
 
 
+def test_the_curve_is_the_mean_of_the_agents() -> None:
+    assert list(curves(ROWS)) == [
+        "ppo while learning: reward (steps, processor time) 20.5 (50k, 6 s), 30.0 (100k, 12 s)"
+    ]
+
+
 def test_the_page_holds_all_arms_and_each(tmp_path: Path) -> None:
     write_page(tmp_path, ROWS)
     text = (tmp_path / "rivals.html").read_text()
     assert all(method in text for method in LEVELS)
-    assert all(words in text for words in ("All 2 arms", "Arm 1", "Arm 2"))
+    assert all(words in text for words in ("All arms together (2)", "Arm 1", "Arm 2"))
     assert (tmp_path / "rivals.png").read_bytes().startswith(b"\x89PNG")

@@ -34,7 +34,7 @@ import numpy as np
 
 from benchmarks.agents import Timed, prepared
 from benchmarks.rivals.learning import OURS, PLANNING, STABLE, learn
-from benchmarks.rivals.table import HEADER, Row, floor, line, pooled, write_page
+from benchmarks.rivals.table import HEADER, Row, curves, floor, line, pooled, write_page
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.console import jsonable, peak_memory
@@ -87,6 +87,7 @@ def measure() -> Iterator[str]:
     yield ""
     yield from pooled(rows)
     yield from floor(rows)
+    yield from curves(rows)
     write_page(folder, rows)
     yield (
         f"{folder / 'rivals.html'}, {folder / 'rivals.png'}; {time.perf_counter() - began:.0f} s, "

@@ -82,6 +82,16 @@ def pooled(rows: list[Row]) -> Iterator[str]:
         )
 
 
+def curves(rows: list[Row]) -> Iterator[str]:
+    """Give the learning curve of each method of other libraries, in the simulation and as a mean of its agents."""
+    for method, own in by_method([row for row in rows if row["curve"]]).items():
+        steps, seconds, reward = np.mean([row["curve"] for row in own], axis=0).T
+        points = ", ".join(
+            f"{r:.1f} ({n / 1e3:.0f}k, {t:.0f} s)" for n, t, r in zip(steps, seconds, reward, strict=True)
+        )
+        yield f"{method} while learning: reward (steps, processor time) {points}"
+
+
 def floor(rows: list[Row]) -> Iterator[str]:
     """Say on each arm whether our agent is above the best of PPO's agents there."""
     found = by_method(rows)
@@ -117,7 +127,7 @@ def write_page(folder: Path, rows: list[Row]) -> None:
     figure = rivals(trained, untrained)
     figure.savefig(folder / "rivals.png", dpi=RASTER_DPI)
     arms = sorted({row["arm"] for row in rows})
-    tables = [table(f"All {len(arms)} arms", found, found.get(BOUND, []))]
+    tables = [table(f"All arms together ({len(arms)})", found, found.get(BOUND, []))]
     for arm in arms:
         own = {name: [row for row in each if row["arm"] == arm] for name, each in found.items()}
         tables.append(table(f"Arm {arm}", own, found.get(BOUND, [])))
@@ -132,16 +142,17 @@ def write_page(folder: Path, rows: list[Row]) -> None:
         Section("Arm by arm", (), (), tables[1:]),
     ]
     summary = [
-        "Every method gets the same simulation, begin states and goals. On the arm nothing is learned. Intervals are "
-        "of 95%, over movements."
+        "Every method gets the same simulation, begin states and goals. On the arm nothing is learned. Training is "
+        "in wall time and in processor time of all threads together; rewards are means of movements, intervals are of "
+        "95% and over movements."
     ]
     write_text(folder / "rivals.html", render("Rivals", summary, sections))
 
 
 def table(title: str, found: dict[str, list[Row]], bound: list[Row]) -> Table:
     header = (
-        "", "agents", "training, wall [s]", "processor [s]", "reward in simulation", "reward on the arm",
-        "below the bound", "success", "actions", "switches",
+        "", "agents", "trained [s]", "in simulation", "reward on the arm", "below the bound", "success", "actions",
+        "switches",
     )  # fmt: skip
     lines = []
     for method, own in found.items():
@@ -153,12 +164,12 @@ def table(title: str, found: dict[str, list[Row]], bound: list[Row]) -> Table:
             [
                 method,
                 f"{len(own)}",
-                *(f"{np.mean([row[clock] for row in own]):.1f}" for clock in ("wall", "cpu")),
+                " / ".join(f"{np.mean([row[clock] for row in own]):.1f}" for clock in ("wall", "cpu")),
                 f"{np.mean(simulated):.2f}" if simulated else "–",
                 with_interval(mean_estimate(joined(own, "reward")), "{:.2f}"),
                 "–" if lost is None or method == BOUND else with_interval(mean_estimate(lost), "{:.2f}"),
-                with_interval(rate_estimate(joined(own, "success")), "{:.2%}"),
-                with_interval(mean_estimate(joined(own, "actions")), "{:.2f}"),
+                with_interval(rate_estimate(joined(own, "success")), "{:.1%}"),
+                with_interval(mean_estimate(joined(own, "actions")), "{:.1f}"),
                 with_interval(mean_estimate(joined(own, "switches")), "{:.2f}"),
             ]
         )

@@ -64,9 +64,13 @@ def rivals(trained: Sequence[Rival], untrained: Mapping[str, Estimate]) -> Figur
     place.set_xscale("log")
     if trained:
         seconds = np.concatenate([rival.seconds for rival in trained])
-        place.set_xlim(0.6 * seconds.min(), 1.6 * seconds.max())
+        low, high = 0.6 * seconds.min(), 1.6 * seconds.max()
+        ticks = [t for t in np.outer(10.0 ** np.arange(-3, 7), (1, 2, 5)).ravel() if low <= t <= high]
+        place.set_xticks(ticks, [f"{t:g}" for t in ticks])
+        place.set_xticks([], minor=True)
+        place.set_xlim(low, high)
     paid = [level.mean for level in untrained.values()]
-    paid += [value for rival in trained for value in rival.reward.tolist()]
+    paid += [value for rival in trained for value in (*rival.reward.tolist(), rival.mean.low) if np.isfinite(value)]
     place.set_ylim(max(min(paid), max(paid) - _MOST_BELOW) - _AIR, max(paid) + _AIR)
     legend_below(figure, handles, labels)
     return figure

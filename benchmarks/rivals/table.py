@@ -143,15 +143,21 @@ def write_page(folder: Path, rows: list[Row]) -> None:
     ]
     summary = [
         "Every method gets the same simulation, begin states and goals. On the arm nothing is learned. Training is "
-        "in wall time and in processor time of all threads together; rewards are means of movements, intervals are of "
-        "95% and over movements."
+        "told in wall time and in processor time of all threads together. Intervals are of 95% and over movements."
     ]
     write_text(folder / "rivals.html", render("Rivals", summary, sections))
 
 
+def around(values: np.ndarray) -> str:
+    """Return a mean and its interval in one line that does not break."""
+    estimate = mean_estimate(values)
+    half = "" if np.isnan(estimate.low) else f"\u00a0±\u00a0{estimate.high - estimate.mean:.2f}"
+    return f"{estimate.mean:.2f}{half}"
+
+
 def table(title: str, found: dict[str, list[Row]], bound: list[Row]) -> Table:
     header = (
-        "", "agents", "trained [s]", "in simulation", "reward on the arm", "below the bound", "success", "actions",
+        "(agents)", "trained [s]", "in simulation", "reward on the arm", "below the bound", "success", "actions",
         "switches",
     )  # fmt: skip
     lines = []
@@ -162,15 +168,14 @@ def table(title: str, found: dict[str, list[Row]], bound: list[Row]) -> Table:
         lost = below(own, bound)
         lines.append(
             [
-                method,
-                f"{len(own)}",
+                f"{method} ({len(own)})",
                 " / ".join(f"{np.mean([row[clock] for row in own]):.1f}" for clock in ("wall", "cpu")),
                 f"{np.mean(simulated):.2f}" if simulated else "–",
-                with_interval(mean_estimate(joined(own, "reward")), "{:.2f}"),
-                "–" if lost is None or method == BOUND else with_interval(mean_estimate(lost), "{:.2f}"),
+                around(joined(own, "reward")),
+                "–" if lost is None or method == BOUND else around(lost),
                 with_interval(rate_estimate(joined(own, "success")), "{:.1%}"),
-                with_interval(mean_estimate(joined(own, "actions")), "{:.1f}"),
-                with_interval(mean_estimate(joined(own, "switches")), "{:.2f}"),
+                around(joined(own, "actions")),
+                around(joined(own, "switches")),
             ]
         )
     return Table(header, lines, title)

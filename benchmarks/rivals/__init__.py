@@ -9,14 +9,15 @@ simulation, where stable-baselines3 and sb3-contrib are installed (the extra ``s
 
 PNEUMARM_RIVALS_ARMS       seeds of virtual arms, by default those of the judging arms, "1001,...,1010"
 PNEUMARM_RIVALS_SEEDS      how many agents each method trains, 3
-PNEUMARM_RIVALS_METHODS    "open loop,closed loop,planning,policy,batched,sarsa,ppo,dqn,qr-dqn"; "dqn:1" trains one
+PNEUMARM_RIVALS_METHODS    "open loop,closed loop,planning,policy,batched,sarsa,ppo,dqn,qr-dqn:1"; ":1" trains one
 PNEUMARM_RIVALS_MOVEMENTS  greedy movements on the arm for each agent, 500
 PNEUMARM_RIVALS_TESTS      movements in the simulation, 10,000; a tenth of them for what plans or looks ahead
 PNEUMARM_RIVALS_STEPS      steps that the methods of other libraries train for, 450,000
 PNEUMARM_RIVALS_FOLDER     what was measured so far, from where a killed run goes on: "runs/rivals"
 
 The folder holds ``rivals.jsonl`` (a row an agent, every movement on the arm in it), ``rivals.html`` and
-``rivals.png``, and what was collected and fitted. Training is timed after everything is compiled: wall time, and
+``rivals.png``, and what was collected and fitted. Several such commands may fill one folder at once, each with arms of
+its own; one with all arms then makes the table of what is there. Training is timed after everything is compiled: wall time, and
 processor time of all threads together. Rivals of other libraries run on one thread. p99 is the processor time of a
 decision at the 99th percentile; wall time where the true physics is planned with.
 """
@@ -69,7 +70,7 @@ def measure() -> Iterator[str]:
     arms = [int(arm) for arm in asked("ARMS", ",".join(str(seed) for seed in range(1001, 1011))).split(",")]
     folder = Path(asked("FOLDER", "runs/rivals"))
     folder.mkdir(parents=True, exist_ok=True)
-    methods = dict(each(asked("METHODS", ",".join(METHODS))))
+    methods = dict(each(asked("METHODS", ",".join(METHODS) + ":1")))
     if missing := unavailable(methods):
         yield missing
         methods = {name: seeds for name, seeds in methods.items() if name not in STABLE}

@@ -16,10 +16,12 @@ PNEUMARM_RIVALS_STEPS      steps that the methods of other libraries train for, 
 PNEUMARM_RIVALS_FOLDER     what was measured so far, from where a killed run goes on: "runs/rivals"
 
 The folder holds ``rivals.jsonl`` (a row an agent, every movement on the arm in it), ``rivals.html`` and
-``rivals.png``, and what was collected and fitted. Several such commands may fill one folder at once, each with arms of
-its own; one with all arms then makes the table of what is there. Training is timed after everything is compiled: wall time, and
-processor time of all threads together. Rivals of other libraries run on one thread. p99 is the processor time of a
-decision at the 99th percentile; wall time where the true physics is planned with.
+``rivals.png``, and what was collected and fitted. Several such commands may fill one folder at once, each with arms
+of its own; one with all arms then makes the table of what is there.
+
+Training is timed after everything is compiled: wall time, and processor time of all threads together. Rivals of
+other libraries run on one thread. p99 is the processor time of a decision at the 99th percentile; wall time where the
+true physics is planned with.
 """
 
 import functools

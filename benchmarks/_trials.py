@@ -77,7 +77,14 @@ def fitted(path: Path, seed: int) -> tuple[StoreFit, BeginStates]:
         return made, begin_states(store.blocks(kinds=KINDS), window, scaling)
 
 
-def moved(agent: AnyAgent, arm: int, goals: NDArray[np.float64], numbers: Iterable[int], seed: int) -> list[Movement]:
+def moved(
+    agent: AnyAgent,
+    arm: int,
+    goals: NDArray[np.float64],
+    numbers: Iterable[int],
+    seed: int,
+    controller: AgentController | None = None,
+) -> list[Movement]:
     """Return greedy movements of ``agent``, which learns nothing, on a virtual arm.
 
     Args:
@@ -86,10 +93,11 @@ def moved(agent: AnyAgent, arm: int, goals: NDArray[np.float64], numbers: Iterab
         goals: range of the goals, shape (joints, 2) [counts].
         numbers: of the movements; begin state and goal depend on these alone.
         seed: of the noise of the arm's sensors and of its timing.
+        controller: what acts in its place.
 
     """
     with open_arm(f"virtual:seed={arm}", seed) as opened:
-        cycle, controller = ControlCycle(guarded(opened)), AgentController(agent)
+        cycle, controller = ControlCycle(guarded(opened)), controller or AgentController(agent)
         made = []
         for number in numbers:
             random, goal = draw_movement(goals, SEED_OF_MOVEMENTS, True, number)

@@ -16,6 +16,7 @@ A failed movement is kept as a row of ``failures.jsonl`` there, with its number,
 """
 
 import os
+import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -68,11 +69,11 @@ def prepare(folder: Path, arm: int) -> Path:
     """Return the file of the agent for an arm; collect, fit and train where that is not done yet."""
     file = folder / f"{arm}.agent"
     if not file.exists():
-        db = folder / f"{arm}.db"
-        collected(db, arm, SEED, TRANSITIONS)
-        made, begin = fitted(db, SEED)
+        with tempfile.TemporaryDirectory() as place:
+            db = Path(place) / "arm.db"
+            collected(db, arm, SEED, TRANSITIONS)
+            made, begin = fitted(db, SEED)
         train(made.simulation, begin, None, SEED).agent.save(file)
-        db.unlink()
     return file
 
 

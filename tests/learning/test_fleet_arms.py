@@ -74,7 +74,7 @@ def test_arms_that_are_done_stay_and_the_others_do_not_notice(joints: int) -> No
     begin_all(env, all_arms)
     begin_all(env, some)
     random, alive, reached = np.random.default_rng(0), np.ones(ARMS, bool), np.zeros((2, ARMS), bool)
-    for k in range(20):
+    for _ in range(20):
         alive &= random.random(ARMS) < 0.9 + 0.1 * (np.arange(ARMS) == 0)  # one goes on to the end
         before = [array.copy() for array in (some.x, some.random, some.taken, reached[1])]
         actions = random.integers(0, 9, (ARMS, joints))

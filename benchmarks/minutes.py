@@ -157,9 +157,9 @@ def curve(found: list[list[dict[str, Any]]]) -> Figure:
     right.set_ylim(0, max(1.0, 105 * failed.max()))
     for place in (left, right):
         place.set_xscale("log")
-        place.set_xticks(minutes, [f"{one:.3g}" for one in minutes])
+        place.set_xticks(minutes, [f"{each[0]['asked']:g}" for each in found])
         place.set_xticks([], minor=True)
         place.set_xlabel("collecting, on the arm's clock [min]")
-    names = ["mean; bars: 95 % of the difference to the longest", "mean", "one arm and seed"]
+    names = ["mean reward; bars: 95 % of its difference to the longest", "mean failures", "one arm and seed"]
     legend_below(figure, [key(DARK, marker="o"), key(MIDDLE, marker="s"), key(GREY, lw=0.7)], names)
     return figure

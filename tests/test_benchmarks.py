@@ -82,7 +82,7 @@ def test_movements_depend_on_their_numbers_alone(small_run: Path) -> None:
 
 
 def rows_of(rewards: list[float], took: float) -> list[dict[str, Any]]:
-    same = {"minutes": took, "movements": 100, "successes": 99}
+    same = {"minutes": took, "asked": took, "movements": 100, "successes": 99}
     return [{**same, "reward": reward} for reward in rewards]
 
 
@@ -91,4 +91,6 @@ def test_differences_to_the_longest_are_taken_arm_by_arm() -> None:
     gained = minutes.differences(short, longest)
     np.testing.assert_array_equal(gained, [-1, -2, -3])
     assert minutes.half_width(gained) == pytest.approx(4.302653 / np.sqrt(3), rel=1e-6)  # t of two degrees of freedom
-    assert len(minutes.curve([short, longest]).axes) == 2
+    left, right = minutes.curve([short, longest]).axes
+    assert [label.get_text() for label in left.get_xticklabels()] == ["5", "110"]
+    np.testing.assert_allclose(right.lines[-1].get_ydata(), [1, 1])  # percent failed

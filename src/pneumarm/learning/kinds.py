@@ -1,7 +1,8 @@
 """Agents of all kinds: what they have in common, and the methods that train them.
 
 Whatever kind an agent is of, it is trained, saved, loaded, tested, transferred and used as a controller by the same
-commands. A kind is a class like :class:`Agent`; a method is a function like :func:`train_values`.
+commands. A kind is a class like :class:`Agent`; a method is a learner for :func:`train_fleet`, or
+a function of its own.
 """
 
 from collections.abc import Callable
@@ -23,8 +24,8 @@ from pneumarm.learning.fleet.adaptation import Adaptation, AdaptationSettings, c
 from pneumarm.learning.fleet.agent import KIND as POLICY
 from pneumarm.learning.fleet.agent import PolicyAgent
 from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
-from pneumarm.learning.fleet.training import FleetTraining, train_policy
-from pneumarm.learning.fleet.value_training import train_batched
+from pneumarm.learning.fleet.training import FleetTraining, PolicyLearner, train_fleet
+from pneumarm.learning.fleet.value_training import ValueLearner
 from pneumarm.learning.imported import KIND as IMPORTED
 from pneumarm.learning.imported import ImportedPolicy
 from pneumarm.learning.settings import TrainSettings, check
@@ -185,8 +186,10 @@ def train(
     if isinstance(settings, TrainSettings):
         return train_online(simulation, begin_states, settings, seed, **how)
     if isinstance(settings, BatchedSettings):
-        return train_batched(simulation, begin_states, settings, seed, **how)
-    return train_policy(simulation, begin_states, settings, seed, **how)
+        batched = settings
+        return train_fleet(lambda n: ValueLearner(simulation, begin_states, batched, seed, n), batched, seed, **how)
+    policy = settings or PolicySettings()
+    return train_fleet(lambda n: PolicyLearner(simulation, begin_states, policy, seed, n), policy, seed, **how)
 
 
 def test(

@@ -1,7 +1,7 @@
 """Transitions: the store, collecting, the state window, the grid filter, import of recordings."""
 
 from pneumarm.transitions.choice import held_out
-from pneumarm.transitions.collect import KINDS, CollectResult, CollectSettings, collect, require_enough
+from pneumarm.transitions.collect import KINDS, CollectBegin, CollectResult, CollectSettings, collect, require_enough
 from pneumarm.transitions.filtering import Enough, Filter, Filtered, enough_data, filter_transitions
 from pneumarm.transitions.grid import Coverage, Grid, GridSettings
 from pneumarm.transitions.players import Keyboard, Trajectory
@@ -13,6 +13,7 @@ from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transit
 __all__ = [
     "KINDS",
     "QUANTITIES",
+    "CollectBegin",
     "CollectResult",
     "CollectSettings",
     "Coverage",

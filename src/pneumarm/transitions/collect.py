@@ -47,6 +47,14 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
+class CollectBegin(BeginState):
+    """How the arm is brought to the begin state of a sequence at rest."""
+
+    inflate: float = 1.2
+    """Longest time that a muscle is inflated again [s] (thesis section 3.2.2: 1.2)."""
+
+
+@dataclass(frozen=True)
 class CollectSettings:
     """How transitions are collected."""
 
@@ -56,7 +64,7 @@ class CollectSettings:
     """Share of sequences whose actions are held (the thesis decides "randomly")."""
     longest_hold: int = 10
     """Most control periods that an action is held, the least is 1 (the thesis does not say)."""
-    begin: BeginState = field(default_factory=lambda: BeginState(inflate=1.2))
+    begin: CollectBegin = field(default_factory=CollectBegin)
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5)."""
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting (thesis figure 2.8)."""

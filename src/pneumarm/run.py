@@ -2,7 +2,8 @@
 
 A folder holds a run: ``settings.json`` (what was asked for), ``transitions.db``, ``simulation.safetensors``,
 ``agent.safetensors``, ``adapted.safetensors``, the versions in between in ``agents/`` with ``adaptation.json``,
-``episodes.csv``, ``report.html``, and ``results.json``, which grows by the stages that are done. A second call with the same folder goes on after the last of them.
+``episodes.csv``, ``report.html``, and ``results.json``, which grows by the stages that are done. A second call with
+the same folder goes on after the last of them.
 """
 
 import json

@@ -3,12 +3,12 @@
     after every movement:  does the simulation still predict the arm?         no: the arm has changed, notice when
                            does the adapted policy earn less than before?     yes: the one before it is put back
     now and then:          what the arm did since it changed -> the simulation fits it better?
-                           no: all stays as it is.  yes: the policy goes on learning there, and is kept if better there
+                           no: all stays as it is.  yes: the policy goes on learning there, and is kept if better
 
 The three questions are answered by :mod:`~pneumarm.learning.fleet.watch`, :mod:`~pneumarm.learning.fleet.trial` and
 :mod:`~pneumarm.learning.fleet.refit`. "Now and then" is after few movements at first, and then each time that their
-number has grown by a half, up to ``every``: what a simulation gains by more data falls with their number. A change that
-is noticed begins this anew.
+number has grown by a half, up to ``every``: what a simulation gains by more data falls with their number. A change
+that is noticed begins this anew.
 """
 
 import json

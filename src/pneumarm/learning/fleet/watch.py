@@ -33,7 +33,8 @@ class WatchSettings:
     """a: mean square of the standardised residue that is no change yet; a policy's movements are other ones than
     those that the simulation was judged on."""
     alarm: float = 10.0
-    """h: with it an unchanged arm raises an alarm about once in 3,000 movements (``python -m benchmarks notice``)."""
+    """h: with it an unchanged arm raises an alarm about once in 3,000 movements; measured by ``python -m benchmarks
+    adaptation``."""
     largest: float = 4.0
     """c: the most that a single movement counts."""
     window: int = 20
@@ -60,9 +61,10 @@ class Watch:
         """Whether a change was noticed since the last :meth:`reset`."""
         self.since = 0
         """Movements that had been made when the change that was noticed last began."""
-        self._recent: list[list[float]] = []
         self._outputs = outputs
-        self.reset()
+        self._sums = np.zeros(outputs)
+        self._began = np.zeros(outputs, np.int64)
+        self._recent: list[list[float]] = []
 
     def saw(self, squares: ArrayLike) -> bool:
         """Count a movement with the mean standardised ``squares`` (outputs,); whether a change is noticed now."""
@@ -80,8 +82,8 @@ class Watch:
     def reset(self) -> None:
         """Begin anew, with a simulation that fits the arm as it is now."""
         self.alarmed = False
-        self._sums = np.zeros(self._outputs)
-        self._began = np.full(self._outputs, self.movements, np.int64)
+        self._sums[:] = 0.0
+        self._began[:] = self.movements
         self._recent = []
 
     @property

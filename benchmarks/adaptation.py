@@ -1,10 +1,11 @@
 """How fast a policy adapts to an arm that has changed, against no adaptation and against an agent trained afresh.
 
 For every seed an arm is drawn, and an agent collects, fits and trains on it. Then the arm changes (CHANGES), and
-three rivals make the same movements, from the same begin states (by seed) to the same goals, on arms in the same state:
+three rivals make the same movements, from the same begin states (by seed) to the same goals, on arms in the same
+state:
 
-    fresh     an agent that collected, fitted and trained anew on the changed arm, in about 110 minutes of its time: the
-              reference
+    fresh     an agent that collected, fitted and trained anew on the changed arm, in about 110 minutes of its time:
+              the reference
     without   the old agent, which stays as it is
     adapting  the old agent, which adapts between movements
 

@@ -1,12 +1,13 @@
 """``pneumarm versions``."""
 
+import math
 from pathlib import Path
 from typing import Any
 
 from pneumarm.commands.common import Json
 from pneumarm.console import say, show, table
 from pneumarm.control import put_back, read_history
-from pneumarm.control.versions import ADAPTED, kept_versions
+from pneumarm.control.versions import ADAPTED, HISTORY, kept_versions
 from pneumarm.learning import Event
 
 
@@ -28,13 +29,16 @@ def versions_(folder: Path, /, *, to: int | None = None, json: Json = False) -> 
     rows = [_row(number, made.get(number), number in taken, history.version) for number in kept_versions(folder)]
     if to is not None:
         say(f"{folder / ADAPTED} is version {to} now")
-    for sentence in history.sentences:
-        say(sentence)
-    show(
-        {"version": history.version, "versions": rows},
-        json,
-        lambda: [table(tuple(rows[0]), [_cells(r) for r in rows])],
-    )
+    say_history(folder)
+    result = {"version": history.version, "versions": rows}
+    show(result, json, lambda: [table(_HEADER, [_cells(row) for row in rows])])
+
+
+def say_history(folder: Path) -> None:
+    """Say when the arm in ``folder`` was found to have changed and what became of the agent, where it adapts."""
+    if (folder / HISTORY).exists():
+        for sentence in read_history(folder).sentences:
+            say(sentence)
 
 
 def _row(number: int, made: Event | None, taken_back: bool, current: int) -> dict[str, Any]:
@@ -49,12 +53,15 @@ def _row(number: int, made: Event | None, taken_back: bool, current: int) -> dic
     }
 
 
-def _cells(row: dict[str, Any]) -> list[Any]:
-    def cell(value: Any) -> Any:
-        if isinstance(value, list):
-            return " ".join(f"{x:.2f}" for x in value)
-        if isinstance(value, bool):
-            return "yes" if value else ""
-        return "" if value is None else value
+_HEADER = ("version", "after movement", "fitted to", "error before", "and after", "")
 
-    return [cell(value) for value in row.values()]
+
+def _cells(row: dict[str, Any]) -> list[Any]:
+    """Return a row for people; errors are geometric means over what is predicted."""
+
+    def mean(values: list[float] | None) -> str:
+        return f"{math.exp(sum(map(math.log, values)) / len(values)):.2f}" if values else ""
+
+    state = "in use" if row["in_use"] else "taken back" if row["taken_back"] else ""
+    fitted = "" if row["fitted_to"] is None else row["fitted_to"]
+    return [row["version"], row["movement"], fitted, mean(row["error_before"]), mean(row["error_after"]), state]

@@ -4,8 +4,8 @@ For every seed an arm is drawn, and an agent collects, fits and trains on it. Th
 three rivals make the same movements, from the same begin states (by seed) to the same goals, on arms in the same
 state:
 
-    fresh     an agent that collected, fitted and trained anew on the changed arm, in about 110 minutes of its time:
-              the reference
+    fresh     an agent that collected, fitted and trained anew on the changed arm: the reference; of an arm that has
+              not changed it is the old agent
     without   the old agent, which stays as it is
     adapting  the old agent, which adapts between movements
 
@@ -20,6 +20,7 @@ Settings come from the environment:
 PNEUMARM_ADAPTATION_SEEDS      seeds of virtual arms, "1,2,3,4,5"; the judging arms are 1001 to 1010
 PNEUMARM_ADAPTATION_CHANGES    names from CHANGES; all by default
 PNEUMARM_ADAPTATION_MOVEMENTS  movements of each rival, 300
+PNEUMARM_ADAPTATION_COLLECTED  transitions that the fresh agent collects, 200000
 PNEUMARM_ADAPTATION_FOLDER     where stores, simulations, agents, rows and the picture are kept; a temporary folder
                                by default
 """
@@ -58,8 +59,6 @@ WORN_IN = 600
 """Begin states that a rested arm was brought to before, in about three quarters of an hour."""
 TORN = 300
 """How much more than a sound one a torn muscle leaks: 7.5 % of its pressure a second."""
-COLLECTED = 200_000
-"""Transitions that every agent collects."""
 WINDOW, SHARE = 100, 0.95
 """Of the definition of *recovered*."""
 RIVALS = ("fresh", "without", "adapting")
@@ -137,19 +136,20 @@ def changed_arm(change: str, seed: int, noise: int) -> VirtualArm:
 class Bench:
     """A folder of stores, simulations, agents and rows."""
 
-    def __init__(self, folder: Path, movements: int) -> None:
-        self.folder, self.movements = folder, movements
+    def __init__(self, folder: Path, movements: int, collected: int) -> None:
+        self.folder, self.movements, self.collected = folder, movements, collected
 
     def row(self, change: str, seed: int, rival: str) -> dict[str, Any]:
         """Return what a rival did; let it move where that is not done yet."""
-        file = self.folder / f"{change}-{seed}-{rival}-{self.movements}.json"
+        file = self.folder / f"{change}-{seed}-{rival}-{self.movements}-{self.collected}.json"
         if not file.exists():
             write_json(file, self.moved(change, seed, rival))
         found: dict[str, Any] = json.loads(file.read_text())
         return found
 
     def moved(self, change: str, seed: int, rival: str) -> dict[str, Any]:
-        old, fresh = self.trained(seed, None), self.trained(seed, change)
+        old = self.trained(seed, None)
+        fresh = old if change == "unchanged" else self.trained(seed, change)
         low = np.maximum(old.goal_range[:, 0], fresh.goal_range[:, 0])
         high = np.minimum(old.goal_range[:, 1], fresh.goal_range[:, 1])
         agent = fresh if rival == "fresh" else old
@@ -176,7 +176,7 @@ class Bench:
 
     def trained(self, seed: int, change: str | None) -> PolicyAgent:
         """Return the policy trained on an arm as drawn, or after a ``change``; train it where there is none."""
-        file = self.folder / (f"{seed}.agent" if change is None else f"{change}-{seed}.agent")
+        file = self.folder / (f"{seed}.agent" if change is None else f"{change}-{seed}-{self.collected}.agent")
         if not file.exists():
             simulation, begin = prepared(self.folder, seed) if change is None else self.prepared_anew(seed, change)
             train(simulation, begin, None, 1).agent.save(file)
@@ -186,7 +186,7 @@ class Bench:
         with tempfile.TemporaryDirectory() as place:
             arm = changed_arm(change, seed, 3000 + seed)
             with Store.for_arm(Path(place) / "db", arm.spec) as store:
-                collect(arm, store, COLLECTED, seed)
+                collect(arm, store, self.collected, seed)
                 simulation = fit_store(store, FitSettings(seed=seed)).simulation
                 return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
 
@@ -205,11 +205,12 @@ def measure() -> Iterator[str]:
     seeds = [int(word) for word in os.environ.get("PNEUMARM_ADAPTATION_SEEDS", "1,2,3,4,5").split(",")]
     changes = os.environ.get("PNEUMARM_ADAPTATION_CHANGES", ",".join(CHANGES)).split(",")
     movements = int(os.environ.get("PNEUMARM_ADAPTATION_MOVEMENTS", "300"))
+    collected = int(os.environ.get("PNEUMARM_ADAPTATION_COLLECTED", "200000"))
     kept = os.environ.get("PNEUMARM_ADAPTATION_FOLDER")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(kept or temporary)
         folder.mkdir(exist_ok=True)
-        bench, found = Bench(folder, movements), {}
+        bench, found = Bench(folder, movements, collected), {}
         yield HEADER
         for change in changes:
             found[change] = [{rival: bench.row(change, seed, rival) for rival in RIVALS} for seed in seeds]

@@ -27,6 +27,8 @@ def figures_of(n, joints):
     won = test.success
     far = (test.distance[won], test.actions[won], test.switches[won])
     real, simulated = q.target - q.observation, q.predicted - q.observation
+    adapted = builders.adaptation(n, joints)
+    marks = [figures.Mark(event.movement, event.what) for event in adapted.events]
     m = builders.movement(joints=joints, n=max(n // 8, 1))
     made = {
         "projections": figures.projections(seen.observation, spec),
@@ -40,6 +42,7 @@ def figures_of(n, joints):
         "distributions": figures.distributions(test.reward, test.actions, test.switches, won),
         "transfer": figures.transfer_curves(phases, levels(test)),
         "displacement": figures.against_displacement(*far, spec),
+        "adaptation": figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14),
         "movement": figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
     }
     if t is not None:
@@ -202,3 +205,14 @@ def test_all_alternatives_hold_computed_numbers():
 def test_a_run_without_anything_has_its_results_only():
     sections = all_sections(RunData(SPEC, {}, test=Episodes.none(1)))
     assert [s.title for s in sections] == ["Results", "Test in the simulation"]
+
+
+def test_the_adaptation_is_told_with_its_figures():
+    adapted = builders.adaptation()
+    marks = [figures.Mark(event.movement, event.what) for event in adapted.events]
+    words = figures.adaptation_curves_alt(adapted.squares, adapted.quantities, marks)
+    first = np.sqrt(adapted.squares[:100, 1, 0].mean())
+    assert f"angle {first:.2f} in the first hundred" in words
+    assert words.endswith(
+        "change noticed after movement 46; new version after movement 60; version taken back after movement 100."
+    )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pneumarm.arm import ArmSpec
+from pneumarm.control import save_history
 from pneumarm.errors import UnusableInput
 from pneumarm.report import (
     CoverageData,
@@ -149,6 +150,7 @@ def save(folder, run):
     save_spec(folder, run.spec)
     for record in (run.coverage, run.quality, run.training, run.test):
         record.save(folder)
+    save_history(folder, run.adaptation)
     for number, movement in enumerate(run.movements):
         save_movement(folder, movement, number)
     with open(folder / "episodes.csv", "w", newline="") as file:
@@ -176,6 +178,8 @@ def test_what_a_run_leaves_in_its_folder_comes_back(tmp_path, joints):
         for name in sent.shapes:
             assert np.array_equal(getattr(back, name), getattr(sent, name)), name
     assert found.transfer.learning_rate == 0.05
+    assert found.adaptation.events == run.adaptation.events
+    np.testing.assert_array_equal(found.adaptation.squares, run.adaptation.squares)
     assert [m.end for m in found.movements] == [m.end for m in run.movements]
 
 

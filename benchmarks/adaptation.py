@@ -99,7 +99,7 @@ def leaking(parameters: ArmParameters, seed: int) -> ArmParameters:
 
 
 def torn(parameters: ArmParameters, seed: int) -> ArmParameters:
-    """Muscle 1 leaks so much that it matters within a movement."""
+    """Muscle 1 leaks so much that it loses half of its pressure in ten seconds."""
     return each_joint(
         parameters, lambda joint: first_muscle(joint, lambda muscle: replace(muscle, leak=TORN * muscle.leak))
     )

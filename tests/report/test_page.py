@@ -80,10 +80,10 @@ def test_page_asks_nothing_of_any_network(html, page):
 
 def test_every_picture_has_a_caption_and_a_text_alternative(page):
     pictures = [attrs for tag, attrs in page.elements if tag == "img"]
-    assert len(pictures) == 17
+    assert len(pictures) == 18
     assert all(len(attrs["alt"]) > 60 for attrs in pictures)
     tags = [tag for tag, _ in page.elements]
-    assert tags.count("figcaption") == tags.count("figure") == 17 + tags.count("table")
+    assert tags.count("figcaption") == tags.count("figure") == 18 + tags.count("table")
 
 
 def test_ids_are_unique_and_the_contents_lead_to_every_section(page):

@@ -307,8 +307,9 @@ def curves(found: Mapping[str, list[dict[str, dict[str, Any]]]]) -> Figure:
         place.set_ylabel("reward [-]")
         place.set_ylim(lowest - 2, 43)
         place.margins(x=0)
-    for place in axes[-1]:
+    for place in axes.ravel()[: len(found)][-2:]:
         place.set_xlabel("movements on the arm [-]")
+        place.tick_params(labelbottom=True)
     for place in axes.ravel()[len(found) :]:
         place.set_visible(False)
     handles = [key(color, dashes) for color, dashes in looks.values()]

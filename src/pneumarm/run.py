@@ -1,8 +1,9 @@
 """The whole job, stage by stage, from an arm to a controller that adapts on it; it can be interrupted anywhere.
 
 A folder holds a run: ``settings.json`` (what was asked for), ``transitions.db``, ``simulation.safetensors``,
-``agent.safetensors``, ``adapted.safetensors``, ``episodes.csv``, ``report.html``, and ``results.json``, which
-grows by the stages that are done. A second call with the same folder goes on after the last of them.
+``agent.safetensors``, ``adapted.safetensors``, the versions in between in ``agents/`` with ``adaptation.json``,
+``episodes.csv``, ``report.html``, and ``results.json``, which grows by the stages that are done. A second call with
+the same folder goes on after the last of them.
 """
 
 import json
@@ -16,7 +17,16 @@ from typing import Any
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
-from pneumarm.control import BoundSettings, PlanSettings, TransferSettings, known_bound, transfer, write_episodes
+from pneumarm.control import (
+    BoundSettings,
+    PlanSettings,
+    TransferSettings,
+    known_bound,
+    save_history,
+    transfer,
+    version_keeper,
+    write_episodes,
+)
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
 from pneumarm.learning import (
@@ -191,9 +201,18 @@ class Run:
             open_arm_checked(wanted) as arm,
             Store.append_to(self.store) as store,
         ):
-            moved = transfer(load_agent(self.agent), arm, store, wanted.transfer, seed=wanted.seed, progress=report)
+            moved = transfer(
+                load_agent(self.agent),
+                arm,
+                store,
+                wanted.transfer,
+                seed=wanted.seed,
+                progress=report,
+                keep_version=version_keeper(self.folder),
+            )
             movements = demonstrate(moved.agent, arm, wanted.seed)
         moved.agent.save(self.adapted)
+        save_history(self.folder, moved.adapted)
         write_episodes(self.episodes, moved.episodes)
         for number, movement in enumerate(movements):
             save_movement(self.folder, movement, number)

@@ -3,6 +3,8 @@
 import numpy as np
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.control import Adapted
+from pneumarm.learning import Event
 from pneumarm.report import CoverageData, Episodes, Movement, QualityData, RunData, TrainingData, TransferData
 from pneumarm.report.figures import Rival
 from pneumarm.statistics import Estimate
@@ -122,6 +124,23 @@ def transfer(joints=1, counts=(500, 1500, 500), seed=0):
     return TransferData(*phases, learning_rate=0.05)
 
 
+def adaptation(movements=300, joints=1, seed=0):
+    random = np.random.default_rng(seed)
+    of = [""] + [f" of joint {joint + 1}" for joint in range(1, joints)]
+    quantities = [name + which for which in of for name in ("angle", "pressure_1", "pressure_2")]
+    squares = np.round(random.gamma(3.0, 1 / 3, (movements, 2, len(quantities))), 4)
+    squares[40:, 0] *= 4
+    squares[40:60, 1] *= 4
+    ratios = [2.0] * len(quantities)
+    events = [
+        Event("noticed", 46, 0, {"since": 40, "ratio": ratios}),
+        Event("refused", 50, 0, {"movements": 10, "before": ratios, "after": ratios}),
+        Event("accepted", 60, 1, {"movements": 20, "before": ratios, "after": [1.0] * len(quantities)}),
+        Event("rolled back", 100, 0, {"taken_back": 1, "reward_before": 38.0, "reward_after": 31.0}),
+    ]
+    return Adapted(0, quantities, squares, [event for event in events if event.movement <= movements])
+
+
 def movement(name="large displacement", goal=70.0, joints=1, n=45, reached=True):
     spec = ArmSpec(joints=joints)
     t = 7300 + np.arange(n) / 30
@@ -198,6 +217,7 @@ def run(joints=1, small=False):
         training=training(),
         test=episodes(10_000 // part, joints, on_arm=False, success=0.995),
         transfer=transfer(joints, (500 // part, 1500 // part, 500 // part)),
+        adaptation=adaptation(2500 // part, joints),
         movements=(
             movement("large displacement", 70.0, joints),
             movement("typical displacement", 30.0, joints),

@@ -17,12 +17,15 @@ from pneumarm.control.transfer import (
     transfer_into,
     write_episodes,
 )
+from pneumarm.control.versions import Adapted, History, put_back, read_history, save_history, version_keeper
 
 __all__ = [
     "BEGIN",
+    "Adapted",
     "AgentController",
     "BoundSettings",
     "Episode",
+    "History",
     "LearningController",
     "Movement",
     "PhysicsModel",
@@ -39,8 +42,12 @@ __all__ = [
     "open_agent",
     "open_controller",
     "physics_planner",
+    "put_back",
+    "read_history",
+    "save_history",
     "simulated_planner",
     "transfer",
     "transfer_into",
+    "version_keeper",
     "write_episodes",
 ]

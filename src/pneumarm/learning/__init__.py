@@ -2,11 +2,14 @@
 
 from pneumarm.learning.agent import Agent
 from pneumarm.learning.begin import BeginStates, begin_states
-from pneumarm.learning.fleet.adaptation import Adaptation, AdaptationSettings
+from pneumarm.learning.fleet.adaptation import Adaptation, AdaptationSettings, Event, told
 from pneumarm.learning.fleet.agent import PolicyAgent
+from pneumarm.learning.fleet.refit import RefitSettings
 from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
 from pneumarm.learning.fleet.side_by_side import FLEET_CURVES
 from pneumarm.learning.fleet.training import FleetTraining
+from pneumarm.learning.fleet.trial import TrialSettings
+from pneumarm.learning.fleet.watch import WatchSettings
 from pneumarm.learning.kinds import (
     LOOKING_AHEAD,
     METHODS,
@@ -17,6 +20,7 @@ from pneumarm.learning.kinds import (
     Settings,
     Trained,
     adaptation,
+    fingerprint,
     load_agent,
     test,
     test_ahead,
@@ -41,6 +45,7 @@ __all__ = [
     "AnyAgent",
     "BatchedSettings",
     "BeginStates",
+    "Event",
     "Exploration",
     "FleetTraining",
     "LearnSettings",
@@ -49,6 +54,7 @@ __all__ = [
     "PolicyAgent",
     "PolicySettings",
     "Progress",
+    "RefitSettings",
     "Reward",
     "Settings",
     "Shaping",
@@ -57,11 +63,15 @@ __all__ = [
     "TrainSettings",
     "Trained",
     "Training",
+    "TrialSettings",
+    "WatchSettings",
     "adaptation",
     "begin_states",
+    "fingerprint",
     "load_agent",
     "test",
     "test_ahead",
     "tested_results",
+    "told",
     "train",
 ]

@@ -5,6 +5,7 @@ commands. A kind is a class like :class:`Agent`; a method is a learner for :func
 a function of its own.
 """
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -144,6 +145,20 @@ def adaptation(agent: AnyAgent, settings: AdaptationSettings, seed: int = 0) -> 
     """Return how ``agent`` adapts to an arm between movements; None for kinds that do not, or learn while moving."""
     adapts = isinstance(agent, PolicyAgent) and settings.every > 0 and can_adapt(agent)
     return Adaptation(agent, settings, seed) if isinstance(agent, PolicyAgent) and adapts else None
+
+
+def fingerprint(agent: AnyAgent) -> str:
+    """Return what tells ``agent`` from others: of its kind, its settings, what it has learned, and its simulation."""
+    digest = hashlib.sha256(f"{type(agent).__name__} {agent.settings!r}".encode())
+    arrays = [agent.weights(), agent.goal_range, *vars(agent.scaling).values()]
+    simulation = getattr(agent, "simulation", None)  # it decides too, in agents that look ahead or adapt
+    if isinstance(simulation, Simulation):
+        header, parts = simulation.parts()
+        digest.update(repr(header).encode())
+        arrays += [parts[name] for name in sorted(parts)]
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:16]
 
 
 def load_agent(path: Path) -> AnyAgent:

@@ -106,6 +106,19 @@ class Recorded:
         return len(self.time)
 
 
+def rows_of(recorded: Recorded, sequence: int = 0) -> Rows:
+    """Return ``recorded`` as the rows of one sequence, before it is stored."""
+    return Rows(
+        sequence=np.full(len(recorded), sequence, np.int64),
+        step=recorded.step,
+        time=recorded.time,
+        angle=recorded.angle,
+        pressure=recorded.pressure,
+        command=recorded.command,
+        at_rest=np.full(len(recorded), recorded.at_rest, np.bool_),
+    )
+
+
 def steps_of(time: NDArray[np.float64], period: float) -> NDArray[np.int64]:
     """Return the steps (n,) of readings at the rising times (n,) [s]: 0, then control periods passed, at least 1."""
     passed = np.maximum(np.rint(np.diff(time) / period), 1.0).astype(np.int64)

@@ -260,10 +260,10 @@ class FaultPlayer:
                 case LogarithmicPotentiometer():
                     self.track["bend"][fault.place] = 2 * math.log(1 / fault.middle - 1)
                 case WornPotentiometer():
-                    one: Any = self.track[fault.place : fault.place + 1]
-                    one["worn_at"] = HIGHEST_COUNT / 2 + COUNTS_PER_DEGREE * fault.angle
-                    one["worn_width"] = COUNTS_PER_DEGREE * fault.width
-                    one["worn_height"], one["worn_contact"] = fault.height, fault.contact
+                    place: Any = self.track[fault.place : fault.place + 1]
+                    place["worn_at"] = HIGHEST_COUNT / 2 + COUNTS_PER_DEGREE * fault.angle
+                    place["worn_width"] = COUNTS_PER_DEGREE * fault.width
+                    place["worn_height"], place["worn_contact"] = fault.height, fault.contact
 
     # ---- saved states
 
@@ -283,7 +283,7 @@ class FaultPlayer:
             UnusableInput: it is none.
 
         """
-        found = np.frombuffer(state, self._state.dtype)
+        found: NDArray[Any] = np.frombuffer(state, self._state.dtype)
         finite = all(np.isfinite(found[name]).all() for name in ("time", "excess", "leap"))
         if found.shape != (1,) or not finite or not np.isin(found["asked"], (-1, 0, 1)).all():
             raise UnusableInput(f"{name}: the saved state is damaged: that of its faults holds impossible numbers")

@@ -232,7 +232,7 @@ def _sequence(
     info: Mapping[str, object] = {}
     actor: Controller
     if controller is None:
-        kind, actor = _random_actions(arm.spec.joints, settings, random)
+        kind, actor = random_actions(arm.spec.joints, settings, random)
         actor.reset(np.zeros(arm.spec.joints))
     else:
         kind, actor = "controller", controller
@@ -250,7 +250,7 @@ def _sequence(
     return Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info)
 
 
-def _random_actions(joints: int, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
+def random_actions(joints: int, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
     """Return one of the two kinds of random sequences: its name and its valves."""
     shape = (settings.actions, joints)
     actions = random.integers(ACTIONS, size=shape)

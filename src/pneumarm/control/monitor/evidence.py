@@ -35,6 +35,10 @@ class Thresholds(NamedTuple):
     """Expected pressures that differ by less than so many standard deviations tell nothing."""
     inflation: float
     """Standard deviations of the simulation's error on held-out sequences that count as one here."""
+    unsure: float
+    """Standard deviation of a filling or emptying as a part of it."""
+    calm: float
+    """A joint slower than this hardly moves [counts/ms]."""
     fast: float
     """Speed at which errors are larger by the root of two than at rest [counts/ms]."""
     apart: float
@@ -103,7 +107,7 @@ def see_by_rules(rules, readings, thresholds, memory, time, angle, pressure):  #
     """Weigh a reading without a simulation; call :func:`remember` with the valves chosen after it."""
     if memory.clock[1] >= 1.0:
         expect_by_rules(rules, readings, memory, angle, memory.expected, memory.std)
-        weigh_hypotheses(thresholds, memory, time, pressure)
+        weigh_hypotheses(thresholds, readings, memory, time, pressure)
     look_at_potentiometers(thresholds, memory, time, angle, pressure)
     observe(memory, time, angle, pressure)
 
@@ -115,7 +119,7 @@ def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pres
         expect_by_simulation(predictor, readings, memory, memory.expected, memory.angle)
         for m in range(memory.std.shape[0]):
             memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2]
-        weigh_hypotheses(thresholds, memory, time, pressure)
+        weigh_hypotheses(thresholds, readings, memory, time, pressure)
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
             weigh_disagreement(thresholds, memory, j, 0, error, time)
@@ -141,19 +145,33 @@ def surprise(error):  # type: ignore[no-untyped-def]
 
 
 @part
-def weigh_hypotheses(thresholds, memory, time, pressure):  # type: ignore[no-untyped-def]
+def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ignore[no-untyped-def]
     """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis."""
     for h in range(1, memory.score.shape[0]):
         evidence = 0.0
         for m in range(memory.std.shape[0]):
-            if memory.expected[h, m] != memory.expected[0, m]:
+            difference = memory.expected[h, m] - memory.expected[0, m]
+            telling = abs(difference) > thresholds.telling * memory.std[m]
+            if readings.leak[h, m] > 0.0:
+                telling = is_calm(thresholds, memory, m)
+            if telling:
+                std = math.sqrt(memory.std[m] ** 2 + (thresholds.unsure * difference) ** 2)
                 read = pressure[m // 2, m % 2]
-                evidence += surprise((read - memory.expected[0, m]) / memory.std[m])
-                evidence -= surprise((read - memory.expected[h, m]) / memory.std[m])
+                evidence += surprise((read - memory.expected[0, m]) / std)
+                evidence -= surprise((read - memory.expected[h, m]) / std)
         evidence = min(max(evidence, -thresholds.most), thresholds.most)
         if memory.score[h] <= 0.0:
             memory.since[h] = time
         memory.score[h] = min(max(memory.score[h] + evidence, 0.0), 2.0 * thresholds.alarm)
+
+
+@part
+def is_calm(thresholds, memory, m):  # type: ignore[no-untyped-def]
+    """Return whether muscle ``m`` is closed for as long as the window reaches, and its joint hardly moves."""
+    calm = abs(memory.observed[0, m // 2, 1]) < thresholds.calm
+    for lag in range(memory.command.shape[0]):
+        calm = calm and memory.command[lag, m] == 0.0
+    return calm
 
 
 @part

@@ -47,8 +47,6 @@ class RuleSettings:
     """Part of its absolute pressure by which a closed muscle's changes when its joint turns by a degree."""
     noise: float = 2.5
     """Standard deviation of what the rules do not explain of an arm at rest [counts]."""
-    unsure: float = 0.5
-    """... of a filling or emptying, as a part of it."""
     unsure_moving: float = 0.7
     """... of a moving arm [counts per degree]."""
 
@@ -74,7 +72,6 @@ class RuleParameters(NamedTuple):
     """By count of the angle."""
     atmosphere: float
     noise: float
-    unsure: float
     unsure_moving: float
     """By count of the angle."""
 
@@ -92,7 +89,6 @@ def rule_parameters(settings: RuleSettings, spec: ArmSpec) -> RuleParameters:
         compression=settings.compression / spec.counts_per_degree,
         atmosphere=_ATMOSPHERE * spec.counts_per_bar,
         noise=settings.noise,
-        unsure=settings.unsure,
         unsure_moving=settings.unsure_moving / spec.counts_per_degree,
     )
 
@@ -113,16 +109,14 @@ def expect_by_rules(rules, readings, memory, angle, expected, std):  # type: ign
         pressure = memory.observed[0, j, 2 + side]
         turned = angle[j] - memory.observed[0, j, 0]
         squeezed = (2.0 * side - 1.0) * rules.compression * turned * (pressure + rules.atmosphere)
-        largest = 0.0
         for h in range(expected.shape[0]):
-            before = carried_out(readings, h, memory.command[1], m)
-            now = carried_out(readings, h, memory.command[0], m)
+            before = carried_out(readings, h, memory.command[1], m, pressure / rules.bar)
+            now = carried_out(readings, h, memory.command[0], m, pressure / rules.bar)
             flow = rules.before * flow_by_rules(rules, pressure, before)
             flow += (1.0 - rules.before) * flow_by_rules(rules, pressure + flow, now)
-            largest = max(largest, abs(flow))
             expected[h, m] = max(0.0, pressure * (1.0 - readings.leak[h, m]) + flow + squeezed)
         moving = rules.unsure_moving * turned
-        std[m] = math.sqrt(rules.noise**2 + (rules.unsure * largest) ** 2 + moving * moving)
+        std[m] = math.sqrt(rules.noise**2 + moving * moving)
 
 
 class Predictor(NamedTuple):
@@ -140,6 +134,8 @@ class Predictor(NamedTuple):
     """Standard deviation of the error on held-out sequences, shape (joints, 4) [sensor units]."""
     first_command: int
     """Place of the command among the inputs."""
+    bar: float
+    """Counts of a bar."""
 
 
 def predictor(simulation: Simulation) -> Predictor:
@@ -154,6 +150,7 @@ def predictor(simulation: Simulation) -> Predictor:
         command_scale=scaling.command_scale,
         std=np.maximum(simulation.error_std, _LEAST_STD),
         first_command=places(simulation.window).command,
+        bar=simulation.spec.counts_per_bar,
     )
 
 
@@ -170,10 +167,11 @@ def expect_by_simulation(predictor, readings, memory, expected, angle):  # type:
                 x[4 * (joints * lag + j) + q] = np.float32(scaled)
     for h in range(expected.shape[0]):
         for m in range(muscles):
-            now = carried_out(readings, h, memory.command[0], m) / predictor.command_scale[m]
+            bar = memory.observed[0, m // 2, 2 + m % 2] / predictor.bar
+            now = carried_out(readings, h, memory.command[0], m, bar) / predictor.command_scale[m]
             x[predictor.first_command + m] = np.float32(now)
             for lag in range(1, history):
-                earlier = carried_out(readings, h, memory.command[lag], m) / predictor.command_scale[m]
+                earlier = carried_out(readings, h, memory.command[lag], m, bar) / predictor.command_scale[m]
                 x[4 * joints * history + muscles * (lag - 1) + m] = np.float32(earlier)
         predict_change(simulation, state)
         for o in range(simulation.place.shape[0]):

@@ -24,23 +24,30 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
-_WORST = 3  # of the hypotheses that are named when the evidence does not tell them apart
 
 
 @dataclass(frozen=True)
 class MonitorSettings:
     """How much evidence a monitor wants."""
 
-    alarm: float = 18.0
-    """Log-likelihood ratio from which on a fault of the valves or the air counts as found."""
-    lead: float = 3.0
-    """By how much it must exceed that of any other fault, up to twice the alarm."""
+    alarm: float = 16.0
+    """Log-likelihood ratio from which on a fault of the valves or the air counts as found by a simulation."""
+    alarm_by_rules: float = 9.0
+    """... by the rules, which take more for possible and so give less evidence for the same."""
+    lead: float = 4.0
+    """By how much it must exceed that of any other fault, up to one and a half times the alarm."""
     most: float = 5.0
     """Evidence that a single reading gives at most."""
     telling: float = 1.5
     """Pressures expected with and without a fault that differ by fewer standard deviations tell nothing."""
     inflation: float = 1.5
     """Standard deviations of the simulation's error on held-out sequences that count as one."""
+    unsure: float = 0.25
+    """Standard deviation of a filling or emptying as a part of it."""
+    unsure_by_rules: float = 0.5
+    """... as the rules know it."""
+    calm: float = 20.0
+    """A joint slower than this hardly moves [degrees/s]; large leaks are looked for then."""
     fast: float = 150.0
     """Speed at which the simulation's errors are larger by the root of two than at rest [degrees/s]."""
     apart: float = 2.5
@@ -61,10 +68,14 @@ class MonitorSettings:
     def __post_init__(self) -> None:
         checks = {
             "alarm": 0 < self.alarm < math.inf,
+            "alarm_by_rules": 0 < self.alarm_by_rules < math.inf,
             "lead": 0 <= self.lead < math.inf,
             "most": 0 < self.most < math.inf,
             "telling": 0 <= self.telling < math.inf,
             "inflation": 0 < self.inflation < math.inf,
+            "unsure": 0 <= self.unsure < math.inf,
+            "unsure_by_rules": 0 <= self.unsure_by_rules < math.inf,
+            "calm": 0 < self.calm < math.inf,
             "fast": 0 < self.fast < math.inf,
             "apart": 1 < self.apart < math.inf,
             "changed": 0 < self.changed < math.inf,
@@ -152,8 +163,8 @@ class Monitor:
         self._hypotheses, self._readings = hypotheses(spec.joints)
         history = 2 if simulation is None else max(2, simulation.window.history)
         self._memory = new_memory(spec.joints, history, len(self._hypotheses))
-        self._thresholds = self._packed()
         self._has_simulation = simulation is not None
+        self._thresholds = self._packed()
         self._expects = (
             rule_parameters(self.settings.rules, spec) if simulation is None else predictor(simulation)
         )
@@ -165,9 +176,11 @@ class Monitor:
         settings, spec = self.settings, self.spec
         return Thresholds(
             most=settings.most,
-            alarm=settings.alarm,
+            alarm=settings.alarm if self._has_simulation else settings.alarm_by_rules,
             telling=settings.telling,
             inflation=settings.inflation,
+            unsure=settings.unsure if self._has_simulation else settings.unsure_by_rules,
+            calm=1e-3 * settings.calm * spec.counts_per_degree,
             fast=1e-3 * settings.fast * spec.counts_per_degree,
             apart=settings.apart,
             changed=settings.changed,
@@ -204,7 +217,7 @@ class Monitor:
         memory, settings = self._memory, self.settings
         return bool(
             self._open
-            or memory.score.max() >= settings.alarm
+            or memory.score.max() >= self._thresholds.alarm
             or memory.same[:, 0].max() >= settings.frozen
             or memory.rail[:, 0].max() >= settings.rail
             or memory.disagreement.max() >= settings.changed
@@ -239,7 +252,7 @@ class Monitor:
         return found
 
     def _judge_valves(self) -> dict[_Key, float]:
-        memory, settings = self._memory, self.settings
+        memory = self._memory
         order = np.argsort(memory.score)[::-1]
         best = int(order[0])
         keys = [(one.kind, one.detail, one.joint, one.muscle) for one in self._hypotheses]
@@ -249,8 +262,8 @@ class Monitor:
         if found:
             return found
         lead = memory.score[best] - memory.score[int(order[1])]
-        sure = memory.score[best] >= settings.alarm and lead >= settings.lead
-        if sure or memory.score[best] >= 2 * settings.alarm:
+        alarm = self._thresholds.alarm
+        if memory.score[best] >= (alarm if lead >= self.settings.lead else 1.5 * alarm):
             found[keys[best]] = float(memory.since[best])
         return found
 

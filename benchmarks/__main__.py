@@ -6,7 +6,7 @@ import sys
 
 import benchmarks
 
-LONG = ("adaptation", "agents", "bound", "judging")
+LONG = ("adaptation", "agents", "bound", "faults", "judging")
 """What takes many minutes runs only when it is named."""
 
 if __name__ == "__main__":

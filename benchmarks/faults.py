@@ -14,7 +14,6 @@ PNEUMARM_FAULTS_FOLDER   where stores, simulations and agents are kept; a tempor
 
 import os
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,9 +35,9 @@ from pneumarm.arm.virtual import (
 )
 from pneumarm.arm.virtual.parameters import BAR
 from pneumarm.control import TransferSettings, transfer
-from pneumarm.control.leaks import LeakTest, leak_test
+from pneumarm.control.leaks import LeakTest, leak_test, leaking
 from pneumarm.control.monitor import Finding, Monitor
-from pneumarm.learning import load_agent, train
+from pneumarm.learning import train
 from pneumarm.learning.begin import begin_states
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.fit import FitSettings, fit_store
@@ -155,4 +154,119 @@ def _contradicts(arm: VirtualArm, fault: Fault, step: Step) -> bool:
     differs = (told != done) & (arm.records.muscles["pending"] == 0)
     if isinstance(fault, SupplyLoss):
         return bool((done[..., 0] & (pressure < _MUCH_AIR)).any())
-    return bool((differs[..., 0] & (pressure < _MUCH_AIR)).any() or (differs[..., 1] & (pressure > _LITTLE_AIR)).any())
+    return bool(
+        (differs[..., 0] & (pressure < _MUCH_AIR)).any() or (differs[..., 1] & (pressure > _LITTLE_AIR)).any()
+    )
+
+
+def measure() -> Iterator[str]:
+    arms = [int(one) for one in os.environ.get("PNEUMARM_FAULTS_ARMS", ",".join(map(str, range(1, 21)))).split(",")]
+    cases = int(os.environ.get("PNEUMARM_FAULTS_CASES", "40"))
+    hours = float(os.environ.get("PNEUMARM_FAULTS_HOURS", "10"))
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(os.environ.get("PNEUMARM_FAULTS_FOLDER", temporary))
+        folder.mkdir(exist_ok=True)
+        simulations = {arm: fitted(folder, arm) for arm in arms}
+        for name, chosen in (("simulation", simulations), ("rules alone", dict.fromkeys(arms, None))):
+            yield f"with {name}; times [s] are medians and 95 %"
+            yield f"{'fault':27}{'found':>9}{'rightly':>9}{'since begin':>16}{'contradiction':>16}{'in 2 s':>8}{'early':>7}"
+            for kind in KINDS:
+                yield line(
+                    kind, [played(kind, arms[i % len(arms)], i, chosen[arms[i % len(arms)]]) for i in range(cases)]
+                )
+            false, done = healthy_collecting(arms, chosen, hours)
+            yield f"{len(false)} false alarms in {done:.1f} h of healthy collecting {[str(one) for one in false]}"
+        false, done = healthy_movements(folder, arms[:2], simulations, hours / 5)
+        yield f"{len(false)} false alarms in {done:.1f} h of healthy movements {[str(one) for one in false]}"
+    for name, factor, watch in (
+        ("3 x", 3.0, 45.0),
+        ("1.5 x", 1.5, 540.0),
+        ("healthy", 1.0, 45.0),
+        ("healthy", 1.0, 540.0),
+    ):
+        yield leaks_found(arms, name, factor, LeakTest(watch=watch))
+
+
+def line(kind: Kind, cases: list[Case]) -> str:
+    """Return a line of the table."""
+    found = [one for one in cases if one.found is not None]
+    rightly = sum(one.found is not None and one.found.kind in kind.found_as for one in cases)
+    begin, contradiction = (
+        "{:.2f} {:.2f}".format(np.median(values), np.quantile(values, 0.95, method="higher"))
+        for values in ([one.since_begin for one in cases], [one.since_contradiction for one in cases])
+    )
+    soon = np.mean([one.since_contradiction <= 2.0 for one in cases])
+    return (
+        f"{kind.name:27}{f'{len(found)}/{len(cases)}':>9}{rightly:>9}{begin:>16}{contradiction:>16}{soon:>8.0%}"
+        f"{sum(one.early for one in cases):>7}"
+    )
+
+
+def fitted(folder: Path, arm: int) -> Simulation:
+    """Return the simulation of a virtual arm; collect and fit where that is not done yet."""
+    file = folder / f"{arm}.sim"
+    if not file.exists():
+        opened = VirtualArm(draw_parameters(arm), seed=arm)
+        with Store.for_arm(folder / f"{arm}.db", opened.spec) as store:
+            collect(opened, store, TRANSITIONS, arm)
+            fit_store(store, FitSettings(epochs=30)).simulation.save(file)
+    return Simulation.load(file)
+
+
+def healthy_collecting(
+    arms: list[int], simulations: dict[int, Simulation | None], hours: float
+) -> tuple[list[Finding], float]:
+    """Return what was found wrong with healthy arms, each collecting from a cold morning on, and the hours watched.
+
+    That an arm has changed is not a false alarm here: the monitor says it of an arm that has warmed up, too.
+    """
+    found, passed = [], 0.0
+    for arm in arms:
+        opened = VirtualArm(draw_parameters(arm), seed=1000 + arm)
+        monitor = Monitor(opened.spec, simulations[arm])
+        for _ in watched_steps(opened, monitor, arm):
+            passed += opened.spec.period / 3600
+            if opened.time >= hours * 3600 / len(arms):
+                break
+        found += [one for one in monitor.findings if one.spoils]
+    return found, passed
+
+
+def healthy_movements(
+    folder: Path, arms: list[int], simulations: dict[int, Simulation], hours: float
+) -> tuple[list[Finding], float]:
+    """Return what was found wrong with healthy arms that a policy moves and adapts to, and the hours that took."""
+    found, seconds = [], 0.0
+    for arm in arms:
+        simulation = simulations[arm]
+        with Store.open(folder / f"{arm}.db") as store:
+            begin = begin_states(store, simulation.window, simulation.scaling)
+        agent = train(simulation, begin, None, 1).agent
+        opened = VirtualArm(draw_parameters(arm), seed=2000 + arm)
+        monitor = Monitor(opened.spec, simulation)
+        episodes = max(1, round(hours * 3600 / len(arms) / 5.5))
+        settings = TransferSettings(episodes=episodes // 2, test_episodes=max(1, episodes // 4))
+        with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", opened.spec) as store:
+            transfer(agent, opened, store, settings, seed=arm, watch=monitor)
+        found += [one for one in monitor.findings if one.spoils]
+        seconds += opened.time
+    return found, seconds / 3600
+
+
+def leaks_found(arms: list[int], name: str, factor: float, test: LeakTest) -> str:
+    """Return a line about leak tests of arms that have been tested when they were healthy."""
+    right = wrong = 0
+    seconds = 0.0
+    for arm in arms:
+        opened = VirtualArm(draw_parameters(arm), seed=arm)
+        for _ in watched_steps(opened, Monitor(opened.spec), arm):
+            if opened.time > 300:
+                break
+        healthy = leak_test(opened, LeakTest(watch=540.0))
+        muscle = arm % 2
+        if factor != 1.0:
+            opened.faults = (Leak(muscle=muscle + 1, factor=factor, begin=opened.time),)
+        now = leak_test(opened, test)
+        leaks = leaking(healthy, now, test)[0]
+        right, wrong, seconds = right + int(leaks[muscle]), wrong + int(leaks[1 - muscle]), now.seconds
+    return f"leak test of {seconds:.0f} s, {name}: {right} of {len(arms)} found, {wrong} of the other muscle"

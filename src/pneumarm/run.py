@@ -16,7 +16,7 @@ from typing import Any
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
-from pneumarm.control import TransferSettings, transfer, write_episodes
+from pneumarm.control import Monitor, TransferSettings, transfer, write_episodes
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
 from pneumarm.learning import BeginStates, LearnSettings, begin_states, load_agent, train
@@ -135,7 +135,10 @@ class Run:
             open_arm_checked(wanted) as arm,
             Store.for_arm(self.store, arm.spec) as store,
         ):
-            collected = collect(arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect)
+            watch = Monitor(arm.spec)
+            collected = collect(
+                arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
+            )
             save_spec(self.folder, arm.spec)
         return {"collect": asdict(collected)}
 

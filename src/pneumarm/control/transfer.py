@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.control.agent import AgentController
+from pneumarm.control.monitor import Monitor
 from pneumarm.control.movement import Movement, move
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder, write_text
@@ -20,6 +21,7 @@ from pneumarm.learning import AdaptationSettings, AnyAgent, adaptation
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import joined
+from pneumarm.transitions.watch import Watch, keep_watch
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
@@ -154,11 +156,13 @@ def transfer(
     *,
     seed: int = 0,
     progress: Callable[[float, float], None] | None = None,
+    watch: Watch | None = None,
 ) -> Transferred:
     """Test ``agent`` on ``arm``, let it learn there, test it again; every movement goes into ``store``.
 
     A transfer that was interrupted goes on after the last movement that was stored, on an arm that can be put into
-    a saved state as if nothing had happened.
+    a saved state as if nothing had happened. What ``watch`` finds spoiled, by default a :class:`Monitor` with the
+    agent's simulation, is stored but not learned from; it counts in the figures, because it happened.
 
     Raises:
         UnusableInput: arm and agent do not fit, or the store holds a transfer with other settings.
@@ -183,12 +187,19 @@ def transfer(
     total = sum(settings.movements(phase) for phase in PHASES)
     cycle = ControlCycle(guarded(arm), settings.close_while_computing)
     waiting: list[tuple[Episode, Movement]] = []
+    watch = watch or Monitor(arm.spec, getattr(agent, "simulation", None))  # not every kind of agent keeps one
+    if done and (seen := store.state("watch")) is not None:
+        watch.set_state(seen)
 
     def keep() -> None:
         state = {"learner": learner.get_state(), "mean": mean.get_state(), "arm": arm.get_state()}
+        state["watch"] = watch.get_state()
+        keep_watch(store, watch, number)
         if adapting is not None:
             state["adaptation"] = adapting.get_state()
-        recorded = [replace(m.recorded, info=asdict(episode)) for episode, m in waiting]
+        recorded = [
+            replace(m.recorded, info=asdict(episode), marks=watch.marks(m.recorded)) for episode, m in waiting
+        ]
         store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
         waiting.clear()
 
@@ -218,7 +229,7 @@ def transfer(
                     controller = AgentController(agent, shown().actor())
                 random, goal = begin_and_goal(agent, seed, greedy, i)
                 BEGIN.reach(cycle.arm, random)
-                movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
+                movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff, watch)
                 if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * count:
                     mean.add(learner.weights())
                 episode = Episode.of(phase, movement)

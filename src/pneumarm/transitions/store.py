@@ -325,6 +325,24 @@ class Store:
             left = joinable(np.array(steps, np.int64).ravel(), self.marks(number).get(number, []))
             connection.execute("UPDATE sequences SET transitions = ? WHERE number = ?", (left, number))
 
+    def mark_since(self, time: float, reason: str, run: int) -> None:
+        """Mark all rows of ``run`` read at ``time`` [s] or later, the newest sequences, that are not marked yet."""
+        with translated(self.path):
+            numbers = self._connection.execute(
+                "SELECT number FROM sequences WHERE run = ? ORDER BY number DESC", (run,)
+            ).fetchall()
+        for (number,) in numbers:
+            with translated(self.path):
+                steps = self._connection.execute(
+                    "SELECT step FROM rows WHERE sequence = ? AND time >= ? ORDER BY step", (number, time)
+                ).fetchall()
+            if not steps:
+                return
+            first, last = steps[0][0], steps[-1][0]
+            marks = self.marks(number).get(number, [])
+            if unmarked(np.array(steps, np.int64).ravel(), marks).any():
+                self.mark(number, [Mark(first, last, reason)])
+
     @staticmethod
     def _insert_marks(connection: sqlite3.Connection, number: int, marks: Iterable[Mark]) -> None:
         connection.executemany(

@@ -1,13 +1,15 @@
 """What watches an arm while it is recorded, and marks what nothing may be learned from."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.cycle import Step
 from pneumarm.arm.seam import Reading
 from pneumarm.transitions.rows import Mark, Recorded
+from pneumarm.transitions.store import Store
 
 
 class Watch(Protocol):
@@ -16,7 +18,7 @@ class Watch(Protocol):
     def begin(self, *, at_rest: bool) -> None:
         """Begin a new sequence; ``at_rest`` says that the arm stood still with closed valves before."""
 
-    def see(self, reading: Reading, valves: "NDArray | None") -> None:  # type: ignore[type-arg]
+    def see(self, reading: Reading, valves: NDArray[np.int8] | None) -> None:
         """Take in a reading and the valves (joints, 2) as applied after it, None after the last one."""
 
     def marks(self, recorded: Recorded) -> tuple[Mark, ...]:
@@ -44,6 +46,14 @@ def watched(steps: Iterator[Step], watch: Watch | None, *, at_rest: bool) -> lis
     return seen
 
 
-def spoiled(recorded: Sequence[Recorded]) -> bool:
-    """Whether all of these sequences are marked, and there is one."""
-    return bool(recorded) and all(one.marks for one in recorded)
+def keep_watch(store: Store, watch: Watch, run: int) -> int:
+    """Mark the stored rows of ``run`` since when something has been wrong; return the transitions that this costs.
+
+    A fault that takes a while to be found has spoiled what was stored in the meantime.
+    """
+    found = watch.spoiled_since()
+    if found is None:
+        return 0
+    before = store.transitions
+    store.mark_since(found[0], found[1], run)
+    return before - store.transitions

@@ -35,6 +35,12 @@ class Thresholds(NamedTuple):
     """Expected pressures that differ by less than so many standard deviations tell nothing."""
     inflation: float
     """Standard deviations of the simulation's error on held-out sequences that count as one here."""
+    full: float
+    """In a muscle over this pressure an open inlet tells nothing: the supply is not much higher [counts]."""
+    empty: float
+    """A muscle below this is empty; how much air it takes until its pressure rises is uncertain [counts]."""
+    clear: float
+    """Expected pressures of an empty muscle that differ by less tell nothing [counts]."""
     unsure: float
     """Standard deviation of a filling or emptying as a part of it."""
     calm: float
@@ -151,12 +157,15 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
         evidence = 0.0
         for m in range(memory.std.shape[0]):
             difference = memory.expected[h, m] - memory.expected[0, m]
-            telling = abs(difference) > thresholds.telling * memory.std[m]
+            before, read = memory.observed[0, m // 2, 2 + m % 2], pressure[m // 2, m % 2]
+            least = thresholds.telling * memory.std[m]
+            if before < thresholds.empty and read < thresholds.empty:
+                least = max(least, thresholds.clear)
+            telling = abs(difference) > least and not (before > thresholds.full and memory.command[0, m] > 0.0)
             if readings.leak[h, m] > 0.0:
                 telling = is_calm(thresholds, memory, m)
             if telling:
                 std = math.sqrt(memory.std[m] ** 2 + (thresholds.unsure * difference) ** 2)
-                read = pressure[m // 2, m % 2]
                 evidence += surprise((read - memory.expected[0, m]) / std)
                 evidence -= surprise((read - memory.expected[h, m]) / std)
         evidence = min(max(evidence, -thresholds.most), thresholds.most)

@@ -100,7 +100,7 @@ def hypotheses(joints: int) -> tuple[list[Hypothesis], Readings]:
 
 @part
 def carried_out(readings, h, commands, m, bar):  # type: ignore[no-untyped-def]
-    """Return what muscle ``m`` at a pressure of ``bar`` does under hypothesis ``h`` when ``commands`` (m,) are told."""
+    """Return what muscle ``m``, at a pressure of ``bar``, does under hypothesis ``h`` when told ``commands`` (m,)."""
     done = readings.table[h, m, int(commands[readings.source[h, m]]) + 1]
     if done > 0.0 and readings.supply[h] < math.inf:
         done *= supplied(readings.supply[h], bar)

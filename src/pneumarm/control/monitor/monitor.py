@@ -1,4 +1,4 @@
-"""The monitor: watches an arm while it moves, names what is wrong, and says which rows nothing may be learned from."""
+"""The monitor: watches an arm while it moves, names what is wrong, and marks what nothing may be learned from."""
 
 import json
 import math
@@ -30,7 +30,7 @@ _QUANTITIES = ("angle", "pressure 1", "pressure 2")
 class MonitorSettings:
     """How much evidence a monitor wants."""
 
-    alarm: float = 16.0
+    alarm: float = 11.0
     """Log-likelihood ratio from which on a fault of the valves or the air counts as found by a simulation."""
     alarm_by_rules: float = 9.0
     """... by the rules, which take more for possible and so give less evidence for the same."""
@@ -42,7 +42,13 @@ class MonitorSettings:
     """Pressures expected with and without a fault that differ by fewer standard deviations tell nothing."""
     inflation: float = 1.5
     """Standard deviations of the simulation's error on held-out sequences that count as one."""
-    unsure: float = 0.25
+    full: float = 0.75
+    """Part of the highest pressure over which an open inlet tells nothing: the supply is not much higher."""
+    empty: float = 0.04
+    """A muscle below this is empty, and how much air it takes until its pressure rises is uncertain [bar] ..."""
+    clear: float = 0.04
+    """... so that expected pressures which differ by less tell nothing [bar]."""
+    unsure: float = 0.2
     """Standard deviation of a filling or emptying as a part of it."""
     unsure_by_rules: float = 0.5
     """... as the rules know it."""
@@ -73,6 +79,9 @@ class MonitorSettings:
             "most": 0 < self.most < math.inf,
             "telling": 0 <= self.telling < math.inf,
             "inflation": 0 < self.inflation < math.inf,
+            "full": 0 < self.full < math.inf,
+            "empty": 0 <= self.empty < math.inf,
+            "clear": 0 <= self.clear < math.inf,
             "unsure": 0 <= self.unsure < math.inf,
             "unsure_by_rules": 0 <= self.unsure_by_rules < math.inf,
             "calm": 0 < self.calm < math.inf,
@@ -165,9 +174,7 @@ class Monitor:
         self._memory = new_memory(spec.joints, history, len(self._hypotheses))
         self._has_simulation = simulation is not None
         self._thresholds = self._packed()
-        self._expects = (
-            rule_parameters(self.settings.rules, spec) if simulation is None else predictor(simulation)
-        )
+        self._expects = rule_parameters(self.settings.rules, spec) if simulation is None else predictor(simulation)
         self._see = see_by_rules if simulation is None else see_by_simulation
         self._none = np.zeros((spec.joints, 2), np.int8)
         self.begin(at_rest=True)
@@ -179,6 +186,9 @@ class Monitor:
             alarm=settings.alarm if self._has_simulation else settings.alarm_by_rules,
             telling=settings.telling,
             inflation=settings.inflation,
+            full=settings.full * spec.max_pressure_counts,
+            empty=settings.empty * spec.counts_per_bar,
+            clear=settings.clear * spec.counts_per_bar,
             unsure=settings.unsure if self._has_simulation else settings.unsure_by_rules,
             calm=1e-3 * settings.calm * spec.counts_per_degree,
             fast=1e-3 * settings.fast * spec.counts_per_degree,
@@ -333,9 +343,7 @@ class Monitor:
         }
 
 
-def marks_of(
-    findings: Iterable[Finding], time: NDArray[np.float64], step: NDArray[np.int64]
-) -> tuple[Mark, ...]:
+def marks_of(findings: Iterable[Finding], time: NDArray[np.float64], step: NDArray[np.int64]) -> tuple[Mark, ...]:
     """Return the marks that ``findings`` make on a sequence with readings at ``time`` (n,) [s] and ``step`` (n,)."""
     marks = []
     for one in findings:

@@ -1,8 +1,8 @@
 """How soon the monitor finds faults, whether it names them rightly, and how often it cries wolf.
 
 Every case is an arm of its own draw, a muscle and a moment drawn at random, while the arm is collecting. Times are
-watched time (the arm is not watched while it is brought to a begin state): since the fault began, and for valves since
-the first reading at which what was told and what was done differed in a muscle where it makes a difference. Healthy
+watched time (the arm is not watched while it is brought to a begin state): since the fault began, and for valves
+since the first reading at which what was told and what was done differed in a muscle where it makes a difference. Healthy
 hours are collecting from a cold morning on, and movements by a policy before, while and after it adapts. Settings
 come from the environment:
 
@@ -46,6 +46,7 @@ from pneumarm.transitions.collect import random_actions
 
 TRANSITIONS = 20_000
 """Transitions that each arm's simulation is fitted to."""
+HEADER = f"{'fault':27}{'found':>9}{'rightly':>9}{'since begin':>16}{'contradiction':>16}{'in 2 s':>8}{'early':>7}"
 WARM_UP = 20.0
 """Healthy watched time before a fault [s]; then up to as long again."""
 PATIENCE = 60.0
@@ -98,7 +99,7 @@ class Case:
 
 
 def watched_steps(arm: VirtualArm, monitor: Monitor, seed: int) -> Iterator[Step]:
-    """Collect for ever, as :func:`pneumarm.transitions.collect` does, and yield the turns after ``monitor`` saw them."""
+    """Collect for ever, as :func:`pneumarm.transitions.collect` does, and yield the turns that ``monitor`` saw."""
     settings, random, guard = CollectSettings(), np.random.default_rng([seed, 7]), guarded(arm)
     while True:
         settings.begin.reach(guard, random)
@@ -169,7 +170,7 @@ def measure() -> Iterator[str]:
         simulations = {arm: fitted(folder, arm) for arm in arms}
         for name, chosen in (("simulation", simulations), ("rules alone", dict.fromkeys(arms, None))):
             yield f"with {name}; times [s] are medians and 95 %"
-            yield f"{'fault':27}{'found':>9}{'rightly':>9}{'since begin':>16}{'contradiction':>16}{'in 2 s':>8}{'early':>7}"
+            yield HEADER
             for kind in KINDS:
                 yield line(
                     kind, [played(kind, arms[i % len(arms)], i, chosen[arms[i % len(arms)]]) for i in range(cases)]

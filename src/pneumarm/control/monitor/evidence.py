@@ -7,8 +7,9 @@ For every hypothesis h the log-likelihood ratio of a reading against the healthy
 (the cumulative sum test: E. S. Page, "Continuous inspection schemes", Biometrika 41, 1954). Residuals follow a
 Student distribution of four degrees of freedom, and a single reading counts for little: what a simulation gets wrong
 in a fast movement must not look like a fault. Where h and the healthy arm differ by little, nothing is summed: there
-a lasting error of the simulation, however small, would prove either in the end. When S_h last was 0 tells since when. Whether the readings agree with
-the simulation at all is weighed in the same way, against residuals that are several times as large as usual.
+a lasting error of the simulation, however small, would prove either in the end. When S_h last was 0 tells since when.
+Whether the readings agree with the simulation at all is weighed in the same way, against residuals that are several
+times as large as usual.
 """
 
 import math
@@ -79,7 +80,7 @@ class Memory(NamedTuple):
     disagreement_since: NDArray[np.float64]
     """Shape (joints, 3) [s]."""
     same: NDArray[np.float64]
-    """By joint: readings of the same angle in a row; since when [s]; lowest and highest pressures meanwhile; (j, 6)."""
+    """By joint: readings of the same angle in a row; since when [s]; least and most pressures meanwhile; (j, 6)."""
     rail: NDArray[np.float64]
     """By joint: readings on a rail in a row; since when [s]; whether it jumped there, its last movement; (j, 4)."""
     expected: NDArray[np.float64]

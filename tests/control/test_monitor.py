@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-
 from benchmarks.faults import KINDS, played, watched_steps
+
 from pneumarm.arm import Reading
 from pneumarm.arm.virtual import DeadPotentiometer, Leak, StuckValve, SupplyLoss, VirtualArm, draw_parameters
 from pneumarm.control import Finding, LeakTest, Monitor, leak_test, leaking
@@ -46,7 +46,8 @@ def by_name():
 def test_finds_faults_with_a_simulation(simulation, name, within):
     for seed in range(3):
         case = played(by_name()[name], 3, seed, simulation, patience=20.0)
-        assert case.found is not None and case.early == 0
+        assert case.found is not None
+        assert case.early == 0
         assert case.since_contradiction <= within
 
 
@@ -54,7 +55,8 @@ def test_finds_faults_with_a_simulation(simulation, name, within):
 def test_finds_faults_before_there_is_a_simulation(name):
     for arm in (1, 2):
         case = played(by_name()[name], arm, arm, None, patience=30.0)
-        assert case.found is not None and case.early == 0
+        assert case.found is not None
+        assert case.early == 0
 
 
 def test_leaves_healthy_arms_alone(simulation):
@@ -142,10 +144,10 @@ def test_costs_less_than_50_microseconds_a_reading(simulation):
     best = np.inf
     for _ in range(5):
         monitor.begin(at_rest=True)
-        begin = time.perf_counter()
+        begin = time.process_time()
         for k, reading in enumerate(readings):
             monitor.see(Reading(k / 30, reading.angle, reading.pressure), valves)
-        best = min(best, (time.perf_counter() - begin) / 500)
+        best = min(best, (time.process_time() - begin) / 500)
     assert best < 50e-6
 
 

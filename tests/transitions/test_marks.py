@@ -62,7 +62,8 @@ def test_a_store_of_version_1_is_read_and_upgraded_by_a_writer(tmp_path):
     connection.execute("PRAGMA user_version = 1")
     connection.close()
     with Store.open(path) as store:
-        assert store.marks() == {} and len(next(iter(store))) == 10
+        assert store.marks() == {}
+        assert len(next(iter(store))) == 10
     with Store.append_to(path) as store:
         store.mark(1, [Mark(0, 3, "why not")])
     with Store.open(path) as store:

@@ -111,7 +111,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
 
 @kernel
 def see_by_rules(rules, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
-    """Weigh a reading without a simulation; call :func:`remember` with the valves chosen after it."""
+    """Weigh a reading without a simulation; the valves chosen after it go into ``memory.command[0]``."""
     if memory.clock[1] >= 1.0:
         expect_by_rules(rules, readings, memory, angle, memory.expected, memory.std)
         weigh_hypotheses(thresholds, readings, memory, time, pressure)
@@ -121,7 +121,7 @@ def see_by_rules(rules, readings, thresholds, memory, time, angle, pressure):  #
 
 @kernel
 def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
-    """Weigh a reading by a simulation; call :func:`remember` with the valves chosen after it."""
+    """Weigh a reading by a simulation; the valves chosen after it go into ``memory.command[0]``."""
     if memory.clock[1] >= memory.clock[2]:
         expect_by_simulation(predictor, readings, memory, memory.expected, memory.angle)
         for m in range(memory.std.shape[0]):
@@ -246,11 +246,3 @@ def observe(memory, time, angle, pressure):  # type: ignore[no-untyped-def]
                     memory.observed[lag, j, q] = memory.observed[0, j, q]
     memory.clock[0] = time
     memory.clock[1] += 1.0
-
-
-@kernel
-def remember(memory, valves):  # type: ignore[no-untyped-def]
-    """Put the ``valves`` (joints, 2) chosen after the newest reading in front of the commands."""
-    for j in range(valves.shape[0]):
-        for side in range(2):
-            memory.command[0, 2 * j + side] = valves[j, side]

@@ -13,7 +13,6 @@ from pneumarm.control.monitor.evidence import (
     Memory,
     Thresholds,
     new_memory,
-    remember,
     see_by_rules,
     see_by_simulation,
 )
@@ -176,7 +175,6 @@ class Monitor:
         self._thresholds = self._packed()
         self._expects = rule_parameters(self.settings.rules, spec) if simulation is None else predictor(simulation)
         self._see = see_by_rules if simulation is None else see_by_simulation
-        self._none = np.zeros((spec.joints, 2), np.int8)
         self.begin(at_rest=True)
 
     def _packed(self) -> Thresholds:
@@ -218,7 +216,8 @@ class Monitor:
         self._see(
             self._expects, self._readings, self._thresholds, memory, reading.time, reading.angle, reading.pressure
         )
-        remember(memory, self._none if valves is None else valves)
+        # Not by a kernel: handing the memory over to one takes longer than the kernel.
+        memory.command[0] = 0.0 if valves is None else valves.ravel()
         if self._suspicious():
             self._decide(reading.time)
 

@@ -3,8 +3,8 @@
 Every case is an arm of its own draw, a muscle and a moment drawn at random, while the arm is collecting. Times are
 watched time (the arm is not watched while it is brought to a begin state): since the fault began, and for valves
 since the first reading at which what was told and what was done differed in a muscle where it makes a difference.
-Healthy hours are collecting from a cold morning on, and movements by a policy before, while and after it adapts. Settings
-come from the environment:
+Healthy hours are collecting from a cold morning on, and movements by a policy before, while and after it adapts.
+Settings come from the environment:
 
 PNEUMARM_FAULTS_ARMS     seeds of virtual arms, 1 to 20 by default; the judging arms are 1001 to 1010
 PNEUMARM_FAULTS_CASES    cases of each fault, 40

@@ -3,7 +3,7 @@
 While an arm moves a leak cannot be told from what moving does to pressures: a muscle that leaks three times as much
 as usual loses 0.03 % of its pressure more in a control period. With closed valves it is the only thing that lasts.
 The rate is that of an exponential fitted to the readings by least squares; what the rubber does by itself (creep
-after the filling) is waited for, and as far as it lasts, it is in the rate of the healthy arm too, with which is compared.
+after the filling) is waited for, and as far as it lasts, it is in the rate of the healthy arm too.
 """
 
 import math

@@ -19,6 +19,7 @@ from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
 from pneumarm.control import (
     BoundSettings,
+    Monitor,
     PlanSettings,
     TransferSettings,
     known_bound,
@@ -159,7 +160,10 @@ class Run:
             open_arm_checked(wanted) as arm,
             Store.for_arm(self.store, arm.spec) as store,
         ):
-            collected = collect(arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect)
+            watch = Monitor(arm.spec)
+            collected = collect(
+                arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
+            )
             save_spec(self.folder, arm.spec)
         return {"collect": asdict(collected)}
 

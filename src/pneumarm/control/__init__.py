@@ -2,6 +2,8 @@
 
 from pneumarm.control.agent import AgentController
 from pneumarm.control.bound import BoundSettings, Planned, known_bound, measure_bound
+from pneumarm.control.leaks import LeakRates, LeakTest, leak_test, leaking
+from pneumarm.control.monitor import Finding, Monitor, MonitorSettings
 from pneumarm.control.movement import LearningController, Movement, move
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.plan_agent import PlanAgent
@@ -25,8 +27,13 @@ __all__ = [
     "AgentController",
     "BoundSettings",
     "Episode",
+    "Finding",
     "History",
+    "LeakRates",
+    "LeakTest",
     "LearningController",
+    "Monitor",
+    "MonitorSettings",
     "Movement",
     "PhysicsModel",
     "PlanAgent",
@@ -37,6 +44,8 @@ __all__ = [
     "TransferSettings",
     "Transferred",
     "known_bound",
+    "leak_test",
+    "leaking",
     "measure_bound",
     "move",
     "open_agent",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.control.agent import AgentController
+from pneumarm.control.monitor import Monitor
 from pneumarm.control.movement import Movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -20,6 +21,7 @@ from pneumarm.learning import AdaptationSettings, AnyAgent, adaptation, fingerpr
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
+from pneumarm.transitions.watch import Watch, keep_watch
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
@@ -170,6 +172,7 @@ def transfer(
     seed: int = 0,
     progress: Callable[[float, float], None] | None = None,
     keep_version: Callable[[int, AnyAgent], None] | None = None,
+    watch: Watch | None = None,
 ) -> Transferred:
     """Test ``agent`` on ``arm``, let it learn there, test it again; every movement goes into ``store``.
 
@@ -177,7 +180,8 @@ def transfer(
     one; after an interruption it may be told of the same one again.
 
     A transfer that was interrupted goes on after the last movement that was stored, on an arm that can be put into
-    a saved state as if nothing had happened.
+    a saved state as if nothing had happened. What ``watch`` finds spoiled, by default a :class:`Monitor` with the
+    agent's simulation, is stored but not learned from; it counts in the figures, because it happened.
 
     Raises:
         UnusableInput: arm and agent do not fit, or the store holds a transfer with other settings.
@@ -207,12 +211,18 @@ def transfer(
     total = sum(settings.movements(phase) for phase in PHASES)
     cycle = ControlCycle(guarded(arm), settings.close_while_computing)
     waiting: list[Recorded] = []
+    watch = watch or Monitor(arm.spec, getattr(agent, "simulation", None))  # not every kind of agent keeps one
+    if done and (seen := store.state("watch")) is not None:
+        watch.set_state(seen)
 
     def keep() -> None:
         state = {"learner": learner.get_state(), "mean": mean.get_state(), "arm": arm.get_state()}
+        state["watch"] = watch.get_state()
+        keep_watch(store, watch, number)
         if adapting is not None:
             state["adaptation"] = adapting.get_state()
-        store.append_all(waiting, {name: value for name, value in state.items() if value is not None})
+        recorded = [replace(one, marks=watch.marks(one)) for one in waiting]
+        store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
         waiting.clear()
 
     def note(phase: Phase, movement: Movement) -> None:
@@ -232,8 +242,8 @@ def transfer(
             return
         keep()  # it learns from what is stored, so that an interruption changes nothing
         made = [entry.number for entry in store.catalogue(number)][-adapting.usable :]
-        rows = joined(store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
-        if adapting.learn(rows) and keep_version is not None:
+        blocks = list(store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
+        if blocks and adapting.learn(joined(blocks)) and keep_version is not None:
             keep_version(adapting.version, adapting.agent)
 
     def shown() -> AnyAgent:
@@ -259,7 +269,7 @@ def transfer(
                     controller = AgentController(moving)
                 random, goal = begin_and_goal(agent, seed, greedy, i)
                 BEGIN.reach(cycle.arm, random)
-                movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
+                movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff, watch)
                 if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * count:
                     mean.add(learner.weights())
                 note(phase, movement)

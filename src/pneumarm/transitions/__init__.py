@@ -6,7 +6,7 @@ from pneumarm.transitions.filtering import Enough, Filter, Filtered, enough_data
 from pneumarm.transitions.grid import Coverage, Grid, GridSettings
 from pneumarm.transitions.players import Keyboard, Trajectory
 from pneumarm.transitions.recording import import_recording
-from pneumarm.transitions.rows import Recorded, Rows
+from pneumarm.transitions.rows import Mark, Recorded, Rows
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
 
@@ -23,6 +23,7 @@ __all__ = [
     "Grid",
     "GridSettings",
     "Keyboard",
+    "Mark",
     "Recorded",
     "Rows",
     "Store",

@@ -63,12 +63,12 @@ def test_help_answers_at_once_and_without_the_heavy_libraries() -> None:
         "sys.exit(len({'numba', 'numpy', 'matplotlib', 'scipy'} & sys.modules.keys()))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
-    assert all(command in done.stdout for command in COMMANDS)
+    assert all(command.split()[0] in done.stdout for command in COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    outcome = Outcome(capsys, command, "--help")
+    outcome = Outcome(capsys, *command.split(), "--help")
     assert outcome.code == 0
     assert f"pneumarm {command} " in outcome.out.replace("\n", " ")
     assert "Example:" in outcome.out

@@ -9,6 +9,7 @@ from cyclopts import App, CycloptsError
 from pneumarm import __version__
 from pneumarm.console import complain
 from pneumarm.errors import PneumarmError
+from pneumarm.leaving import leave_by_exceptions
 
 COMMANDS = {
     "run": (
@@ -55,6 +56,18 @@ COMMANDS = {
         "Say what can be achieved on a virtual arm at all, by planning with its true physics.",
         "pneumarm bound --arm virtual:seed=7 --episodes 500",
     ),
+    "arm check": (
+        "Move an arm gently and say in plain words what is wrong with it.",
+        "pneumarm arm check virtual:seed=7 --out checkup",
+    ),
+    "arm calibrate": (
+        "Measure an arm's sensors and write what everything else needs to know of it.",
+        "pneumarm arm calibrate virtual:seed=7 --out arm.toml",
+    ),
+    "arm valves": (
+        "Click every valve, one by one, saying which; before the air is on.",
+        "pneumarm arm valves virtual",
+    ),
     "report": (
         "Write the report of a finished run again.",
         "pneumarm report runs/first",
@@ -68,23 +81,27 @@ app = App(
     version=__version__,
     suppress_keyboard_interrupt=False,
 )
+_groups = {"arm": App(name="arm", help="Check an arm, calibrate it, try its valves.")}
+for _group in _groups.values():
+    app.command(_group)
 for _name, (_help, _example) in COMMANDS.items():
-    app.command(f"pneumarm.commands.{_name}_:{_name}_", name=_name, help=_help, help_epilogue=f"Example: {_example}")
+    _file, _, _part = _name.partition(" ")
+    _groups.get(_file, app).command(
+        f"pneumarm.commands.{_file}_:{_part or _file}_",
+        name=_part or _file,
+        help=_help,
+        help_epilogue=f"Example: {_example}",
+    )
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; exit with 0 done, 2 unusable input, 1 anything else."""
-    # A polite kill leaves through the same doors as Ctrl-C: arms are closed, files are whole.
-    signal.signal(signal.SIGTERM, _interrupt)
+    """Run the command line; exit with 0 done, 2 unusable input, 128 + N ended by signal N, 1 anything else."""
     sys.exit(_run(sys.argv[1:] if arguments is None else arguments))
-
-
-def _interrupt(signal_number: int, frame: object) -> None:
-    raise KeyboardInterrupt
 
 
 def _run(arguments: list[str]) -> int:
     try:
+        leave_by_exceptions()
         app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         complain(f"{error} See pneumarm --help.")
@@ -92,9 +109,12 @@ def _run(arguments: list[str]) -> int:
     except PneumarmError as error:
         complain(error)
         return error.exit_code
-    except KeyboardInterrupt:
-        complain("interrupted; run, collect and transfer go on where they were when called again")
-        return 1
+    except KeyboardInterrupt as error:
+        told = f" ({error})" if str(error) else ""
+        complain(
+            f"interrupted{told}; the arm is closed; run, collect and transfer go on where they were, called again"
+        )
+        return getattr(error, "exit_code", 128 + signal.SIGINT)
     except BrokenPipeError:
         sys.stderr.close()
         return 1

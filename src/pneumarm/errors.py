@@ -18,3 +18,7 @@ class UnusableInput(PneumarmError):  # noqa: N818 - reads as a sentence where it
 
 class ArmFailure(PneumarmError):  # noqa: N818
     """The arm stopped answering or answered nonsense while it was in use."""
+
+
+class ControllerFailure(PneumarmError):  # noqa: N818
+    """A controller went on giving decisions that cannot be used; the arm is vented."""

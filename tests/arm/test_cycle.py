@@ -1,7 +1,12 @@
+from time import monotonic, sleep
+
 import numpy as np
 import pytest
 
 from pneumarm.arm import BeginState, ControlCycle, GuardedArm
+from pneumarm.arm.guard import HELD, MOST_REPLACED, Interventions
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.errors import ControllerFailure, UnusableInput
 
 OPEN = np.array([[1, -1]], np.int8)
 
@@ -62,7 +67,7 @@ def test_a_lost_period_is_counted_and_not_caught_up(smallest_arm):
     assert np.diff(times)[3:] == pytest.approx(1 / 30)
 
 
-def test_an_error_in_deciding_closes_the_valves(smallest_arm):
+def test_an_error_in_deciding_is_held_then_vented_then_told(smallest_arm):
     arm = smallest_arm()
 
     def decide(reading):
@@ -70,9 +75,76 @@ def test_an_error_in_deciding_closes_the_valves(smallest_arm):
             raise RuntimeError("no idea")
         return OPEN
 
-    with pytest.raises(RuntimeError, match="no idea"):
+    applied = []
+    with pytest.raises(ControllerFailure, match=r"31 decisions in a row .*RuntimeError: no idea"):
+        applied.extend(step.valves.tolist() for step in ControlCycle(GuardedArm(arm)).run(decide))
+    assert applied == [[[1, -1]]] * (1 + HELD) + [[[-1, -1]]] * (MOST_REPLACED - HELD)
+    assert arm.valves == [[0, 0]]
+
+
+def test_an_error_on_purpose_ends_at_once_with_closed_valves(smallest_arm):
+    arm = smallest_arm()
+
+    def decide(reading):
+        if reading.time > 0:
+            raise UnusableInput("another arm, please")
+        return OPEN
+
+    with pytest.raises(UnusableInput):
         list(ControlCycle(GuardedArm(arm)).run(decide))
     assert arm.valves == [[0, 0]]
+
+
+def real_time(smallest):
+    """Return an arm whose clock runs while somebody computes, as hardware's does, at a period of 5 ms."""
+
+    class RealTime(smallest):
+        def read(self):
+            now = monotonic()
+            super().wait(max(0.0, now - self.time) if self.time else 0.0)
+            self.time = now
+            return super().read()
+
+        def wait(self, seconds):
+            sleep(seconds)
+
+    return RealTime(period=0.005)
+
+
+def test_late_decisions_are_held_then_vented_and_the_arm_goes_on_when_they_are_in_time(smallest_arm):
+    arm = real_time(smallest_arm)
+    # In periods: in time, a little late, in time, lost in thought, in time.
+    thoughts = [0.0, 1.5, 0.0, HELD + 2.0, 0.0]
+    remaining = list(thoughts)
+    decisions = [OPEN, -OPEN, -OPEN, OPEN, OPEN]
+
+    def decide(reading):
+        if not remaining:
+            return None
+        sleep(remaining.pop(0) * 0.005)
+        return decisions[len(thoughts) - len(remaining) - 1]
+
+    guard = GuardedArm(arm)
+    cycle = ControlCycle(guard)
+    applied = [step.valves.tolist() for step in cycle.run(decide) if step.valves is not None]
+    assert applied[1] == applied[0] == OPEN.tolist()
+    assert applied[2] == (-OPEN).tolist()
+    assert applied[3] == [[-1, -1]]
+    assert applied[4] == OPEN.tolist()
+    assert guard.interventions == Interventions(late=2, vented=1)
+    assert cycle.missed_deadlines >= 1
+
+
+def test_computing_takes_no_time_of_an_arm_whose_clock_stands_still():
+    guard = GuardedArm(VirtualArm())
+    plain = [s.reading.angle for s in ControlCycle(GuardedArm(VirtualArm())).run(deciding(OPEN, OPEN, OPEN))]
+
+    def slow(reading, quick=deciding(OPEN, OPEN, OPEN)):
+        sleep(0.05)
+        return quick(reading)
+
+    assert [s.reading.angle for s in ControlCycle(guard).run(slow)] == plain
+    assert guard.interventions == Interventions()
 
 
 def test_stopping_early_closes_the_valves(smallest_arm):

@@ -1,8 +1,12 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 from pneumarm.arm import GuardedArm, Reading
-from pneumarm.errors import ArmFailure, PneumarmError
+from pneumarm.arm.guard import HELD, MOST_REPLACED, Interventions
+from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
 
 
 def test_only_the_muscle_over_the_limit_is_blocked(smallest_arm):
@@ -13,7 +17,7 @@ def test_only_the_muscle_over_the_limit_is_blocked(smallest_arm):
     safe.set_valves([[1, 1], [1, -1]])
     assert safe.applied.tolist() == [[0, 1], [1, -1]]
     assert arm.valves == [[0, 1], [1, -1]]
-    assert safe.interventions == 1
+    assert safe.interventions == Interventions(pressure=1)
     assert safe.peak_pressure.tolist() == [[167, 166], [10, 300]]
 
 
@@ -91,3 +95,141 @@ def test_closing_closes_the_arm_behind(smallest_arm):
     with GuardedArm(arm):
         pass
     assert arm.closed == 1
+
+
+OPEN = [[1, -1]]
+
+
+class Hostile:
+    """What no array can be made of."""
+
+    def __array__(self, *_args, **_kwargs):
+        raise RuntimeError("boo")
+
+
+@pytest.mark.parametrize(
+    "nonsense", [[[0, 2]], [[np.nan, 0]], [[np.inf, 0]], [0, 0], [[1], [1, 0]], "up", {}, [[{}, 0]], None, Hostile()]
+)
+def test_a_decision_that_is_nonsense_is_held_then_vented_then_stopped(smallest_arm, nonsense):
+    arm = smallest_arm()
+    safe = GuardedArm(arm)
+    safe.decide(OPEN)
+    for count in range(1, MOST_REPLACED + 1):
+        safe.decide(nonsense)
+        assert arm.valves == (OPEN if count <= HELD else [[-1, -1]])
+    assert safe.interventions == Interventions(nonsense=MOST_REPLACED, vented=MOST_REPLACED - HELD)
+    assert safe.interventions.total == MOST_REPLACED
+    with pytest.raises(ControllerFailure, match="smallest: stopped and vented"):
+        safe.decide(nonsense)
+    assert arm.valves == safe.applied.tolist() == [[-1, -1]]
+
+
+def test_one_good_decision_makes_the_guard_patient_again(smallest_arm):
+    arm = smallest_arm()
+    safe = GuardedArm(arm)
+    for _ in range(MOST_REPLACED):
+        for _ in range(HELD):
+            safe.decide(None)
+        safe.decide(OPEN)
+    assert arm.valves == OPEN
+    assert safe.interventions == Interventions(nonsense=HELD * MOST_REPLACED)
+
+
+def test_what_is_held_keeps_to_the_limits(smallest_arm):
+    arm = smallest_arm(max_pressure=0.5)
+    safe = GuardedArm(arm)
+    safe.decide(OPEN)
+    arm.pressure = [[100, 0]]
+    safe.read()
+    safe.decide("hold on")
+    assert arm.valves == [[0, -1]]
+    assert safe.interventions == Interventions(pressure=1, nonsense=1)
+
+
+def test_an_inlet_that_was_open_for_too_long_rests_as_long(smallest_arm):
+    arm = smallest_arm(joints=2, max_inflation=2.0, max_pressure=1e6)
+    safe = GuardedArm(arm)
+    asked = np.array([[1, 0], [0, -1]])
+    opened = []
+    for _ in range(300):
+        safe.read()
+        safe.set_valves(asked)
+        arm.wait(0.1)
+        opened.append(safe.applied[0, 0])
+    # 2 s in, 2 s of rest, and so on; nothing of this concerns the other muscles.
+    changes = np.flatnonzero(np.diff(opened))
+    assert np.diff(changes) == pytest.approx(20, abs=1)
+    assert safe.interventions == Interventions(inflation=opened.count(0))
+
+
+def test_pulses_count_as_inflation_too_and_venting_ends_it(smallest_arm):
+    arm = smallest_arm(max_inflation=2.0, max_pressure=1e6)
+    safe = GuardedArm(arm)
+    for turn in range(100):
+        safe.read()
+        safe.set_valves([[1 if turn % 4 else 0, 0]])
+        arm.wait(0.1)
+    assert safe.interventions.inflation > 0
+    safe.set_valves([[-1, -1]])
+    arm.wait(0.25)
+    safe.read()
+    safe.set_valves(OPEN)
+    assert arm.valves == OPEN
+
+
+@pytest.mark.parametrize("how", ["wait", "wait_until"])
+def test_long_waits_keep_to_pressure_and_time(smallest_arm, how):
+    for limits, opened in (({"max_pressure": 0.5}, 0.5), ({"max_inflation": 2.0, "max_pressure": 1e6}, 2.0)):
+        arm = smallest_arm(**limits)
+        safe = GuardedArm(arm)
+        safe.read()
+        safe.set_valves([[1, 0]])
+        getattr(safe, how)(60.0)
+        assert arm.time == pytest.approx(60.0)
+        assert arm.pressure[0][0] / 166 == pytest.approx(opened, abs=0.1)
+        assert safe.interventions.total == 1
+
+
+def test_at_an_end_of_the_angle_nothing_pushes_further_out(smallest_arm):
+    arm = smallest_arm(joints=3, angle_limits=(100.0, 900.0))
+    safe = GuardedArm(arm)
+    arm.angle = [950, 500, 100]
+    safe.read()
+    for asked, applied in ((1, [[0, 1], [1, 1], [1, 0]]), (-1, [[-1, -1]] * 3)):
+        safe.set_valves(np.full((3, 2), asked))
+        assert arm.valves == applied
+    safe.set_valves([[1, -1]] * 3)
+    assert arm.valves == [[0, 0], [1, -1], [1, -1]]
+    safe.set_valves([[-1, 1]] * 3)
+    assert arm.valves == [[-1, 1], [-1, 1], [0, 0]]
+    assert safe.interventions == Interventions(angle=2 + 2 + 2)
+    arm.angle = [500, 500, 500]
+    safe.read()
+    safe.set_valves([[1, -1]] * 3)
+    assert arm.valves == [[1, -1]] * 3
+
+
+def test_interventions_are_counted_apart_and_can_be_told():
+    first, second = Interventions(pressure=3, late=1), Interventions(pressure=1, vented=2)
+    assert (first + second) - second == first
+    assert str(first) == "3 x pressure, 1 x late"
+    assert str(Interventions()) == "none"
+    assert second.total == 1
+
+
+def test_what_nobody_closed_is_closed_when_the_interpreter_ends(tmp_path):
+    program = (
+        "import sys; from pathlib import Path; from pneumarm.arm import ArmSpec, Arm, Reading, guarded\n"
+        "class Logged(Arm):\n"
+        "    spec = ArmSpec()\n"
+        "    def read(self): return Reading(0.0, [0], [[0, 0]])\n"
+        "    def set_valves(self, valves): pass\n"
+        "    def wait(self, seconds): pass\n"
+        "    def close(self): print('closed', sys.argv[1])\n"
+        "arm = Logged()\n"
+        "guarded(arm).set_valves([[1, 1]])\n"
+        "if sys.argv[1] == 'failing': raise ValueError\n"
+    )
+    for how in ("well", "failing"):
+        done = subprocess.run([sys.executable, "-c", program, how], capture_output=True, text=True)
+        assert done.stdout == f"closed {how}\n"

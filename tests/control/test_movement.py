@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, Reading, guarded
 from pneumarm.control import LearningController, move
+from pneumarm.errors import ControllerFailure
 from pneumarm.learning import Reward
 from pneumarm.simulation import SimulationArm
 from simple_simulation import QUIET, simulation
@@ -106,7 +107,7 @@ def test_too_fast_at_the_goal_is_not_at_the_goal() -> None:
 
 def test_valves_are_closed_when_a_controller_fails() -> None:
     arm = Dial(100)
-    with pytest.raises(IndexError):
+    with pytest.raises(ControllerFailure, match="IndexError"):
         move(ControlCycle(guarded(arm)), Player(1), GOAL, Reward())
     assert arm.valve == 0
 

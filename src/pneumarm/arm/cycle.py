@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from time import monotonic
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.guard import GuardedArm
 from pneumarm.arm.seam import Reading
+from pneumarm.errors import PneumarmError
 
 Decide = Callable[[Reading], NDArray[np.int8] | None]
 
@@ -24,7 +26,8 @@ class Step(NamedTuple):
 class ControlCycle:
     """Read, decide, let the latency pass, set the valves, wait for the period to end; over and over.
 
-    The valves stay as they are between reading and acting, or are closed then (thesis figure 2.8).
+    The valves stay as they are between reading and acting, or are closed then (thesis figure 2.8). A decision that
+    cannot be used, that raises, or that took longer than a period on the arm's clock is replaced by the guard.
     """
 
     arm: GuardedArm
@@ -40,7 +43,12 @@ class ControlCycle:
     def run(self, decide: Decide) -> Iterator[Step]:
         """Yield the turns until ``decide`` returns None; that last turn's valves are None, and all are closed.
 
-        Raises whatever ``decide`` or the arm raises, after closing the valves.
+        The valves are closed on every way out.
+
+        Raises:
+            PneumarmError: whatever ``decide`` raises on purpose.
+            ControllerFailure: too many decisions in a row had to be replaced.
+
         """
         arm, period, latency = self.arm, self.arm.spec.period, self.arm.spec.latency
         closed = np.zeros_like(arm.applied)
@@ -55,18 +63,40 @@ class ControlCycle:
                 due = (reading.time if due is None else due) + period
                 if self.close_while_computing:
                     arm.set_valves(closed)
-                valves = decide(reading)
+                began, raised = monotonic(), None
+                try:
+                    valves = decide(reading)
+                except PneumarmError:
+                    raise
+                except Exception as error:
+                    valves, raised = arm.applied, error
                 if valves is None:
                     yield Step(reading, None)
                     return
+                late = self._lateness(reading) if monotonic() - began > period else 0.0
                 if latency:
                     arm.wait(latency)
-                arm.set_valves(valves)
+                if raised is not None:
+                    arm.replace("raised", f"{type(raised).__name__}: {raised}", max(late, 1.0), raised)
+                elif late > 1:
+                    arm.replace("late", f"{late:.1f} periods after its reading", late)
+                else:
+                    arm.decide(valves)
                 self.applied = arm.applied
                 yield Step(reading, arm.applied)
                 arm.wait_until(due)
         finally:
             arm.set_valves(closed)
+
+    def _lateness(self, reading: Reading) -> float:
+        """Return how many periods ago ``reading`` was on the arm's clock.
+
+        The clock of an arm that has a state stands still while we compute, however long that takes, and is not asked:
+        another reading would draw other noise, and nothing would repeat.
+        """
+        if self.arm.get_state() is not None:
+            return 0.0
+        return (self.arm.read().time - reading.time) / self.arm.spec.period
 
 
 @dataclass(frozen=True)

@@ -1,65 +1,239 @@
-"""The guard between any controller and any arm: no inlet opens into a muscle that reads over its limit."""
+"""The guard between any controller and any arm: what could harm is replaced, counted, and never reaches a valve.
+
+What is asked for passes four rules, in this order:
+
+1. *Sense*: valves are (joints, 2) of -1, 0, +1. A controller that gives anything else, that raises, or that takes
+   longer than a control period is replaced: what was last applied is held, then everything is vented, in the end the
+   controller is stopped (:meth:`GuardedArm.decide`, :meth:`GuardedArm.replace`).
+2. *Pressure*: an inlet stays closed while its muscle reads over ``spec.max_pressure``.
+3. *Time of inflation*: an inlet that was open for ``spec.max_inflation`` stays closed until its muscle has rested as
+   long, or has been vented for a tenth of it. A muscle that takes air for so long without reaching its limit is
+   unplugged, burst, or its pressure sensor does not see it.
+4. *Angle*: at an end of ``spec.angle_limits``, valves that push further out (air into the muscle that pulls there,
+   air out of the other) stay closed. A joint may always be vented whole.
+
+A decision that never returns cannot be replaced from here: that is what the dead-man of a microcontroller is for.
+"""
+
+import atexit
+import math
+import weakref
+from contextlib import suppress
+from dataclasses import astuple, dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Arm, Reading, checked
-from pneumarm.errors import PneumarmError
+from pneumarm.errors import ControllerFailure, PneumarmError
 
 _SETTINGS = frozenset((-1, 0, 1))
+HELD = 3
+"""Control periods in a row without a decision in which the valves are held, 0.1 s at 30 Hz; then they are vented."""
+MOST_REPLACED = 30
+"""Decisions in a row that are replaced; the one after stops the controller."""
+_VENTING = 10.0
+"""How many times faster a muscle recovers from inflation by venting than by resting."""
+
+Reason = Literal["nonsense", "raised", "late"]
+
+_open_arms: "weakref.WeakValueDictionary[int, Arm]" = weakref.WeakValueDictionary()
+
+
+@atexit.register
+def _close_open_arms() -> None:
+    """Close what nobody closed before the interpreter ends."""
+    for arm in list(_open_arms.values()):
+        with suppress(Exception):  # the other arms are to be closed too
+            arm.close()
+
+
+@dataclass
+class Interventions:
+    """How often the guard did what."""
+
+    pressure: int = 0
+    """Inlets kept closed because their muscle read over its limit."""
+    inflation: int = 0
+    """Inlets kept closed because they had been open for too long."""
+    angle: int = 0
+    """Valves kept closed because they push out of the limits of the angle."""
+    nonsense: int = 0
+    """Decisions replaced that were no valves: NaN, other numbers, another shape, nothing like it."""
+    raised: int = 0
+    """Decisions replaced because the controller raised an error."""
+    late: int = 0
+    """Decisions replaced because they came more than a control period after their reading."""
+    vented: int = 0
+    """How many of the decisions that were replaced were so by venting, not by holding."""
+
+    @property
+    def total(self) -> int:
+        """Valves kept closed and decisions replaced."""
+        return sum(astuple(self)) - self.vented
+
+    def __add__(self, other: "Interventions") -> "Interventions":
+        return Interventions(*[a + b for a, b in zip(astuple(self), astuple(other), strict=True)])
+
+    def __sub__(self, other: "Interventions") -> "Interventions":
+        return Interventions(*[a - b for a, b in zip(astuple(self), astuple(other), strict=True)])
+
+    def __str__(self) -> str:
+        said = [f"{count} x {name}" for name, count in vars(self).items() if count]
+        return ", ".join(said) or "none"
 
 
 class GuardedArm(Arm):
-    """An arm whose inlets stay closed while their muscle reads over ``spec.max_pressure``.
+    """An arm behind the guard: its readings are checked and its limits hold, whoever sets its valves.
 
-    Waits with an open inlet are cut into control periods with a reading between them, so that the limit also
-    holds during a long inflation. ``applied`` are the valves as they were really set.
+    Waits with an open inlet are cut into control periods with a reading between them, so that the limits also
+    hold during a long inflation. ``applied`` are the valves as they were really set. An arm that nobody closed is
+    closed when the interpreter ends.
     """
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self.spec = arm.spec
         self.applied: NDArray[np.int8] = np.zeros((arm.spec.joints, 2), np.int8)
-        self.interventions = 0
-        """Number of times that an inlet was kept closed."""
         self.peak_pressure = np.zeros((arm.spec.joints, 2))
         """Highest pressures read, shape (joints, 2) [counts]."""
+        self._interventions = Interventions()
         self._limit = arm.spec.max_pressure_counts
         self._over: NDArray[np.bool_] | None = None  # which muscles read over the limit; None if none does
+        self._outward: NDArray[np.int8] | None = None  # valves that push out of the angle's limits; None if none does
+        self._inflation = _Inflation(arm.spec.max_inflation, self.applied.size)
+        self._inflating = False
+        self._replaced = 0  # decisions in a row
+        self._undecided = 0.0  # control periods in a row without a decision of the controller
+        self._time = -math.inf  # of the last reading
+        _open_arms[id(arm)] = arm
+
+    @property
+    def interventions(self) -> Interventions:
+        """How often the guard did what until now; a record of its own, that later interventions do not change."""
+        return replace(self._interventions)
 
     def read(self) -> Reading:
-        """Return a checked reading and remember which muscles are over the limit."""
+        """Return a checked reading and remember which muscles and joints are at their limits."""
         reading = checked(self.arm.read(), self.spec)
         over = max(reading.pressure.ravel().tolist()) > self._limit
         self._over = reading.pressure > self._limit if over else None
         np.maximum(self.peak_pressure, reading.pressure, out=self.peak_pressure)
+        if self.spec.angle_limits is not None:
+            self._outward = _outward(reading.angle, *self.spec.angle_limits)
+        self._inflation.pass_until(reading.time)
+        self._time = reading.time
         return reading
 
     def set_valves(self, valves: ArrayLike) -> None:
-        """Set ``valves`` (joints, 2), with the inlets of muscles over the limit kept closed."""
-        asked = np.asarray(valves)
-        if asked.shape != self.applied.shape or not _SETTINGS.issuperset(asked.ravel().tolist()):
+        """Set ``valves`` (joints, 2), with those that break a limit kept closed.
+
+        Raises:
+            PneumarmError: other values or another shape; nothing is set then.
+
+        """
+        asked = self._sensible(valves)
+        if asked is None:
             raise PneumarmError(f"valves must be {self.applied.shape} of -1, 0 or +1, got {valves!r}")
-        applied = asked.astype(np.int8)
+        self._set(self._within_limits(asked))
+
+    def decide(self, valves: object) -> None:
+        """Set the ``valves`` that a controller decided on, or replace the decision where they are none.
+
+        Raises:
+            ControllerFailure: too many decisions in a row had to be replaced; everything is vented then.
+
+        """
+        asked = self._sensible(valves)
+        if asked is None:
+            self.replace("nonsense", f"it gave {valves!r}")
+            return
+        self._replaced, self._undecided = 0, 0.0
+        self._set(self._within_limits(asked))
+
+    def replace(self, reason: Reason, what: str, periods: float = 1.0, cause: Exception | None = None) -> None:
+        """Do what is safe instead of what a controller decided: hold the valves as applied, or vent everything.
+
+        Args:
+            reason: why; it is counted.
+            what: happened, for the message of the error.
+            periods: control periods that went by without a decision.
+            cause: what the controller raised.
+
+        Raises:
+            ControllerFailure: too many decisions in a row had to be replaced; everything is vented then.
+
+        """
+        counts = self._interventions
+        setattr(counts, reason, getattr(counts, reason) + 1)
+        self._replaced += 1
+        self._undecided += periods
+        if self._undecided <= HELD:
+            self._set(self._within_limits(self.applied.copy()))
+            return
+        counts.vented += 1
+        self._set(np.full_like(self.applied, -1))  # no limit forbids to vent
+        if self._replaced > MOST_REPLACED:
+            raise ControllerFailure(
+                f"{self.spec.name}: stopped and vented, because {self._replaced} decisions in a row could not be "
+                f"used ({reason}: {what}); mend the controller and run the same command again"
+            ) from cause
+
+    def _sensible(self, valves: object) -> NDArray[np.int8] | None:
+        """Return a copy of ``valves`` if they are valves, else None."""
+        try:
+            asked = np.asarray(valves)
+            if asked.shape == self.applied.shape and _SETTINGS.issuperset(asked.ravel().tolist()):
+                return asked.astype(np.int8)
+        except Exception:  # whatever a foreign object does when it is made an array
+            return None
+        return None
+
+    def _within_limits(self, valves: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Close those of ``valves`` that break a limit, and return them."""
+        counts = self._interventions
         if self._over is not None:
-            blocked = (applied > 0) & self._over
-            applied[blocked] = 0
-            self.interventions += int(blocked.sum())
-        self.arm.set_valves(applied)
-        self.applied = applied
+            counts.pressure += _close(valves, (valves > 0) & self._over)
+        if self._inflation.spent:
+            counts.inflation += _close(valves, (valves > 0) & np.reshape(self._inflation.blocked, valves.shape))
+        if self._outward is not None:
+            vented = (valves < 0).all(axis=1, keepdims=True)
+            counts.angle += _close(valves, (valves != 0) & (valves == self._outward) & ~vented)
+        return valves
+
+    def _set(self, valves: NDArray[np.int8]) -> None:
+        self.arm.set_valves(valves)
+        self.applied = valves
+        self._inflation.valves = values = valves.ravel().tolist()
+        self._inflating = 1 in values
+
+    def watch(self) -> Reading:
+        """Return a reading, after closing the valves that are at a limit now."""
+        reading = self.read()
+        if self._over is not None or self._outward is not None or self._inflation.spent:
+            before = self._interventions
+            self._interventions = replace(before)
+            now = self._within_limits(self.applied.copy())
+            if np.array_equal(now, self.applied):
+                self._interventions = before
+            else:
+                self._set(now)
+        return reading
 
     def wait(self, seconds: float) -> None:
-        """Let time pass, looking at the pressures every control period while an inlet is open."""
-        while seconds > self.spec.period and (self.applied > 0).any():
+        """Let time pass, looking at the limits every control period while an inlet is open."""
+        while seconds > self.spec.period and self._inflating:
             self.arm.wait(self.spec.period)
             seconds -= self.spec.period
-            self.read()
-            if self._over is not None and ((self.applied > 0) & self._over).any():
-                self.set_valves(self.applied)
+            self.watch()
         self.arm.wait(seconds)
 
     def wait_until(self, time: float) -> None:
-        """Let time pass until the arm's clock shows ``time`` [s]."""
+        """Let time pass until the arm's clock shows ``time`` [s], looking at the limits as :meth:`wait` does."""
+        while time - self._time > 2 * self.spec.period and self._inflating:
+            self.arm.wait(self.spec.period)
+            self.watch()
         self.arm.wait_until(time)
 
     def get_state(self) -> bytes | None:
@@ -70,12 +244,63 @@ class GuardedArm(Arm):
         """Restore the state of the arm behind."""
         self.arm.set_state(state)
         self.applied = np.zeros_like(self.applied)
+        self._inflation = _Inflation(self.spec.max_inflation, self.applied.size)
+        self._inflating, self._time, self._replaced, self._undecided = False, -math.inf, 0, 0.0
 
     def close(self) -> None:
         """Close the arm behind."""
         self.arm.close()
+        _open_arms.pop(id(self.arm), None)
 
 
 def guarded(arm: Arm) -> GuardedArm:
     """Return ``arm`` behind a guard; an arm that has one already is returned as it is."""
     return arm if isinstance(arm, GuardedArm) else GuardedArm(arm)
+
+
+def _close(valves: NDArray[np.int8], which: NDArray[np.bool_]) -> int:
+    """Close ``which`` of the ``valves``; return how many."""
+    valves[which] = 0
+    return int(which.sum())
+
+
+def _outward(angle: NDArray[np.float64], low: float, high: float) -> NDArray[np.int8] | None:
+    """Return the valves (joints, 2) that push joints at a limit further out, 0 elsewhere; None if no joint is there.
+
+    Air in muscle 1 turns a joint to higher angles, air in muscle 2 to lower ones.
+    """
+    side = (angle >= high).astype(np.int8) - (angle <= low).astype(np.int8)
+    return np.stack([side, -side], axis=1) if side.any() else None
+
+
+class _Inflation:
+    """For how long each inlet has been open: counted up while it is, down while it is closed, fast while vented.
+
+    In plain Python: for the handful of muscles of an arm that is several times faster than NumPy, and it runs in
+    every control period.
+    """
+
+    def __init__(self, limit: float, muscles: int) -> None:
+        self.valves: list[int] = [0] * muscles
+        self.blocked = [False] * muscles
+        """Which inlets stay closed."""
+        self.spent = False
+        """Whether any does."""
+        self._limit = limit
+        self._open_for = [0.0] * muscles  # s
+        self._time: float | None = None
+
+    def pass_until(self, time: float) -> None:
+        """Let time pass until ``time`` [s] with the valves as they are."""
+        passed = 0.0 if self._time is None else time - self._time
+        self._time = time
+        for i, valve in enumerate(self.valves):
+            if valve > 0:
+                self._open_for[i] += passed
+                if self._open_for[i] >= self._limit:
+                    self.blocked[i] = self.spent = True
+            elif self._open_for[i] > 0:
+                self._open_for[i] -= passed if valve == 0 else _VENTING * passed
+                if self._open_for[i] <= 0 and self.blocked[i]:
+                    self.blocked[i] = False
+                    self.spent = any(self.blocked)

@@ -12,19 +12,38 @@ _FORMS = (
     "python:module:callable"
 )
 _FAULTS = ",faults="
+_SPEC = ",spec="
 
 
-def open_arm(name: str, seed: int = 0) -> Arm:
+def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     """Return the arm called ``name``; ``seed`` seeds the noise of its sensors and of its surroundings.
 
     ``virtual`` is the nominal virtual arm, ``virtual:seed=N`` another one from the distribution of arms,
     ``virtual:seed=N,faults=PLAN.toml`` one with faults (:mod:`pneumarm.arm.virtual.faults`);
     ``simulation:FILE`` a fitted simulation; ``python:module:callable`` calls ``callable()`` for the arm.
+    ``spec`` is a file from ``pneumarm arm calibrate``, which any name may also end in: ``NAME,spec=arm.toml``.
+    The arm is not guarded: see :func:`pneumarm.arm.guarded`.
 
     Raises:
-        UnusableInput: no arm has this name.
+        UnusableInput: no arm has this name, or the file is not one of this arm.
 
     """
+    name, found, file = name.partition(_SPEC)
+    if found or spec is not None:
+        from pneumarm.arm.corrected import CorrectedArm
+        from pneumarm.arm.spec_file import load_arm_file
+
+        known = load_arm_file(spec or file)
+        arm = _open(name, seed)
+        try:
+            return CorrectedArm(arm, known)
+        except UnusableInput:
+            arm.close()
+            raise
+    return _open(name, seed)
+
+
+def _open(name: str, seed: int) -> Arm:
     kind, _, rest = name.partition(":")
     if kind == "virtual":
         return _virtual(name, rest, seed)

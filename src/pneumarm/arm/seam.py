@@ -32,6 +32,10 @@ class ArmSpec:
     """Lowest and highest count of the angle sensor; its middle is called 0 degrees."""
     max_pressure: float = 1.05
     """Inlets stay closed while their muscle reads over this [bar]."""
+    max_inflation: float = 10.0
+    """An inlet that was open for so long [s] stays closed until its muscle has rested (:mod:`pneumarm.arm.guard`)."""
+    angle_limits: tuple[float, float] | None = None
+    """At these angles [counts] valves that push further out stay closed; None where the end stops bear that."""
     latency: float = 0.0
     """Time [s] between reading and acting that the control cycle has to let pass on this arm.
 
@@ -41,6 +45,7 @@ class ArmSpec:
 
     def __post_init__(self) -> None:
         low, high = self.angle_range
+        lowest, highest = self.angle_limits or (-1.0, 1.0)
         checks = {
             "joints": isinstance(self.joints, int) and self.joints >= 1,
             "period": _positive(self.period),
@@ -48,6 +53,8 @@ class ArmSpec:
             "counts_per_bar": _positive(self.counts_per_bar),
             "angle_range": math.isfinite(low) and math.isfinite(high) and low < high,
             "max_pressure": _positive(self.max_pressure),
+            "max_inflation": _positive(self.max_inflation),
+            "angle_limits": math.isfinite(lowest) and math.isfinite(highest) and lowest < highest,
             "latency": math.isfinite(self.latency) and 0 <= self.latency < self.period,
         }
         for name, valid in checks.items():

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.controller import Controller
 from pneumarm.arm.cycle import BeginState, ControlCycle
-from pneumarm.arm.guard import GuardedArm, guarded
+from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, Reading
 from pneumarm.arm.valves import ACTIONS, to_valves
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -97,8 +97,8 @@ class CollectResult:
     """Time that this call took [s]."""
     peak_pressure: NDArray[np.float64]
     """Highest pressures read, shape (joints, 2) [counts]."""
-    interventions: int
-    """Number of times that the guard kept an inlet closed."""
+    interventions: Interventions
+    """How often the guard did what."""
     missed_deadlines: int
     """Number of control periods that began more than half a period late."""
 
@@ -108,13 +108,13 @@ class _Tally:
     """What is counted over all calls of one collection; kept in the store with each sequence."""
 
     seconds: float = 0.0
-    interventions: int = 0
+    interventions: dict[str, int] = field(default_factory=dict)
     missed_deadlines: int = 0
     peak_pressure: list[list[float]] = field(default_factory=list)
 
-    def add(self, arm: GuardedArm, interventions: int, missed: int, seconds: float) -> None:
+    def add(self, arm: GuardedArm, interventions: Interventions, missed: int, seconds: float) -> None:
         self.seconds += seconds
-        self.interventions += interventions
+        self.interventions = asdict(Interventions(**self.interventions) + interventions)
         self.missed_deadlines += missed
         peak = arm.peak_pressure
         self.peak_pressure = (np.maximum(peak, self.peak_pressure) if self.peak_pressure else peak).tolist()
@@ -200,7 +200,7 @@ def collect(
         seconds=tally.seconds,
         wall_seconds=wall_clock.perf_counter() - begun,
         peak_pressure=np.array(tally.peak_pressure),
-        interventions=tally.interventions,
+        interventions=Interventions(**tally.interventions),
         missed_deadlines=tally.missed_deadlines,
     )
 
@@ -281,7 +281,7 @@ def _sequence(
     remaining = iter(range(settings.actions))
 
     def decide(reading: Reading) -> NDArray[np.int8] | None:
-        return None if next(remaining, None) is None else _acted(actor, reading)
+        return None if next(remaining, None) is None else actor.act(reading)
 
     steps = watched(cycle.run(decide), watch, at_rest=True)
     tally.add(arm, arm.interventions - interventions, cycle.missed_deadlines, steps[-1].reading.time - start)
@@ -312,10 +312,3 @@ def _told(controller: Controller, goal: NDArray[np.float64]) -> None:
         controller.reset(goal)
     except Exception as error:
         raise PneumarmError(f"the controller failed at a new goal ({type(error).__name__}: {error})") from error
-
-
-def _acted(controller: Controller, reading: Reading) -> NDArray[np.int8]:
-    try:
-        return controller.act(reading)
-    except Exception as error:
-        raise PneumarmError(f"the controller failed to act ({type(error).__name__}: {error})") from error

@@ -1,0 +1,58 @@
+"""An arm whose sensors are put right by what a calibration found."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import Arm, Reading, checked
+from pneumarm.arm.spec_file import ArmFile
+from pneumarm.errors import UnusableInput
+
+
+class CorrectedArm(Arm):
+    """``arm`` with the spec and the corrections of its file; everything else is the arm's own."""
+
+    def __init__(self, arm: Arm, known: ArmFile) -> None:
+        """Take what is ``known`` of ``arm``.
+
+        Raises:
+            UnusableInput: it is for another number of joints.
+
+        """
+        if known.spec.joints != arm.spec.joints:
+            raise UnusableInput(
+                f"the file is of an arm with {known.spec.joints} joint(s), this has {arm.spec.joints}"
+            )
+        self.arm, self.spec = arm, known.spec
+        self._correction = known.correction
+
+    def read(self) -> Reading:
+        """Return what the sensors say, put right."""
+        raw = checked(self.arm.read(), self.arm.spec)
+        correction = self._correction
+        return replace(raw, angle=correction.angle(raw.angle), pressure=correction.pressure(raw.pressure))
+
+    def set_valves(self, valves: NDArray[np.int8]) -> None:
+        """Set the valves."""
+        self.arm.set_valves(valves)
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass [s]."""
+        self.arm.wait(seconds)
+
+    def wait_until(self, time: float) -> None:
+        """Let time pass until the arm's clock shows ``time`` [s]."""
+        self.arm.wait_until(time)
+
+    def get_state(self) -> bytes | None:
+        """Return the state of the arm."""
+        return self.arm.get_state()
+
+    def set_state(self, state: bytes) -> None:
+        """Restore the state of the arm."""
+        self.arm.set_state(state)
+
+    def close(self) -> None:
+        """Close the arm."""
+        self.arm.close()

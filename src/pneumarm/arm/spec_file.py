@@ -1,0 +1,192 @@
+"""What is known of an arm, in a file of its own: its spec, and what its sensors need to be put right.
+
+An ``arm.toml`` holds a table ``[spec]`` with the fields of :class:`~pneumarm.arm.ArmSpec`, and, where a calibration
+found that readings must be corrected, a table ``[correction]`` with those of :class:`Correction`::
+
+    [spec]
+    joints = 1
+    period = 0.03333333333333333
+    counts_per_degree = 11.378
+    counts_per_bar = 166.0
+    angle_range = [12.0, 1009.0]
+
+    [correction]
+    pressure_zero = [[41.0, 40.5]]
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.errors import UnusableInput
+from pneumarm.files import write_text
+
+_LARGEST = 1 << 18
+"""Largest file that is read [bytes]: a thousand times what it needs."""
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What is done to the raw counts of an arm's sensors, before anybody else sees them."""
+
+    pressure_zero: tuple[tuple[float, float], ...] = ()
+    """What each pressure sensor reads at atmosphere, (joints, 2) [counts]; it is subtracted. None by default."""
+    pressure_gain: tuple[tuple[float, float], ...] = ()
+    """What each pressure is then multiplied by, (joints, 2), so that all sensors have the same counts per bar."""
+    angle_raw: tuple[tuple[float, ...], ...] = ()
+    """For each joint the raw counts, rising, at which the linearisation table knows the true angle [counts]."""
+    angle_true: tuple[tuple[float, ...], ...] = ()
+    """For each joint what a linear potentiometer would read there, rising [counts]."""
+
+    def __post_init__(self) -> None:
+        for name in ("pressure_zero", "pressure_gain"):
+            _require(all(map(_finite, getattr(self, name))), name, "two finite numbers a joint")
+        _require(all(g > 0 for pair in self.pressure_gain for g in pair), "pressure_gain", "positive numbers")
+        _require(len(self.angle_raw) == len(self.angle_true), "angle_true", "as many tables as angle_raw")
+        for raw, true in zip(self.angle_raw, self.angle_true, strict=True):
+            _require(_rising(raw), "angle_raw", "at least two rising numbers a joint")
+            _require(_rising(true), "angle_true", "at least two rising numbers a joint")
+            _require(len(raw) == len(true), "angle_true", "as many numbers as angle_raw")
+
+    @property
+    def is_none(self) -> bool:
+        """Whether nothing is corrected."""
+        return not any(asdict(self).values())
+
+    def fits(self, joints: int) -> bool:
+        """Return whether every table that is there is for ``joints`` joints."""
+        return all(len(table) in (0, joints) for table in asdict(self).values())
+
+    def angle(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the corrected angles (joints,) [counts]; beyond its ends a table goes on straight."""
+        if not self.angle_raw:
+            return raw
+        pairs = zip(self.angle_raw, self.angle_true, strict=True)
+        return np.array([_interpolated(r, *table) for r, table in zip(raw.tolist(), pairs, strict=True)])
+
+    def pressure(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the corrected pressures (joints, 2) [counts]."""
+        shifted = raw - np.asarray(self.pressure_zero) if self.pressure_zero else raw
+        return shifted * np.asarray(self.pressure_gain) if self.pressure_gain else shifted
+
+
+def _interpolated(value: float, raw: Sequence[float], true: Sequence[float]) -> float:
+    i = min(max(int(np.searchsorted(raw, value)), 1), len(raw) - 1)
+    return true[i - 1] + (value - raw[i - 1]) * (true[i] - true[i - 1]) / (raw[i] - raw[i - 1])
+
+
+def _finite(values: Sequence[float]) -> bool:
+    return all(map(math.isfinite, values))
+
+
+def _rising(values: Sequence[float]) -> bool:
+    return len(values) >= 2 and _finite(values) and all(a < b for a, b in pairwise(values))
+
+
+def _require(valid: bool, name: str, expected: str) -> None:
+    if not valid:
+        raise UnusableInput(f"Correction: {name} needs {expected}")
+
+
+@dataclass(frozen=True)
+class ArmFile:
+    """The content of an ``arm.toml``."""
+
+    spec: ArmSpec
+    correction: Correction = Correction()
+
+    def __post_init__(self) -> None:
+        if not self.correction.fits(self.spec.joints):
+            raise UnusableInput(f"the correction must be for {self.spec.joints} joint(s), as the spec is")
+
+
+def load_spec(path: Path | str) -> ArmSpec:
+    """Return the spec in the file at ``path``.
+
+    Raises:
+        UnusableInput: it cannot be read, or holds anything that is not known or not possible.
+
+    """
+    return load_arm_file(path).spec
+
+
+def save_spec(spec: ArmSpec, path: Path | str) -> None:
+    """Write ``spec`` to ``path``, whole or not at all.
+
+    Raises:
+        UnusableInput: the folder is missing or cannot be written.
+
+    """
+    save_arm_file(ArmFile(spec), path)
+
+
+def load_arm_file(path: Path | str) -> ArmFile:
+    """Return what the file at ``path`` says of an arm.
+
+    Raises:
+        UnusableInput: it cannot be read, or holds anything that is not known or not possible.
+
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            text = file.read(_LARGEST + 1)
+        if len(text) > _LARGEST:
+            raise UnusableInput(f"larger than {_LARGEST:,} bytes")
+        found = tomllib.loads(text.decode())
+        _refuse_unknown(found, ArmFile, "")
+        for part, kind in (("spec", ArmSpec), ("correction", Correction)):
+            if isinstance(found.get(part), dict):
+                _refuse_unknown(found[part], kind, f"[{part}] ")
+        return msgspec.convert(found, ArmFile)
+    except OSError as error:
+        raise UnusableInput(f"{path}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, RecursionError, msgspec.MsgspecError, UnusableInput) as error:
+        raise UnusableInput(
+            f"{path}: expected what is known of an arm, as pneumarm arm calibrate writes it; {error}"
+        ) from error
+
+
+def save_arm_file(known: ArmFile, path: Path | str) -> None:
+    """Write what is ``known`` of an arm to ``path``, whole or not at all.
+
+    Raises:
+        UnusableInput: the folder is missing or cannot be written.
+
+    """
+    tables = {"spec": asdict(known.spec)}
+    if not known.correction.is_none:
+        tables["correction"] = asdict(known.correction)
+    lines = ["# An arm as pneumarm knows it: angles and pressures in sensor counts, times in seconds."]
+    for name, table in tables.items():
+        entries = [f"{key} = {_toml(value)}" for key, value in table.items() if value is not None and value != ()]
+        lines += ["", f"[{name}]", *entries]
+    write_text(Path(path), "\n".join(lines) + "\n")
+
+
+def _refuse_unknown(found: Mapping[str, Any], kind: type, place: str) -> None:
+    known = [field.name for field in fields(kind)]
+    unknown = [name for name in found if name not in known]
+    if unknown:
+        raise UnusableInput(f"{place}{', '.join(unknown)} is unknown; known are {', '.join(known)}")
+
+
+def _toml(value: Any) -> str:
+    """Return ``value`` as TOML; Python and TOML write numbers alike."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        # A basic string of TOML is one of JSON, but for the characters that only TOML wants escaped.
+        return msgspec.json.encode(value).decode().replace("\x7f", "\\u007f")
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    return repr(value)

@@ -1,0 +1,401 @@
+"""What is wrong with an arm, in plain words: what, where, how it is told, and what to do.
+
+Every rule looks at one thing that a healthy arm cannot do. The limits are far from what healthy virtual arms show
+(``python -m benchmarks checkup`` makes the figures again), because a false complaint costs more than a fault that the
+monitor finds a minute later.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.checkup.measure import Array, Checkup, JointTest, MuscleTest, Trace
+
+MOVED = 0.10
+"""A pressure moved if it changed by so much [bar]; the other muscle, stretched or slackened, moves by less."""
+WHITE = 0.25
+"""Noise whose autocorrelation at any of the first lags exceeds this is not white."""
+LAGS = 20
+LEAK = 12.0
+"""A muscle leaks if it loses more than so many percent of its pressure a minute."""
+LOW_SUPPLY = 0.75
+"""The supply is low if a full muscle reads less than this share of the pressure limit."""
+LEAP = 0.08
+"""A sensor is at the valve's side if its reading leaps by so much [bar] when the valve opens and falls back."""
+LOGARITHMIC = 1.3
+"""A potentiometer is logarithmic if one half of the sweep turns it so many times further than the other half."""
+WORN = 6.0
+"""A place of the potentiometer is worn if its readings are off by so many counts there (root mean square)."""
+_BIN = 10.0  # counts: about a degree
+_EVEN = 0.35  # bar: what a filled muscle always exceeds, and one that is merely stretched never reaches
+
+Kind = Literal[
+    "muscles swapped", "pressure sensors swapped", "valves swapped", "inlet stuck closed", "inlet stuck open",
+    "exhaust stuck closed", "exhaust stuck open", "low supply", "leak", "angle reversed", "angle dead",
+    "angle frozen", "pressure frozen", "angle logarithmic", "angle worn", "pressure at the valve's side",
+    "noise not white", "jitter",
+]  # fmt: skip
+
+
+class Finding(NamedTuple):
+    """Something that is wrong."""
+
+    kind: Kind
+    where: str
+    told_by: str
+    """The figure that tells."""
+    remedy: str
+    """What to do."""
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.kind}: {self.told_by}. {self.remedy}."
+
+
+@dataclass(frozen=True)
+class MuscleFigures:
+    """What one muscle and its valves do."""
+
+    full: float
+    """Pressure when full [bar]."""
+    fill_time: float
+    """Time from the command until 63 % of that [s]; not a number if it does not fill."""
+    exhaust_time: float
+    """Time from the command until 37 % of that [s]; not a number if it does not empty."""
+    leak: float
+    """Share of the pressure lost by closed valves [% a minute]."""
+    turned: float
+    """How far filling turned the joint [degrees]."""
+    noise: float
+    """Standard deviation of the pressure's reading at rest [counts]."""
+    leap: float
+    """By how much the reading falls within 0.06 s after a pulse of air has ended [bar]."""
+
+
+@dataclass(frozen=True)
+class JointFigures:
+    """What one joint does."""
+
+    muscles: tuple[MuscleFigures, MuscleFigures]
+    angle_noise: float
+    """Standard deviation of the angle's reading at rest [counts]."""
+    lowest: float
+    """Lowest angle of the sweep [counts]."""
+    highest: float
+    """Highest angle of the sweep [counts]."""
+    halves: float
+    """How many times further the upper half of the pressure difference turns the joint than the lower half."""
+    worst: float
+    """Largest irregularity of the angle at any place (root mean square) [counts]."""
+
+
+def joint_figures(checkup: Checkup, joint: int) -> JointFigures:
+    """Return the figures of ``joint``."""
+    test = checkup.joints[joint]
+    one, two = (_muscle_figures(checkup, test, m) for m in range(2))
+    return JointFigures(
+        muscles=(one, two),
+        angle_noise=float(np.std(detrended(test.rest.time, test.rest.angle))),
+        lowest=float(test.sweep.angle.min()),
+        highest=float(test.sweep.angle.max()),
+        halves=halves(test),
+        worst=float(max(irregularity(test)[1], default=0.0)),
+    )
+
+
+def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
+    settings, bar = checkup.settings, checkup.spec.counts_per_bar
+    fill, hold, exhaust = cut(test.muscles[m], checkup)
+    rise = fill.pressure[:, m] - fill.pressure[0, m]
+    full = float(np.median(hold.pressure[:, m]) - fill.pressure[0, m])
+    fall = exhaust.pressure[:, m] - exhaust.pressure[-10:, m].mean()
+    moved = full > MOVED * bar
+    rest = test.rest
+    slope, level = np.polyfit(rest.time, rest.pressure[:, m], 1)
+    pulse = test.muscles[m].pulse
+    end = int(np.searchsorted(pulse.time, settings.pulse))
+    settled = np.median(pulse.pressure[_window(pulse.time, settings.pulse + 0.05, 0.05), m])
+    peak = pulse.pressure[_window(pulse.time, settings.pulse - 0.01, 0.04), m].max() if end else settled
+    return MuscleFigures(
+        full=full / bar,
+        fill_time=_first(fill.time, rise > 0.63 * full) if moved else float("nan"),
+        exhaust_time=_first(exhaust.time - exhaust.time[0], fall < 0.37 * full) if moved else float("nan"),
+        leak=float(-6000 * slope / level) if level > MOVED * bar else float("nan"),
+        turned=float(fill.angle[-1] - fill.angle[0]) / checkup.spec.counts_per_degree,
+        noise=float(np.std(detrended(rest.time, rest.pressure[:, m]))),
+        leap=float(peak - settled) / bar,
+    )
+
+
+def cut(test: MuscleTest, checkup: Checkup) -> list[Trace]:
+    """Return fill, hold and exhaust of a muscle's test."""
+    settings = checkup.settings
+    half = settings.step / 2
+    return test.whole.pieces(settings.fill + half, settings.fill + settings.hold + half)
+
+
+def _window(time: Array, begin: float, length: float) -> NDArray[np.bool_]:
+    return (time >= begin) & (time <= begin + length)
+
+
+def _first(time: Array, reached: NDArray[np.bool_]) -> float:
+    return float(time[np.argmax(reached)]) if reached.any() else float("nan")
+
+
+def detrended(time: Array, values: Array) -> Array:
+    """Return ``values`` without what changes slowly: creep, heat and leak (thesis A.1.3: "we detrend this data")."""
+    scaled = time / time[-1]
+    return values - np.polyval(np.polyfit(scaled, values, 4), scaled)
+
+
+_NOTHING = 1e-6
+"""A variance below this [counts^2] is that of rounding."""
+
+
+def autocorrelation(values: Array) -> Array:
+    """Return the autocorrelation at lags 0..LAGS; zeros where nothing varies.
+
+    The covariance is the inverse Fourier transform of the power spectrum (thesis A.1.3), zero-padded, so that the end
+    of the record does not meet its beginning.
+    """
+    spectrum = np.abs(np.fft.rfft(values - values.mean(), 2 * len(values))) ** 2
+    covariance = np.fft.irfft(spectrum)[: LAGS + 1]
+    return covariance / covariance[0] if covariance[0] > _NOTHING * len(values) else np.zeros(LAGS + 1)
+
+
+def ljung_box(correlation: Array, count: int) -> float:
+    """Return the statistic of Ljung and Box of ``count`` values, which is chi-squared with LAGS degrees if white.
+
+    G. M. Ljung and G. E. P. Box, "On a measure of lack of fit in time series models", Biometrika 65, 1978.
+    """
+    lags = np.arange(1, len(correlation))
+    return float(count * (count + 2) * np.sum(correlation[1:] ** 2 / (count - lags)))
+
+
+def halves(test: JointTest) -> float:
+    """Return how many times further the upper half of the pressure difference turns the joint than the lower half.
+
+    Two muscles that are alike turn a joint by the same angle for the same difference either way; weight and unlike
+    muscles bend that by a tenth, the track of a logarithmic potentiometer by a factor of three to eight.
+    """
+    difference = test.sweep.pressure[:, 0] - test.sweep.pressure[:, 1]
+    low, high = difference.min(), difference.max()
+    reach = 0.8 * min(-low, high)
+    if reach <= 0:
+        return float("nan")
+    turns = []
+    n = len(difference) // 2 + 1
+    for half in (slice(0, n), slice(n - 1, None)):
+        order = np.argsort(difference[half])
+        at = np.interp((-reach, 0.0, reach), difference[half][order], test.sweep.angle[half][order])
+        turns.append(np.diff(at))
+    lower, upper = np.mean(turns, axis=0)
+    return float(upper / lower) if lower > 0 and upper > 0 else float("nan")
+
+
+def irregularity(test: JointTest) -> tuple[Array, Array]:
+    """Return places of the angle [counts] and how far readings there are off those before and after (rms) [counts].
+
+    A joint has inertia: within a few readings it moves on a parabola. What departs from the parabola at the same
+    angle again and again, whatever the movement, is the potentiometer.
+    """
+    places, offs = [], []
+    for trace in [piece for muscle in test.muscles for piece in (muscle.whole, muscle.pulse)]:
+        angle = trace.angle
+        if len(angle) < 2 * _AROUND + 1:
+            continue
+        around = np.lib.stride_tricks.sliding_window_view(angle, 2 * _AROUND + 1)
+        places.append(np.median(around, axis=1))
+        offs.append(angle[_AROUND:-_AROUND] - around @ _PARABOLA)
+    place, off = np.concatenate(places), np.concatenate(offs)
+    bins = np.floor(place / _BIN).astype(int)
+    found = [(b, off[bins == b]) for b in np.unique(bins)]
+    kept = [(b, values) for b, values in found if len(values) >= 3]
+    centres = np.array([(b + 0.5) * _BIN for b, _ in kept])
+    return centres, np.array([float(np.sqrt(np.mean(values**2))) for _, values in kept])
+
+
+_AROUND = 7
+"""Readings either side that a parabola is fitted to, without those in the middle."""
+
+
+def _parabola() -> Array:
+    """Return the weights that give a parabola's value in the middle of 2 * _AROUND + 1 readings."""
+    x = np.arange(-_AROUND, _AROUND + 1.0)
+    outer = np.abs(x) > 1
+    weights = np.zeros(len(x))
+    weights[outer] = np.linalg.pinv(np.vander(x[outer], 3, increasing=True))[0]
+    return weights
+
+
+_PARABOLA = _parabola()
+
+
+def diagnose(checkup: Checkup) -> list[Finding]:
+    """Return what is wrong with the arm; an empty list for a healthy one."""
+    found = [finding for j in range(len(checkup.joints)) for finding in _of_joint(checkup, j)]
+    periods = checkup.timing.periods
+    if np.quantile(periods, 0.95) > 1.5 * checkup.spec.period:
+        worst = f"95 % of the control periods are below {1e3 * np.quantile(periods, 0.95):.0f} ms"
+        remedy = f"This host or link cannot keep {1e3 * checkup.spec.period:.0f} ms: take a longer period"
+        found.append(Finding("jitter", "control cycle", worst, remedy))
+    return found
+
+
+def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
+    test, figures, bar = checkup.joints[j], joint_figures(checkup, j), checkup.spec.counts_per_bar
+    name = f"joint {j + 1}" if len(checkup.joints) > 1 else "joint"
+    rose = np.array([_rise(test.muscles[m], checkup) for m in range(2)]) / bar  # [muscle filled, sensor]
+    own, other = rose.diagonal(), rose[:, ::-1].diagonal()
+    turned = np.array([m.turned for m in figures.muscles])
+    crossed = bool((other > _EVEN).all() and (own < 0.5 * other).all())
+    reversed_ = bool(turned[0] < -5 and turned[1] > 5)
+    yield from _of_sensors(checkup, j, name)
+    before = test.before.pressure
+    filled_by_venting = (before[-10:].mean(axis=0) - before[0]) / bar > MOVED
+    stays = np.array([_stays(test.muscles[m], m, checkup) for m in range(2)])
+    for m in range(2):
+        where = f"{name}, muscle {m + 1}"
+        swapped = _vents_up(test.muscles[m], m, checkup)
+        if filled_by_venting[m] or swapped:
+            yield Finding(
+                "valves swapped", where, "its pressure rises on letting air out", "Swap its inlet and exhaust wires"
+            )
+    swapped_pair = filled_by_venting.any()
+    if crossed and reversed_:
+        told = "filling one raises the pressure of the other and turns the joint the other way"
+        yield Finding("muscles swapped", name, told, "Swap the valves of muscle 1 with those of muscle 2")
+    elif crossed:
+        told = "filling one raises the pressure of the other, yet the joint turns the right way"
+        yield Finding("pressure sensors swapped", name, told, "Swap the two pressure sensors")
+    elif reversed_:
+        told = f"muscle 1 turns it by {turned[0]:.0f}, muscle 2 by {turned[1]:.0f} degrees"
+        yield Finding("angle reversed", name, told, "Swap the outer wires of the potentiometer")
+    if crossed or swapped_pair:
+        return
+    frozen = [_is_frozen(test, m) for m in range(2)]
+    valves = list(_of_valves(figures, rose, stays, frozen, checkup, name))
+    stuck = [finding for finding in valves if "stuck" in finding.kind]
+    if stuck:
+        yield from stuck  # while air flows that should not, nothing else can be judged
+        return
+    yield from valves
+    yield from _of_noise(checkup, j, name)
+    yield from _of_potentiometer(checkup, test, figures, name)
+
+
+def _of_valves(
+    figures: JointFigures, rose: Array, stays: NDArray[np.bool_], frozen: list[bool], checkup: Checkup, name: str
+) -> Iterator[Finding]:
+    limit = checkup.spec.max_pressure
+    own, other = rose.diagonal(), rose[::-1].diagonal()[::-1]  # by its own inlet, by the other muscle's
+    full = np.array([m.full for m in figures.muscles])
+    if (own < MOVED).all():
+        yield Finding("low supply", name, "no muscle fills", "Turn the air on; see to the valves' power")
+        return
+    if (np.maximum(full, own) < LOW_SUPPLY * limit).all():
+        told = f"full muscles reach {full[0]:.2f} and {full[1]:.2f} bar of {limit:.2f}"
+        yield Finding("low supply", name, told, "See to the reducer, the buffer and the filters")
+    most = np.nanmax([LEAK, *(muscle.leak for muscle in figures.muscles)])  # where one sags, the other is stretched
+    for m, muscle in enumerate(figures.muscles):
+        where = f"{name}, muscle {m + 1}"
+        if frozen[m]:
+            continue  # nothing is known of its valves
+        if own[m] < MOVED:
+            told = f"it gains {own[m]:.2f} bar when its inlet opens"
+            yield Finding("inlet stuck closed", where, told, "See to the inlet valve, its wire and its hose")
+        elif stays[m]:
+            told = "its pressure does not fall when its exhaust opens"
+            yield Finding("exhaust stuck closed", where, told, "See to the exhaust valve, its wire and its silencer")
+        elif muscle.full < 0.6 * own[m]:
+            told = f"of {own[m]:.2f} bar it keeps {muscle.full:.2f} when its valves close"
+            yield Finding("exhaust stuck open", where, told, "See to the exhaust valve; or the muscle has burst")
+        elif other[m] > _EVEN or muscle.leak < -LEAK:
+            told = "its pressure rises while its valves are closed"
+            yield Finding("inlet stuck open", where, told, "See to the inlet valve: dirt in its seat, or it sticks")
+        elif muscle.leak > max(LEAK, 0.5 * most):
+            told = f"closed, it loses {muscle.leak:.0f} % a minute"
+            yield Finding("leak", where, told, "Look for the leak with soap water: clamps, hose, exhaust valve")
+        elif muscle.leap > LEAP:
+            told = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
+            remedy = "Move the pressure sensor to the far end of the muscle (thesis A.1.1)"
+            yield Finding("pressure at the valve's side", where, told, remedy)
+
+
+def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
+    test = checkup.joints[j]
+    everything = np.concatenate([trace.angle for m in test.muscles for trace in (m.whole, m.pulse)])
+    low, high = checkup.spec.angle_range
+    if np.ptp(everything) == 0:
+        dead = everything[0] <= low or everything[0] >= high
+        remedy = "See to the potentiometer's wires" if dead else "See to the potentiometer's axis and its wires"
+        told = f"it reads {everything[0]:.0f} whatever moves"
+        yield Finding("angle dead" if dead else "angle frozen", name, told, remedy)
+    for m in range(2):
+        if _is_frozen(test, m):
+            told = f"it reads {test.rest.pressure[0, m]:.0f} whatever moves"
+            yield Finding("pressure frozen", f"{name}, muscle {m + 1}", told, "See to the pressure sensor's wires")
+
+
+def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
+    test = checkup.joints[j]
+    for what, values in (
+        ("angle", test.rest.angle),
+        *((f"pressure {m + 1}", test.rest.pressure[:, m]) for m in (0, 1)),
+    ):
+        correlation = autocorrelation(detrended(test.rest.time, values))
+        worst = int(np.argmax(np.abs(correlation[1:]))) + 1
+        unlikely = ljung_box(correlation, len(values)) > _LIKELY
+        if unlikely and abs(correlation[worst]) > WHITE:
+            told = f"at rest its readings {worst} apart have a correlation of {correlation[worst]:.2f}"
+            remedy = "Look for hum of the mains, a bad ground, or a filter; medians of such readings help little"
+            yield Finding("noise not white", f"{name}, {what}", told, remedy)
+
+
+_LIKELY = 90.0
+"""White noise gives a larger statistic of Ljung and Box once in 10^10 times, with 20 lags."""
+
+
+def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, name: str) -> Iterator[Finding]:
+    if not np.isnan(figures.halves) and not 1 / LOGARITHMIC < figures.halves < LOGARITHMIC:
+        told = (
+            f"the upper half of the pressure difference turns it {figures.halves:.2f} times as far as the lower half"
+        )
+        remedy = "Put in a linear one, or let `pneumarm arm calibrate` linearise it"
+        yield Finding("angle logarithmic", name, told, remedy)
+    places, off = irregularity(test)
+    worn = places[off > WORN]
+    if len(worn):
+        degrees = ", ".join(f"{d:.0f}" for d in checkup.spec.degrees(worn))
+        told = f"readings are off by up to {off.max():.0f} counts at {degrees} degrees"
+        remedy = "Put in a new potentiometer, and mount it so that nothing presses on its axis (thesis A.1.2)"
+        yield Finding("angle worn", name, told, remedy)
+
+
+def _is_frozen(test: JointTest, m: int) -> bool:
+    """Return whether the pressure sensor of muscle ``m`` never says anything else."""
+    pressures = np.concatenate([trace.pressure[:, m] for o in test.muscles for trace in (o.whole, o.pulse)])
+    return bool(np.ptp(pressures) == 0)
+
+
+def _rise(test: MuscleTest, checkup: Checkup) -> Array:
+    """Return how far each pressure rose while a muscle was filled, (2,) [counts]."""
+    fill = cut(test, checkup)[0]
+    rise: Array = np.quantile(fill.pressure, 0.95, axis=0) - fill.pressure[:3].mean(axis=0)
+    return rise
+
+
+def _stays(test: MuscleTest, m: int, checkup: Checkup) -> bool:
+    """Return whether muscle ``m`` keeps most of its air while its exhaust is open."""
+    _, hold, exhaust = cut(test, checkup)
+    held = np.median(hold.pressure[:, m])
+    return bool(held > MOVED * checkup.spec.counts_per_bar and exhaust.pressure[-10:, m].mean() > 0.7 * held)
+
+
+def _vents_up(test: MuscleTest, m: int, checkup: Checkup) -> bool:
+    """Return whether the pressure of muscle ``m`` rises while its exhaust is open."""
+    exhaust = cut(test, checkup)[2]
+    gained = exhaust.pressure[-10:, m].mean() - exhaust.pressure[0, m]
+    return bool(gained > MOVED * checkup.spec.counts_per_bar)

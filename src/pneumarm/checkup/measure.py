@@ -1,0 +1,262 @@
+"""What is done with an arm to check it: gently, a joint at a time, behind the guard.
+
+1. *Timing*: readings and settings of closed valves, timed by the host's clock; the control cycle with closed valves.
+2. *Muscles*, one at a time from vented: fill, hold, exhaust. Then a short pulse, which is over while air still flows
+   fast: a sensor at the valve's side shows it by a leap (thesis A.1.1).
+3. *Rest*: both muscles half full and closed. After they have settled, the readings are noise (thesis A.1.3), and what
+   the pressures lose is the leak.
+4. *Sweep*: from one end to the other and back in small steps, standing still after each: angle against pressures.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
+from pneumarm.errors import UnusableInput
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CheckupSettings:
+    """How long an arm is looked at, and how closely."""
+
+    step: float = 0.005
+    """Time between two readings while a muscle fills or exhausts [s]; an arm that is slower gives fewer."""
+    fill: float = 1.5
+    """Time that a muscle is filled [s]: at 1 bar it is full then (thesis figure 2.6)."""
+    hold: float = 0.5
+    """Time that it is held after that [s]."""
+    exhaust: float = 2.0
+    """Time that it is vented [s]."""
+    pulse: float = 0.25
+    """Length of the short pulse [s]."""
+    settle: float = 3.0
+    """Time that closed muscles rest before noise and leak are measured [s]."""
+    rest: float = 20.0
+    """Time over which noise and leak are measured [s]."""
+    rest_step: float = 0.02
+    """Time between two readings then [s]."""
+    sweep_steps: int = 16
+    """Steps of the sweep in one direction."""
+    sweep_pulse: float = 0.05
+    """Time that the valves are open for a step of the sweep [s]."""
+    sweep_settle: float = 0.6
+    """Time that the arm comes to rest after a step of the sweep [s]."""
+    repeats: int = 200
+    """How often a reading and a setting are timed."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0 < value < 1e4:
+                raise UnusableInput(f"the check-up's {name} must be above 0, got {value!r}")
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What one joint's sensors read while its valves were set to something."""
+
+    time: Array
+    """Since the valves were first set [s], shape (n,)."""
+    angle: Array
+    """Shape (n,) [counts]."""
+    pressure: Array
+    """Shape (n, 2) [counts]."""
+
+    def pieces(self, *ends: float) -> list["Trace"]:
+        """Return the trace cut at the times ``ends`` [s]."""
+        places = np.searchsorted(self.time, ends)
+        cut = zip(
+            np.split(self.time, places), np.split(self.angle, places), np.split(self.pressure, places), strict=True
+        )
+        return [Trace(*piece) for piece in cut]
+
+
+@dataclass(frozen=True)
+class MuscleTest:
+    """One muscle of a joint, filled, held and exhausted, and then given a pulse, the other one vented."""
+
+    whole: Trace
+    """Fill, hold, exhaust; it begins at the moment that the inlet is opened."""
+    pulse: Trace
+    """The pulse and some 0.1 s after it."""
+
+
+@dataclass(frozen=True)
+class JointTest:
+    """What was measured of one joint."""
+
+    before: Trace
+    """While all muscles were first vented: nothing should rise."""
+    muscles: tuple[MuscleTest, MuscleTest]
+    rest: Trace
+    """Both muscles half full and closed."""
+    sweep: Trace
+    """A reading at rest for each step, up and then down; many readings are averaged for each."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How fast the arm answers, in seconds of the host's clock, and how even its control periods are."""
+
+    read: Array
+    set_and_read: Array
+    periods: Array
+    """Control periods by the arm's clock [s]."""
+
+
+@dataclass(frozen=True)
+class Checkup:
+    """All that was measured of an arm."""
+
+    spec: ArmSpec
+    settings: CheckupSettings
+    timing: Timing
+    joints: tuple[JointTest, ...]
+
+
+def measure(
+    arm: Arm,
+    settings: CheckupSettings = CheckupSettings(),
+    *,
+    progress: Callable[[float, float], None] | None = None,
+) -> Checkup:
+    """Check ``arm``, whose joints must be free to move; it is left vented and closed.
+
+    Raises:
+        ArmFailure: the arm fails.
+
+    """
+    guard = guarded(arm)
+    bench = _Bench(guard, settings)
+    told = progress or (lambda done, total: None)
+    joints = guard.spec.joints
+    try:
+        first = bench.vent()
+        timing = _timing(guard, settings)
+        tests = []
+        for joint in range(joints):
+            tests.append(bench.joint(joint, first))
+            told(joint + 1, joints)
+        bench.vent()
+        return Checkup(guard.spec, settings, timing, tuple(tests))
+    finally:
+        guard.set_valves(np.zeros_like(guard.applied))
+
+
+def _timing(guard: GuardedArm, settings: CheckupSettings) -> Timing:
+    closed = np.zeros_like(guard.applied)
+
+    def timed(what: Callable[[], object]) -> Array:
+        seconds = np.empty(settings.repeats)
+        for i in range(settings.repeats):
+            began = perf_counter()
+            what()
+            seconds[i] = perf_counter() - began
+        return seconds
+
+    def set_and_read() -> None:
+        guard.set_valves(closed)
+        guard.read()
+
+    turns = iter(range(settings.repeats // 4))
+    cycle = ControlCycle(guard)
+    steps = list(cycle.run(lambda reading: closed if next(turns, None) is not None else None))
+    periods = np.diff([step.reading.time for step in steps])
+    return Timing(timed(guard.read), timed(set_and_read), periods)
+
+
+class _Bench:
+    """Moves an arm for its check-up."""
+
+    def __init__(self, guard: GuardedArm, settings: CheckupSettings) -> None:
+        self.guard, self.settings = guard, settings
+
+    def valves(self, joint: int, first: int, second: int) -> NDArray[np.int8]:
+        """Return the valves of ``joint``; those of all others closed."""
+        valves = np.zeros_like(self.guard.applied)
+        valves[joint] = first, second
+        return valves
+
+    def vent(self) -> list[Reading]:
+        """Vent all muscles."""
+        self.guard.read()
+        readings = self.watch(np.full_like(self.guard.applied, -1), self.settings.exhaust)
+        self.guard.set_valves(np.zeros_like(self.guard.applied))
+        return readings
+
+    def watch(self, valves: NDArray[np.int8], seconds: float, step: float | None = None) -> list[Reading]:
+        """Set ``valves`` and read every ``step`` [s] for ``seconds`` [s]; the first reading is from before."""
+        step = step or self.settings.step
+        readings = [self.guard.read()]
+        self.guard.set_valves(valves)
+        end = readings[0].time + seconds
+        due = readings[0].time
+        while (now := readings[-1].time) < end - step / 2:
+            due = max(due + step, now)
+            self.guard.wait(max(due - now, 0.0))
+            readings.append(self.guard.watch())
+        return readings
+
+    def joint(self, joint: int, first: list[Reading]) -> JointTest:
+        """Carry out all tests of ``joint``."""
+        one, two = self.muscle(joint, 0), self.muscle(joint, 1)
+        return JointTest(_trace(first, joint), (one, two), self.rest(joint), self.sweep(joint))
+
+    def muscle(self, joint: int, muscle: int) -> MuscleTest:
+        """Fill, hold and exhaust a muscle; then give it a pulse."""
+        wanted = self.settings
+        alone = np.eye(2, dtype=int)[muscle]
+        self.vent()
+        fill = self.watch(self.valves(joint, *alone), wanted.fill)
+        hold = self.watch(self.valves(joint, 0, 0), wanted.hold)
+        exhaust = self.watch(self.valves(joint, *-alone), wanted.exhaust)
+        self.vent()
+        pulse = self.watch(self.valves(joint, *alone), wanted.pulse)
+        after = self.watch(self.valves(joint, 0, 0), wanted.hold)
+        self.vent()
+        return MuscleTest(_trace(fill + hold + exhaust, joint), _trace(pulse + after, joint))
+
+    def rest(self, joint: int) -> Trace:
+        """Fill both muscles half, close them, let them settle, and read."""
+        wanted = self.settings
+        self.vent()
+        self.watch(self.valves(joint, 1, 1), wanted.fill / 3)
+        self.watch(self.valves(joint, 0, 0), wanted.settle)
+        return _trace(self.watch(self.valves(joint, 0, 0), wanted.rest, wanted.rest_step), joint)
+
+    def sweep(self, joint: int) -> Trace:
+        """Go from one end to the other and back, standing still after each step."""
+        wanted = self.settings
+        self.vent()
+        self.watch(self.valves(joint, 0, 1), wanted.fill)
+        stops = [self._still(joint)]
+        for direction in (1, -1):
+            for _ in range(wanted.sweep_steps):
+                # One muscle takes air while the other lets it out: the pressures cross each other slowly.
+                self._step(joint, direction)
+                stops.append(self._still(joint))
+        return _trace(stops, joint)
+
+    def _step(self, joint: int, direction: int) -> None:
+        out = self.settings.sweep_pulse / 2  # air leaves faster than it comes
+        both, only_in = (direction, -direction), (max(direction, 0), max(-direction, 0))
+        self.watch(self.valves(joint, *both), out)
+        self.watch(self.valves(joint, *only_in), self.settings.sweep_pulse)
+
+    def _still(self, joint: int) -> Reading:
+        """Return the mean of the readings once the arm stands still."""
+        self.watch(self.valves(joint, 0, 0), self.settings.sweep_settle, self.settings.rest_step)
+        last = self.watch(self.valves(joint, 0, 0), 0.1)
+        angle = np.median([r.angle for r in last], axis=0)
+        return Reading(last[-1].time, angle, np.mean([r.pressure for r in last], axis=0))
+
+
+def _trace(readings: list[Reading], joint: int) -> Trace:
+    time = np.array([r.time for r in readings])
+    angle = np.array([r.angle[joint] for r in readings])
+    return Trace(time - time[0], angle, np.array([r.pressure[joint] for r in readings]))

@@ -1,0 +1,193 @@
+"""``pneumarm arm check``, ``calibrate`` and ``valves``."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from pneumarm.arm import Arm, guarded, open_arm
+from pneumarm.arm.spec_file import save_arm_file
+from pneumarm.checkup import (
+    Checkup,
+    CheckupSettings,
+    Known,
+    calibrate,
+    diagnose,
+    joint_figures,
+    measure,
+)
+from pneumarm.commands.common import Json, Settings
+from pneumarm.console import progress, say, show, table
+from pneumarm.errors import UnusableInput
+from pneumarm.files import require_folder, write_text
+
+
+def _measured(opened: Arm, settings: CheckupSettings) -> Checkup:
+    with progress("checking") as report:
+        return measure(opened, settings, progress=report)
+
+
+def check_(
+    arm: str,
+    /,
+    *,
+    out: Path | None = None,
+    seed: int = 0,
+    settings: Annotated[CheckupSettings, Settings] = CheckupSettings(),
+    json: Json = False,
+) -> None:
+    """Move an arm gently, a muscle at a time, and say what is wrong with it. Its joints must be free to move.
+
+    Parameters
+    ----------
+    arm
+        virtual, virtual:seed=N or python:module:callable; ``,spec=arm.toml`` behind it names a calibration.
+    out
+        Folder for a page with curves; made where there is none.
+    seed
+        Of a virtual arm's noise.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    if out is not None:
+        require_folder(out)
+    with open_arm(arm, seed) as opened:
+        checkup = _measured(opened, settings)
+    findings = diagnose(checkup)
+    figures = [joint_figures(checkup, j) for j in range(len(checkup.joints))]
+    timing = _timing(checkup)
+    if out is not None:
+        from pneumarm.report.checkup import checkup_page
+
+        out.mkdir(exist_ok=True)
+        write_text(out / "checkup.html", checkup_page(checkup, findings))
+        say(f"page: {out / 'checkup.html'}")
+    result = {
+        "healthy": not findings,
+        "findings": [finding._asdict() for finding in findings],
+        "timing_ms": timing,
+        "joints": [asdict(joint) for joint in figures],
+    }
+
+    def rows() -> list[Any]:
+        muscles = [
+            (f"joint {j + 1}, muscle {m + 1}", *asdict(muscle).values())
+            for j, joint in enumerate(figures)
+            for m, muscle in enumerate(joint.muscles)
+        ]
+        header = (
+            "",
+            "full [bar]",
+            "fills [s]",
+            "empties [s]",
+            "leak [%/min]",
+            "turns [°]",
+            "noise [counts]",
+            "leap [bar]",
+        )
+        verdict: Sequence[str] = [str(finding) for finding in findings] or ["Nothing is wrong with it."]
+        return [table(header, muscles, arm), table(("time [ms]", ""), list(timing.items())), *verdict]
+
+    show(result, json, rows)
+
+
+def _timing(checkup: Checkup) -> dict[str, float]:
+    """Return quantiles of the arm's answers and of its control periods [ms]."""
+    timing = checkup.timing
+    named = {"read": timing.read, "set and read": timing.set_and_read, "control period": timing.periods}
+    return {
+        f"{name}, {word}": round(1e3 * float(np.quantile(values, share)), 4)
+        for name, values in named.items()
+        for word, share in (("p50", 0.5), ("p99", 0.99))
+    }
+
+
+def calibrate_(
+    arm: str,
+    /,
+    *,
+    out: Path,
+    angles: tuple[float, float] | None = None,
+    supply: float | None = None,
+    seed: int = 0,
+    settings: Annotated[CheckupSettings, Settings] = CheckupSettings(),
+    json: Json = False,
+) -> None:
+    """Measure an arm's sensors and write what everything else needs to know of it.
+
+    Afterwards ``,spec=FILE`` behind the arm's name uses it with any command.
+
+    Parameters
+    ----------
+    arm
+        virtual, virtual:seed=N or python:module:callable.
+    out
+        File to write, arm.toml.
+    angles
+        Angles of the joint with muscle 2 full and with muscle 1 full, by a protractor [degrees].
+    supply
+        Pressure of the supply by its manometer [bar gauge].
+    seed
+        Of a virtual arm's noise.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    require_folder(out)
+    known = Known(angles, supply)
+    with open_arm(arm, seed) as opened:
+        checkup = _measured(opened, settings)
+    blocking = [finding for finding in diagnose(checkup) if finding.kind not in _NO_HINDRANCE]
+    if blocking:
+        raise UnusableInput(f"{arm} is to be mended before it is calibrated: {' '.join(map(str, blocking))}")
+    calibration = calibrate(checkup, known)
+    save_arm_file(calibration.file, out)
+    result = {
+        "spec": asdict(calibration.file.spec),
+        "correction": asdict(calibration.file.correction),
+        "linearised_residual_degrees": list(calibration.residual),
+    }
+    for j, residual in enumerate(calibration.residual):
+        if residual is not None:
+            say(f"joint {j + 1}: the potentiometer is not linear; linearised off by {residual:.2f} degrees (rms)")
+    show(result, json, lambda: [table((str(out), ""), list(result["spec"].items()))])  # type: ignore[attr-defined]
+
+
+_NO_HINDRANCE = ("angle logarithmic", "low supply", "leak", "noise not white", "jitter")
+"""Findings with which the sensors can be calibrated all the same."""
+
+
+def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Json = False) -> None:
+    """Click every valve, one by one, saying which: with the air off, to see and hear that all are wired right.
+
+    Parameters
+    ----------
+    arm
+        virtual, virtual:seed=N or python:module:callable.
+    open_for
+        How long each is open [s].
+    pause
+        How long all are closed after each [s].
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    if not (0 < open_for <= 5 and 0 <= pause <= 60):
+        raise UnusableInput(f"a valve can be open for up to 5 s with pauses of up to 60 s, got {open_for}, {pause}")
+    clicked = []
+    with open_arm(arm) as opened:
+        guard = guarded(opened)
+        closed = np.zeros_like(guard.applied)
+        guard.read()
+        for joint, muscle in np.ndindex(closed.shape):
+            for value, name in ((1, "inlet"), (-1, "exhaust")):
+                where = f"joint {joint + 1}, muscle {muscle + 1}, {name}"
+                say(where)
+                wanted = closed.copy()
+                wanted[joint, muscle] = value
+                guard.set_valves(wanted)
+                guard.wait(open_for)
+                clicked.append({"valve": where, "opened": bool((guard.applied == wanted).all())})
+                guard.set_valves(closed)
+                guard.wait(pause)
+    show({"clicked": clicked}, json, lambda: [table(("valve", "opened"), [list(c.values()) for c in clicked])])

@@ -1,0 +1,69 @@
+"""Leaving in good order: whatever ends the program, arms are closed and files are whole.
+
+A signal is raised as an exception in the main thread, so that everything leaves through the doors of ``with`` and
+``finally``. Only ``kill -9`` and the end of the power do not: the dead-man of the microcontroller is for these.
+"""
+
+import atexit
+import ctypes
+import os
+import signal
+import sys
+from time import monotonic
+from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_PATIENCE = 2.0
+"""For so long [s] after a first signal others are ignored: whoever presses Ctrl-C twice means it once."""
+_PARENT_GONE = signal.SIGUSR2
+_PR_SET_PDEATHSIG = 1  # from linux/prctl.h
+
+
+class Interrupted(KeyboardInterrupt):
+    """The program was asked to end by a signal, or lost its parent."""
+
+    def __init__(self, number: int, reason: str) -> None:
+        super().__init__(reason)
+        self.exit_code = 128 + number
+        """What a shell reports of a program that a signal ended: 130 for SIGINT, 143 for SIGTERM."""
+
+
+def leave_by_exceptions() -> None:
+    """Have signals, and on Linux the end of the parent process, raise :class:`Interrupted` in the main thread.
+
+    A signal that is ignored stays so: ``nohup`` means what it says, also for the end of the parent.
+    """
+    first: float | None = None
+    parent = os.getppid()
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal first
+        gone = number == _PARENT_GONE
+        if gone and os.getppid() == parent:
+            return  # the kernel means the thread that started us; the process of which it was one goes on
+        now = monotonic()
+        if first is not None and now - first < _PATIENCE:
+            return
+        if first is None:
+            # While the interpreter ends it forgets its handlers, but not what it ignores.
+            atexit.register(ignore)
+        first = now
+        if gone:
+            raise Interrupted(signal.SIGHUP, "the process that started it has ended")
+        raise Interrupted(number, signal.Signals(number).name)
+
+    def ignore() -> None:
+        for number in wanted:
+            signal.signal(number, signal.SIG_IGN)
+
+    wanted = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    for number in wanted:
+        signal.signal(number, interrupt)
+    if signal.SIGHUP in wanted and sys.platform == "linux":
+        signal.signal(_PARENT_GONE, interrupt)
+        try:
+            ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(_PARENT_GONE))
+        except (OSError, AttributeError):
+            return  # a C library without it: the other ways remain
+        if os.getppid() != parent:
+            raise Interrupted(signal.SIGHUP, "the process that started it has ended")

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup run test lint bench judge soak clean
+.PHONY: setup run test lint bench judge rivals soak clean
 
 setup: $(READY)
 
@@ -30,6 +30,10 @@ bench: setup
 
 judge: setup  ## the whole job on the ten judging arms; takes about ten minutes
 	$(BIN)/python -m benchmarks judging
+
+rivals: setup  ## the table of rivals on the judging arms, into runs/rivals; takes hours, a second call goes on
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,stable-baselines]'
+	$(BIN)/python -m benchmarks rivals
 
 soak: setup  ## fault injection that takes minutes: kills, power cuts, full disks
 	$(BIN)/python -m pytest -m soak -s

@@ -6,11 +6,11 @@ import sys
 
 import benchmarks
 
-LONG = ("adaptation", "agents", "bound", "judging")
+LONG = ("adaptation", "agents", "bound", "faults", "judging", "minutes", "rivals", "success")
 """What takes many minutes runs only when it is named."""
 
 if __name__ == "__main__":
-    found = [module.name for module in pkgutil.iter_modules(benchmarks.__path__) if module.name != "__main__"]
+    found = [module.name for module in pkgutil.iter_modules(benchmarks.__path__) if not module.name.startswith("_")]
     names = sys.argv[1:] or [name for name in found if name not in LONG]
     for name in names:
         print(f"== {name.replace('_', ' ')}", flush=True)

@@ -1,48 +1,78 @@
-"""What adapting gains a policy: development arms that have changed since it was trained, and one that has not.
+"""How fast a policy adapts to an arm that has changed, against no adaptation and against an agent trained afresh.
 
-Every transfer is made twice, adapting and not, with the same arm, goals and begin states: arms warm up and creep, so
-the reward after is compared with that of the agent which stayed as it was, not with the reward before. Goals within
-the reach are those between the lowest and the highest angle of all movements; no agent reaches the others. Settings
-come from the environment:
+For every seed an arm is drawn, and an agent collects, fits and trains on it. Then the arm changes (CHANGES), and
+three rivals make the same movements, from the same begin states (by seed) to the same goals, on arms in the same
+state:
 
-PNEUMARM_ADAPTATION_ARMS       seeds of virtual arms, "1,2,3,4,5" by default; the judging arms are 1001 to 1010
+    fresh     an agent that collected, fitted and trained anew on the changed arm: the reference; of an arm that has
+              not changed it is the old agent
+    without   the old agent, which stays as it is
+    adapting  the old agent, which adapts between movements
+
+Goals lie within the reach of the changed arm, the 1st to 99th percentile of its angles in the fresh agent's
+collecting, and within the range of the old agent. Every transfer is a row in a file; those that are there are not
+made again.
+
+*Recovered* is the first movement from which on the mean reward of every 100 following movements is at least 95 % of
+what the fresh agent gets in those same movements; its time is that of the arm, the ways to the begin states included.
+Settings come from the environment:
+
+PNEUMARM_ADAPTATION_SEEDS      seeds of virtual arms, "1,2,3,4,5"; the judging arms are 1001 to 1010
 PNEUMARM_ADAPTATION_CHANGES    names from CHANGES; all by default
-PNEUMARM_ADAPTATION_MOVEMENTS  movements while learning, 300
-PNEUMARM_ADAPTATION_TESTS      movements before and after, 200
-PNEUMARM_ADAPTATION_SEED       added to the seeds of begin states and goals, 0
-PNEUMARM_ADAPTATION_FOLDER     where stores, simulations and agents are kept; a temporary folder by default
+PNEUMARM_ADAPTATION_MOVEMENTS  movements of each rival, 300
+PNEUMARM_ADAPTATION_COLLECTED  transitions that the fresh agent collects, 200000
+PNEUMARM_ADAPTATION_FOLDER     where stores, simulations, agents, rows and the picture are kept; a temporary folder
+                               by default
 """
 
+import json
 import os
 import tempfile
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from benchmarks.agents import prepared
 from pneumarm.arm import guarded
 from pneumarm.arm.virtual import ArmParameters, VirtualArm, draw_parameters
 from pneumarm.arm.virtual.parameters import JointParameters, MuscleParameters
-from pneumarm.control import BEGIN, Episode, Transferred, TransferSettings, transfer
-from pneumarm.learning import AnyAgent, load_agent, train
-from pneumarm.transitions import Store
+from pneumarm.control import BEGIN, TransferSettings, transfer
+from pneumarm.files import write_json
+from pneumarm.learning import AdaptationSettings, PolicyAgent, TrialSettings, WatchSettings, begin_states, train
+from pneumarm.learning.fleet.trial import lower_by
+from pneumarm.learning.fleet.watch import Watch
+from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, key, legend_below, panels, styled
+from pneumarm.simulation import FitSettings, fit_store
+from pneumarm.statistics import moving_mean
+from pneumarm.transitions import KINDS, Store, collect
 
+Floats = NDArray[np.float64]
 NIGHT = 14 * 3600.0
 """A rest [s] of a rested arm."""
 WORN_IN = 600
 """Begin states that a rested arm was brought to before, in about three quarters of an hour."""
-HEADER = (
-    f"{'arm':5}{'change':11}{'before':>8}{'last 100':>9}{'after':>8}{'unadapted':>10}{'gain':>15}"
-    f"{'in reach':>10}{'after':>8}{'unadapted':>10}{'success':>8}{'unadapted':>10}{'accepted':>9}{'s':>5}"
-)
+TORN = 300
+"""How much more than a sound one a torn muscle leaks: 7.5 % of its pressure a second."""
+WINDOW, SHARE = 100, 0.95
+"""Of the definition of *recovered*."""
+RIVALS = ("fresh", "without", "adapting")
+
+
+# What changes -----------------------------------------------------------------------------------------------------
 
 
 def each_joint(parameters: ArmParameters, change: Callable[[JointParameters], JointParameters]) -> ArmParameters:
     return replace(parameters, joints=tuple(change(joint) for joint in parameters.joints))
+
+
+def first_muscle(joint: JointParameters, change: Callable[[MuscleParameters], MuscleParameters]) -> JointParameters:
+    return replace(joint, muscles=(change(joint.muscles[0]), joint.muscles[1]))
 
 
 def each_muscle(joint: JointParameters, change: Callable[[MuscleParameters], MuscleParameters]) -> JointParameters:
@@ -50,108 +80,238 @@ def each_muscle(joint: JointParameters, change: Callable[[MuscleParameters], Mus
     return replace(joint, muscles=(change(first), change(second)))
 
 
-def heavier(parameters: ArmParameters, arm: int) -> ArmParameters:
+def heavier(parameters: ArmParameters, seed: int) -> ArmParameters:
     """A payload 30 % heavier."""
     return each_joint(parameters, lambda joint: replace(joint, mass=1.3 * joint.mass))
 
 
-def exchanged(parameters: ArmParameters, arm: int) -> ArmParameters:
+def exchanged(parameters: ArmParameters, seed: int) -> ArmParameters:
     """Muscle 1 is that of another draw."""
-    other = draw_parameters(100 + arm).joints[0].muscles[0]
-    return each_joint(parameters, lambda joint: replace(joint, muscles=(other, joint.muscles[1])))
+    other = draw_parameters(100 + seed).joints[0].muscles[0]
+    return each_joint(parameters, lambda joint: first_muscle(joint, lambda muscle: other))
 
 
-def leaking(parameters: ArmParameters, arm: int) -> ArmParameters:
-    """Muscles leak three times as much."""
+def leaking(parameters: ArmParameters, seed: int) -> ArmParameters:
+    """Muscles leak three times as much: some 5 % of their pressure a minute."""
     return each_joint(
         parameters, lambda joint: each_muscle(joint, lambda muscle: replace(muscle, leak=3 * muscle.leak))
     )
 
 
-def same(parameters: ArmParameters, arm: int) -> ArmParameters:
+def torn(parameters: ArmParameters, seed: int) -> ArmParameters:
+    """Muscle 1 leaks so much that it loses half of its pressure in ten seconds."""
+    return each_joint(
+        parameters, lambda joint: first_muscle(joint, lambda muscle: replace(muscle, leak=TORN * muscle.leak))
+    )
+
+
+def same(parameters: ArmParameters, seed: int) -> ArmParameters:
     return parameters
 
 
-CHANGES = {"unchanged": same, "payload": heavier, "muscle": exchanged, "leak": leaking, "rested": same}
+CHANGES = {"unchanged": same, "rested": same, "leak": leaking, "payload": heavier, "torn": torn, "muscle": exchanged}
+WORDS = {
+    "unchanged": "nothing has changed",
+    "rested": "rested for 14 h",
+    "leak": "muscles leak three times as much",
+    "payload": "30 % more payload",
+    "torn": f"muscle 1 leaks {TORN} times as much",
+    "muscle": "muscle 1 exchanged",
+}
+
+
+def changed_arm(change: str, seed: int, noise: int) -> VirtualArm:
+    arm = VirtualArm(CHANGES[change](draw_parameters(seed), seed), seed=noise)
+    if change == "rested":
+        random = np.random.default_rng(seed)
+        for _ in range(WORN_IN):
+            BEGIN.reach(guarded(arm), random)
+        arm.rest(NIGHT)
+    return arm
+
+
+# The rivals -------------------------------------------------------------------------------------------------------
+
+
+class Bench:
+    """A folder of stores, simulations, agents and rows."""
+
+    def __init__(self, folder: Path, movements: int, collected: int) -> None:
+        self.folder, self.movements, self.collected = folder, movements, collected
+
+    def row(self, change: str, seed: int, rival: str) -> dict[str, Any]:
+        """Return what a rival did; let it move where that is not done yet."""
+        file = self.folder / f"{change}-{seed}-{rival}-{self.movements}-{self.collected}.json"
+        if not file.exists():
+            write_json(file, self.moved(change, seed, rival))
+        found: dict[str, Any] = json.loads(file.read_text())
+        return found
+
+    def moved(self, change: str, seed: int, rival: str) -> dict[str, Any]:
+        old = self.trained(seed, None)
+        fresh = old if change == "unchanged" else self.trained(seed, change)
+        low = np.maximum(old.goal_range[:, 0], fresh.goal_range[:, 0])
+        high = np.minimum(old.goal_range[:, 1], fresh.goal_range[:, 1])
+        agent = fresh if rival == "fresh" else old
+        agent = replace(agent, simulation=replace(agent.simulation, goal_range=np.stack([low, high], axis=1)))
+        settings = TransferSettings(
+            episodes=self.movements, test_episodes=1, learning_rate=0.01 if rival == "adapting" else 0.0
+        )
+        arm = changed_arm(change, seed, 2000 + seed)
+        with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", arm.spec) as store:
+            moved = transfer(agent, arm, store, settings, seed=seed)
+        made = [*moved.phase("before"), *moved.phase("learning")]
+        assert moved.adapted is not None
+        return {
+            "change": change,
+            "seed": seed,
+            "rival": rival,
+            "reward": [episode.reward for episode in made],
+            "success": [episode.success for episode in made],
+            "time": [episode.time_end - made[0].time_start for episode in made],
+            "squares": np.round(moved.adapted.squares[: len(made), 1], 4).tolist(),
+            "events": [asdict(event) for event in moved.adapted.events if event.what != "refused"],
+            "goal_range": agent.goal_range.tolist(),
+        }
+
+    def trained(self, seed: int, change: str | None) -> PolicyAgent:
+        """Return the policy trained on an arm as drawn, or after a ``change``; train it where there is none."""
+        file = self.folder / (f"{seed}.agent" if change is None else f"{change}-{seed}-{self.collected}.agent")
+        if not file.exists():
+            simulation, begin = prepared(self.folder, seed) if change is None else self.prepared_anew(seed, change)
+            train(simulation, begin, None, 1).agent.save(file)
+        return PolicyAgent.load(file)
+
+    def prepared_anew(self, seed: int, change: str) -> tuple[Any, Any]:
+        with tempfile.TemporaryDirectory() as place:
+            arm = changed_arm(change, seed, 3000 + seed)
+            with Store.for_arm(Path(place) / "db", arm.spec) as store:
+                collect(arm, store, self.collected, seed)
+                simulation = fit_store(store, FitSettings(seed=seed)).simulation
+                return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+
+
+# The table --------------------------------------------------------------------------------------------------------
+
+HEADER = (
+    f"{'change':10}{'right after':>12}{'first 100 movements':>35}{'last 100 movements':>28}"
+    f"{'recovered without':>19}{'adapting':>27}{'noticed':>20}{'back':>5}\n"
+    f"{'':10}{'without':>12}{'adapting':>10}{'without':>9}{'gain':>16}{'fresh':>9}{'without':>9}{'adapting':>10}"
+    f"{'movements':>19}{'movements':>13}{'minutes':>14}{'movement':>20}"
+)
 
 
 def measure() -> Iterator[str]:
-    arms = os.environ.get("PNEUMARM_ADAPTATION_ARMS", "1,2,3,4,5").split(",")
+    seeds = [int(word) for word in os.environ.get("PNEUMARM_ADAPTATION_SEEDS", "1,2,3,4,5").split(",")]
     changes = os.environ.get("PNEUMARM_ADAPTATION_CHANGES", ",".join(CHANGES)).split(",")
-    settings = TransferSettings(
-        episodes=int(os.environ.get("PNEUMARM_ADAPTATION_MOVEMENTS", "300")),
-        test_episodes=int(os.environ.get("PNEUMARM_ADAPTATION_TESTS", "200")),
-    )
-    gains: dict[str, list[tuple[float, float]]] = {change: [] for change in changes}
-    yield HEADER
+    movements = int(os.environ.get("PNEUMARM_ADAPTATION_MOVEMENTS", "300"))
+    collected = int(os.environ.get("PNEUMARM_ADAPTATION_COLLECTED", "200000"))
+    kept = os.environ.get("PNEUMARM_ADAPTATION_FOLDER")
     with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(os.environ.get("PNEUMARM_ADAPTATION_FOLDER", temporary))
+        folder = Path(kept or temporary)
         folder.mkdir(exist_ok=True)
-        for arm in map(int, arms):
-            agent = trained(folder, arm)
-            for change in changes:
-                line, gain = adapted(agent, arm, change, settings)
-                gains[change].append(gain)
-                yield line
-    for change, found in gains.items():
-        gain, reached = np.mean(found, axis=0)
-        lowest = min(one[0] for one in found)
-        yield f"{change}: gain {gain:+.2f} (of an arm at least {lowest:+.2f}), on goals within reach {reached:+.2f}"
+        bench, found = Bench(folder, movements, collected), {}
+        yield HEADER
+        for change in changes:
+            found[change] = [{rival: bench.row(change, seed, rival) for rival in RIVALS} for seed in seeds]
+            yield line(change, found[change])
+        yield from rates(found)
+        if kept:
+            curves(found).savefig(folder / "adaptation.png", dpi=150)
+            yield f"curves: {folder / 'adaptation.png'}"
 
 
-def trained(folder: Path, arm: int) -> AnyAgent:
-    """Return the policy trained for a virtual arm; train it where that is not done yet."""
-    file = folder / f"{arm}.agent"
-    if not file.exists():
-        train(*prepared(folder, arm), None, 1).agent.save(file)
-    return load_agent(file)
-
-
-def adapted(agent: AnyAgent, arm: int, change: str, settings: TransferSettings) -> tuple[str, tuple[float, float]]:
-    """Return a line of the table, and the gains of reward on all goals and on those within the reach."""
-    began = time.perf_counter()
-    moved, low, high = moved_on(agent, arm, change, settings)
-    seconds = time.perf_counter() - began
-    fixed, lowest, highest = moved_on(agent, arm, change, replace(settings, learning_rate=0.0))
-    low, high = np.minimum(low, lowest), np.maximum(high, highest)
-    before, last, after, unadapted = (
-        rewards(phase)
-        for phase in (
-            moved.phase("before"),
-            moved.phase("learning")[-100:],
-            moved.phase("after"),
-            fixed.phase("after"),
-        )
+def line(change: str, rows: list[dict[str, dict[str, Any]]]) -> str:
+    """Return the line of a change: means over seeds; movements and minutes of each seed."""
+    rewards = {rival: np.array([row[rival]["reward"] for row in rows]) for rival in RIVALS}
+    without, adapting = rewards["without"], rewards["adapting"]
+    gain, half = over_seeds((adapting - without)[:, :100].mean(axis=1))
+    last = {rival: reward[:, -100:].mean() for rival, reward in rewards.items()}
+    recovered = {rival: [recovery(row[rival], row["fresh"]) for row in rows] for rival in ("without", "adapting")}
+    noticed = [
+        next((e["movement"] for e in row["without"]["events"] if e["what"] == "noticed"), None) for row in rows
+    ]
+    back = sum(e["what"] == "rolled back" for row in rows for e in row["adapting"]["events"])
+    return (
+        f"{change:10}{without[:, :50].mean():12.1f}{adapting[:, :100].mean():10.1f}{without[:, :100].mean():9.1f}"
+        f"{f'{gain:+.2f} ± {half:.2f}':>16}{last['fresh']:9.1f}{last['without']:9.1f}{last['adapting']:10.1f}"
+        f"{listed([m for m, _ in recovered['without']]):>19}{listed([m for m, _ in recovered['adapting']]):>13}"
+        f"{listed([minutes for _, minutes in recovered['adapting']]):>14}{listed(noticed):>20}{back:5d}"
     )
-    inside = np.array([bool(np.all((low <= one.goal) & (one.goal <= high))) for one in moved.phase("after")])
-    gained = after - unadapted
-    spread = 1.96 * gained.std() / np.sqrt(len(gained))
-    rates = [np.mean([one.success for one in transferred.phase("after")]) for transferred in (moved, fixed)]
-    line = (
-        f"{arm:<5}{change:11}{before.mean():8.2f}{last.mean():9.2f}{after.mean():8.2f}{unadapted.mean():10.2f}"
-        f"{f'{gained.mean():+.2f} ± {spread:.2f}':>15}{inside.mean():10.1%}{after[inside].mean():8.2f}"
-        f"{unadapted[inside].mean():10.2f}{rates[0]:8.3f}{rates[1]:10.3f}{moved.adaptations:9d}{seconds:5.0f}"
-    )
-    return line, (float(gained.mean()), float(gained[inside].mean()))
 
 
-def moved_on(
-    agent: AnyAgent, arm: int, change: str, settings: TransferSettings
-) -> tuple[Transferred, NDArray[np.float64], NDArray[np.float64]]:
-    """Return a transfer onto the changed arm, and the lowest and highest angles of all its movements."""
-    opened = VirtualArm(CHANGES[change](draw_parameters(arm), arm), seed=2000 + arm)
-    if change == "rested":
-        random = np.random.default_rng(arm)
-        for _ in range(WORN_IN):
-            BEGIN.reach(guarded(opened), random)
-        opened.rest(NIGHT)
-    with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", opened.spec) as store:
-        moved = transfer(
-            agent, opened, store, settings, seed=arm + int(os.environ.get("PNEUMARM_ADAPTATION_SEED", "0"))
-        )
-        angles = np.concatenate([rows.angle for rows in store.blocks()])
-    return moved, angles.min(axis=0), angles.max(axis=0)
+def listed(values: list[int | None]) -> str:
+    return " ".join("-" if value is None else str(value) for value in values)
 
 
-def rewards(episodes: list[Episode]) -> NDArray[np.float64]:
-    return np.array([one.reward for one in episodes])
+def over_seeds(values: Floats) -> tuple[float, float]:
+    """Return the mean over seeds and half of its 95 % interval, by Student's t."""
+    n = len(values)
+    if n < 2:
+        return float(values.mean()), float("nan")
+    return float(values.mean()), float(student.ppf(0.975, n - 1) * values.std(ddof=1) / np.sqrt(n))
+
+
+def recovery(row: Mapping[str, Any], fresh: Mapping[str, Any]) -> tuple[int | None, int | None]:
+    """Return the movements and minutes until the reward is recovered for good; None where it is not."""
+    mine, reference = (np.convolve(one["reward"], np.ones(WINDOW) / WINDOW, "valid") for one in (row, fresh))
+    below = np.flatnonzero(mine < SHARE * reference)
+    first = int(below[-1]) + 1 if len(below) else 0
+    if first == len(mine):
+        return None, None
+    return first, round((row["time"][first - 1] if first else 0.0) / 60)
+
+
+def rates(found: Mapping[str, list[dict[str, dict[str, Any]]]]) -> Iterator[str]:
+    """Say how often an arm that has hardly changed is noticed, and an agent that is no worse would be taken back."""
+    calm = [row["without"] for change in ("unchanged", "rested", "leak") for row in found.get(change, [])]
+    if not calm:
+        return
+    alarms = movements = 0
+    for row in calm:
+        watch = Watch(WatchSettings(), len(row["squares"][0]))
+        for squares in row["squares"]:
+            movements += 1
+            if watch.saw(squares):
+                alarms += 1
+                watch.reset()
+    yield f"false alarms: {alarms} in {movements} movements of arms that have not, or hardly, changed"
+    trial, random = TrialSettings(), np.random.default_rng(0)
+    taken = tries = 0
+    for row in calm:
+        for known in (AdaptationSettings().first, trial.remembered):
+            for _ in range(200):
+                tries += 1
+                old, new = random.choice(row["reward"], known), random.choice(row["reward"], trial.looks[-1])
+                taken += any(lower_by(old, new[:look]) > trial.limit for look in trial.looks)
+    yield f"taken back though no worse: {taken / tries:.2%} of {tries} trials on rewards drawn anew from these arms"
+
+
+@styled
+def curves(found: Mapping[str, list[dict[str, dict[str, Any]]]]) -> Figure:
+    """Draw the reward of the rivals over the movements, one panel for each change."""
+    rows = -(-len(found) // 2)
+    figure, axes = panels(rows, 2, 0.6 + 2.0 * rows, sharex=True)
+    looks = {"fresh": (GREY, ":"), "without": (MIDDLE, "--"), "adapting": (DARK, "-")}
+    for place, (change, each) in zip(axes.ravel(), found.items(), strict=False):
+        lowest = np.inf
+        for rival, (color, dashes) in looks.items():
+            smooth = np.array([moving_mean(row[rival]["reward"], 50).mean for row in each])
+            mean = smooth.mean(axis=0)
+            lowest = min(lowest, mean.min())
+            if rival == "adapting" and len(each) > 1:
+                half = np.array([over_seeds(column)[1] for column in smooth.T])
+                place.fill_between(np.arange(len(mean)), mean - half, mean + half, color=LIGHT, alpha=0.5, lw=0)
+            place.plot(mean, color=color, ls=dashes)
+        place.set_title(WORDS[change])
+        place.set_ylabel("reward [-]")
+        place.set_ylim(lowest - 2, 43)
+        place.margins(x=0)
+    for place in axes.ravel()[: len(found)][-2:]:
+        place.set_xlabel("movements on the arm [-]")
+        place.tick_params(labelbottom=True)
+    for place in axes.ravel()[len(found) :]:
+        place.set_visible(False)
+    handles = [key(color, dashes) for color, dashes in looks.values()]
+    legend_below(figure, handles, ["trained afresh", "not adapting", "adapting (95 % interval over seeds)"])
+    return figure

@@ -10,6 +10,7 @@ SMALL = RunSettings(
     seed=5,
     transitions=6_000,
     test_episodes=300,
+    bound_episodes=8,
     fit=FitSettings(epochs=10),
     method="sarsa",
     thesis=TrainSettings(agents=2, max_episodes=3_000, validation_episodes=100, shaping=Shaping(episodes=100)),

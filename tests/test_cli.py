@@ -4,12 +4,15 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pneumarm.cli import COMMANDS, main
+from pneumarm.learning.imported import ImportedPolicy
+from pneumarm.simulation import Simulation
 
 README = Path(__file__).parent.parent / "README.md"
 
@@ -213,10 +216,17 @@ def test_json_is_one_object_on_stdout_and_nothing_else(
     assert set(fitted["std"]) == set(fitted["relative_error"]) == quantities  # type: ignore[call-overload]
     trained = asked("train", sim, store, "--out", tmp_path / "agent", "--agents", 1, "--policy.updates", 5)
     assert {"episodes", "steps", "seconds", "steps_per_second_per_core"} <= trained.keys()
-    assert figures <= asked("test", agent, sim, store, "--episodes", 50).keys()
+    assert figures | {"lookahead"} <= asked("test", agent, sim, store, "--episodes", 50).keys()
     out = ("--out", tmp_path / "t", "--episodes", 3, "--test-episodes", 4)
     moved = asked("transfer", agent, "--arm", "virtual:seed=3", *out)
     assert figures <= moved["before"].keys()  # type: ignore[attr-defined]
+    assert Outcome(capsys, "versions", tmp_path / "t").is_refused("adaptation.json", "adapts between movements")
+    out = ("--out", tmp_path / "p", "--episodes", 3, "--test-episodes", 4)
+    assert asked("transfer", tmp_path / "agent", "--arm", "virtual:seed=3", *out)["version"] == 0
+    listed = asked("versions", tmp_path / "p", "--to", 0)
+    assert listed["version"] == 0
+    assert [row["in_use"] for row in listed["versions"]] == [True]  # type: ignore[attr-defined]
+    assert Outcome(capsys, "versions", tmp_path / "p", "--to", 7).is_refused("there is no version 7")
     assert "verdict" in asked("coverage", store)
     asked("analyse", store, sim, "--out", tmp_path / "quality")
     assert (tmp_path / "quality" / "analysis.html").exists()
@@ -232,6 +242,32 @@ def test_the_file_of_a_simulation_is_an_agent_that_plans_in_it(
     assert (
         json.loads(Outcome(capsys, "transfer", sim, "--arm", "virtual:seed=3", *out, "--json").out)["episodes"] == 0
     )
+
+
+def test_an_agent_of_another_library_is_tested_and_transferred(
+    capsys: pytest.CaptureFixture[str], store: Path, sim: Path, tmp_path: Path
+) -> None:
+    """Layers such as the importer leaves; how well they move matters less here than that they go all the way."""
+    simulation, random = Simulation.load(sim), np.random.default_rng(0)
+    sizes = [simulation.window.state_size + 1, 64, 64, 9]
+    layers = tuple(
+        (random.normal(0, n**-0.5, (n, m)).astype(np.float32), np.zeros(m, np.float32)) for n, m in pairwise(sizes)
+    )
+    file = tmp_path / "theirs.agent"
+    parts = (simulation.spec, simulation.window, simulation.scaling, simulation.goal_range)
+    ImportedPolicy(*parts, layers).save(file)
+    tested = Outcome(capsys, "test", file, sim, store, "--episodes", 20, "--json")
+    assert tested.code == 0, tested.err
+    figures = json.loads(tested.out)
+    assert figures["episodes"] == 20
+    assert figures["lookahead"] is None
+    out = tmp_path / "t"
+    options = ("--arm", "virtual:seed=3", "--out", out, "--episodes", 2, "--test-episodes", 3, "--json")
+    moved = Outcome(capsys, "transfer", file, *options)
+    assert moved.code == 0, moved.err
+    results = json.loads(moved.out)
+    assert (results["before"]["episodes"], results["after"]["episodes"], results["adaptations"]) == (3, 3, 0)
+    assert (out / "adapted.safetensors").read_bytes() == file.read_bytes()  # it cannot learn here
 
 
 def blocks(language: str) -> Iterator[str]:

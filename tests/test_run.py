@@ -17,7 +17,7 @@ from pneumarm.transitions import Store
 from small import SMALL
 
 TIMES = ("peak_memory_mb", "seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
-STAGES = ("collect", "simulation", "training", "test", "transfer")
+STAGES = ("collect", "simulation", "training", "test", "transfer", "bound")
 
 
 def results_of(folder: Path) -> dict[str, Any]:
@@ -47,6 +47,20 @@ def test_results_have_the_keys_that_are_promised(small_run: Path) -> None:
     assert figures <= results["transfer"]["after"].keys()
     assert results["transfer"]["episodes"] == SMALL.transfer.episodes
     assert results["transfer"]["learning_rate"] == SMALL.transfer.learning_rate
+
+
+def test_the_bound_is_told_for_the_movements_of_the_tests(small_run: Path) -> None:
+    results = results_of(small_run)
+    bound = results["bound"]
+    with open(small_run / "episodes.csv", newline="") as file:
+        rows = [r for r in csv.DictReader(file) if r["phase"] == "after"][: SMALL.bound_episodes]
+    paid = sum(float(r["reward"]) for r in rows) / len(rows)
+    for planner in ("open_loop", "closed_loop"):
+        assert bound[planner]["episodes"] == SMALL.bound_episodes
+        lost = bound["distance"]["after"][planner]
+        assert lost["reward"] == pytest.approx(bound[planner]["reward"] - paid)
+        assert lost["reward"] > 0  # 30 movements of learning make no planner
+    assert "planning with the arm's true physics" in (small_run / "report.html").read_text().replace("&#39;", "'")
 
 
 def test_the_ledger_agrees_with_the_episodes(small_run: Path) -> None:
@@ -135,7 +149,7 @@ def killed_in(stage: str, folder: Path, after: float) -> None:
 
 def test_a_run_killed_in_every_stage_ends_as_if_nothing_had_happened(small_run: Path, tmp_path: Path) -> None:
     folder = tmp_path / "killed"
-    for stage, after in zip(STAGES, (0.1, 0.3, 0.3, 0.05, 0.2), strict=True):
+    for stage, after in zip(STAGES, (0.1, 0.3, 0.3, 0.05, 0.2, 0.1), strict=True):
         killed_in(stage, folder, after)
     assert started(folder).wait() == 0
     assert without_times(results_of(folder)) == without_times(results_of(small_run))

@@ -48,6 +48,10 @@ COMMANDS = {
         "Move an agent onto an arm and let it adapt there.",
         "pneumarm transfer arm.agent --arm virtual:seed=7 --episodes 500 --out adapted",
     ),
+    "versions": (
+        "List the versions of an agent that adapted on an arm, and put one back.",
+        "pneumarm versions adapted --to 1",
+    ),
     "bound": (
         "Say what can be achieved on a virtual arm at all, by planning with its true physics.",
         "pneumarm bound --arm virtual:seed=7 --episodes 500",

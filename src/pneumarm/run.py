@@ -1,8 +1,9 @@
 """The whole job, stage by stage, from an arm to a controller that adapts on it; it can be interrupted anywhere.
 
 A folder holds a run: ``settings.json`` (what was asked for), ``transitions.db``, ``simulation.safetensors``,
-``agent.safetensors``, ``adapted.safetensors``, ``episodes.csv``, ``report.html``, and ``results.json``, which
-grows by the stages that are done. A second call with the same folder goes on after the last of them.
+``agent.safetensors``, ``adapted.safetensors``, the versions in between in ``agents/`` with ``adaptation.json``,
+``episodes.csv``, ``report.html``, and ``results.json``, which grows by the stages that are done. A second call with
+the same folder goes on after the last of them.
 """
 
 import json
@@ -16,13 +17,32 @@ from typing import Any
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
-from pneumarm.control import TransferSettings, transfer, write_episodes
+from pneumarm.control import (
+    BoundSettings,
+    Monitor,
+    PlanSettings,
+    TransferSettings,
+    known_bound,
+    save_history,
+    transfer,
+    version_keeper,
+    write_episodes,
+)
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
-from pneumarm.learning import BeginStates, LearnSettings, begin_states, load_agent, train
+from pneumarm.learning import (
+    LOOKING_AHEAD,
+    BeginStates,
+    LearnSettings,
+    begin_states,
+    load_agent,
+    test_ahead,
+    tested_results,
+    train,
+)
 from pneumarm.learning import test as test_agent
 from pneumarm.records import demonstrate, test_record, training_record
-from pneumarm.report import save_movement, save_spec, write_report
+from pneumarm.report import read_episodes, save_movement, save_spec, write_report
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import KINDS, CollectSettings, Store, collect, require_enough
 
@@ -49,6 +69,8 @@ class RunSettings(LearnSettings):
     """How many to collect (thesis section 3.2.2: 200,000, two hours)."""
     test_episodes: int = 10_000
     """Movements of the test in simulation (thesis section 5.2)."""
+    bound_episodes: int = 150
+    """Movements planned with the true physics, which say what can be achieved; 0 for none. Virtual arms only."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     transfer: TransferSettings = field(default_factory=TransferSettings)
@@ -57,6 +79,8 @@ class RunSettings(LearnSettings):
         require_enough(self.transitions)
         if self.test_episodes < 1:
             raise UnusableInput(f"a run needs at least 1 test episode, got {self.test_episodes}")
+        if self.bound_episodes < 0:
+            raise UnusableInput(f"a run needs 0 or more movements for the bound, got {self.bound_episodes}")
 
 
 class Run:
@@ -112,6 +136,7 @@ class Run:
             ("training", self._train),
             ("test", self._test),
             ("transfer", self._transfer),
+            ("bound", self._bound),
         ):
             if name not in self.results:
                 began = time.perf_counter()
@@ -135,7 +160,10 @@ class Run:
             open_arm_checked(wanted) as arm,
             Store.for_arm(self.store, arm.spec) as store,
         ):
-            collected = collect(arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect)
+            watch = Monitor(arm.spec)
+            collected = collect(
+                arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
+            )
             save_spec(self.folder, arm.spec)
         return {"collect": asdict(collected)}
 
@@ -163,16 +191,12 @@ class Run:
         return {"training": training.results()}
 
     def _test(self) -> dict[str, Any]:
-        simulation = Simulation.load(self.simulation)
-        tested = test_agent(
-            load_agent(self.agent),
-            simulation,
-            self._begin_states(simulation),
-            self.settings.test_episodes,
-            self.settings.seed,
-        )
+        simulation, agent = Simulation.load(self.simulation), load_agent(self.agent)
+        begin, episodes, seed = self._begin_states(simulation), self.settings.test_episodes, self.settings.seed
+        tested = test_agent(agent, simulation, begin, episodes, seed)
+        ahead = test_ahead(agent, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
         test_record(tested).save(self.folder)
-        return {"test": tested.results()}
+        return {"test": tested_results(tested, ahead)}
 
     def _transfer(self) -> dict[str, Any]:
         wanted = self.settings
@@ -181,13 +205,38 @@ class Run:
             open_arm_checked(wanted) as arm,
             Store.append_to(self.store) as store,
         ):
-            moved = transfer(load_agent(self.agent), arm, store, wanted.transfer, seed=wanted.seed, progress=report)
+            moved = transfer(
+                load_agent(self.agent),
+                arm,
+                store,
+                wanted.transfer,
+                seed=wanted.seed,
+                progress=report,
+                keep_version=version_keeper(self.folder),
+            )
             movements = demonstrate(moved.agent, arm, wanted.seed)
         moved.agent.save(self.adapted)
+        save_history(self.folder, moved.adapted)
         write_episodes(self.episodes, moved.episodes)
         for number, movement in enumerate(movements):
             save_movement(self.folder, movement, number)
         return {"transfer": moved.results()}
+
+    def _bound(self) -> dict[str, Any]:
+        """Say what could be achieved in the first movements of the tests on the arm (thesis section 5.5.1)."""
+        wanted = self.settings
+        if wanted.bound_episodes == 0:
+            return {"bound": {"missing": "it was not asked for"}}
+        agent, made = load_agent(self.agent), read_episodes(self.episodes)
+        rewards = {phase: made[phase].reward for phase in ("before", "after")}
+        settings = BoundSettings(wanted.bound_episodes, PlanSettings(cutoff=agent.settings.cutoff))
+        with self.progress("planning with the true physics") as report, open_arm_checked(wanted) as arm:
+            return {
+                "bound": known_bound(
+                    arm, agent.goal_range, rewards, settings,
+                    seed=wanted.seed, reward=agent.settings.reward, progress=report,
+                )
+            }  # fmt: skip
 
     def _begin_states(self, simulation: Simulation) -> BeginStates:
         with Store.open(self.store) as store:

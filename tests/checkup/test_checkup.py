@@ -106,7 +106,7 @@ def test_what_cannot_be_linearised_is_refused():
 
 
 def test_a_calibration_finds_scales_and_zeros():
-    """Sensors of another make: 0.6 of the counts a bar, 40 counts at atmosphere; the angle 0.9 of the counts, shifted."""
+    """Sensors of another make: 0.6 of the counts a bar, 40 at atmosphere; the angle 0.9 of the counts, shifted."""
     arm = FaultyArm(5, pressure=lambda p, v, s: 40 + 0.6 * p * [[1.0, 0.95]], angle=lambda a: 80 + 0.9 * a)
     arm.spec = replace(arm.spec, counts_per_bar=130.0)
     raw = FaultyArm(5)

@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from synthetic_arm import synthetic_simulation
 
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.cli import main
-from pneumarm.control import BoundSettings, PlanSettings, measure_bound
+from pneumarm.control import BoundSettings, PlanSettings, known_bound, measure_bound
 from pneumarm.errors import UnusableInput
+from pneumarm.simulation import SimulationArm
 
 GOALS = np.array([[250.0, 780.0]])
 FEW = BoundSettings(episodes=8)
@@ -66,6 +68,29 @@ def test_command(capsys: pytest.CaptureFixture[str], small_run: Path) -> None:
     for rival in ("open_loop", "closed_loop", "simulated"):
         assert result[rival]["episodes"] == 3
         assert set(result[rival]["intervals"]) == {"reward", "success_rate", "actions", "switches"}
+
+
+def test_the_distance_is_taken_movement_by_movement(planned) -> None:  # type: ignore[no-untyped-def]
+    best = np.array([e.reward for e in planned["open_loop"].episodes])
+    lost = np.array([0.0, 3.0, 1.0, 8.0, 0.0])
+    assert planned["open_loop"].distance(best[:5] - lost) == {"episodes": 5, "reward": 2.4, "interval": None}
+    more = planned["open_loop"].distance(np.concatenate([best - 1.0, np.zeros(100)]))
+    assert (more["episodes"], more["reward"]) == (8, pytest.approx(1.0))
+    with pytest.raises(UnusableInput, match="at least 1"):
+        planned["open_loop"].distance(np.zeros(0))
+
+
+def test_a_bound_is_known_of_virtual_arms_only(planned) -> None:  # type: ignore[no-untyped-def]
+    arm = VirtualArm(draw_parameters(9), name="ninth")
+    rewards = {"before": np.full(20, 10.0), "after": np.full(20, 30.0)}
+    known = known_bound(arm, GOALS, rewards, FEW, seed=3)
+    for rival in ("open_loop", "closed_loop"):
+        mean = planned[rival].results()["reward"]
+        assert known[rival]["reward"] == mean
+        assert known["distance"]["before"][rival]["reward"] == pytest.approx(mean - 10)
+        assert known["distance"]["after"][rival]["reward"] == pytest.approx(mean - 30)
+    opened = SimulationArm(synthetic_simulation())
+    assert "true physics is not known" in known_bound(opened, GOALS, rewards, FEW)["missing"]
 
 
 def test_only_virtual_arms_have_a_bound(capsys: pytest.CaptureFixture[str], small_run: Path) -> None:

@@ -148,7 +148,7 @@ def test_plans_keep_to_the_pressure_limit() -> None:
     guard.wait(0.5)
     assert (arm.read().pressure > 0.98 * arm.spec.max_pressure_counts).all()
     begin, before = arm.get_state(), guard.interventions
-    assert before > 0
+    assert before.pressure > 0
     for goal in (350.0, 650.0):
         arm.set_state(begin)
         planner = open_loop(arm)

@@ -1,6 +1,7 @@
 """Transfer: resumable, comparable, and the adapted agent is what was averaged."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,9 +11,18 @@ import pytest
 import pneumarm
 from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.control import TransferSettings, transfer, transfer_into
+from pneumarm.control import TransferSettings, put_back, read_history, transfer, transfer_into
 from pneumarm.errors import ArmFailure, UnusableInput
-from pneumarm.learning import AdaptationSettings, Agent, AnyAgent, PolicySettings, begin_states, train
+from pneumarm.learning import (
+    AdaptationSettings,
+    Agent,
+    AnyAgent,
+    PolicyAgent,
+    PolicySettings,
+    RefitSettings,
+    begin_states,
+    train,
+)
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import KINDS, Store
 
@@ -62,7 +72,9 @@ def policy(small_run: Path) -> AnyAgent:
 
 
 POLICY = TransferSettings(
-    episodes=12, test_episodes=60, adaptation=AdaptationSettings(every=4, judged=0.1, updates=2, warm_up=1)
+    episodes=12,
+    test_episodes=30,
+    adaptation=AdaptationSettings(every=4, updates=2, warm_up=1, refit=RefitSettings(gain=0.0, certainty=0.0)),
 )
 
 
@@ -84,9 +96,83 @@ def test_a_policy_that_was_interrupted_while_adapting_goes_on_as_if_nothing_had_
             continue
     assert readings > 300  # it was interrupted
     assert result == whole
-    for name in ("episodes.csv", "adapted.safetensors"):
+    versions = [f"agents/{number:03d}.safetensors" for number in range(whole["adaptations"] + 1)]
+    assert sorted(path.name for path in (folder / "agents").iterdir()) == [Path(name).name for name in versions]
+    for name in ("episodes.csv", "adapted.safetensors", "adaptation.json", *versions):
         assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
     assert (folder / "adapted.safetensors").read_bytes() != _saved(policy, tmp_path)
+    assert (folder / "agents/000.safetensors").read_bytes() == _saved(policy, tmp_path)
+    assert transfer_into(folder, policy, VirtualArm(seed=4), POLICY, seed=1) == whole  # there is nothing left to do
+
+
+@pytest.fixture(scope="module")
+def moved(policy: AnyAgent, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a transfer in which the agent became at least one other version."""
+    folder = tmp_path_factory.mktemp("transfers") / "moved"
+    result = transfer_into(folder, policy, VirtualArm(seed=4), POLICY, seed=1)
+    assert result["version"] == result["adaptations"] > 0
+    return folder
+
+
+def test_the_history_tells_every_movement_and_every_version(moved: Path) -> None:
+    history = read_history(moved)
+    total = 2 * POLICY.test_episodes + POLICY.episodes
+    assert history.squares.shape == (total, 2, 3)
+    assert (history.squares > 0).all()
+    made = [event for event in history.events if event.what == "accepted"]
+    assert [event.version for event in made] == list(range(1, history.version + 1))
+    first = made[0].movement
+    np.testing.assert_array_equal(history.squares[:first, 0], history.squares[:first, 1])
+    assert not np.array_equal(history.squares[first:, 0], history.squares[first:, 1])
+    assert any(f"version {history.version}" in sentence for sentence in history.sentences)
+
+
+def test_any_version_can_be_put_back(moved: Path, policy: AnyAgent, tmp_path: Path) -> None:
+    folder = tmp_path / "copy"
+    shutil.copytree(moved, folder)
+    newest = (folder / "adapted.safetensors").read_bytes()
+    assert newest == (folder / f"agents/{read_history(folder).version:03d}.safetensors").read_bytes()
+    assert put_back(folder, 0).version == 0
+    assert (folder / "adapted.safetensors").read_bytes() == _saved(policy, tmp_path)
+    assert read_history(folder).version == 0
+    put_back(folder, 1)
+    assert read_history(folder).put_back_by_hand == (0, 1)
+    assert (folder / "adapted.safetensors").read_bytes() == (folder / "agents/001.safetensors").read_bytes()
+    with pytest.raises(UnusableInput, match="no version 99; there are 0, 1"):
+        put_back(folder, 99)
+    with pytest.raises(UnusableInput, match=r"adaptation\.json: cannot be read"):
+        put_back(tmp_path, 0)
+    (folder / "adaptation.json").write_text("{}")
+    with pytest.raises(UnusableInput, match="expected the history"):
+        read_history(folder)
+
+
+def test_an_agent_with_another_simulation_is_another_agent(moved: Path, policy: AnyAgent, tmp_path: Path) -> None:
+    folder = tmp_path / "copy"
+    shutil.copytree(moved, folder)
+    assert isinstance(policy, PolicyAgent)
+    other = replace(policy, simulation=replace(policy.simulation, error_std=2 * policy.simulation.error_std))
+    with pytest.raises(UnusableInput, match="agent was"):
+        transfer_into(folder, other, VirtualArm(seed=4), POLICY, seed=1)
+
+
+def test_a_version_that_is_taken_back_moves_the_arm_no_more(
+    policy: AnyAgent, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Whatever was earned: this is about what happens after the verdict, which tests of its own are about.
+    monkeypatch.setattr(
+        "pneumarm.learning.fleet.adaptation.verdict", lambda old, new, settings: "worse" if len(new) == 3 else "open"
+    )
+    settings = replace(POLICY, episodes=16, test_episodes=10, adaptation=replace(POLICY.adaptation, growth=3.0))
+    result = transfer_into(tmp_path / "t", policy, VirtualArm(seed=4), settings, seed=1)
+    assert result["rolled_back"]
+    history = read_history(tmp_path / "t")
+    back = next(event for event in history.events if event.what == "rolled back")
+    at = back.movement
+    np.testing.assert_array_equal(
+        *np.moveaxis(history.squares[at : at + 2], 1, 0)
+    )  # the one that arrived moves again
+    assert (tmp_path / "t" / "agents" / f"{back.figures['taken_back']:03d}.safetensors").exists()
 
 
 def _saved(agent: AnyAgent, folder: Path) -> bytes:

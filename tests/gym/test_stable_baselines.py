@@ -57,6 +57,19 @@ def test_the_vector_tells_how_movements_ended() -> None:
     assert False in kinds
 
 
+def test_rewards_are_scaled_and_nothing_else_changes() -> None:
+    def rewards(scale: float) -> np.ndarray:
+        many = StableVector(PointToPointVector(SIMULATION, BEGIN, 3, autoreset_mode=AutoresetMode.SAME_STEP), scale)
+        many.seed(1)
+        many.reset()
+        random = np.random.default_rng(0)
+        return np.array([many.step(random.integers(0, 9, 3))[1] for _ in range(50)])
+
+    np.testing.assert_allclose(rewards(0.5), 0.5 * rewards(1.0))
+    with pytest.raises(UnusableInput, match="reward_scale"):
+        rewards(0.0)
+
+
 def test_what_cannot_be_imported_is_refused() -> None:
     with pytest.raises(UnusableInput, match="SAME_STEP"):
         StableVector(PointToPointVector(SIMULATION, BEGIN, 2))

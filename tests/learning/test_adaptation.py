@@ -1,6 +1,8 @@
 """Adapting to an arm: a changed one is learned, an unchanged one is left alone, what is unseen is not forgotten."""
 
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import repeat
 
 import numpy as np
 import pytest
@@ -10,9 +12,20 @@ from pneumarm.arm import BeginState, ControlCycle, Reading, guarded
 from pneumarm.arm.valves import VALVES
 from pneumarm.control import PlanAgent
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Adaptation, AdaptationSettings, PolicyAgent, PolicySettings, adaptation
+from pneumarm.learning import (
+    Adaptation,
+    AdaptationSettings,
+    PolicyAgent,
+    PolicySettings,
+    RefitSettings,
+    TrialSettings,
+    WatchSettings,
+    adaptation,
+    fingerprint,
+    told,
+)
 from pneumarm.learning import train as train_any
-from pneumarm.learning.fleet.adaptation import adapted_simulation, rehearse
+from pneumarm.learning.fleet.refit import _outputs_fitted, refit, rehearse
 from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.quality import residue
@@ -21,7 +34,8 @@ from pneumarm.transitions.rows import Recorded, Rows, joined
 from pneumarm.transitions.window import transitions
 
 POLICY = PolicySettings(updates=40, agents=1, arms=32, steps=16, hidden=(8,), validation_episodes=200, lookahead=0)
-SETTINGS = AdaptationSettings(updates=20, warm_up=5)
+REFIT = RefitSettings(fewest_rehearsed=300)
+SETTINGS = AdaptationSettings(updates=20, warm_up=5, refit=REFIT)
 
 
 def changed(simulation: Simulation, by: float = 1.4) -> Simulation:
@@ -90,68 +104,190 @@ def test_what_is_rehearsed_is_what_the_simulation_says_of_movements(joints: int,
     assert set(np.unique(made.inputs[:, -commands:])) == {-1, 0, 1}
 
 
+def movement(rows: Rows, number: int) -> Rows:
+    chosen = rows.sequence == number
+    return Rows(**{name: values[chosen] for name, values in vars(rows).items()})
+
+
+def first_of(rows: Rows, movements: int) -> Rows:
+    return joined([movement(rows, number) for number in range(movements)])
+
+
 @pytest.mark.parametrize("joints", [1, 2])
 def test_a_changed_arm_is_learned_and_judged_on_other_movements(joints: int) -> None:
     origin = synthetic_simulation(joints)
     arm = changed(origin)
-    fitted = adapted_simulation(origin, origin, moved(arm, 60), SETTINGS, 0)
-    assert fitted is not None
+    found = refit(origin, origin, moved(arm, 60), REFIT, 0)
+    assert found is not None
+    assert found.better
     fresh = moved(arm, 20, seed=9)
-    assert np.log(squares(fitted, fresh) / squares(origin, fresh)).mean() < np.log(0.3)
-    found = residue(fitted, transitions(fresh, origin.window)).std(axis=0).reshape(joints, -1)
-    np.testing.assert_allclose(fitted.error_std, found, rtol=0.5)
-    assert fitted.scaling is origin.scaling
-    assert fitted.spec == origin.spec
+    assert np.log(squares(found.simulation, fresh) / squares(origin, fresh)).mean() < np.log(0.3)
+    error = residue(found.simulation, transitions(fresh, origin.window))
+    np.testing.assert_allclose(
+        found.simulation.error_std, np.sqrt((error**2).mean(axis=0)).reshape(joints, -1), rtol=0.5
+    )
+    assert found.simulation.scaling is origin.scaling
+    assert found.simulation.spec == origin.spec
 
 
-def test_an_arm_that_is_as_it_was_changes_nothing(agent: PolicyAgent) -> None:
-    rows = moved(agent.simulation, 60)
-    adapting = Adaptation(agent, SETTINGS)
-    adapting.learn(rows, 100)
-    assert adapting.agent is agent
-    assert adapting.accepted == 0
-
-
-def test_rehearsal_keeps_what_the_movements_do_not_show() -> None:
+def test_few_movements_are_enough_for_a_large_change_and_spoil_nothing_elsewhere() -> None:
     origin = synthetic_simulation()
-    rows = moved(changed(origin), 60)
-    unseen = rehearse(origin, transitions(rows, origin.window), 1000, np.random.default_rng(5))
-    forgotten = []
-    for share in (0.0, 1.0):
-        fitted = adapted_simulation(origin, origin, rows, replace(SETTINGS, rehearsed=share), 0)
-        assert fitted is not None
-        forgotten.append(np.mean((residue(fitted, unseen) / origin.scaling.observation_scale) ** 2))
-    assert forgotten[1] < forgotten[0]
+    arm = changed(origin)
+    found = refit(origin, origin, moved(arm, 10), REFIT, 0)
+    assert found is not None
+    assert found.better
+    elsewhere = rehearse(arm, transitions(moved(arm, 30, seed=8), origin.window), 2000, np.random.default_rng(5))
+    unit = origin.error_std.ravel()[origin.outputs] ** 2
+    (angle, *after), (_, *before) = (
+        (residue(one, elsewhere) ** 2).mean(axis=0)[origin.outputs] / unit for one in (found.simulation, origin)
+    )
+    assert angle < 0.1  # it has not changed
+    assert np.all(np.array(after) < 0.75 * np.array(before))
+
+
+def test_output_weights_are_those_of_ridge_regression(changed_rows: Rows) -> None:
+    origin = synthetic_simulation()
+    known = transitions(changed_rows, origin.window)
+    stiff, free = (_outputs_fitted(origin, known, ridge) for ridge in (1e12, 1e-9))
+    x = origin.scaling.inputs(known.inputs, origin.window)
+    for output, place in enumerate(origin.outputs):
+        before = origin.networks[output]
+        np.testing.assert_allclose(stiff[output].output_weights, before.output_weights, atol=1e-6)
+        hidden = np.tanh(x @ before.hidden_weights + before.hidden_bias)
+        hidden = np.concatenate([hidden, np.ones((len(x), 1))], axis=1)
+        scale = origin.scaling.observation_scale[place]
+        wanted = (known.target[:, place].astype(np.float64) - known.inputs[:, place]) / scale
+        best = hidden @ np.linalg.lstsq(hidden, wanted, rcond=None)[0]
+        np.testing.assert_allclose(free[output](x)[:, 0], best, atol=1e-4)
 
 
 def test_too_few_movements_are_left_alone(agent: PolicyAgent, changed_rows: Rows) -> None:
-    few = Rows(**{name: values[changed_rows.sequence < 10] for name, values in vars(changed_rows).items()})
-    assert adapted_simulation(agent.simulation, agent.simulation, few, SETTINGS, 0) is None
+    few = first_of(changed_rows, 2 * REFIT.folds - 1)
+    assert refit(agent.simulation, agent.simulation, few, REFIT, 0) is None
+    adapting = Adaptation(agent, SETTINGS)
+    assert not adapting.learn(few)
+    assert adapting.agent is agent
+    assert adapting.events == []
 
 
-def test_it_is_reproducible_and_its_state_is_all_there_is(agent: PolicyAgent, changed_rows: Rows) -> None:
-    one, other, resumed = (Adaptation(agent, SETTINGS, seed=3) for _ in range(3))
+def test_an_arm_that_is_as_it_was_changes_nothing(agent: PolicyAgent) -> None:
+    # Its error is that of an arm with this noise, so that there is nothing to gain.
+    adapting = Adaptation(agent, SETTINGS)
+    for seed in range(3):
+        assert not adapting.learn(moved(agent.simulation, 40, seed))
+    assert adapting.agent is agent
+    assert adapting.accepted == 0
+    assert [event.what for event in adapting.events] == ["refused"] * 3
+
+
+def told_of(adapting: Adaptation, rows: Rows, rewards: float | Iterable[float]) -> None:
+    numbers = np.unique(rows.sequence)
+    each = repeat(rewards) if isinstance(rewards, int | float) else rewards
+    for number, reward in zip(numbers, each, strict=False):
+        adapting.saw(movement(rows, number), reward)
+
+
+def test_a_change_is_noticed_and_only_movements_since_then_are_used(agent: PolicyAgent) -> None:
+    # The error of the simulation is said to be that of the arm's noise, see ``moved``.
+    exact = replace(agent.simulation, error_std=0.15 * agent.simulation.error_std)
+    adapting = Adaptation(replace(agent, simulation=exact), SETTINGS)
+    told_of(adapting, moved(agent.simulation, 30), 30.0)
+    assert [event.what for event in adapting.events] == []
+    assert adapting.usable == 30
+    told_of(adapting, moved(changed(agent.simulation), 30, seed=1), 30.0)
+    (event,) = adapting.events
+    assert event.what == "noticed"
+    assert 31 <= event.movement <= 40
+    assert 28 <= event.figures["since"] <= 31
+    assert adapting.usable == 60 - event.figures["since"]
+    assert adapting.is_due()
+    assert "changed" in told(adapting.events, adapting.quantities)[0]
+
+
+def test_when_to_adapt_is_after_ever_more_movements(agent: PolicyAgent, changed_rows: Rows) -> None:
+    adapting = Adaptation(agent, replace(SETTINGS, first=4, growth=2.0, every=10))
+    due = []
+    for number in range(40):
+        adapting.saw(movement(changed_rows, number), 30.0)
+        if adapting.is_due():
+            due.append(adapting.movements)
+            adapting._tried = adapting.movements
+    assert due == [4, 8, 16, 26, 36]
+
+
+@pytest.fixture(scope="module")
+def adapted(agent: PolicyAgent, changed_rows: Rows) -> bytes:
+    """Return the state of an agent that has become version 1 after ten movements with a reward of about 30."""
+    adapting = Adaptation(agent, SETTINGS, seed=3)
+    first = first_of(changed_rows, 10)
+    told_of(adapting, first, np.linspace(28, 32, 10))
+    assert adapting.is_due()
+    assert adapting.learn(first)
+    assert adapting.version == 1
+    return adapting.get_state()
+
+
+def resumed(agent: PolicyAgent, state: bytes) -> Adaptation:
+    adapting = Adaptation(agent, SETTINGS, seed=3)
+    adapting.set_state(state)
+    return adapting
+
+
+def test_an_agent_that_earns_less_is_taken_back(agent: PolicyAgent, adapted: bytes, changed_rows: Rows) -> None:
+    adapting = resumed(agent, adapted)
+    assert adapting.agent.policy is not agent.policy
+    told_of(adapting, changed_rows, [*np.linspace(0, 20, 9)])
+    assert adapting.version == 1  # nobody has looked yet
+    adapting.saw(movement(changed_rows, 50), 10.0)
+    assert adapting.version == 0
+    np.testing.assert_array_equal(adapting.agent.policy, agent.policy)
+    for mine, was in zip(adapting.agent.simulation.networks, agent.simulation.networks, strict=True):
+        np.testing.assert_array_equal(mine.output_weights, was.output_weights)
+    assert adapting.events[-1].what == "rolled back"
+    assert not adapting.is_due()
+    assert "taken back" in told(adapting.events, adapting.quantities)[-1]
+
+
+def test_an_agent_that_earns_no_less_becomes_the_one_to_go_back_to(
+    agent: PolicyAgent, adapted: bytes, changed_rows: Rows
+) -> None:
+    adapting = resumed(agent, adapted)
+    rewards = np.random.default_rng(0).normal(31, 2, SETTINGS.trial.looks[-1])
+    for number, reward in enumerate(rewards):
+        adapting.saw(movement(changed_rows, number % 60), float(reward))
+    assert adapting.version == 1
+    assert adapting._trusted is adapting.agent
+
+
+def test_movements_of_a_test_take_nothing_back(agent: PolicyAgent, adapted: bytes, changed_rows: Rows) -> None:
+    adapting = resumed(agent, adapted)
+    for number in range(40):
+        adapting.saw(movement(changed_rows, number), -100.0, judges=False)
+    assert adapting.version == 1
+
+
+def test_it_is_reproducible_and_its_state_is_all_there_is(
+    agent: PolicyAgent, adapted: bytes, changed_rows: Rows
+) -> None:
+    one = Adaptation(agent, SETTINGS, seed=3)
+    first = first_of(changed_rows, 10)
+    told_of(one, first, np.linspace(28, 32, 10))
+    one.learn(first)
+    assert one.get_state() == adapted != Adaptation(agent, SETTINGS).get_state()
+    other = resumed(agent, adapted)
+    more = moved(changed(agent.simulation, 2.2), 30, seed=4)
     for adapting in (one, other):
-        adapting.learn(changed_rows, 100)
-    assert one.accepted == 1
-    assert one.get_state() == other.get_state() != Adaptation(agent, SETTINGS).get_state()
-    resumed.set_state(one.get_state())
-    assert resumed.get_state() == one.get_state()
-    assert not resumed.is_due(100)
-    assert resumed.is_due(200)
-    more = moved(changed(agent.simulation, 1.8), 60, seed=4)
-    for adapting in (one, resumed):
-        adapting.learn(more, 200)
-    assert one.accepted == 2
-    assert one.get_state() == resumed.get_state()
-    for damaged in (b"", one.get_state()[:-1], one.get_state()[:-8], b"\xff" * len(one.get_state())):
+        told_of(adapting, more, 25.0)
+        assert adapting.learn(more)
+    assert one.get_state() == other.get_state()
+    for damaged in (b"", adapted[:-1], adapted[:-8], b"\xff" * len(adapted)):
         with pytest.raises(UnusableInput, match="state of the adaptation"):
-            resumed.set_state(damaged)
+            other.set_state(damaged)
 
 
 def test_the_policy_gets_better_in_the_new_simulation(agent: PolicyAgent, changed_rows: Rows) -> None:
     adapting = Adaptation(agent, SETTINGS)
-    adapting.learn(changed_rows, 100)
+    assert adapting.learn(changed_rows)
     begin = synthetic_begin_states(agent.simulation)
     now = changed(agent.simulation)
     before, after = (one.test(now, begin, 1000, (1,)).reward.mean() for one in (agent, adapting.agent))
@@ -164,5 +300,19 @@ def test_only_what_can_adapt_does(agent: PolicyAgent) -> None:
     linear = replace(agent, simulation=synthetic_simulation(direct=True))
     assert adaptation(linear, AdaptationSettings()) is None
     assert adaptation(PlanAgent(agent.simulation), AdaptationSettings()) is None
-    with pytest.raises(UnusableInput, match="judged"):
-        AdaptationSettings(judged=1.0)
+    for wrong in (
+        lambda: AdaptationSettings(growth=1.0),
+        lambda: RefitSettings(folds=1),
+        lambda: WatchSettings(allowance=5.0),
+        lambda: TrialSettings(looks=(10, 10)),
+    ):
+        with pytest.raises(UnusableInput):
+            wrong()
+
+
+def test_a_fingerprint_tells_agents_by_their_simulation_too(agent: PolicyAgent) -> None:
+    other = replace(agent, simulation=changed(agent.simulation))
+    narrower = replace(agent, simulation=replace(agent.simulation, goal_range=agent.goal_range + 1))
+    found = [fingerprint(one) for one in (agent, other, narrower, agent.with_weights(agent.weights() + 1))]
+    assert len(set(found)) == 4
+    assert fingerprint(replace(agent)) == found[0]

@@ -7,7 +7,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.kernels import kernel
 from pneumarm.learning import PolicySettings
 from pneumarm.learning.environment import begin_episode, environment, episode, take
-from pneumarm.learning.fleet.arms import begin_all, fleet, is_useful, limits, note_still, take_all
+from pneumarm.learning.fleet.arms import begin_all, fleet, is_useful, limits, note_still, take_alive, take_all
 from pneumarm.random import random_states
 
 ARMS = 5
@@ -63,6 +63,34 @@ def test_an_arm_does_not_depend_on_its_neighbours() -> None:
             take_all(env, bounds, arms, actions, reached)
         found.append(arms.x[:, 2].copy())
     np.testing.assert_array_equal(*found)
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_arms_that_are_done_stay_and_the_others_do_not_notice(joints: int) -> None:
+    simulation = synthetic_simulation(joints)
+    env = environment(simulation, synthetic_begin_states(simulation), PolicySettings())
+    bounds = limits(simulation.window, simulation.scaling, simulation.spec, 25.0)
+    all_arms, some = (fleet(env, random_states(4, ARMS)) for _ in range(2))
+    begin_all(env, all_arms)
+    begin_all(env, some)
+    random, alive, reached = np.random.default_rng(0), np.ones(ARMS, bool), np.zeros((2, ARMS), bool)
+    for _ in range(20):
+        alive &= random.random(ARMS) < 0.9 + 0.1 * (np.arange(ARMS) == 0)  # one goes on to the end
+        before = [array.copy() for array in (some.x, some.random, some.taken, reached[1])]
+        actions = random.integers(0, 9, (ARMS, joints))
+        take_all(env, bounds, all_arms, actions, reached[0])
+        take_alive(env, bounds, some, actions, alive, reached[1])
+        np.testing.assert_array_equal(some.x[:, alive], all_arms.x[:, alive])
+        np.testing.assert_array_equal(reached[:, alive][0], reached[:, alive][1])
+        for name in ("average", "random", "actions", "switched", "still", "taken"):
+            one, other = getattr(some, name), getattr(all_arms, name)
+            chosen = (slice(None), alive) if name == "average" else alive
+            np.testing.assert_array_equal(one[chosen], other[chosen], err_msg=name)
+        for was, now in zip(before, (some.x, some.random, some.taken, reached[1]), strict=True):
+            done = (slice(None), ~alive) if was.shape == some.x.shape else ~alive
+            np.testing.assert_array_equal(was[done], now[done])
+    assert alive.any()
+    assert not alive.all()
 
 
 @kernel

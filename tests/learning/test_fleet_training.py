@@ -21,6 +21,8 @@ from pneumarm.learning import (
     TrainSettings,
     load_agent,
     test,
+    test_ahead,
+    tested_results,
     train,
 )
 from pneumarm.learning.fleet.agent import KIND
@@ -227,3 +229,23 @@ def test_the_batched_agent_goes_on_as_the_thesis(trained: dict[str, FleetTrainin
     assert isinstance(agent.settings, TrainSettings)
     agent.save(tmp_path / "agent")
     assert load_agent(tmp_path / "agent").learns
+
+
+def test_looking_ahead_is_tested_on_the_first_of_the_same_movements(
+    agent: PolicyAgent, trained: dict[str, FleetTraining], simulation: Simulation, begin: BeginStates
+) -> None:
+    plain, ahead = test(agent, simulation, begin, 120, seed=4), test_ahead(agent, simulation, begin, 100, seed=4)
+    assert ahead is not None
+    np.testing.assert_array_equal(ahead.goal, plain.goal[:100])
+    np.testing.assert_array_equal(ahead.angle_begin, plain.angle_begin[:100])
+    assert ahead.reward.mean() > plain.reward[:100].mean()  # a short training leaves much to be seen ahead
+    found = tested_results(plain, ahead)
+    assert found["reward"] == plain.results()["reward"]
+    assert found["lookahead"] == ahead.results()
+    blind = replace(agent, settings=replace(agent.settings, lookahead=0))
+    assert test_ahead(blind, simulation, begin, 10) is None
+    assert test_ahead(trained["batched"].agent, simulation, begin, 10) is None
+    assert tested_results(plain, None)["lookahead"] is None
+    scaling = replace(simulation.scaling, observation_scale=2 * simulation.scaling.observation_scale)
+    with pytest.raises(UnusableInput, match="another simulation"):
+        test_ahead(agent, replace(simulation, scaling=scaling), begin, 10)

@@ -164,6 +164,29 @@ def test_it_stops_at_a_perfect_fit() -> None:
     assert fit.mse[-1] < 1e-20
 
 
+def test_anchored_weights_decay_towards_the_start() -> None:
+    x, y = data(80, 3, 2)
+    start = random_network(3, 4, 2, seed=2)
+    free, held, fixed = (
+        levenberg_marquardt(x, y, start, LevenbergMarquardt(epochs=20, decay=decay, anchored=True)).network
+        for decay in (0.0, 1.0, 1e9)
+    )
+
+    def away(network: Network) -> float:
+        return sum(
+            float(np.square(getattr(network, name) - getattr(start, name)).sum())
+            for name in ("hidden_weights", "hidden_bias", "output_weights", "output_bias")
+        )
+
+    assert away(fixed) < 1e-12
+    assert 0 < away(held) < away(free)
+    problem = Problem(x, y, start, 0.5, anchored=True)
+    weights = problem.pack(start) + 0.1
+    shifts = 1e-5 * np.eye(len(weights))
+    slope = [(problem.error(weights + s) - problem.error(weights - s)) / 2e-5 for s in shifts]
+    np.testing.assert_allclose(2 * problem.normal_equations(weights).gradient, slope, rtol=1e-4, atol=1e-5)
+
+
 def test_decay_keeps_weights_small() -> None:
     x, y = data(200, 3, 1, seed=10)
     start = nguyen_widrow(3, 8, 1, 0)

@@ -3,7 +3,11 @@
 import numpy as np
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.control import Adapted
+from pneumarm.learning import Event
 from pneumarm.report import CoverageData, Episodes, Movement, QualityData, RunData, TrainingData, TransferData
+from pneumarm.report.figures import Rival
+from pneumarm.statistics import Estimate
 from pneumarm.transitions.window import QUANTITIES, Window
 
 
@@ -120,6 +124,23 @@ def transfer(joints=1, counts=(500, 1500, 500), seed=0):
     return TransferData(*phases, learning_rate=0.05)
 
 
+def adaptation(movements=300, joints=1, seed=0):
+    random = np.random.default_rng(seed)
+    of = [""] + [f" of joint {joint + 1}" for joint in range(1, joints)]
+    quantities = [name + which for which in of for name in ("angle", "pressure_1", "pressure_2")]
+    squares = np.round(random.gamma(3.0, 1 / 3, (movements, 2, len(quantities))), 4)
+    squares[40:, 0] *= 4
+    squares[40:60, 1] *= 4
+    ratios = [2.0] * len(quantities)
+    events = [
+        Event("noticed", 46, 0, {"since": 40, "ratio": ratios}),
+        Event("refused", 50, 0, {"movements": 10, "before": ratios, "after": ratios}),
+        Event("accepted", 60, 1, {"movements": 20, "before": ratios, "after": [1.0] * len(quantities)}),
+        Event("rolled back", 100, 0, {"taken_back": 1, "reward_before": 38.0, "reward_after": 31.0}),
+    ]
+    return Adapted(0, quantities, squares, [event for event in events if event.movement <= movements])
+
+
 def movement(name="large displacement", goal=70.0, joints=1, n=45, reached=True):
     spec = ArmSpec(joints=joints)
     t = 7300 + np.arange(n) / 30
@@ -150,8 +171,38 @@ def results():
             "seconds": 1.9,
         },
         "training": {"episodes": 280_000, "steps": 9_000_000, "seconds": 4.2, "steps_per_second": 2.1e6},
+        "test": {"lookahead": tested(37.4)},
         "transfer": {"learning_rate": 0.05},
+        "bound": {
+            "open_loop": tested(40.2),
+            "closed_loop": tested(39.9),
+            "distance": {
+                phase: {planner: below(by) for planner, by in (("open_loop", 2.1), ("closed_loop", 1.8))}
+                for phase in ("before", "after")
+            },
+        },
     }
+
+
+def tested(reward):
+    means = {"reward": reward, "success_rate": 0.998, "actions": 8.9, "switches": 0.31}
+    return {"episodes": 500, **means, "intervals": {name: [0.99 * v, 1.002 * v] for name, v in means.items()}}
+
+
+def below(by):
+    return {"episodes": 150, "reward": by, "interval": [by - 0.5, by + 0.5]}
+
+
+def rivals(agents=3, seed=0):
+    """Methods that were trained, each with some agents, and levels that need no training."""
+    random = np.random.default_rng(seed)
+    trained = []
+    for name, seconds, reward in (("policy", 4.0, 38.0), ("sarsa", 2.0, 21.0), ("ppo", 60.0, 35.0))[: agents and 3]:
+        means = reward + random.normal(0, 2, agents)
+        spent = seconds * random.uniform(0.8, 1.2, agents)
+        mean = Estimate(float(means.mean()), float(means.mean()) - 0.6, float(means.mean()) + 0.6, 500 * agents)
+        trained.append(Rival(name, spent, means, mean))
+    return trained, {"open loop": Estimate(40.2, 39.6, 40.8, 500), "planning": Estimate(38.8, 38.0, 39.6, 500)}
 
 
 def run(joints=1, small=False):
@@ -166,6 +217,7 @@ def run(joints=1, small=False):
         training=training(),
         test=episodes(10_000 // part, joints, on_arm=False, success=0.995),
         transfer=transfer(joints, (500 // part, 1500 // part, 500 // part)),
+        adaptation=adaptation(2500 // part, joints),
         movements=(
             movement("large displacement", 70.0, joints),
             movement("typical displacement", 30.0, joints),

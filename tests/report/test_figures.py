@@ -27,6 +27,8 @@ def figures_of(n, joints):
     won = test.success
     far = (test.distance[won], test.actions[won], test.switches[won])
     real, simulated = q.target - q.observation, q.predicted - q.observation
+    adapted = builders.adaptation(n, joints)
+    marks = [figures.Mark(event.movement, event.what) for event in adapted.events]
     m = builders.movement(joints=joints, n=max(n // 8, 1))
     made = {
         "projections": figures.projections(seen.observation, spec),
@@ -40,6 +42,8 @@ def figures_of(n, joints):
         "distributions": figures.distributions(test.reward, test.actions, test.switches, won),
         "transfer": figures.transfer_curves(phases, levels(test)),
         "displacement": figures.against_displacement(*far, spec),
+        "rivals": figures.rivals(*(builders.rivals(min(n, 10)) if n else ([], {}))),
+        "adaptation": figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14),
         "movement": figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
     }
     if t is not None:
@@ -202,3 +206,28 @@ def test_all_alternatives_hold_computed_numbers():
 def test_a_run_without_anything_has_its_results_only():
     sections = all_sections(RunData(SPEC, {}, test=Episodes.none(1)))
     assert [s.title for s in sections] == ["Results", "Test in the simulation"]
+
+
+def test_rivals_stand_at_their_rewards_beside_the_bound():
+    trained, untrained = builders.rivals()
+    place = figures.rivals(trained, untrained).axes[0]
+    drawn = {(x, y) for line in place.lines for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)}
+    for rival in trained:
+        assert set(zip(rival.seconds, rival.reward, strict=True)) <= drawn
+        assert rival.mean.mean in {y for _, y in drawn}
+    assert {level.mean for level in untrained.values()} <= {y for _, y in drawn}
+    low, high = place.get_ylim()
+    assert low < min(rival.reward.min() for rival in trained) < 40.2 < high
+    assert "open loop: 40.20 without training" in figures.rivals_alt(trained, untrained)
+    assert figures.rivals_alt([], {}) == "Reward against training time. No rival was measured."
+
+
+def test_the_adaptation_is_told_with_its_figures():
+    adapted = builders.adaptation()
+    marks = [figures.Mark(event.movement, event.what) for event in adapted.events]
+    words = figures.adaptation_curves_alt(adapted.squares, adapted.quantities, marks)
+    first = np.sqrt(adapted.squares[:100, 1, 0].mean())
+    assert f"angle {first:.2f} in the first hundred" in words
+    assert words.endswith(
+        "change noticed after movement 46; new version after movement 60; version taken back after movement 100."
+    )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pneumarm.arm import ArmSpec
+from pneumarm.control import save_history
 from pneumarm.errors import UnusableInput
 from pneumarm.report import (
     CoverageData,
@@ -28,6 +29,7 @@ from pneumarm.report import (
 )
 from pneumarm.report.data import COLUMNS
 from pneumarm.report.ledger import beside_thesis, ledger
+from pneumarm.report.sections import overview
 
 VOID = {"meta", "img", "link", "br", "hr", "input"}
 MOST_BYTES = 6e6
@@ -79,10 +81,10 @@ def test_page_asks_nothing_of_any_network(html, page):
 
 def test_every_picture_has_a_caption_and_a_text_alternative(page):
     pictures = [attrs for tag, attrs in page.elements if tag == "img"]
-    assert len(pictures) == 17
+    assert len(pictures) == 18
     assert all(len(attrs["alt"]) > 60 for attrs in pictures)
     tags = [tag for tag, _ in page.elements]
-    assert tags.count("figcaption") == tags.count("figure") == 17 + tags.count("table")
+    assert tags.count("figcaption") == tags.count("figure") == 18 + tags.count("table")
 
 
 def test_ids_are_unique_and_the_contents_lead_to_every_section(page):
@@ -149,6 +151,7 @@ def save(folder, run):
     save_spec(folder, run.spec)
     for record in (run.coverage, run.quality, run.training, run.test):
         record.save(folder)
+    save_history(folder, run.adaptation)
     for number, movement in enumerate(run.movements):
         save_movement(folder, movement, number)
     with open(folder / "episodes.csv", "w", newline="") as file:
@@ -176,6 +179,8 @@ def test_what_a_run_leaves_in_its_folder_comes_back(tmp_path, joints):
         for name in sent.shapes:
             assert np.array_equal(getattr(back, name), getattr(sent, name)), name
     assert found.transfer.learning_rate == 0.05
+    assert found.adaptation.events == run.adaptation.events
+    np.testing.assert_array_equal(found.adaptation.squares, run.adaptation.squares)
     assert [m.end for m in found.movements] == [m.end for m in run.movements]
 
 
@@ -260,3 +265,15 @@ def test_success_may_be_written_as_a_word(tmp_path):
     row = "after,600,1,2,500,601,0.2,10,1,33,{}\n"
     path.write_text(",".join(COLUMNS) + "\n" + row.format("True") + row.format("False"))
     assert read_episodes(path)["after"].success.tolist() == [True, False]
+
+
+def test_the_distance_to_the_bound_is_told_or_why_it_is_not(html):
+    text = " ".join(Page(html).text).replace("\u00a0", " ")
+    assert "planning with the arm's true physics finds there is 40.20; the controller is 2.10 below it" in text
+    assert "1.80 (1.30 to 2.30)" in text
+    assert "37.40 (37.03 to 37.47)" in text  # looking ahead
+    unknown = {"bound": {"missing": "mine is no virtual arm: its true physics is not known"}}
+    told = overview(RunData(ArmSpec(), unknown))
+    assert "mine is no virtual arm" in told.text[-1]
+    for results in (unknown, {}):
+        assert len(overview(RunData(ArmSpec(), results)).tables) == len(overview(builders.run(small=True)).tables) - 1

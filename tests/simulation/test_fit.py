@@ -11,7 +11,7 @@ import pytest
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.simulation import FitResult, FitSettings, by_quantity, fit, fit_store, refiltered
-from pneumarm.transitions import Store, held_out
+from pneumarm.transitions import GridSettings, Store, held_out
 from pneumarm.transitions.rows import Recorded, Rows
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
 
@@ -186,6 +186,23 @@ def test_a_store_is_filtered_fitted_and_judged(make_rows: Callable[..., Rows], t
         other = replace(result.simulation, window=Window(2, 3))
         with pytest.raises(UnusableInput, match="belong together"):
             refiltered(store, other)
+
+
+def test_the_fewest_transitions_allowed_can_be_fitted_with_any_seed(
+    make_rows: Callable[..., Rows], tmp_path: Path
+) -> None:
+    stored(tmp_path / "store.db", make_rows(sequences=10, steps=200))
+    everything = GridSettings(per_cell=1_000_000)
+    with Store.open(tmp_path / "store.db") as store:
+        numbers = [entry.number for entry in store.catalogue()]
+        unlucky = [seed for seed in range(100) if not held_out(numbers, 0.1, seed).any()]
+        for seed in unlucky[:3]:
+            result, filtered = fit_store(store, FitSettings(epochs=3, hidden=3, seed=seed), everything)
+            assert result.held_out.rows == 200
+            assert result.rows == 1800
+            assert result.generalisation is None  # the filter left nothing out
+            again = refiltered(store, result.simulation, everything)
+            np.testing.assert_array_equal(again.transitions.inputs, filtered.transitions.inputs)
 
 
 def test_a_small_store_is_refused(make_rows: Callable[..., Rows], tmp_path: Path) -> None:

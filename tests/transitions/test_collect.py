@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from stand_ins import FirstOrderArm
 
-from pneumarm.arm import ArmSpec, BeginState
+from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import to_actions
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.transitions import CollectSettings, Store, collect
+from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
 
-SHORT = CollectSettings(actions=100, begin=BeginState(deflate=0.5, inflate=0.5, settle=0.2))
+SHORT = CollectSettings(actions=100, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
 
 
 def collected(folder, name="s.db", joints=1, count=2000, settings=SHORT, arm=None, **options):
@@ -138,7 +138,7 @@ def test_a_killed_collection_resumes_bit_for_bit(tmp_path, python):
 import os, signal, sys
 from stand_ins import FirstOrderArm
 from pneumarm.arm import BeginState
-from pneumarm.transitions import CollectSettings, Store, collect
+from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
 from pathlib import Path
 path, reads = Path(sys.argv[1]), int(sys.argv[2])
 class Killed(FirstOrderArm):
@@ -147,7 +147,7 @@ class Killed(FirstOrderArm):
             os.kill(os.getpid(), signal.SIGKILL)
         return super().read()
 arm = Killed()
-settings = CollectSettings(actions=100, begin=BeginState(deflate=0.5, inflate=0.5, settle=0.2))
+settings = CollectSettings(actions=100, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
 with (Store.append_to(path) if path.exists() else Store.create(path, arm.spec)) as store:
     collect(arm, store, 2000, settings=settings)
 """

@@ -11,7 +11,7 @@ from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import ACTIONS, to_valves
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.transitions import Grid, GridSettings, Store, Window, enough_data, filter_transitions, held_out
-from pneumarm.transitions.choice import hashed_uniform, joined, sample
+from pneumarm.transitions.choice import hashed_uniform, joined, sample, share_held_out
 from pneumarm.transitions.grid import CellCounts, Coverage
 
 COARSE = GridSettings(angle_bins=3, velocity_bins=2, pressure_bins=2)
@@ -149,6 +149,23 @@ def test_held_out_sequences_do_not_change_with_more_data():
     assert many.mean() == pytest.approx(0.1, abs=0.01)
     assert held_out(7, 1.0).tolist() == [True]
     assert not held_out(np.arange(1000), 0.0).any()
+
+
+@given(st.integers(0, 2**31), st.integers(3, 30), st.floats(0.0, 0.5))
+def test_of_few_sequences_at_least_one_is_held_out_and_one_is_not(seed, count, fraction):
+    sequences = np.arange(1, count + 1)
+    share = share_held_out(sequences, fraction, seed)
+    usual, apart = held_out(sequences, fraction, seed), held_out(sequences, share, seed)
+    if usual.any():
+        assert share == fraction
+    else:
+        assert apart.sum() == 1
+        assert share_held_out(sequences[~apart], fraction, seed) > share  # the smallest that does it
+
+
+def test_a_single_sequence_is_not_held_out_for_want_of_others():
+    alone = [share_held_out(np.array([1]), 0.1, seed) for seed in range(50)]
+    assert alone == [0.1] * 50
 
 
 @given(st.integers(0, 2**40), st.integers(0, 2**40))

@@ -9,15 +9,18 @@ from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.errors import UnusableInput
 
 _FORMS = (
-    "virtual, virtual:seed=7, virtual:preset=A, simulation:FILE, serial:PORT, emulated:ARM or python:module:callable"
+    "virtual, virtual:seed=7, virtual:preset=A, virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
+    "emulated:ARM or python:module:callable"
 )
+_FAULTS = ",faults="
 _SPEC = ",spec="
 
 
 def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     """Return the arm called ``name``; ``seed`` seeds the noise of its sensors and of its surroundings.
 
-    ``virtual`` is the nominal virtual arm, ``virtual:seed=N`` another one from the distribution of arms;
+    ``virtual`` is the nominal virtual arm, ``virtual:seed=N`` another one from the distribution of arms,
+    ``virtual:seed=N,faults=PLAN.toml`` one with faults (:mod:`pneumarm.arm.virtual.faults`);
     ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
     ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
     ``python:module:callable`` calls ``callable()`` for the arm.
@@ -46,32 +49,43 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
 def _open(name: str, seed: int, spec: ArmSpec | None = None) -> Arm:
     kind, _, rest = name.partition(":")
     if kind == "virtual":
-        from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters
-
-        if not rest:
-            return VirtualArm(seed=seed)
-        key, _, value = rest.partition("=")
-        if key == "seed" and value.isdecimal():
-            return VirtualArm(draw_parameters(int(value)), seed=seed, name=name)
-        if key == "preset":
-            return VirtualArm(preset_parameters(value), seed=seed, name=name)
-    elif kind == "simulation" and rest:
-        from pneumarm.simulation import Simulation, SimulationArm
-
-        return SimulationArm(Simulation.load(Path(rest)), seed=seed)
-    elif kind == "serial" and rest:
-        from pneumarm.arm.serial.arm import SerialArm
-        from pneumarm.arm.serial.port import SerialPort
-
-        return SerialArm(SerialPort(rest), spec or ArmSpec(name=name))
-    elif kind == "emulated" and rest:
+        return _virtual(name, rest, seed)
+    if kind == "emulated" and rest:
         from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
 
         inner = _open(rest, seed)
         return SerialArm(BoardLine(EmulatedBoard(inner)), replace(spec or inner.spec, name=name))
-    elif kind == "python" and rest.count(":") == 1:
+    if _FAULTS in rest:
+        raise UnusableInput(f"arm {name!r}: only a virtual arm plays faults; remove {_FAULTS!r} and what follows")
+    if kind == "simulation" and rest:
+        from pneumarm.simulation import Simulation, SimulationArm
+
+        return SimulationArm(Simulation.load(Path(rest)), seed=seed)
+    if kind == "serial" and rest:
+        from pneumarm.arm.serial.arm import SerialArm
+        from pneumarm.arm.serial.port import SerialPort
+
+        return SerialArm(SerialPort(rest), spec or ArmSpec(name=name))
+    if kind == "python" and rest.count(":") == 1:
         return _from_python(rest)
     raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
+
+
+def _virtual(name: str, rest: str, seed: int) -> Arm:
+    """Return the virtual arm with the options ``rest``: seed=N or preset=P, then faults=FILE."""
+    from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, read_plan
+
+    first, separator, file = (rest if not rest.startswith("faults=") else f",{rest}").partition(_FAULTS)
+    key, _, value = first.partition("=")
+    if not first and name != "virtual:":
+        parameters = None
+    elif key == "seed" and value.isdecimal():
+        parameters = draw_parameters(int(value))
+    elif key == "preset":
+        parameters = preset_parameters(value)
+    else:
+        raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
+    return VirtualArm(parameters, seed=seed, name=name, faults=read_plan(file) if separator else ())
 
 
 def _from_python(place: str) -> Arm:

@@ -277,9 +277,12 @@ def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
         return
     frozen = [_is_frozen(test, m) for m in range(2)]
     valves = list(_of_valves(figures, rose, stays, frozen, checkup, name))
+    stuck = [finding for finding in valves if "stuck" in finding.kind]
+    if stuck:
+        yield from stuck  # while air flows that should not, nothing else can be judged
+        return
     yield from valves
-    if not any("stuck" in finding.kind for finding in valves):
-        yield from _of_noise(checkup, j, name)  # while air flows, readings at rest are no noise
+    yield from _of_noise(checkup, j, name)
     yield from _of_potentiometer(checkup, test, figures, name)
 
 
@@ -306,7 +309,7 @@ def _of_valves(
         elif stays[m]:
             told = "its pressure does not fall when its exhaust opens"
             yield Finding("exhaust stuck closed", where, told, "See to the exhaust valve, its wire and its silencer")
-        elif muscle.full < 0.4 * own[m]:
+        elif muscle.full < 0.6 * own[m]:
             told = f"of {own[m]:.2f} bar it keeps {muscle.full:.2f} when its valves close"
             yield Finding("exhaust stuck open", where, told, "See to the exhaust valve; or the muscle has burst")
         elif other[m] > _EVEN or muscle.leak < -LEAK:
@@ -387,7 +390,8 @@ def _rise(test: MuscleTest, checkup: Checkup) -> Array:
 def _stays(test: MuscleTest, m: int, checkup: Checkup) -> bool:
     """Return whether muscle ``m`` keeps most of its air while its exhaust is open."""
     _, hold, exhaust = cut(test, checkup)
-    return bool(exhaust.pressure[-10:, m].mean() > 0.7 * np.median(hold.pressure[:, m]))
+    held = np.median(hold.pressure[:, m])
+    return bool(held > MOVED * checkup.spec.counts_per_bar and exhaust.pressure[-10:, m].mean() > 0.7 * held)
 
 
 def _vents_up(test: MuscleTest, m: int, checkup: Checkup) -> bool:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, Settings
-from pneumarm.console import progress, show, table
-from pneumarm.control import open_controller
+from pneumarm.console import progress, say, show, table
+from pneumarm.control import Monitor, open_controller
 from pneumarm.transitions import CollectSettings, Store, collect, require_enough
 
 
@@ -46,5 +46,10 @@ def collect_(
         Store.for_arm(db, opened.spec) as store,
         progress("collecting") as report,
     ):
-        result = collect(opened, store, transitions, seed, progress=report, settings=settings, controller=player)
+        watch = Monitor(opened.spec)
+        result = collect(
+            opened, store, transitions, seed, progress=report, settings=settings, controller=player, watch=watch
+        )
+    for found in watch.findings:
+        say(f"found: {found}; what was read meanwhile is marked and not learned from")
     show(asdict(result), json, lambda: [table(("collected", ""), list(asdict(result).items()))])

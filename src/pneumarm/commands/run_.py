@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.run import Run, RunSettings
 
@@ -35,5 +36,6 @@ def run_(
     }
     rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
     show(results, json, lambda: [table(("", *COLUMNS), rows, title="Ledger")])
+    say_history(out)
     seconds = sum(results["wall_seconds"].values())
     say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory")

@@ -5,14 +5,19 @@ from pathlib import Path
 from pneumarm.commands.common import Json
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
-from pneumarm.learning import begin_states
+from pneumarm.learning import LOOKING_AHEAD, begin_states, test_ahead, tested_results
 from pneumarm.learning import test as test_agent
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
 
+COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
+
 
 def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: int = 0, json: Json = False) -> None:
     """Test an agent in a simulation: greedy, not learning, from all begin states to all goals.
+
+    An agent that looks ahead on an arm is tested without, and then with it on the first 500 of the movements
+    ("lookahead"): what would move on the arm is the latter, but it takes a hundred times as long.
 
     Parameters
     ----------
@@ -33,5 +38,11 @@ def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: 
     with Store.open(db) as store:
         begin = begin_states(store, simulation.window, simulation.scaling)
     tested = test_agent(trained, simulation, begin, episodes, seed)
-    result = tested.results()
-    show(result, json, lambda: [table(("tested", ""), list(result.items()))])
+    ahead = test_ahead(trained, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
+    result = tested_results(tested, ahead)
+
+    def rows() -> list[tuple[object, ...]]:
+        shown = [("in the simulation", result)] + ([("looking ahead", result["lookahead"])] if ahead else [])
+        return [(name, *[figures[column] for column in COLUMNS]) for name, figures in shown]
+
+    show(result, json, lambda: [table(("tested", *COLUMNS), rows())])

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
 
@@ -37,6 +38,7 @@ def transfer_(
     trained = open_agent(agent)
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
         result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
+    say_history(out)
     say(f"adapted agent: {out / 'adapted.safetensors'}")
     show(
         result,

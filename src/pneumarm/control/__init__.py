@@ -1,7 +1,9 @@
 """Controllers on an arm: agents, movements, transfer and adaptation."""
 
 from pneumarm.control.agent import AgentController
-from pneumarm.control.bound import BoundSettings, Planned, measure_bound
+from pneumarm.control.bound import BoundSettings, Planned, known_bound, measure_bound
+from pneumarm.control.leaks import LeakRates, LeakTest, leak_test, leaking
+from pneumarm.control.monitor import Finding, Monitor, MonitorSettings
 from pneumarm.control.movement import LearningController, Movement, move
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.plan_agent import PlanAgent
@@ -17,13 +19,21 @@ from pneumarm.control.transfer import (
     transfer_into,
     write_episodes,
 )
+from pneumarm.control.versions import Adapted, History, put_back, read_history, save_history, version_keeper
 
 __all__ = [
     "BEGIN",
+    "Adapted",
     "AgentController",
     "BoundSettings",
     "Episode",
+    "Finding",
+    "History",
+    "LeakRates",
+    "LeakTest",
     "LearningController",
+    "Monitor",
+    "MonitorSettings",
     "Movement",
     "PhysicsModel",
     "PlanAgent",
@@ -33,13 +43,20 @@ __all__ = [
     "SimulationModel",
     "TransferSettings",
     "Transferred",
+    "known_bound",
+    "leak_test",
+    "leaking",
     "measure_bound",
     "move",
     "open_agent",
     "open_controller",
     "physics_planner",
+    "put_back",
+    "read_history",
+    "save_history",
     "simulated_planner",
     "transfer",
     "transfer_into",
+    "version_keeper",
     "write_episodes",
 ]

@@ -4,7 +4,7 @@ Thesis section 5.5.1: "We do not know what an optimal controller can achieve." W
 computed, see :mod:`pneumarm.control.planner`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,6 +22,7 @@ from pneumarm.control.transfer import BEGIN, Episode, draw_movement, summary
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Reward
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.statistics import FEWEST, mean_estimate
 from pneumarm.transitions import Store, collect
 
 Rival = Literal["open_loop", "closed_loop", "simulated"]
@@ -59,6 +60,27 @@ class Planned:
         milliseconds = 1e3 * self.seconds
         times = {"median": float(np.median(milliseconds)), "p99": float(np.quantile(milliseconds, 0.99))}
         return {**summary(self.episodes), "decision_ms": times, "unproven_plans": self.unproven}
+
+    def distance(self, reward: NDArray[np.float64]) -> dict[str, Any]:
+        """Return how far another controller stays below, by its ``reward`` (n,) in the first of the same movements.
+
+        The movements are paired, so that easy goals and hard ones do not blur the difference. Their goals are the
+        same, and so are the begin states but for the arm's noise: 2.5 counts on arm 1 of the distribution.
+
+        Raises:
+            UnusableInput: there is no movement to compare.
+
+        """
+        n = min(len(reward), len(self.episodes))
+        if n == 0:
+            raise UnusableInput("a distance to the bound needs at least 1 movement, got none")
+        lost = np.array([episode.reward for episode in self.episodes[:n]]) - reward[:n]
+        estimate = mean_estimate(lost)
+        return {
+            "episodes": n,
+            "reward": estimate.mean,
+            "interval": [estimate.low, estimate.high] if n >= FEWEST else None,
+        }
 
 
 def measured_goal_range(arm: Arm, seed: int = 0) -> NDArray[np.float64]:
@@ -129,6 +151,45 @@ def _movements(
         episodes.append(Episode.of("bound", movement))
         report(number + 1)
     return Planned(episodes, np.array(planner.seconds), planner.unproven)
+
+
+def known_bound(
+    arm: Arm,
+    goal_range: NDArray[np.float64],
+    rewards: Mapping[str, NDArray[np.float64]],
+    settings: BoundSettings,
+    *,
+    seed: int = 0,
+    reward: Reward = Reward(),
+    progress: Callable[[float, float], None] | None = None,
+) -> dict[str, Any]:
+    """Return the bound of ``arm`` where its true physics is known, and how far a controller stays below it.
+
+    Args:
+        arm: any; the true physics is known of a virtual one only. It is not moved.
+        goal_range: goals are drawn from it, shape (joints, 2) [counts].
+        rewards: of the controller's tests on the arm by their names, each shape (n,), in the order of the movements.
+        settings: how many movements, and which plans.
+        seed: of the transfer in which the tests were made.
+        reward: what is paid.
+        progress: called with what is done and the total.
+
+    Returns:
+        ``open_loop`` and ``closed_loop`` with their figures, and ``distance`` from a test's name to the distances
+        to both; ``missing`` says instead why there is none.
+
+    """
+    if not isinstance(arm, VirtualArm):
+        return {"missing": f"{arm.spec.name} is no virtual arm: its true physics is not known"}
+    planned = measure_bound(arm, goal_range, settings, seed=seed, reward=reward, progress=progress)
+    figures: dict[str, Any] = {rival: movements.results() for rival, movements in planned.items()}
+    for found in figures.values():
+        del found["decision_ms"]  # of the machine, not of the arm
+    figures["distance"] = {
+        test: {rival: movements.distance(paid) for rival, movements in planned.items()}
+        for test, paid in rewards.items()
+    }
+    return figures
 
 
 def bound_results(

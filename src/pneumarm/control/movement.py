@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import ControlCycle, Controller, Reading
 from pneumarm.learning import Reward
 from pneumarm.transitions.rows import Recorded
+from pneumarm.transitions.watch import Watch, watched
 
 
 @runtime_checkable
@@ -52,7 +53,12 @@ class Movement:
 
 
 def move(
-    cycle: ControlCycle, controller: Controller, goal: NDArray[np.float64], reward: Reward, cutoff: int = 100
+    cycle: ControlCycle,
+    controller: Controller,
+    goal: NDArray[np.float64],
+    reward: Reward,
+    cutoff: int = 100,
+    watch: Watch | None = None,
 ) -> Movement:
     """Move the arm, at rest with closed valves, until ``goal`` is reached or the movement is cut off.
 
@@ -62,11 +68,12 @@ def move(
         goal: shape (joints,) [counts].
         reward: what is paid for an action, and when the goal is reached.
         cutoff: actions after which a movement that has not reached its goal ends (thesis section 5.4.2: 100).
+        watch: sees every reading, such as a :class:`~pneumarm.control.Monitor`.
 
     """
     count = _Count(cycle, controller, np.asarray(goal, np.float64), reward, cutoff)
     controller.reset(count.goal)
-    steps = list(cycle.run(count.decide))
+    steps = watched(cycle.run(count.decide), watch, at_rest=True)
     recorded = Recorded.from_steps(steps, cycle.arm.spec, kind="episode", at_rest=True)
     return Movement(count.goal, len(steps) - 1, count.switches, count.total, count.success, count.velocity, recorded)
 

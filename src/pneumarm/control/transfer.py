@@ -1,7 +1,6 @@
 """Transfer: an agent moves onto an arm, is tested, goes on learning there, and is tested again (thesis 5.5)."""
 
 import csv
-import hashlib
 import io
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -13,13 +12,16 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.control.agent import AgentController
+from pneumarm.control.monitor import Monitor
 from pneumarm.control.movement import Movement, move
+from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder, write_text
-from pneumarm.learning import AdaptationSettings, AnyAgent, adaptation
+from pneumarm.learning import AdaptationSettings, AnyAgent, adaptation, fingerprint
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import Recorded, joined, rows_of
+from pneumarm.transitions.watch import Watch, keep_watch
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
@@ -128,8 +130,13 @@ class Transferred:
     agent: AnyAgent
     """The agent as it is after learning."""
     learning_rate: float
-    adaptations: int = 0
-    """How often a policy has adapted, see :class:`~pneumarm.learning.Adaptation`."""
+    adapted: Adapted | None = None
+    """How a policy adapted; None for an agent that does not, or learns while it moves."""
+
+    @property
+    def adaptations(self) -> int:
+        """How often a policy has adapted."""
+        return 0 if self.adapted is None else sum(e.what == "accepted" for e in self.adapted.events)
 
     def phase(self, phase: Phase) -> list[Episode]:
         """Return the movements of a phase."""
@@ -143,6 +150,16 @@ class Transferred:
             "episodes": len(self.phase("learning")),
             "learning_rate": self.learning_rate,
             "adaptations": self.adaptations,
+            **({} if self.adapted is None else self._adapted(self.adapted)),
+        }
+
+    @staticmethod
+    def _adapted(adapted: Adapted) -> dict[str, Any]:
+        """Return when the arm was found to have changed, and what became of the agent."""
+        return {
+            "version": adapted.version,
+            "noticed": [e.movement for e in adapted.events if e.what == "noticed"],
+            "rolled_back": [e.movement for e in adapted.events if e.what == "rolled back"],
         }
 
 
@@ -154,11 +171,17 @@ def transfer(
     *,
     seed: int = 0,
     progress: Callable[[float, float], None] | None = None,
+    keep_version: Callable[[int, AnyAgent], None] | None = None,
+    watch: Watch | None = None,
 ) -> Transferred:
     """Test ``agent`` on ``arm``, let it learn there, test it again; every movement goes into ``store``.
 
+    ``keep_version`` is told the number of each version of an adapting agent and the agent itself, as soon as there is
+    one; after an interruption it may be told of the same one again.
+
     A transfer that was interrupted goes on after the last movement that was stored, on an arm that can be put into
-    a saved state as if nothing had happened.
+    a saved state as if nothing had happened. What ``watch`` finds spoiled, by default a :class:`Monitor` with the
+    agent's simulation, is stored but not learned from; it counts in the figures, because it happened.
 
     Raises:
         UnusableInput: arm and agent do not fit, or the store holds a transfer with other settings.
@@ -166,40 +189,62 @@ def transfer(
 
     """
     check_fit(agent, arm)
-    number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": _fingerprint(agent)})
-    done = [Episode(**entry.info) for entry in store.catalogue(number)]
+    number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": fingerprint(agent)})
+    stored = [dict(entry.info) for entry in store.catalogue(number)]
+    squares = [info.pop(_SQUARES) for info in stored if _SQUARES in info]
+    done = [Episode(**info) for info in stored]
     arm_state = store.state("arm")
     if arm_state is not None and arm.get_state() is not None:
         arm.set_state(arm_state)
     rate = settings.learning_rate if agent.learns else 0.0
     learner = agent.actor(rate, explores=agent.learns, seed=seed)
     mean = _Mean(agent)
-    adapting = adaptation(agent, settings.adaptation, seed) if settings.learning_rate > 0 else None
+    adapting = adaptation(agent, settings.adaptation, seed)
+    adapts = settings.learning_rate > 0
     if done:
         learner.set_state(store.state("learner") or learner.get_state())
         mean.set_state(store.state("mean") or mean.get_state())
         if adapting is not None:
             adapting.set_state(store.state("adaptation") or adapting.get_state())
+    elif keep_version is not None and adapting is not None:
+        keep_version(0, agent)
     total = sum(settings.movements(phase) for phase in PHASES)
     cycle = ControlCycle(guarded(arm), settings.close_while_computing)
-    waiting: list[tuple[Episode, Movement]] = []
+    waiting: list[Recorded] = []
+    watch = watch or Monitor(arm.spec, getattr(agent, "simulation", None))  # not every kind of agent keeps one
+    if done and (seen := store.state("watch")) is not None:
+        watch.set_state(seen)
 
     def keep() -> None:
         state = {"learner": learner.get_state(), "mean": mean.get_state(), "arm": arm.get_state()}
+        state["watch"] = watch.get_state()
+        keep_watch(store, watch, number)
         if adapting is not None:
             state["adaptation"] = adapting.get_state()
-        recorded = [replace(m.recorded, info=asdict(episode)) for episode, m in waiting]
+        recorded = [replace(one, marks=watch.marks(one)) for one in waiting]
         store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
         waiting.clear()
 
-    def adapt(movements: int) -> bool:
-        """Let the agent adapt where that is due after so many movements while learning; whether it was."""
-        if adapting is None or not adapting.is_due(movements):
-            return False
+    def note(phase: Phase, movement: Movement) -> None:
+        """Keep what came of a movement, and let the agent take notice of it."""
+        episode = Episode.of(phase, movement)
+        info = asdict(episode)
+        if adapting is not None:
+            judges = adapts and phase == "learning"
+            squares.append(adapting.saw(rows_of(movement.recorded), movement.reward, judges=judges))
+            info[_SQUARES] = squares[-1]
+        done.append(episode)
+        waiting.append(replace(movement.recorded, info=info))
+
+    def adapt() -> None:
+        """Let the agent adapt where that is due."""
+        if adapting is None or not adapts or not adapting.is_due():
+            return
         keep()  # it learns from what is stored, so that an interruption changes nothing
-        made = [entry.number for entry in store.catalogue(number)][-settings.adaptation.newest :]
-        adapting.learn(joined(store.blocks(sequences=lambda numbers: np.isin(numbers, made))), movements)
-        return True
+        made = [entry.number for entry in store.catalogue(number)][-adapting.usable :]
+        blocks = list(store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
+        if blocks and adapting.learn(joined(blocks)) and keep_version is not None:
+            keep_version(adapting.version, adapting.agent)
 
     def shown() -> AnyAgent:
         if adapting is not None:
@@ -210,20 +255,24 @@ def transfer(
         for phase in PHASES:
             count = settings.movements(phase)
             greedy = phase != "learning"
-            if phase == "after" and settings.episodes > 0:
-                adapt(settings.episodes)
-            controller = AgentController(agent, learner if not greedy and adapting is None else shown().actor())
-            for i in range(sum(e.phase == phase for e in done), count):
-                if phase == "learning" and adapt(i):
-                    controller = AgentController(agent, shown().actor())
+            made = sum(e.phase == phase for e in done)
+            if phase == "after" and settings.episodes > 0 and made == 0:
+                adapt()
+            learns = adapting is None and not greedy
+            moving = agent if learns else shown()
+            controller = AgentController(moving, learner if learns else None)
+            for i in range(made, count):
+                if phase == "learning":
+                    adapt()
+                if adapting is not None and moving is not adapting.agent:
+                    moving = adapting.agent
+                    controller = AgentController(moving)
                 random, goal = begin_and_goal(agent, seed, greedy, i)
                 BEGIN.reach(cycle.arm, random)
-                movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff)
+                movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff, watch)
                 if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * count:
                     mean.add(learner.weights())
-                episode = Episode.of(phase, movement)
-                done.append(episode)
-                waiting.append((episode, movement))
+                note(phase, movement)
                 if len(waiting) == _TOGETHER or i == count - 1:
                     keep()
                 if progress is not None:
@@ -235,7 +284,13 @@ def transfer(
             f"{arm.spec.name}: failed in movement {len(done) + 1} ({type(error).__name__}: {error}); "
             "see to the arm and run the same command again"
         ) from error
-    return Transferred(done, shown(), rate, 0 if adapting is None else adapting.accepted)
+    adapted = None
+    if adapting is not None:
+        adapted = Adapted(adapting.version, adapting.quantities, np.array(squares), adapting.events)
+    return Transferred(done, shown(), rate, adapted)
+
+
+_SQUARES = "squares"  # place of a movement's errors beside its figures in the store
 
 
 class _Mean:
@@ -274,6 +329,9 @@ def transfer_into(
 ) -> dict[str, Any]:
     """Transfer ``agent`` and leave ``episodes.csv``, ``transitions.db`` and the adapted agent in ``folder``.
 
+    Of an agent that adapts between movements its versions and their history stay too, see
+    :mod:`~pneumarm.control.versions`.
+
     Raises:
         UnusableInput: the folder's parent is missing, or it holds another transfer.
 
@@ -282,14 +340,13 @@ def transfer_into(
     require_folder(folder)
     folder.mkdir(exist_ok=True)
     with Store.for_arm(folder / "transitions.db", arm.spec) as store:
-        moved = transfer(agent, arm, store, settings, seed=seed, progress=progress)
+        moved = transfer(
+            agent, arm, store, settings, seed=seed, progress=progress, keep_version=version_keeper(folder)
+        )
     moved.agent.save(folder / "adapted.safetensors")
+    save_history(folder, moved.adapted)
     write_episodes(folder / "episodes.csv", moved.episodes)
     return moved.results()
-
-
-def _fingerprint(agent: AnyAgent) -> str:
-    return hashlib.sha256(agent.weights().tobytes()).hexdigest()[:16]
 
 
 def check_fit(agent: AnyAgent, arm: Arm) -> None:

@@ -2,12 +2,16 @@
 
 from pneumarm.learning.agent import Agent
 from pneumarm.learning.begin import BeginStates, begin_states
-from pneumarm.learning.fleet.adaptation import Adaptation, AdaptationSettings
+from pneumarm.learning.fleet.adaptation import Adaptation, AdaptationSettings, Event, told
 from pneumarm.learning.fleet.agent import PolicyAgent
+from pneumarm.learning.fleet.refit import RefitSettings
 from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
 from pneumarm.learning.fleet.side_by_side import FLEET_CURVES
 from pneumarm.learning.fleet.training import FleetTraining
+from pneumarm.learning.fleet.trial import TrialSettings
+from pneumarm.learning.fleet.watch import WatchSettings
 from pneumarm.learning.kinds import (
+    LOOKING_AHEAD,
     METHODS,
     Actor,
     AnyAgent,
@@ -16,8 +20,11 @@ from pneumarm.learning.kinds import (
     Settings,
     Trained,
     adaptation,
+    fingerprint,
     load_agent,
     test,
+    test_ahead,
+    tested_results,
     train,
 )
 from pneumarm.learning.online import OnlineLearner
@@ -29,6 +36,7 @@ from pneumarm.learning.training import CURVES, Progress, Training
 __all__ = [
     "CURVES",
     "FLEET_CURVES",
+    "LOOKING_AHEAD",
     "METHODS",
     "Actor",
     "Adaptation",
@@ -37,6 +45,7 @@ __all__ = [
     "AnyAgent",
     "BatchedSettings",
     "BeginStates",
+    "Event",
     "Exploration",
     "FleetTraining",
     "LearnSettings",
@@ -45,6 +54,7 @@ __all__ = [
     "PolicyAgent",
     "PolicySettings",
     "Progress",
+    "RefitSettings",
     "Reward",
     "Settings",
     "Shaping",
@@ -53,9 +63,15 @@ __all__ = [
     "TrainSettings",
     "Trained",
     "Training",
+    "TrialSettings",
+    "WatchSettings",
     "adaptation",
     "begin_states",
+    "fingerprint",
     "load_agent",
     "test",
+    "test_ahead",
+    "tested_results",
+    "told",
     "train",
 ]

@@ -1,9 +1,11 @@
 """Agents of all kinds: what they have in common, and the methods that train them.
 
 Whatever kind an agent is of, it is trained, saved, loaded, tested, transferred and used as a controller by the same
-commands. A kind is a class like :class:`Agent`; a method is a function like :func:`train_values`.
+commands. A kind is a class like :class:`Agent`; a method is a learner for :func:`train_fleet`, or
+a function of its own.
 """
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,8 +25,8 @@ from pneumarm.learning.fleet.adaptation import Adaptation, AdaptationSettings, c
 from pneumarm.learning.fleet.agent import KIND as POLICY
 from pneumarm.learning.fleet.agent import PolicyAgent
 from pneumarm.learning.fleet.settings import BatchedSettings, PolicySettings
-from pneumarm.learning.fleet.training import FleetTraining, train_policy
-from pneumarm.learning.fleet.value_training import train_batched
+from pneumarm.learning.fleet.training import FleetTraining, PolicyLearner, train_fleet
+from pneumarm.learning.fleet.value_training import ValueLearner
 from pneumarm.learning.imported import KIND as IMPORTED
 from pneumarm.learning.imported import ImportedPolicy
 from pneumarm.learning.settings import TrainSettings, check
@@ -40,6 +42,9 @@ METHODS: tuple[Method, ...] = get_args(Method)
 Settings = PolicySettings | BatchedSettings | TrainSettings
 """Settings of a training; their type says which method is meant."""
 Trained = FleetTraining[PolicyAgent] | FleetTraining[Agent] | Training
+
+LOOKING_AHEAD = 500
+"""Movements of a test that looks ahead; they take seconds."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +147,20 @@ def adaptation(agent: AnyAgent, settings: AdaptationSettings, seed: int = 0) -> 
     return Adaptation(agent, settings, seed) if isinstance(agent, PolicyAgent) and adapts else None
 
 
+def fingerprint(agent: AnyAgent) -> str:
+    """Return what tells ``agent`` from others: of its kind, its settings, what it has learned, and its simulation."""
+    digest = hashlib.sha256(f"{type(agent).__name__} {agent.settings!r}".encode())
+    arrays = [agent.weights(), agent.goal_range, *vars(agent.scaling).values()]
+    simulation = getattr(agent, "simulation", None)  # it decides too, in agents that look ahead or adapt
+    if isinstance(simulation, Simulation):
+        header, parts = simulation.parts()
+        digest.update(repr(header).encode())
+        arrays += [parts[name] for name in sorted(parts)]
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:16]
+
+
 def load_agent(path: Path) -> AnyAgent:
     """Return the agent in ``path``, of whatever kind.
 
@@ -182,8 +201,10 @@ def train(
     if isinstance(settings, TrainSettings):
         return train_online(simulation, begin_states, settings, seed, **how)
     if isinstance(settings, BatchedSettings):
-        return train_batched(simulation, begin_states, settings, seed, **how)
-    return train_policy(simulation, begin_states, settings, seed, **how)
+        batched = settings
+        return train_fleet(lambda n: ValueLearner(simulation, begin_states, batched, seed, n), batched, seed, **how)
+    policy = settings or PolicySettings()
+    return train_fleet(lambda n: PolicyLearner(simulation, begin_states, policy, seed, n), policy, seed, **how)
 
 
 def test(
@@ -195,18 +216,52 @@ def test(
 ) -> TestResult:
     """Let ``agent`` move greedily and without learning, from all begin states to all goals.
 
-    Begin states and goals depend on ``seed`` alone, not on what the agent does, so rivals get the same ones.
+    A policy moves as it says at once; what looking ahead adds on an arm is told by :func:`test_ahead`. Begin states
+    and goals depend on ``seed`` alone, not on what the agent does, so rivals get the same ones.
 
     Raises:
         UnusableInput: the agent was made for an arm or a window of another kind, or there is no episode.
 
     """
+    _check_made_for(agent, simulation)
+    return agent.test(simulation, begin_states, episodes, (seed, TEST))
+
+
+test.__test__ = False  # type: ignore[attr-defined]
+
+
+def test_ahead(
+    agent: AnyAgent,
+    simulation: Simulation,
+    begin_states: BeginStates,
+    episodes: int = LOOKING_AHEAD,  # noqa: PT028 - this is no test case
+    seed: int = 0,  # noqa: PT028
+) -> TestResult | None:
+    """Let ``agent`` make the first movements of :func:`test` as it makes them on an arm, looking ahead.
+
+    None for an agent that acts on an arm as it does in :func:`test`: there is nothing to add.
+
+    Raises:
+        UnusableInput: the agent was made for an arm or a window of another kind, or there is no episode.
+
+    """
+    _check_made_for(agent, simulation)
+    if not isinstance(agent, PolicyAgent):
+        return None
+    return agent.test_ahead(simulation, begin_states, episodes, (seed, TEST))
+
+
+test_ahead.__test__ = False  # type: ignore[attr-defined]
+
+
+def tested_results(tested: TestResult, ahead: TestResult | None) -> dict[str, Any]:
+    """Return what ``results.json`` holds of :func:`test` and, under ``lookahead``, of :func:`test_ahead`."""
+    return {**tested.results(), "lookahead": None if ahead is None else ahead.results()}
+
+
+def _check_made_for(agent: AnyAgent, simulation: Simulation) -> None:
     if agent.window != simulation.window:
         raise UnusableInput(f"an agent for {agent.window} cannot be tested on a simulation of {simulation.window}")
     scaling, other = agent.scaling, simulation.scaling
     if not all(np.array_equal(getattr(scaling, name), getattr(other, name)) for name in vars(scaling)):
         raise UnusableInput("the agent was trained in another simulation: its inputs are scaled differently")
-    return agent.test(simulation, begin_states, episodes, (seed, TEST))
-
-
-test.__test__ = False  # type: ignore[attr-defined]

@@ -71,6 +71,16 @@ class Exploration:
 
 
 @dataclass(frozen=True)
+class FirstExploration(Exploration):
+    """Exploration at the initial deviation of shaping."""
+
+    epsilon: float = 0.5
+    """Probability of an exploring action (thesis: 0.5 at the start of shaping)."""
+    temperature: float = 20.0
+    """Temperature T of its Boltzmann distribution, in units of reward (thesis: 20 at the start of shaping)."""
+
+
+@dataclass(frozen=True)
 class Shaping:
     """From begin states next to the goal to all begin states (section 4.3.2)."""
 
@@ -88,7 +98,7 @@ class Shaping:
     """Success rate demanded at the initial deviation (thesis: 50 %)."""
     criterium: float = 0.95
     """Success rate demanded at the whole range of angles (thesis: 95 %)."""
-    exploration: Exploration = Exploration(0.5, 20.0)
+    exploration: FirstExploration = field(default_factory=FirstExploration)
     """Exploration at the initial deviation (thesis: 0.5 and 20)."""
     weights: tuple[float, ...] = (0.4, 0.3, 0.2, 0.1)
     """Weights of the sub-intervals of begin states on each side of the goal, the farthest first (thesis: these)."""

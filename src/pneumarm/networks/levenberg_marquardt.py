@@ -61,7 +61,9 @@ class LevenbergMarquardt:
     patience: int = 3
     """Epochs without notable progress before the fit counts as converged."""
     decay: float = 0.0
-    """Weight decay: ``decay |w|^2`` is added to the error; 0 for none (thesis)."""
+    """Weight decay: ``decay |w - c|^2`` is added to the error; 0 for none (thesis)."""
+    anchored: bool = False
+    """Whether weights decay towards those that the fit starts from, c = w_0, rather than towards c = 0."""
     damping: float = 1e-3
     """First mu, as a part of the mean of the diagonal of A."""
     block: int = 4096
@@ -107,7 +109,7 @@ def levenberg_marquardt(
 
     """
     settings = settings or LevenbergMarquardt()
-    problem = Problem(x, y, start, settings.decay, settings.block)
+    problem = Problem(x, y, start, settings.decay, settings.block, settings.anchored)
     weights = problem.pack(start)
     curve = [problem.error(weights)]
     damping, growth = None, 2.0
@@ -171,8 +173,19 @@ class Problem:
     likewise, (hidden + 1, outputs).
     """
 
-    def __init__(self, x: ArrayLike, y: ArrayLike, like: Network, decay: float = 0.0, block: int = 4096) -> None:
-        """Keep float32 copies of ``x`` (n, inputs) and float64 of ``y`` (n, outputs), for networks as ``like``."""
+    def __init__(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        like: Network,
+        decay: float = 0.0,
+        block: int = 4096,
+        anchored: bool = False,
+    ) -> None:
+        """Keep float32 copies of ``x`` (n, inputs) and float64 of ``y`` (n, outputs), for networks as ``like``.
+
+        With ``anchored`` weights decay towards those of ``like``.
+        """
         if like.direct is not None:
             raise ValueError("a network with direct connections cannot be fitted by Levenberg-Marquardt")
         inputs, self.hidden = like.hidden_weights.shape
@@ -188,6 +201,7 @@ class Problem:
         self.x = [np.ascontiguousarray(whole[:, piece]) for piece in pieces]
         self.y = [np.ascontiguousarray(y[piece].T, np.float64) for piece in pieces]
         self.inputs, self.rows, self.decay = inputs + 1, n, decay
+        self.centre = self.pack(like) if anchored else 0.0
 
     def pack(self, network: Network) -> Floats:
         """Return the weights of ``network`` as a vector."""
@@ -202,7 +216,12 @@ class Problem:
     def error(self, weights: Floats) -> float:
         """Return E, with the decay."""
         total = sum(float(np.vdot(r, r)) for _, _, r in self._blocks(weights))
-        return total / self.rows + self.decay * float(weights @ weights)
+        return total / self.rows + self.decayed(weights)
+
+    def decayed(self, weights: Floats) -> float:
+        """Return what the decay adds to E."""
+        away = weights - self.centre
+        return self.decay * float(away @ away)
 
     def normal_equations(self, weights: Floats) -> NormalEquations:
         """Return A, g and E, with the decay."""
@@ -225,8 +244,8 @@ class Problem:
         curvature[first:, first:] = ww.reshape(size - first, -1)
         curvature /= n
         curvature.flat[:: size + 1] += self.decay
-        gradient = np.concatenate([sums.x_se.ravel(), sums.h_r.ravel()]) / n + self.decay * weights
-        return NormalEquations(curvature, gradient, total / n + self.decay * float(weights @ weights))
+        gradient = np.concatenate([sums.x_se.ravel(), sums.h_r.ravel()]) / n + self.decay * (weights - self.centre)
+        return NormalEquations(curvature, gradient, total / n + self.decayed(weights))
 
     def _layers(self, weights: Floats) -> tuple[Floats, Floats]:
         first = self.inputs * self.hidden

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.control.versions import HISTORY, read_history
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_json, write_text
 from pneumarm.report.data import (
@@ -90,6 +91,7 @@ def read_run(folder: Path) -> RunData:
         training=_read(TrainingData, folder) or _read(LearningData, folder),
         test=_read(Episodes, folder),
         transfer=_read_transfer(folder / EPISODES, results),
+        adaptation=read_history(folder) if (folder / HISTORY).exists() else None,
         movements=tuple(Movement.load(folder, path.name) for path in sorted(folder.glob(MOVEMENTS))),
     )
 
@@ -145,4 +147,13 @@ def _summary(run: RunData) -> list[str]:
         ]
         if parts:
             text.append("On the arm it reaches " + " and ".join(parts) + ".")
+    bound = run.results.get("bound", {})
+    if "after" in bound.get("distance", {}):
+        below = bound["distance"]["after"]["open_loop"]["reward"]
+        text.append(
+            f"The best that planning with the arm's true physics finds there is {bound['open_loop']['reward']:.2f}; "
+            f"the controller is {abs(below):.2f} {'below' if below >= 0 else 'above'} it after adaptation."
+        )
+    if run.adaptation is not None:
+        text += [f"{line[0].upper()}{line[1:]}." for line in run.adaptation.sentences]
     return text

@@ -1,5 +1,6 @@
 """The sections of a run's report: which figures, with which words."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
+from pneumarm.control.versions import Adapted
+from pneumarm.learning import WatchSettings
 from pneumarm.report import figures
 from pneumarm.report.data import (
     CoverageData,
@@ -19,8 +22,8 @@ from pneumarm.report.data import (
     TrainingData,
     TransferData,
 )
-from pneumarm.report.figures import Classification, Phase
-from pneumarm.report.ledger import beside_thesis, ledger
+from pneumarm.report.figures import Classification, Mark, Phase
+from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import of_joint, quantities
 
@@ -37,6 +40,7 @@ class RunData:
     training: TrainingData | LearningData | None = None
     test: Episodes | None = None
     transfer: TransferData | None = None
+    adaptation: Adapted | None = None
     movements: tuple[Movement, ...] = ()
 
 
@@ -57,7 +61,10 @@ def all_sections(run: RunData) -> list[Section]:
     if run.test is not None:
         sections.append(tested(run.test))
     if run.transfer is not None:
-        sections += [transferred(run.transfer, run.test), by_displacement(run.transfer, run.test, run.spec)]
+        sections.append(transferred(run.transfer, run.test))
+        if run.adaptation is not None:
+            sections.append(adapted(run.adaptation))
+        sections.append(by_displacement(run.transfer, run.test, run.spec))
     if run.movements:
         sections.append(moved(run.movements, run.spec))
     return sections
@@ -65,16 +72,20 @@ def all_sections(run: RunData) -> list[Section]:
 
 def overview(run: RunData) -> Section:
     """Return the ledger and the comparison with the thesis."""
+    bound = run.results.get("bound", {})
+    text = [
+        "The first table is what counts: how well the controller moves in the simulation it was trained in, on the "
+        "arm as it arrives there, and after it went on learning on the arm. The last table puts our figures beside "
+        "those of the thesis."
+    ]
+    if "missing" in bound:
+        text.append(f"What could be achieved on this arm at all is not told: {bound['missing']}.")
     return Section(
         "Results",
-        (
-            "The first table is what counts: how well the controller moves in the simulation it was "
-            "trained in, on the "
-            "arm as it arrives there, and after it went on learning on the arm. The second table puts our figures "
-            "beside those of the thesis.",
-        ),
+        text,
         tables=(
-            ledger(run.test, run.transfer),
+            ledger(run.test, run.transfer, run.results.get("test", {}).get("lookahead")),
+            *([bound_table(bound)] if "distance" in bound else []),
             beside_thesis(run.results, run.quality, run.test, run.transfer, run.spec),
         ),
     )
@@ -328,6 +339,32 @@ def transferred(data: TransferData, test: Episodes | None) -> Section:
                 "Reward, success, actions and switches on the arm (thesis figures 5.9 to 5.12; as there actions and "
                 "switches are those of successful episodes). Averages do not reach over the borders of the phases.",
                 figures.transfer_curves_alt(phases, reference),
+            ),
+        ),
+    )
+
+
+def adapted(data: Adapted) -> Section:
+    """Return how the simulation predicted the arm, when it was found to have changed, and the agent's versions."""
+    marks = [Mark(event.movement, event.what) for event in data.events]
+    happened = data.sentences
+    text = [
+        "After every movement the simulation's errors on the arm are compared with those of its fit. Where a "
+        "simulation that is fitted to the newest movements predicts others of them better, the agent becomes a new "
+        "version; one that earns less than that before it is taken back."
+    ]
+    text += [f"{sentence[0].upper()}{sentence[1:]}." for sentence in happened]
+    if not happened:
+        text.append("The arm was as it had been collected from; the agent stayed as it was.")
+    return Section(
+        "Adaptation to the arm",
+        text,
+        (
+            Picture(
+                figures.adaptation_curves(data.squares, data.quantities, marks, math.sqrt(WatchSettings().allowance)),
+                "Error of the simulation on the arm over that of its fit, as moving means of 20 movements; 1 is an "
+                "arm that is as it was (no figure in the thesis, whose agent learns while it moves, section 5.5).",
+                figures.adaptation_curves_alt(data.squares, data.quantities, marks),
             ),
         ),
     )

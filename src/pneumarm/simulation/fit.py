@@ -29,6 +29,7 @@ from pneumarm.networks import (
 from pneumarm.networks import importance as importance_of
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Scaling, Simulation, Velocity
+from pneumarm.transitions.choice import share_held_out
 from pneumarm.transitions.filtering import Filtered, filter_transitions
 from pneumarm.transitions.grid import GridSettings
 from pneumarm.transitions.store import Store
@@ -62,7 +63,7 @@ class FitSettings:
     velocity: Velocity = "derived"
     """Velocity derived from the predicted angle (thesis), or by a network of its own."""
     held_out: float = 0.1
-    """Share of the sequences that is kept out of the fit, to measure its errors on."""
+    """Share of the sequences that is kept out of the fit, to measure its errors on; at least one sequence."""
     seed: int = 0
     """Of the initial weights and of every other choice by lot."""
 
@@ -309,14 +310,17 @@ def fit_store(
     if store.transitions < FEWEST:
         raise UnusableInput(f"{store.transitions} transitions are too few to fit; collect at least {FEWEST:,}")
     window = Window(store.joints, settings.history)
+    sequences = [entry.number for entry in store.catalogue()]
+    settings = replace(settings, held_out=share_held_out(sequences, settings.held_out, settings.seed))
     filtered = filter_transitions(store, window, grid, seed=settings.seed, hold_out=settings.held_out)
+    coverage = filtered.coverage
     result = fit(
         filtered.transitions,
         filtered.stream("held-out"),
         spec=store.spec,
         goal_range=store.percentiles(),
         valves=store.valves,
-        generalisation=filtered.stream("generalisation"),
+        generalisation=filtered.stream("generalisation") if coverage.kept < coverage.seen else None,
         settings=settings,
         progress=progress,
     )

@@ -1,18 +1,19 @@
 """Transitions: the store, collecting, the state window, the grid filter, import of recordings."""
 
 from pneumarm.transitions.choice import held_out
-from pneumarm.transitions.collect import KINDS, CollectResult, CollectSettings, collect, require_enough
+from pneumarm.transitions.collect import KINDS, CollectBegin, CollectResult, CollectSettings, collect, require_enough
 from pneumarm.transitions.filtering import Enough, Filter, Filtered, enough_data, filter_transitions
 from pneumarm.transitions.grid import Coverage, Grid, GridSettings
 from pneumarm.transitions.players import Keyboard, Trajectory
 from pneumarm.transitions.recording import import_recording
-from pneumarm.transitions.rows import Recorded, Rows
+from pneumarm.transitions.rows import Mark, Recorded, Rows
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
 
 __all__ = [
     "KINDS",
     "QUANTITIES",
+    "CollectBegin",
     "CollectResult",
     "CollectSettings",
     "Coverage",
@@ -22,6 +23,7 @@ __all__ = [
     "Grid",
     "GridSettings",
     "Keyboard",
+    "Mark",
     "Recorded",
     "Rows",
     "Store",

@@ -36,6 +36,15 @@ def held_out(sequence: ArrayLike, fraction: float = 0.1, seed: int = 0) -> NDArr
     return hashed_uniform(seed, np.atleast_1d(sequence)) < fraction
 
 
+def share_held_out(sequences: ArrayLike, fraction: float = 0.1, seed: int = 0) -> float:
+    """Return the smallest share from ``fraction`` on that holds out at least one of the ``sequences`` (n,).
+
+    Among few sequences a small share may hold out none. A single sequence is never held out for that.
+    """
+    draws = np.sort(hashed_uniform(seed, np.atleast_1d(sequences)))
+    return fraction if len(draws) < 2 or draws[0] < fraction else float(np.nextafter(draws[0], 1.0))
+
+
 def sample(blocks: Iterable[Transitions], count: int, seed: int = 0) -> Transitions | None:
     """Return ``count`` transitions drawn from a stream, in its order, or all where there are fewer; None of none.
 

@@ -20,13 +20,13 @@ import json
 import time as wall_clock
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.controller import Controller
-from pneumarm.arm.cycle import BeginState, ControlCycle, Step
+from pneumarm.arm.cycle import BeginState, ControlCycle
 from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, Reading
 from pneumarm.arm.valves import ACTIONS, to_valves
@@ -34,16 +34,27 @@ from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.transitions.players import Trajectory
 from pneumarm.transitions.rows import Recorded
 from pneumarm.transitions.store import Store
+from pneumarm.transitions.watch import Watch, keep_watch, watched
 
 KINDS = ("zero-velocity", "velocity", "controller")
 """Kinds of the sequences made here."""
 FEWEST_TRANSITIONS = 2_000
 """Fewer cannot be learnt from."""
+MOST_SPOILED = 5
+"""Sequences in a row in which something may be wrong before collecting gives up."""
 PURPOSE = "collect"
 """The purpose of the runs made here."""
 
 Progress = Callable[[int, int], None]
 """Called with the transitions stored so far and those asked for."""
+
+
+@dataclass(frozen=True)
+class CollectBegin(BeginState):
+    """How the arm is brought to the begin state of a sequence at rest."""
+
+    inflate: float = 1.2
+    """Longest time that a muscle is inflated again [s] (thesis section 3.2.2: 1.2)."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +67,7 @@ class CollectSettings:
     """Share of sequences whose actions are held (the thesis decides "randomly")."""
     longest_hold: int = 10
     """Most control periods that an action is held, the least is 1 (the thesis does not say)."""
-    begin: BeginState = field(default_factory=lambda: BeginState(inflate=1.2))
+    begin: CollectBegin = field(default_factory=CollectBegin)
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5)."""
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting (thesis figure 2.8)."""
@@ -119,6 +130,7 @@ def collect(
     settings: CollectSettings | None = None,
     controller: Controller | None = None,
     goals: ArrayLike | None = None,
+    watch: Watch | None = None,
 ) -> CollectResult:
     """Collect at least ``transitions`` transitions in ``store``, going on where an earlier call was interrupted.
 
@@ -136,10 +148,13 @@ def collect(
         controller: what acts instead of random actions.
         goals: range (joints, 2) [counts] in which goals are drawn for ``controller``, one a sequence; by default
             the range of the angle's sensor.
+        watch: sees every reading and marks what nothing may be learned from, such as a
+            :class:`~pneumarm.control.Monitor`; marked transitions do not count as collected.
 
     Raises:
         UnusableInput: fewer than 2,000 transitions, another arm or other settings than the store was begun with.
         ArmFailure: the arm failed; what was stored before stays, the sequence that it failed in is not stored.
+            Or something has been wrong for several sequences.
 
     """
     settings = settings or CollectSettings()
@@ -150,14 +165,23 @@ def collect(
     done, number = sum(entries), len(entries)
     tally = _restored(arm, store, resumed=number > 0)
     guard = guarded(arm)
+    if watch is not None and number and (seen := store.state("watch")) is not None:
+        watch.set_state(seen)
+    wrong = 0
     try:
         while done < transitions:
-            recorded = _sequence(guard, tally, settings, np.random.default_rng([seed, number]), controller, goals)
+            random = np.random.default_rng([seed, number])
+            recorded = _sequence(guard, tally, settings, random, controller, goals, watch)
             state = {"collect": json.dumps(asdict(tally)).encode()}
             if (arm_state := guard.get_state()) is not None:
                 state["arm"] = arm_state
+            if watch is not None:
+                recorded = replace(recorded, marks=watch.marks(recorded))
+                done -= keep_watch(store, watch, run)
+                state["watch"] = watch.get_state()
+                wrong = _still_wrong(arm, watch, wrong)
             store.append(recorded, state)
-            done += int((np.diff(recorded.step) == 1).sum())
+            done += recorded.transitions
             number += 1
             if progress is not None:
                 progress(min(done, transitions), transitions)
@@ -179,6 +203,19 @@ def collect(
         interventions=Interventions(**tally.interventions),
         missed_deadlines=tally.missed_deadlines,
     )
+
+
+def _still_wrong(arm: Arm, watch: Watch, before: int) -> int:
+    """Return for how many sequences something has been wrong; raise ArmFailure where that is no passing trouble."""
+    found = watch.spoiled_since()
+    if found is None:
+        return 0
+    if before + 1 >= MOST_SPOILED:
+        raise ArmFailure(
+            f"{arm.spec.name}: {found[1]}, for {MOST_SPOILED} sequences now; nothing can be learned from that: "
+            "see to the arm and run the same command again"
+        )
+    return before + 1
 
 
 def require_enough(transitions: int) -> None:
@@ -224,6 +261,7 @@ def _sequence(
     random: np.random.Generator,
     controller: Controller | None,
     goals: ArrayLike | None,
+    watch: Watch | None,
 ) -> Recorded:
     """Bring the arm to a begin state, carry out one sequence, and return what was read."""
     interventions = arm.interventions
@@ -232,7 +270,7 @@ def _sequence(
     info: Mapping[str, object] = {}
     actor: Controller
     if controller is None:
-        kind, actor = _random_actions(arm.spec.joints, settings, random)
+        kind, actor = random_actions(arm.spec.joints, settings, random)
         actor.reset(np.zeros(arm.spec.joints))
     else:
         kind, actor = "controller", controller
@@ -245,12 +283,12 @@ def _sequence(
     def decide(reading: Reading) -> NDArray[np.int8] | None:
         return None if next(remaining, None) is None else actor.act(reading)
 
-    steps: list[Step] = list(cycle.run(decide))
+    steps = watched(cycle.run(decide), watch, at_rest=True)
     tally.add(arm, arm.interventions - interventions, cycle.missed_deadlines, steps[-1].reading.time - start)
     return Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info)
 
 
-def _random_actions(joints: int, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
+def random_actions(joints: int, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
     """Return one of the two kinds of random sequences: its name and its valves."""
     shape = (settings.actions, joints)
     actions = random.integers(ACTIONS, size=shape)

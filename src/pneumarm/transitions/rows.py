@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.cycle import Step
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.errors import UnusableInput
+
+LONGEST_REASON = 1000
+"""Most characters of a mark's reason."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,33 @@ def joined(blocks: Iterable[Rows]) -> Rows:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """Steps of a sequence that nothing may be learned from, and why."""
+
+    first: int
+    """First step."""
+    last: int
+    """Last step."""
+    reason: str
+    """What was found, in words."""
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.first <= self.last and 0 < len(self.reason) <= LONGEST_REASON):
+            raise UnusableInput(
+                f"a mark needs a first and a last step in this order and a reason of 1 to {LONGEST_REASON} "
+                f"characters, got {self!r}"
+            )
+
+
+def unmarked(step: NDArray[np.int64], marks: Iterable[Mark]) -> NDArray[np.bool_]:
+    """Return which of the steps (n,) no mark holds."""
+    kept = np.ones(len(step), bool)
+    for mark in marks:
+        kept &= (step < mark.first) | (step > mark.last)
+    return kept
+
+
+@dataclass(frozen=True)
 class Recorded:
     """One sequence of ``n`` readings and the ``n - 1`` commands between them, before it has a number in a store."""
 
@@ -68,6 +99,8 @@ class Recorded:
     """What was done: zero-velocity, velocity, controller, episode, imported, ..."""
     at_rest: bool = False
     """Whether it began at rest with closed valves."""
+    marks: tuple[Mark, ...] = ()
+    """What of it nothing may be learned from."""
     info: Mapping[str, Any] = field(default_factory=dict)
     """Whatever else is to be kept with it, such as the goal: small, and of JSON's types."""
 
@@ -102,8 +135,31 @@ class Recorded:
             info=info or {},
         )
 
+    @property
+    def transitions(self) -> int:
+        """Transitions to learn from: pairs of rows that follow on each other, none of them marked."""
+        return joinable(self.step, self.marks)
+
     def __len__(self) -> int:
         return len(self.time)
+
+
+def rows_of(recorded: Recorded, sequence: int = 0) -> Rows:
+    """Return ``recorded`` as the rows of one sequence, before it is stored."""
+    return Rows(
+        sequence=np.full(len(recorded), sequence, np.int64),
+        step=recorded.step,
+        time=recorded.time,
+        angle=recorded.angle,
+        pressure=recorded.pressure,
+        command=recorded.command,
+        at_rest=np.full(len(recorded), recorded.at_rest, np.bool_),
+    )
+
+
+def joinable(step: NDArray[np.int64], marks: Iterable[Mark]) -> int:
+    """Return how many of the steps (n,) of a sequence are followed by the next one, both unmarked."""
+    return int((np.diff(step[unmarked(step, marks)]) == 1).sum())
 
 
 def steps_of(time: NDArray[np.float64], period: float) -> NDArray[np.int64]:

@@ -15,8 +15,8 @@ from pneumarm.errors import PneumarmError, UnusableInput
 
 APPLICATION = 0x706E6575
 """SQLite's application id of a store: "pneu"."""
-VERSION = 1
-"""Version of the tables below."""
+VERSION = 2
+"""Version of the tables below. Version 1 had no marks; it is read, and made version 2 by the first writer."""
 LONGEST_SEQUENCE = 100_000
 """Most rows of a sequence, so that a block of whole sequences is bounded in memory."""
 MOST_JOINTS = 64
@@ -31,10 +31,16 @@ def row_columns(joints: int) -> list[str]:
     return ["time", *(f"joint_{j}_{name}" for j in range(1, joints + 1) for name in names)]
 
 
-def tables(joints: int) -> dict[str, str]:
-    """Return the statements that create the tables, by name."""
+_MARKS = (
+    "CREATE TABLE marks (sequence INTEGER NOT NULL REFERENCES sequences, first INTEGER NOT NULL, "
+    "last INTEGER NOT NULL, reason TEXT NOT NULL)"
+)
+
+
+def tables(joints: int, version: int = VERSION) -> dict[str, str]:
+    """Return the statements that create the tables of a ``version``, by name."""
     values = "".join(f", {name} REAL{'' if '_command_' in name else ' NOT NULL'}" for name in row_columns(joints))
-    return {
+    made = {
         "store": "CREATE TABLE store (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
         "runs": "CREATE TABLE runs (number INTEGER PRIMARY KEY, purpose TEXT NOT NULL, metadata TEXT NOT NULL)",
         "sequences": (
@@ -47,6 +53,7 @@ def tables(joints: int) -> dict[str, str]:
         ),
         "state": "CREATE TABLE state (name TEXT PRIMARY KEY, value BLOB NOT NULL) WITHOUT ROWID",
     }
+    return made if version == 1 else made | {"marks": _MARKS}
 
 
 def create_tables(path: Path, spec: ArmSpec, valves: bool) -> None:
@@ -120,9 +127,10 @@ def _check_header(path: Path) -> None:
     version, application = struct.unpack(">I4xI", header[60:72])
     if application != APPLICATION:
         raise UnusableInput(f"{path}: {expected}, this is another program's database")
-    if version != VERSION:
+    if not 1 <= version <= VERSION:
         raise UnusableInput(
-            f"{path}: a store of version {version}, this pneumarm reads version {VERSION}; use the one that wrote it"
+            f"{path}: a store of version {version}, this pneumarm reads versions 1 to {VERSION}; "
+            "use the one that wrote it"
         )
 
 
@@ -140,9 +148,20 @@ def read_settings(connection: sqlite3.Connection, path: Path) -> tuple[ArmSpec, 
     if spec.joints > MOST_JOINTS:
         raise damaged(path, f"an arm of {spec.joints} joints")
     found = connection.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 100")
-    if dict(found) != tables(spec.joints):
+    if dict(found) != tables(spec.joints, version_of(connection)):
         raise damaged(path, "its tables are not those of a store")
     return spec, valves
+
+
+def version_of(connection: sqlite3.Connection) -> int:
+    """Return the version of the tables."""
+    return int(connection.execute("PRAGMA user_version").fetchone()[0])
+
+
+def upgrade(connection: sqlite3.Connection) -> None:
+    """Make a store of version 1, whose tables were checked, one of this version."""
+    if version_of(connection) == 1:
+        connection.executescript(f"BEGIN IMMEDIATE; {_MARKS}; PRAGMA user_version = {VERSION}; COMMIT;")
 
 
 def damaged(path: Path, what: str) -> UnusableInput:

@@ -30,7 +30,7 @@ from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.files import written_whole
 from pneumarm.transitions.lock import WriterLock
 from pneumarm.transitions.quantiles import Quantiles
-from pneumarm.transitions.rows import Recorded, Rows
+from pneumarm.transitions.rows import Mark, Recorded, Rows, joinable, unmarked
 from pneumarm.transitions.schema import (
     LONGEST_SEQUENCE,
     connect,
@@ -39,6 +39,8 @@ from pneumarm.transitions.schema import (
     read_settings,
     row_columns,
     translated,
+    upgrade,
+    version_of,
 )
 
 Predicate = Callable[[NDArray[np.int64]], NDArray[np.bool_]]
@@ -74,6 +76,8 @@ class Store:
         """Whether the commands are valves -1, 0, +1; an imported recording may have continuous ones."""
         with translated(path):
             self.spec, self.valves = read_settings(connection, path)
+            if lock is not None:
+                upgrade(connection)
             self._check_sequences()
 
     @classmethod
@@ -159,7 +163,7 @@ class Store:
 
     @property
     def transitions(self) -> int:
-        """Number of transitions: rows with a command and the row of the next step."""
+        """Number of transitions: rows with a command and the row of the next step, none of them marked."""
         return int(self._one("SELECT coalesce(sum(transitions), 0) FROM sequences"))
 
     @property
@@ -192,13 +196,37 @@ class Store:
         return iter(self.blocks())
 
     def blocks(
-        self, rows: int = BLOCK, sequences: Predicate | None = None, kinds: Collection[str] | None = None
+        self,
+        rows: int = BLOCK,
+        sequences: Predicate | None = None,
+        kinds: Collection[str] | None = None,
+        *,
+        marked: bool = False,
     ) -> "Blocks":
         """Return the rows as blocks of whole sequences of about ``rows`` rows, in bounded memory.
 
-        ``sequences`` and ``kinds`` choose what is read. The result can be iterated over again and again.
+        ``sequences`` and ``kinds`` choose what is read. Marked rows are left out, which leaves a gap in the steps
+        that no transition spans, unless ``marked`` asks for them. The result can be iterated over again and again.
         """
-        return Blocks(self, rows, sequences, kinds)
+        return Blocks(self, rows, sequences, kinds, marked)
+
+    def marks(self, number: int | None = None) -> dict[int, list[Mark]]:
+        """Return the marks of every sequence that has some, or of sequence ``number``, in the order of marking."""
+        found: dict[int, list[Mark]] = {}
+        for sequence, mark in self._marks("?1 IS NULL OR sequence = ?1", (number,)):
+            found.setdefault(sequence, []).append(mark)
+        return found
+
+    def _marks(self, condition: str, values: tuple[Any, ...]) -> list[tuple[int, Mark]]:
+        with translated(self.path):
+            if version_of(self._connection) == 1:
+                return []
+            query = f"SELECT sequence, first, last, reason FROM marks WHERE {condition} ORDER BY sequence, rowid"
+            found = self._connection.execute(query, values).fetchall()
+        try:
+            return [(int(sequence), Mark(first, last, reason)) for sequence, first, last, reason in found]
+        except (UnusableInput, TypeError, ValueError) as error:
+            raise damaged(self.path, f"an impossible mark: {error}") from error
 
     def percentiles(
         self,
@@ -282,9 +310,47 @@ class Store:
                 connection.execute("INSERT OR REPLACE INTO state VALUES (?, ?)", (name, value))
         return number
 
+    def mark(self, number: int, marks: Iterable[Mark]) -> None:
+        """Mark steps of sequence ``number``, so that nothing is learned from them; marks are never taken back.
+
+        Raises:
+            UnusableInput: there is no such sequence.
+
+        """
+        with self._writing() as connection:
+            steps = connection.execute("SELECT step FROM rows WHERE sequence = ? ORDER BY step", (number,)).fetchall()
+            if not steps:
+                raise UnusableInput(f"{self.path}: there is no sequence {number} to mark")
+            self._insert_marks(connection, number, marks)
+            left = joinable(np.array(steps, np.int64).ravel(), self.marks(number).get(number, []))
+            connection.execute("UPDATE sequences SET transitions = ? WHERE number = ?", (left, number))
+
+    def mark_since(self, time: float, reason: str, run: int) -> None:
+        """Mark all rows of ``run`` read at ``time`` [s] or later, the newest sequences, that are not marked yet."""
+        with translated(self.path):
+            numbers = self._connection.execute(
+                "SELECT number FROM sequences WHERE run = ? ORDER BY number DESC", (run,)
+            ).fetchall()
+        for (number,) in numbers:
+            with translated(self.path):
+                steps = self._connection.execute(
+                    "SELECT step FROM rows WHERE sequence = ? AND time >= ? ORDER BY step", (number, time)
+                ).fetchall()
+            if not steps:
+                return
+            first, last = steps[0][0], steps[-1][0]
+            marks = self.marks(number).get(number, [])
+            if unmarked(np.array(steps, np.int64).ravel(), marks).any():
+                self.mark(number, [Mark(first, last, reason)])
+
+    @staticmethod
+    def _insert_marks(connection: sqlite3.Connection, number: int, marks: Iterable[Mark]) -> None:
+        connection.executemany(
+            "INSERT INTO marks VALUES (?, ?, ?, ?)", ((number, one.first, one.last, one.reason) for one in marks)
+        )
+
     def _insert(self, connection: sqlite3.Connection, number: int, one: Recorded) -> None:
         values = _row_values(one, self.spec, self.valves)
-        transitions = int((np.diff(one.step) == 1).sum())
         connection.execute(
             "INSERT INTO sequences VALUES (?, ?, ?, ?, ?, ?, ?)",
             (
@@ -293,10 +359,11 @@ class Store:
                 one.kind,
                 int(one.at_rest),
                 len(one),
-                transitions,
+                one.transitions,
                 _as_json(one.info),
             ),
         )
+        self._insert_marks(connection, number, one.marks)
         places = ", ".join("?" * (values.shape[1] + 1))
         # SQLite stores NaN as NULL, which is what a row without a command has.
         connection.executemany(
@@ -334,9 +401,10 @@ class Store:
             if found != "ok":
                 raise damaged(self.path, str(found))
             numbers, joined = 0, 0
+            for block in self.blocks(marked=True):
+                numbers += len(np.unique(block.sequence))
             for block in self.blocks():
                 joined += int(((np.diff(block.sequence) == 0) & (np.diff(block.step) == 1)).sum())
-                numbers += len(np.unique(block.sequence))
             stray = self._one("SELECT count(*) FROM rows") - self._one("SELECT coalesce(sum(rows), 0) FROM sequences")
         if numbers != self.sequences or joined != self.transitions or stray:
             raise damaged(self.path, "its catalogue does not agree with its rows")
@@ -374,8 +442,11 @@ def lock_vacant(path: Path) -> WriterLock:
 class Blocks:
     """Rows of a store as blocks of whole sequences; every iteration reads them anew."""
 
-    def __init__(self, store: Store, rows: int, sequences: Predicate | None, kinds: Collection[str] | None) -> None:
+    def __init__(
+        self, store: Store, rows: int, sequences: Predicate | None, kinds: Collection[str] | None, marked: bool
+    ) -> None:
         self._store, self._rows, self._sequences, self._kinds = store, rows, sequences, kinds
+        self._marked = marked
 
     def __iter__(self) -> Iterator[Rows]:
         number, length, at_rest = self._chosen()
@@ -384,7 +455,8 @@ class Blocks:
         while begin < len(number):
             end = int(np.searchsorted(before, before[begin] + self._rows, "right")) - 1
             part = slice(begin, max(end, begin + 1))
-            yield self._read(number[part], length[part], at_rest[part])
+            if len(block := self._read(number[part], length[part], at_rest[part])):
+                yield block
             begin = part.stop
 
     def _chosen(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
@@ -426,7 +498,18 @@ class Blocks:
         first = np.concatenate([[0], np.cumsum(length)[:-1]])
         if surplus or not _is_sound(rows, first, store.spec, store.valves):
             raise damaged(store.path, f"impossible values in sequences {number[0]} to {number[-1]}")
-        return rows
+        return rows if self._marked else self._without_marked(rows)
+
+    def _without_marked(self, rows: Rows) -> Rows:
+        """Return the rows that are not marked."""
+        first, last = int(rows.sequence[0]), int(rows.sequence[-1])
+        marks = self._store._marks("sequence BETWEEN ? AND ?", (first, last))
+        if not marks:
+            return rows
+        kept = np.ones(len(rows), bool)
+        for sequence, mark in marks:
+            kept &= (rows.sequence != sequence) | unmarked(rows.step, [mark])
+        return Rows(**{name: values[kept] for name, values in vars(rows).items()})
 
 
 def _is_sound(rows: Rows, first: NDArray[np.int64], spec: ArmSpec, valves: bool) -> bool:

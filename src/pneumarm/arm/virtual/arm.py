@@ -3,6 +3,7 @@
 import hashlib
 import math
 import struct
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,12 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, Constants, constants
+from pneumarm.arm.virtual.faults import Fault, Plan
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
+from pneumarm.arm.virtual.playing import FaultPlayer
 from pneumarm.arm.virtual.rest import pass_time, static_angle
-from pneumarm.arm.virtual.sensors import MOST_CONVERSIONS, sense
+from pneumarm.arm.virtual.sensors import MOST_CONVERSIONS, sense, sense_with_faults
 from pneumarm.arm.virtual.start import start
-from pneumarm.arm.virtual.state import JOINT, MUSCLE, QUEUE, SLOW_TICK, SURROUNDINGS
-from pneumarm.arm.virtual.valve import command
+from pneumarm.arm.virtual.state import INLET, JOINT, MUSCLE, OUTLET, QUEUE, SLOW_TICK, SURROUNDINGS
+from pneumarm.arm.virtual.valve import command, command_sides
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.random import random_states, uniform
@@ -58,10 +61,21 @@ class VirtualArm(Arm):
         parameters: what the arm is made of; the nominal arm by default.
         seed: seeds the noise of the sensors, the jitter, and the fluctuation of the supply.
         name: what reports call the arm.
+        faults: what goes wrong with it, and when; see :mod:`pneumarm.arm.virtual.faults`.
+
+    Raises:
+        UnusableInput: the arm cannot play the faults.
 
     """
 
-    def __init__(self, parameters: ArmParameters | None = None, *, seed: int = 0, name: str = "virtual") -> None:
+    def __init__(
+        self,
+        parameters: ArmParameters | None = None,
+        *,
+        seed: int = 0,
+        name: str = "virtual",
+        faults: Sequence[Fault] = (),
+    ) -> None:
         self.parameters = parameters if parameters is not None else ArmParameters()
         joints = len(self.parameters.joints)
         self.spec = ArmSpec(
@@ -101,6 +115,45 @@ class VirtualArm(Arm):
             self._scratch,
         )
         start(*self._physics)
+        self._player: FaultPlayer | None = None
+        self.faults = tuple(faults)
+
+    @property
+    def faults(self) -> Plan:
+        """The faults that the arm plays; set it, also while the arm moves, to play others from now on."""
+        return () if self._player is None else self._player.plan
+
+    @faults.setter
+    def faults(self, plan: Sequence[Fault]) -> None:
+        asked = self._asked()
+        before, self._player = self._player, None
+        if before is not None:
+            before.restore()
+        try:
+            if plan:
+                self._player = FaultPlayer(
+                    tuple(plan),
+                    self.parameters,
+                    self._constants,
+                    self._muscles,
+                    self._joints,
+                    self._surroundings,
+                    asked,
+                )
+        except UnusableInput:
+            self._player = before
+            if before is not None:
+                before.update(self.time, afresh=True)
+            raise
+        if before is not None or plan:
+            self.set_valves(asked)
+
+    def _asked(self) -> NDArray[np.int8]:
+        """Return the valves (joints, 2) as they were last asked for."""
+        if self._player is not None:
+            return self._player.asked.copy()
+        sides = (self._muscles["open"] + self._muscles["pending"]) % 2
+        return (sides[..., INLET] - sides[..., OUTLET]).astype(np.int8)
 
     @property
     def constants(self) -> Constants:
@@ -141,6 +194,9 @@ class VirtualArm(Arm):
         """Return what the sensors say now; two readings at the same time differ by their noise."""
         joints = self.spec.joints
         angle, pressure = np.empty(joints), np.empty((joints, 2))
+        if self._player is not None:
+            time = sense_with_faults(*self._sensing, self._player.track, self._player.leap, angle, pressure)
+            return Reading(time, angle, pressure)
         return Reading(sense(*self._sensing, angle, pressure), angle, pressure)
 
     def set_valves(self, valves: ArrayLike) -> None:
@@ -153,6 +209,9 @@ class VirtualArm(Arm):
         asked = np.asarray(valves)
         if asked.shape == self._muscles.shape:
             exact = asked if asked.dtype == np.int8 else _as_int8(asked)
+            if self._player is not None and np.isin(exact, (-1, 0, 1)).all():
+                self._route(self._player, exact)
+                return
             if command(self._muscles, self._surroundings, self._constants.surroundings, np.ascontiguousarray(exact)):
                 return
         raise PneumarmError(f"valves must be {self._muscles.shape} of -1, 0 or +1, got {valves!r}")
@@ -166,7 +225,10 @@ class VirtualArm(Arm):
         """
         if not 0.0 <= seconds <= LONGEST_WAIT:
             raise PneumarmError(f"an arm can wait for 0 to {LONGEST_WAIT:g} s, got {seconds!r}")
-        pass_for(*self._physics, seconds)
+        if self._player is not None:
+            self._play(self._player, self.time + seconds)
+        else:
+            pass_for(*self._physics, seconds)
 
     def wait_until(self, time: float) -> None:
         """Let time pass until the clock shows ``time`` [s], or a little more; return at once if it is past.
@@ -177,7 +239,28 @@ class VirtualArm(Arm):
         """
         if not time <= LONGEST_WAIT and not time - self.time <= LONGEST_WAIT:
             raise PneumarmError(f"an arm can wait for up to {LONGEST_WAIT:g} s, got the time {time!r}")
-        pass_until(*self._physics, self._random[_JITTER], self._lateness, time)
+        if self._player is not None:
+            self._play(self._player, time, late=True)
+        else:
+            pass_until(*self._physics, self._random[_JITTER], self._lateness, time)
+
+    def _play(self, player: FaultPlayer, until: float, *, late: bool = False) -> None:
+        """Let time pass until ``until`` [s], or until a little ``late``, cut where faults change."""
+        while (change := player.next_change()) < until:
+            pass_time(*self._physics, change)
+            self._update(player)
+        if late:
+            pass_until(*self._physics, self._random[_JITTER], self._lateness, until)
+        else:
+            pass_time(*self._physics, until)
+        self._update(player)
+
+    def _update(self, player: FaultPlayer) -> None:
+        if player.update(self.time):
+            self._route(player, player.asked.copy())
+
+    def _route(self, player: FaultPlayer, asked: NDArray[np.int8]) -> None:
+        command_sides(self._muscles, self._surroundings, self._constants.surroundings, player.route(asked))
 
     def rest(self, seconds: float) -> None:
         """Vent all muscles for ``seconds`` [s] and close the valves again; a night costs milliseconds."""
@@ -194,38 +277,47 @@ class VirtualArm(Arm):
 
     def _digest(self) -> bytes:
         digest = hashlib.blake2b(digest_size=16)
-        for record in self._constants:
+        player = self._player
+        for record in self._constants if player is None else player.sound:
             digest.update(record.tobytes())
         digest.update(struct.pack("<d", self._lateness))
+        if player is not None:
+            digest.update(player.digest())
         return digest.digest()
 
     def get_state(self) -> bytes:
         """Return everything that the arm's future depends on besides its parameters."""
-        return _HEADER.pack(_MAGIC, _VERSION, self._digest()) + b"".join(part.tobytes() for part in self._parts())
+        parts = [_HEADER.pack(_MAGIC, _VERSION, self._digest()), *(part.tobytes() for part in self._parts())]
+        return b"".join(parts if self._player is None else [*parts, self._player.get_state()])
 
     def set_state(self, state: bytes) -> None:
-        """Take up a state that an arm with the same parameters returned; the future is the same bit for bit.
+        """Take up a state of an arm with the same parameters and faults; the future is the same bit for bit.
 
         Raises:
-            UnusableInput: no state of an arm with these parameters, or a damaged one.
+            UnusableInput: no state of an arm with these parameters and faults, or a damaged one.
 
         """
+        player = self._player
         expected = _HEADER.size + sum(part.nbytes for part in self._parts())
+        expected += 0 if player is None else player.state_size
         if len(state) != expected:
             raise UnusableInput(f"{self.spec.name}: expected a saved state of {expected} bytes, got {len(state)}")
         magic, version, digest = _HEADER.unpack_from(state)
         if (magic, version) != (_MAGIC, _VERSION):
             raise UnusableInput(f"{self.spec.name}: this is no saved state of a virtual arm of version {_VERSION}")
         if digest != self._digest():
-            raise UnusableInput(f"{self.spec.name}: the saved state is of an arm with other parameters")
+            raise UnusableInput(f"{self.spec.name}: the saved state is of an arm with other parameters or faults")
         offset, restored = _HEADER.size, []
         for part in self._parts():
             restored.append(np.frombuffer(state, part.dtype, part.size, offset).reshape(part.shape))
             offset += part.nbytes
         for values in restored:
             _check_state(values, self.spec.name)
+        played = None if player is None else player.check_state(state[offset:], self.spec.name)
         for part, values in zip(self._parts(), restored, strict=True):
             part[...] = values
+        if player is not None and played is not None:
+            player.set_state(played)
 
 
 def _check_state(values: NDArray[Any], name: str) -> None:

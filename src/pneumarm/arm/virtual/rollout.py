@@ -17,6 +17,7 @@ from pneumarm.arm.virtual.rest import pass_time
 from pneumarm.arm.virtual.sensors import convert, worn
 from pneumarm.arm.virtual.state import JOINT, MUSCLE, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command
+from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 
 
@@ -61,7 +62,14 @@ class PhysicsStates(NamedTuple):
 
 
 def physics_of(arm: VirtualArm) -> Physics:
-    """Return the physics of ``arm`` for rollouts."""
+    """Return the physics of ``arm`` for rollouts.
+
+    Raises:
+        UnusableInput: the arm plays faults, which a rollout does not.
+
+    """
+    if arm.faults:
+        raise UnusableInput(f"{arm.spec.name}: no rollouts of an arm with faults; remove them")
     spec = arm.spec
     return Physics(*arm.constants, spec.period, spec.latency, spec.max_pressure_counts)
 

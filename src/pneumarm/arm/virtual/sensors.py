@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from pneumarm.arm.virtual.constants import BUMPS
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
 from pneumarm.kernels import kernel
@@ -11,6 +13,19 @@ MOST_CONVERSIONS = 9
 """Most conversions of which a median is taken."""
 BUMP_WIDTH = 6.0
 """Standard deviation of a worn place, about half a degree [counts]."""
+TRACK = np.dtype(
+    [
+        ("rail", "f8"),  # the reading of a broken potentiometer, NaN for a whole one [counts]
+        ("frozen", "f8"),  # the reading of one that slips, NaN for one that does not [counts]
+        ("bend", "f8"),  # exponent of a logarithmic track, 0 for a linear one
+        ("worn_at", "f8"),  # [counts]
+        ("worn_width", "f8"),  # [counts]
+        ("worn_height", "f8"),  # [counts]
+        ("worn_contact", "f8"),  # [counts]
+    ]
+)
+"""What faults have made of a potentiometer."""
+_RIPPLES = (17.0, 7.0)  # lengths of the lasting errors of a worn track, in counts
 
 
 @kernel
@@ -58,3 +73,41 @@ def sense(muscles, joints, surroundings, sensors_c, random, scratch, angle, pres
             value = c.counts_per_pascal * (muscles[j, m].pressure - ATMOSPHERE)
             pressure[j, m] = median_conversion(value, c.pressure_noise, c, random, scratch)
     return surroundings[0].time
+
+
+@kernel
+def sense_with_faults(  # type: ignore[no-untyped-def]
+    muscles, joints, surroundings, sensors_c, random, scratch, track, leap, angle, pressure
+):
+    """As :func:`sense`, with potentiometers ``track`` (joints,) and ``leap`` (joints, 2) [Pa] added to pressures."""
+    c = sensors_c[0]
+    for j in range(len(joints)):
+        value = c.middle + c.counts_per_radian * joints[j].angle
+        if c.wear > 0.0:
+            value = worn(value, c)
+        value = shown(value, track[j], c, random)
+        angle[j] = median_conversion(value, c.angle_noise, c, random, scratch)
+        if c.dropout > 0.0 and uniform(random) < c.dropout:
+            angle[j] = 0.0
+        if not math.isnan(track[j].frozen):
+            angle[j] = track[j].frozen
+        if not math.isnan(track[j].rail):
+            angle[j] = track[j].rail
+        for m in range(2):
+            value = c.counts_per_pascal * (muscles[j, m].pressure - ATMOSPHERE + leap[j, m])
+            pressure[j, m] = median_conversion(value, c.pressure_noise, c, random, scratch)
+    return surroundings[0].time
+
+
+@kernel
+def shown(value, track, c, random):  # type: ignore[no-untyped-def]
+    """Return what a potentiometer with faults shows at the angle ``value`` [counts]."""
+    if track.bend > 0.0:
+        inside = min(max(value / c.highest, 0.0), 1.0)
+        value = c.highest * math.expm1(track.bend * inside) / math.expm1(track.bend)
+    if track.worn_height > 0.0 or track.worn_contact > 0.0:
+        distance = (value - track.worn_at) / track.worn_width
+        depth = math.exp(-0.5 * distance * distance)
+        ripple = 0.5 * (math.sin(value / _RIPPLES[0]) + math.sin(value / _RIPPLES[1]))
+        value += depth * (track.worn_height * ripple + track.worn_contact * normal(random))
+    return value

@@ -48,6 +48,19 @@ def command(muscles, surroundings, surroundings_c, valves):  # type: ignore[no-u
 
 
 @kernel
+def command_sides(muscles, surroundings, surroundings_c, sides):  # type: ignore[no-untyped-def]
+    """Set inlets and outlets apart, ``sides`` (joints, 2, 2) of 0 or 1: what faults make of a command."""
+    now = surroundings[0].time
+    opened = now + surroundings_c[0].opening_delay
+    closed = now + surroundings_c[0].closing_delay
+    for j in range(muscles.shape[0]):
+        for m in range(2):
+            for side in range(2):
+                wanted = sides[j, m, side]
+                switch(muscles[j, m], side, wanted, opened if wanted else closed)
+
+
+@kernel
 def toggle_due(muscle, now):  # type: ignore[no-untyped-def]
     """Toggle the valves whose time has come, and return the time of the next toggle [s] (inf if none)."""
     following = math.inf

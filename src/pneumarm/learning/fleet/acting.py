@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import kernel
 from pneumarm.learning.environment import Environment, reward
-from pneumarm.learning.fleet.arms import Fleet, Limits, fleet, take_all
+from pneumarm.learning.fleet.arms import Fleet, Limits, fleet, take_alive, take_all
 from pneumarm.learning.fleet.inputs import InputParameters, write_inputs
 from pneumarm.learning.fleet.layers import Layers, forward, room
 from pneumarm.learning.fleet.policy import FORBIDDEN, log_softmax, write_bias
@@ -70,20 +70,24 @@ def lanes(mind: Mind, sizes: tuple[int, ...], random: RandomState) -> Lanes:
         actions=np.zeros((n, joints), np.int64),
         is_reached=np.zeros(n, np.bool_),
         total=np.zeros(n),
-        alive=np.zeros(n, np.bool_),
+        alive=np.ones(n, np.bool_),
     )
 
 
 @kernel
 def judge_all(mind, lanes):  # type: ignore[no-untyped-def]
-    """Let ``lanes.units[-1]`` be the log probabilities of the actions, and ``lanes.actions`` the most probable."""
+    """Let ``lanes.units[-1]`` be the logits of the actions, and ``lanes.actions`` the most probable, where alive."""
     arms = lanes.fleet
     write_inputs(mind.inputs, arms.x, arms.actions, lanes.rows)
     forward(mind.layers, lanes.rows, lanes.units)
     for e in range(lanes.actions.shape[0]):
+        if not lanes.alive[e]:
+            continue
         write_bias(mind.limits, mind.hold, arms.x[:, e], arms.actions[e], arms.still[e], lanes.bias, e)
     logits = lanes.units[-1]
     for e in range(lanes.actions.shape[0]):
+        if not lanes.alive[e]:
+            continue
         for joint in range(lanes.actions.shape[1]):
             first, best = ACTIONS * joint, 0
             for action in range(ACTIONS):
@@ -146,7 +150,7 @@ def move_all(mind, lanes, horizon):  # type: ignore[no-untyped-def]
     for k in range(horizon):
         if k > 0:
             judge_all(mind, lanes)
-        take_all(mind.environment, mind.limits, lanes.fleet, lanes.actions, lanes.is_reached)
+        take_alive(mind.environment, mind.limits, lanes.fleet, lanes.actions, lanes.alive, lanes.is_reached)
         is_done = True
         for e in range(lanes.total.shape[0]):
             if lanes.alive[e]:

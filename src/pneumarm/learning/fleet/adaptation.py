@@ -1,115 +1,237 @@
 """A policy adapts to the arm that it moves: its simulation is fitted anew, and it goes on learning in that.
 
-    what the arm did          -> the simulation fits it better than before?  no: all stays as it is
-    the simulation as it is now -> the policy goes on learning there: better than before?  no: the policy stays
+    after every movement:  does the simulation still predict the arm?         no: the arm has changed, notice when
+                           does the adapted policy earn less than before?     yes: the one before it is put back
+    now and then:          what the arm did since it changed -> the simulation fits it better?
+                           no: all stays as it is.  yes: the policy goes on learning there, and is kept if better
 
-The networks of the simulation go on from where they are, by Levenberg-Marquardt, on the transitions of the newest
-movements and on rehearsed ones: what the simulation that the agent came with says of actions drawn at random. Without
-these a fit to a policy's movements, which use few of the actions, forgets the rest (A. Robins, "Catastrophic
-forgetting, rehearsal and pseudorehearsal", Connection Science 7(2), 1995).
-
-The newest movements of all are kept out of the fit. They decide whether it is an improvement, and how much noise the
-simulation gets. So an agent whose simulation cannot be improved stays as it is.
+The three questions are answered by :mod:`~pneumarm.learning.fleet.watch`, :mod:`~pneumarm.learning.fleet.trial` and
+:mod:`~pneumarm.learning.fleet.refit`. "Now and then" is after few movements at first, and then each time that their
+number has grown by a half, up to ``every``: what a simulation gains by more data falls with their number. A change
+that is noticed begins this anew.
 """
 
+import json
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.valves import VALVES
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.begin import BeginStates, begin_states
 from pneumarm.learning.fleet.agent import PolicyAgent
+from pneumarm.learning.fleet.refit import Refit, RefitSettings, refit
 from pneumarm.learning.fleet.settings import PolicySettings
 from pneumarm.learning.fleet.training import PolicyLearner
+from pneumarm.learning.fleet.trial import TrialSettings, verdict
+from pneumarm.learning.fleet.watch import Watch, WatchSettings, error_squares, output_names, standardised_squares
 from pneumarm.learning.settings import check
-from pneumarm.networks import LevenbergMarquardt, Network, levenberg_marquardt
-from pneumarm.simulation.quality import statistics
+from pneumarm.networks import Network
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Rows
-from pneumarm.transitions.window import Transitions, transitions
 
-_SWITCHES = 0.2  # how often a rehearsed action is another than the one before
-_REHEARSED_STEPS = 20  # of a rehearsed movement; the policy's take about ten
 _LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias")
+What = Literal["noticed", "accepted", "refused", "rolled back"]
 
 
 @dataclass(frozen=True)
 class AdaptationSettings:
     """How a policy adapts to an arm between movements."""
 
+    first: int = 10
+    """Movements until the first adaptation, on arrival and after a change that was noticed."""
+    growth: float = 1.5
+    """Factor by which their number grows from one adaptation to the next."""
     every: int = 100
-    """Movements between two adaptations; 0: never."""
-    newest: int = 1000
-    """Movements that the simulation is fitted to, the newest ones."""
-    judged: float = 0.2
-    """Share of these, the newest of all, that is kept out of the fit and decides whether it is an improvement."""
-    gain: float = 0.05
-    """Part by which the mean squared errors must be lower, as a geometric mean over the quantities predicted."""
-    rehearsed: float = 0.5
-    """Rehearsed transitions for each of the arm's."""
-    epochs: int = 10
-    """Epochs of Levenberg-Marquardt."""
+    """Most movements between two adaptations; 0: never."""
     updates: int = 30
     """How often the policy collects experience in the new simulation and learns from it."""
     warm_up: int = 8
     """Updates before these that learn the values of states alone, which an agent does not keep."""
     learning_rate: float = 1e-3
     """Of the policy, by Adam, at the start; falls linearly to 0."""
+    refit: RefitSettings = field(default_factory=RefitSettings)
+    """How the simulation is fitted further."""
+    watch: WatchSettings = field(default_factory=WatchSettings)
+    """When the arm counts as changed."""
+    trial: TrialSettings = field(default_factory=TrialSettings)
+    """When an adapted agent is taken back."""
 
     def __post_init__(self) -> None:
         check(
             self,
+            first=self.first >= 1,
+            growth=1 < self.growth < math.inf,
             every=self.every >= 0,
-            newest=self.newest >= 2,
-            judged=0 < self.judged < 1,
-            gain=0 <= self.gain < 1,
-            rehearsed=0 <= self.rehearsed < math.inf,
-            epochs=self.epochs >= 1,
             updates=self.updates >= 1,
             warm_up=self.warm_up >= 0,
             learning_rate=0 < self.learning_rate < math.inf,
         )
 
 
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to an adapting agent."""
+
+    what: What
+    movement: int
+    """Movements made on the arm by then, those of tests counted."""
+    version: int
+    """Of the agent after it; 0 is the one that arrived."""
+    figures: Mapping[str, Any]
+    """``noticed``: since (the movement) and ratio; ``accepted``, ``refused``: movements, and the errors before and
+    after over those of the fit; ``rolled back``: the mean rewards before and after, and the version taken back.
+    Ratios are of angle, pressure 1, pressure 2, joint after joint."""
+
+
 class Adaptation:
-    """A policy agent adapting to an arm. It depends on nothing but its arguments and what :meth:`learn` is given."""
+    """A policy agent adapting to an arm. It depends on nothing but its arguments and what it is told.
+
+    It is told of every movement by :meth:`saw`. :meth:`learn` makes a new version of the agent, which :meth:`saw` may
+    take back.
+    """
 
     def __init__(self, agent: PolicyAgent, settings: AdaptationSettings, seed: int = 0) -> None:
         self._origin, self._settings, self._seed = agent, settings, seed
         self.agent = agent
         """The agent as it is now."""
-        self.accepted = 0
-        """How often the simulation was replaced by one that fits better."""
-        self.tried = -1
-        """Movements while learning at the last attempt, accepted or not; -1 before the first."""
+        self.version = 0
+        """Its number."""
+        self.versions = 1
+        """Versions so far, the one that arrived and those taken back counted."""
+        self.events: list[Event] = []
+        self._watch = Watch(settings.watch, len(agent.simulation.outputs))
+        self._began = 0  # movement since which the arm is as it is now
+        self._tried = -1  # movement of the last attempt to learn
+        self._trusted, self._trusted_version = agent, 0  # what is put back if the agent is worse
+        self._old: list[float] = []  # rewards of the trusted agent
+        self._new: list[float] = []  # rewards of the agent that is on trial
+        self.quantities = output_names(agent.simulation)
+        """What the ratios are of."""
 
-    def is_due(self, movements: int) -> bool:
-        """Whether to :meth:`learn` after so many ``movements`` while learning."""
-        return movements > self.tried and self._settings.every > 0 and movements % self._settings.every == 0
+    @property
+    def accepted(self) -> int:
+        """How often a new version was made."""
+        return self.versions - 1
 
-    def learn(self, rows: Rows, movements: int) -> None:
-        """Adapt to ``rows``, those of movements on the arm, the newest last, after so many ``movements``.
+    @property
+    def movements(self) -> int:
+        """Movements that it was told of."""
+        return self._watch.movements
 
-        With too few rows for the fit to be determined, nothing happens.
+    @property
+    def usable(self) -> int:
+        """The newest movements that :meth:`learn` should be given: no more than since the arm changed."""
+        return min(self.movements - self._began, self._settings.refit.newest)
+
+    @property
+    def ratio(self) -> NDArray[np.float64]:
+        """Error of the simulation in the last movements over that of its fit, shape (outputs,)."""
+        return self._watch.ratio
+
+    def saw(self, rows: Rows, reward: float, *, judges: bool = True) -> list[list[float]]:
+        """Take notice of a movement: its ``rows`` and its ``reward``; with ``judges`` an agent may be taken back.
+
+        Returns the mean standardised squared errors in it (2, outputs) of the simulation that arrived and of the one
+        in use, for people.
         """
-        self.tried = movements
-        simulation = adapted_simulation(
-            self.agent.simulation, self._origin.simulation, rows, self._settings, self._seed
-        )
-        if simulation is None:
-            return
-        self.accepted += 1
-        begin = begin_states(rows, simulation.window, simulation.scaling)
-        policy = adapted_policy(self.agent, simulation, begin, self._settings, self._seed + movements)
-        self.agent = replace(self.agent, simulation=simulation, policy=policy)
+        now = standardised_squares(self.agent.simulation, rows)
+        arrived = now if self.version == 0 else standardised_squares(self._origin.simulation, rows)
+        if self._watch.saw(now):
+            self._notice()
+        if self.version == self._trusted_version:
+            self._old = [*self._old, reward][-self._settings.trial.remembered :]
+        else:
+            self._new.append(reward)
+            if judges:
+                self._judge()
+        return [arrived.tolist(), now.tolist()]
+
+    def _notice(self) -> None:
+        since = self._watch.since
+        self._tell("noticed", since=since, ratio=self.ratio.tolist())
+        if since > self._began + self._settings.trial.fewest:
+            # Rewards on the arm as it was say nothing about agents on the arm as it is.
+            self._began = since
+            self._trust()
+
+    def _judge(self) -> None:
+        found = verdict(self._old, self._new, self._settings.trial)
+        if found == "confirmed":
+            self._trust()
+        elif found == "worse":
+            worse, means = self.version, [float(np.mean(rewards)) for rewards in (self._old, self._new)]
+            self.agent, self.version, self._new = self._trusted, self._trusted_version, []
+            self._watch.reset()
+            self._tried = self.movements
+            self._tell("rolled back", taken_back=worse, reward_before=means[0], reward_after=means[1])
+
+    def _trust(self) -> None:
+        """Count the agent as proven."""
+        remembered = self._settings.trial.remembered
+        self._trusted, self._trusted_version = self.agent, self.version
+        self._old, self._new = self._new[-remembered:], []
+
+    def is_due(self) -> bool:
+        """Whether to :meth:`learn` now."""
+        every, made = self._settings.every, self.movements - self._began
+        if every == 0 or self.movements == self._tried or made < min(self._settings.first, every):
+            return False
+        tried = self._tried - self._began
+        return tried < 0 or made - tried >= every or made >= self._settings.growth * tried
+
+    def learn(self, rows: Rows) -> bool:
+        """Adapt to ``rows``, those of the :attr:`usable` movements, the newest last; whether there is a new version.
+
+        With too few movements nothing happens.
+        """
+        self._tried = self.movements
+        found = refit(self.agent.simulation, self._origin.simulation, rows, self._settings.refit, self._seed)
+        if found is None:
+            return False
+        if found.better:
+            simulation = found.simulation
+            begin = begin_states(rows, simulation.window, simulation.scaling)
+            policy = adapted_policy(self.agent, simulation, begin, self._settings, self._seed + self.movements)
+            self.agent = replace(self.agent, simulation=simulation, policy=policy)
+            self.version, self.versions = self.versions, self.versions + 1
+            self._new = []
+            self._watch.reset()
+        self._tell("accepted" if found.better else "refused", **self._told(found))
+        return found.better
+
+    def _told(self, found: Refit) -> dict[str, Any]:
+        unit = np.sqrt(error_squares(self._origin.simulation))
+        return {
+            "movements": found.movements,
+            "before": (found.before / unit).tolist(),
+            "after": (found.after / unit).tolist(),
+        }
+
+    def _tell(self, what: What, **figures: Any) -> None:
+        self.events.append(Event(what, self.movements, self.version, figures))
 
     def get_state(self) -> bytes:
         """Return all that its future depends on besides what it was made with."""
-        head = np.array([self.accepted, self.tried], np.float64)
-        return b"".join([head.tobytes(), *(part.astype(np.float64).tobytes() for part in _plastic(self.agent))])
+        head = {
+            "version": self.version,
+            "versions": self.versions,
+            "began": self._began,
+            "tried": self._tried,
+            "trusted": self._trusted_version,
+            "old": self._old,
+            "new": self._new,
+            "events": [asdict(event) for event in self.events],
+            "watch": self._watch.get_state(),
+        }
+        text = json.dumps(head).encode()
+        arrays = [part for agent in (self.agent, self._trusted) for part in _plastic(agent)]
+        return b"".join(
+            [np.int64(len(text)).tobytes(), text, *(part.astype(np.float64).tobytes() for part in arrays)]
+        )
 
     def set_state(self, state: bytes) -> None:
         """Take up a state of :meth:`get_state`, bit for bit.
@@ -118,20 +240,24 @@ class Adaptation:
             UnusableInput: it is of another agent, or damaged.
 
         """
-        parts = _plastic(self._origin)
-        numbers = np.frombuffer(state, np.float64) if len(state) % 8 == 0 else np.zeros(0)
-        if numbers.size != 2 + sum(part.size for part in parts) or not np.isfinite(numbers).all():
+        try:
+            length = int(np.frombuffer(state[:8], np.int64)[0])
+            head = json.loads(state[8 : 8 + length])
+            numbers = np.frombuffer(state[8 + length :], np.float64)
+            self.version, self.versions = int(head["version"]), int(head["versions"])
+            self._began, self._tried = int(head["began"]), int(head["tried"])
+            self._trusted_version = int(head["trusted"])
+            self._old, self._new = list(map(float, head["old"])), list(map(float, head["new"]))
+            self.events = [Event(**event) for event in head["events"]]
+            self._watch.set_state(head["watch"])
+        except (ValueError, TypeError, KeyError, IndexError) as error:
+            raise UnusableInput(
+                f"the state of the adaptation is damaged or of another agent ({error}); begin another folder"
+            ) from error
+        size = sum(part.size for part in _plastic(self._origin))
+        if numbers.size != 2 * size or not np.isfinite(numbers).all():
             raise UnusableInput("the state of the adaptation is damaged or of another agent; begin another folder")
-        self.accepted, self.tried = int(numbers[0]), int(numbers[1])
-        ends = 2 + np.cumsum([part.size for part in parts])
-        taken = [numbers[e - p.size : e].reshape(p.shape).copy() for e, p in zip(ends, parts, strict=True)]
-        policy, error_std, pressure_range, *layers = taken
-        size = len(_LAYERS)
-        networks = tuple(Network(*layers[i : i + size]) for i in range(0, len(layers), size))
-        simulation = replace(
-            self._origin.simulation, networks=networks, error_std=error_std, pressure_range=pressure_range
-        )
-        self.agent = replace(self._origin, simulation=simulation, policy=policy.astype(np.float32))
+        self.agent, self._trusted = (_with_plastic(self._origin, part) for part in np.split(numbers, 2))
 
 
 def _plastic(agent: PolicyAgent) -> list[NDArray[np.floating]]:
@@ -141,44 +267,21 @@ def _plastic(agent: PolicyAgent) -> list[NDArray[np.floating]]:
     return [agent.policy, simulation.error_std, simulation.pressure_range, *layers]
 
 
+def _with_plastic(agent: PolicyAgent, numbers: NDArray[np.float64]) -> PolicyAgent:
+    """Return ``agent`` with other :func:`_plastic` arrays, one after the other in ``numbers``."""
+    parts = _plastic(agent)
+    ends = np.cumsum([part.size for part in parts])
+    taken = [numbers[e - p.size : e].reshape(p.shape).copy() for e, p in zip(ends, parts, strict=True)]
+    policy, error_std, pressure_range, *layers = taken
+    size = len(_LAYERS)
+    networks = tuple(Network(*layers[i : i + size]) for i in range(0, len(layers), size))
+    simulation = replace(agent.simulation, networks=networks, error_std=error_std, pressure_range=pressure_range)
+    return replace(agent, simulation=simulation, policy=policy.astype(np.float32))
+
+
 def can_adapt(agent: PolicyAgent) -> bool:
     """Whether the simulation of ``agent`` can be fitted further: a linear one, without hidden units, cannot."""
     return all(network.direct is None for network in agent.simulation.networks)
-
-
-def adapted_simulation(
-    simulation: Simulation, origin: Simulation, rows: Rows, settings: AdaptationSettings, seed: int
-) -> Simulation | None:
-    """Return ``simulation`` fitted further to ``rows``, or None where that does not make it better.
-
-    ``origin`` says what is rehearsed. Scaling, window and spec stay as they are, so that a policy of the one can act
-    in the other.
-    """
-    window = simulation.window
-    found = transitions(_last_sequences(rows, settings.newest), window)
-    numbers = np.unique(found.sequence)
-    first_judged = numbers[-max(1, round(settings.judged * len(numbers)))] if len(numbers) else 0
-    known, judged = _part(found, found.sequence < first_judged), _part(found, found.sequence >= first_judged)
-    weights = max(sum(getattr(network, name).size for name in _LAYERS) for network in simulation.networks)
-    if len(known.inputs) < weights:
-        return None
-    count = round(settings.rehearsed * len(known.inputs))
-    rehearsed = rehearse(origin, known, count, np.random.default_rng([seed, len(numbers)]))
-    inputs = np.concatenate([known.inputs, rehearsed.inputs])
-    target = np.concatenate([known.target, rehearsed.target])
-    x = simulation.scaling.inputs(inputs, window).astype(np.float32)
-    places, scale = simulation.outputs, simulation.scaling.observation_scale
-    y = (target[:, places].astype(np.float64) - inputs[:, places]) / scale[places]
-    refitted = replace(
-        simulation,
-        networks=_refitted(simulation.networks, x, y, settings.epochs),
-        pressure_range=_reaching(simulation.pressure_range, found, window.joints),
-    )
-    before, after = statistics(simulation, judged), statistics(refitted, judged)
-    squares = [(one.std**2 + one.mean**2)[places] for one in (before, after)]
-    if np.log(np.maximum(squares[1], 1e-30) / np.maximum(squares[0], 1e-30)).mean() > math.log1p(-settings.gain):
-        return None
-    return replace(refitted, error_std=after.std.reshape(window.joints, -1))
 
 
 def adapted_policy(
@@ -214,69 +317,28 @@ class _Tuner(PolicyLearner):
 _VALUE_RATE = 4e-3  # of a policy's training, whose values begin at random, too
 
 
-def rehearse(origin: Simulation, known: Transitions, count: int, random: np.random.Generator) -> Transitions:
-    """Return ``count`` transitions that ``origin`` predicts of actions drawn at random.
-
-    Movements begin in the states in which those of ``known`` begin, or in any where there is none.
-    """
-    window, size = origin.window, origin.window.observation_size
-    began = known.inputs[known.step == 0]
-    sigma = (began if len(began) else known.inputs)[:, : window.state_size]
-    lanes = -(-count // _REHEARSED_STEPS)
-    sigma = sigma[random.integers(len(sigma), size=lanes)]
-    actions = random.integers(len(VALVES), size=(lanes, window.joints))
-    inputs, target = [], []
-    for _ in range(_REHEARSED_STEPS):
-        drawn = random.integers(len(VALVES), size=actions.shape)
-        actions = np.where(random.random(actions.shape) < _SWITCHES, drawn, actions)
-        command = VALVES[actions].reshape(lanes, window.command_size).astype(np.float32)
-        inputs.append(np.concatenate([sigma, command], axis=1))
-        target.append(origin.predict(inputs[-1]).astype(np.float32))
-        observed, commanded = sigma[:, : window.history * size], sigma[:, window.history * size :]
-        commands = np.concatenate([command, commanded], axis=1)[:, : commanded.shape[1]]
-        sigma = np.concatenate([target[-1], observed[:, :-size], commands], axis=1)
-    zeros = np.zeros(count)
-    return Transitions(
-        inputs=np.concatenate(inputs)[:count],
-        target=np.concatenate(target)[:count],
-        sequence=zeros.astype(np.int64),
-        step=zeros.astype(np.int64),
-        interval=np.full(count, origin.spec.period, np.float32),
-        time=zeros,
-    )
-
-
-def _refitted(
-    networks: tuple[Network, ...], x: NDArray[np.float32], y: NDArray[np.float64], epochs: int
-) -> tuple[Network, ...]:
-    """Return the networks fitted further to all columns of ``y`` (n, outputs), each to its own."""
-    solver = LevenbergMarquardt(epochs=epochs)
-    columns = np.array_split(y, len(networks), axis=1)
-    fitted = []
-    for network, of_it in zip(networks, columns, strict=True):
-        spread = of_it.std(axis=0)
-        spread[spread == 0] = 1.0  # outputs of about 1, as the solver wants them
-        scaled = replace(
-            network, output_weights=network.output_weights / spread, output_bias=network.output_bias / spread
-        )
-        one = levenberg_marquardt(x, of_it / spread, scaled, solver).network
-        fitted.append(replace(one, output_weights=one.output_weights * spread, output_bias=one.output_bias * spread))
-    return tuple(fitted)
-
-
-def _reaching(pressure_range: NDArray[np.float64], found: Transitions, joints: int) -> NDArray[np.float64]:
-    """Return the range of pressures (joints, 2, 2), wide enough for all that were read."""
-    pressure = found.target.reshape(-1, joints, 4)[:, :, -2:].astype(np.float64)
-    low, high = np.moveaxis(pressure_range, -1, 0)
-    return np.stack([np.minimum(low, pressure.min(axis=0)), np.maximum(high, pressure.max(axis=0))], axis=-1)
-
-
-def _last_sequences(rows: Rows, count: int) -> Rows:
-    """Return the rows of the last ``count`` sequences."""
-    numbers = np.unique(rows.sequence)
-    chosen = rows.sequence >= (numbers[-count] if len(numbers) > count else -1)
-    return Rows(**{name: values[chosen] for name, values in vars(rows).items()})
-
-
-def _part(found: Transitions, chosen: NDArray[np.bool_]) -> Transitions:
-    return Transitions(**{name: values[chosen] for name, values in found._asdict().items()})
+def told(events: Sequence[Event], quantities: Sequence[str]) -> list[str]:
+    """Return the ``events`` that matter to people as sentences; attempts that changed nothing are left out."""
+    lines = []
+    for event in events:
+        found = event.figures
+        if event.what == "noticed":
+            ratio = np.array(found["ratio"])
+            worst = int(ratio.argmax())
+            lines.append(
+                f"the arm has changed: noticed after movement {event.movement}, since about movement "
+                f"{found['since'] + 1} (error of {quantities[worst].replace('_', ' ')} {ratio[worst]:.1f} times that "
+                "of the fit)"
+            )
+        elif event.what == "accepted":
+            before, after = (float(np.exp(np.log(found[name]).mean())) for name in ("before", "after"))
+            lines.append(
+                f"version {event.version} after movement {event.movement}: fitted to {found['movements']} movements, "
+                f"error {before:.2f} -> {after:.2f} times that of the fit"
+            )
+        elif event.what == "rolled back":
+            lines.append(
+                f"version {found['taken_back']} taken back after movement {event.movement}: reward "
+                f"{found['reward_before']:.1f} -> {found['reward_after']:.1f}; again version {event.version}"
+            )
+    return lines

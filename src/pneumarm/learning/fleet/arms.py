@@ -167,6 +167,22 @@ def take_all(environment, limits, fleet, actions, is_reached):  # type: ignore[n
         is_reached[e] = reached(environment.task, one(fleet, e))
 
 
+@kernel
+def take_alive(environment, limits, fleet, actions, alive, is_reached):  # type: ignore[no-untyped-def]
+    """Do what :func:`take_all` does, in the arms that are ``alive`` (n,) alone."""
+    simulation = environment.simulation
+    for e in range(actions.shape[0]):
+        if alive[e]:
+            arm = one(fleet, e)
+            order(environment.task, arm, actions[e])
+            put_command(simulation, arm.state.x, arm.command)
+    predict_changes(simulation, fleet)
+    for e in range(actions.shape[0]):
+        if alive[e]:
+            advance(environment, limits, fleet, e)
+            is_reached[e] = reached(environment.task, one(fleet, e))
+
+
 @kernel(fastmath=FASTMATH)
 def predict_changes(simulation, fleet):  # type: ignore[no-untyped-def]
     """Set ``fleet.change`` to what the networks predict for the states and commands in ``fleet.x``."""

@@ -1,5 +1,6 @@
-"""Training policies: several at once, of which the best is kept."""
+"""Training in many simulated arms: several learners at once, of which the best is kept; and the policy's learner."""
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.learning.begin import BeginStates
+from pneumarm.learning.fleet.acting import Mind
 from pneumarm.learning.fleet.agent import PolicyAgent, mind, policy_sizes
 from pneumarm.learning.fleet.arms import begin_all, fleet
 from pneumarm.learning.fleet.layers import initial_weights, trainable
 from pneumarm.learning.fleet.policy import Rule, batch, collect, improve
-from pneumarm.learning.fleet.settings import PolicySettings
+from pneumarm.learning.fleet.settings import FleetSettings, PolicySettings
 from pneumarm.learning.fleet.side_by_side import Learner, identity_of, train_side_by_side
 from pneumarm.learning.fleet.testing import run_policy
 from pneumarm.learning.testing import TestResult
@@ -59,30 +61,41 @@ class FleetTraining(Generic[AgentT]):
         }
 
 
-def train_policy(
-    simulation: Simulation,
-    begin_states: BeginStates,
-    settings: PolicySettings | None = None,
+class FleetLearner(Learner, Generic[AgentT]):
+    """A learner that becomes an agent."""
+
+    mind: Mind
+    """What acts in the simulated arms."""
+
+    @abstractmethod
+    def agent(self) -> AgentT:
+        """Return the agent as it is now."""
+
+
+def train_fleet(
+    make: Callable[[int], FleetLearner[AgentT]],
+    settings: FleetSettings,
     seed: int = 0,
     *,
     progress: Callable[[Progress], None] | None = None,
     checkpoint: Path | None = None,
     threads: int | None = None,
-) -> FleetTraining[PolicyAgent]:
-    """Train ``settings.agents`` policies in ``simulation`` and return the best, with what it took.
+) -> FleetTraining[AgentT]:
+    """Train ``settings.agents`` learners, of which ``make`` makes each by its number, and return the best agent.
 
-    The same seed gives the same policies, bit for bit, with any number of ``threads`` (default: one a core). With a
+    The same seed gives the same agents, bit for bit, with any number of ``threads`` (default: one a core). With a
     ``checkpoint`` a killed training goes on from there; the file is left when training is done.
 
+    ``seed`` is the one that the learners are made with.
+
     Raises:
-        UnusableInput: begin states and simulation do not fit, or the checkpoint is of another training.
+        UnusableInput: the checkpoint is of another training.
 
     """
-    settings = settings or PolicySettings()
-    compiled = PolicyLearner(simulation, begin_states, settings, seed, 0)
+    compiled = make(0)
     compiled.update()  # on a learner that is thrown away, so that compiling is not counted as training
     compiled.validate(1)
-    learners = [PolicyLearner(simulation, begin_states, settings, seed, a) for a in range(settings.agents)]
+    learners = [make(number) for number in range(settings.agents)]
     trained = train_side_by_side(
         learners,
         settings.updates,
@@ -92,25 +105,19 @@ def train_policy(
         checkpoint=checkpoint,
         threads=threads,
     )
-    agent = PolicyAgent(simulation, learners[trained.best].policy.flat, settings)
-    return fleet_training(agent, learners, trained, settings.arms * settings.steps)
-
-
-def fleet_training(agent: AgentT, learners: Any, trained: Any, steps: int) -> FleetTraining[AgentT]:
-    """Return what came of it; ``steps`` are those of a batch."""
     return FleetTraining(
-        agent=agent,
+        agent=learners[trained.best].agent(),
         best=trained.best,
         validation=trained.validation,
         curves=np.stack([one.curve for one in learners]),
         episodes=sum(int(one.counts[2]) for one in learners),
-        steps=sum(int(one.counts[0]) for one in learners) * steps,
+        steps=sum(int(one.counts[0]) for one in learners) * settings.arms * settings.steps,
         seconds=trained.seconds,
         core_seconds=sum(float(one.seconds[0]) for one in learners),
     )
 
 
-class PolicyLearner(Learner):
+class PolicyLearner(FleetLearner[PolicyAgent]):
     """A policy and the value of states under it, with the arms in which they are learned."""
 
     networks = ("policy", "value")
@@ -130,7 +137,7 @@ class PolicyLearner(Learner):
         super().__init__(arms, random_state((seed, _ORDER, number)))
         self._batch = batch(settings.steps, self.sizes[0], window.joints, settings.arms)
         self._rule = rule(settings)
-        self._settings, self._seed = settings, seed
+        self._simulation, self._settings, self._seed = simulation, settings, seed
 
     def update(self) -> tuple[int, int, float]:
         """Act for a batch of steps and learn from them."""
@@ -143,6 +150,10 @@ class PolicyLearner(Learner):
         """Return the learning rates of policy and values."""
         rate = self._settings.learning_rate * (1 - self.counts[0] / self._settings.updates)
         return rate, rate
+
+    def agent(self) -> PolicyAgent:
+        """Return the agent as it is now."""
+        return PolicyAgent(self._simulation, self.policy.flat.copy(), self._settings)
 
     def validate(self, episodes: int) -> TestResult:
         """Return greedy movements, without lookahead."""

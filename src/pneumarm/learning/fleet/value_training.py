@@ -1,8 +1,5 @@
 """Training the thesis' nine networks in many simulated arms at once."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 
 from pneumarm.learning.agent import Agent
@@ -13,8 +10,7 @@ from pneumarm.learning.fleet.arms import begin_all, fleet, limits
 from pneumarm.learning.fleet.inputs import input_parameters
 from pneumarm.learning.fleet.layers import initial_weights, trainable
 from pneumarm.learning.fleet.settings import BatchedSettings
-from pneumarm.learning.fleet.side_by_side import Learner, identity_of, train_side_by_side
-from pneumarm.learning.fleet.training import FleetTraining, fleet_training
+from pneumarm.learning.fleet.training import FleetLearner
 from pneumarm.learning.fleet.values import (
     ValueRule,
     collect_values,
@@ -25,7 +21,6 @@ from pneumarm.learning.fleet.values import (
     value_batch,
 )
 from pneumarm.learning.testing import TestResult
-from pneumarm.learning.training import Progress
 from pneumarm.random import random_state, random_states
 from pneumarm.simulation.simulation import Simulation
 
@@ -33,40 +28,7 @@ _WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
 _LAST_LAYER = 0.1  # the first values are small
 
 
-def train_batched(
-    simulation: Simulation,
-    begin_states: BeginStates,
-    settings: BatchedSettings | None = None,
-    seed: int = 0,
-    *,
-    progress: Callable[[Progress], None] | None = None,
-    checkpoint: Path | None = None,
-    threads: int | None = None,
-) -> FleetTraining[Agent]:
-    """Train ``settings.agents`` agents of the thesis' kind and return the best, with what it took.
-
-    Raises:
-        UnusableInput: begin states and simulation do not fit, or the checkpoint is of another training.
-
-    """
-    settings = settings or BatchedSettings()
-    compiled = ValueLearner(simulation, begin_states, settings, seed, 0)
-    compiled.update()  # on a learner that is thrown away, so that compiling is not counted as training
-    compiled.validate(1)
-    learners = [ValueLearner(simulation, begin_states, settings, seed, a) for a in range(settings.agents)]
-    trained = train_side_by_side(
-        learners,
-        settings.updates,
-        settings.validation_episodes,
-        identity_of(compiled.mind.environment, settings, seed),
-        progress=progress,
-        checkpoint=checkpoint,
-        threads=threads,
-    )
-    return fleet_training(learners[trained.best].agent(), learners, trained, settings.arms * settings.steps)
-
-
-class ValueLearner(Learner):
+class ValueLearner(FleetLearner[Agent]):
     """Nine networks a joint, with the arms in which they are learned."""
 
     networks = ("values",)

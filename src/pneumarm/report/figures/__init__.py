@@ -4,6 +4,7 @@ Beside every function ``name`` that draws stands a function ``name_alt`` that sa
 main numbers, for those who do not see it.
 """
 
+from pneumarm.report.figures.adaptation import Mark, adaptation_curves, adaptation_curves_alt
 from pneumarm.report.figures.coverage import cells, cells_alt, new_share, projections, projections_alt
 from pneumarm.report.figures.displacement import against_displacement, against_displacement_alt
 from pneumarm.report.figures.episodes import distributions, distributions_alt
@@ -19,6 +20,7 @@ from pneumarm.report.figures.residues import (
     residue_by_class,
     residue_by_class_alt,
 )
+from pneumarm.report.figures.rivals import Rival, rivals, rivals_alt
 from pneumarm.report.figures.training import (
     shaping_curves,
     shaping_curves_alt,
@@ -29,7 +31,11 @@ from pneumarm.report.figures.transfer import Phase, transfer_curves, transfer_cu
 
 __all__ = [
     "Classification",
+    "Mark",
     "Phase",
+    "Rival",
+    "adaptation_curves",
+    "adaptation_curves_alt",
     "against_displacement",
     "against_displacement_alt",
     "cells",
@@ -54,6 +60,8 @@ __all__ = [
     "residue_alt",
     "residue_by_class",
     "residue_by_class_alt",
+    "rivals",
+    "rivals_alt",
     "shaping_curves",
     "shaping_curves_alt",
     "spread_of_agents",

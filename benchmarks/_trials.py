@@ -1,0 +1,106 @@
+"""What long benchmarks share: rows that outlast an interruption, and movements on an arm by their numbers."""
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import ControlCycle, guarded, open_arm
+from pneumarm.control import BEGIN, AgentController, Movement, move
+from pneumarm.control.transfer import draw_movement
+from pneumarm.learning import AnyAgent, BeginStates, begin_states
+from pneumarm.simulation import FitSettings, StoreFit, fit_store
+from pneumarm.transitions import KINDS, Store, collect
+
+JUDGING = ",".join(str(seed) for seed in range(1001, 1011))
+"""The arms to judge on; nothing is developed on them."""
+SEED_OF_MOVEMENTS = 0
+
+
+class Rows:
+    """Results in a file, one JSON object a line: what is there need not be measured again."""
+
+    def __init__(self, path: Path, *keys: str) -> None:
+        """Read the rows in ``path``; a row is known by its ``keys``. A line that was cut off is left out."""
+        self.path, self.keys = path, keys
+        self._found: dict[tuple[Any, ...], dict[str, Any]] = {}
+        whole = b""
+        if path.exists():
+            whole = path.read_bytes()
+            whole = whole[: whole.rfind(b"\n") + 1]
+            path.write_bytes(whole)
+        for line in whole.splitlines():
+            row = json.loads(line)
+            self._found[self._key(row)] = row
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return iter(list(self._found.values()))
+
+    def get(self, *key: Any) -> dict[str, Any] | None:
+        """Return the row of this ``key``, in the order of the keys; None where it is not yet measured."""
+        return self._found.get(key)
+
+    def add(self, row: dict[str, Any]) -> dict[str, Any]:
+        """Write a row to the end of the file and return it."""
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        self._found[self._key(row)] = row
+        return row
+
+    def _key(self, row: dict[str, Any]) -> tuple[Any, ...]:
+        return tuple(row[key] for key in self.keys)
+
+
+def collected(path: Path, arm: int, seed: int, transitions: int = 0, minutes: float = 0.0) -> tuple[int, float]:
+    """Collect on a virtual arm until there are so many ``transitions`` and so many ``minutes`` have passed for it.
+
+    Whole sequences are stored, so there may be one more than needed. Returns the transitions and the minutes.
+    """
+    with open_arm(f"virtual:seed={arm}", seed) as opened, Store.for_arm(path, opened.spec) as store:
+        done = collect(opened, store, max(transitions, 2_000), seed)
+        while done.seconds < 60 * minutes:
+            done = collect(opened, store, done.transitions + 1, seed)
+    return done.transitions, done.seconds / 60
+
+
+def fitted(path: Path, seed: int) -> tuple[StoreFit, BeginStates]:
+    """Return the simulation fitted to a store, and its begin states."""
+    with Store.open(path) as store:
+        made = fit_store(store, FitSettings(seed=seed))
+        window, scaling = made.simulation.window, made.simulation.scaling
+        return made, begin_states(store.blocks(kinds=KINDS), window, scaling)
+
+
+def moved(
+    agent: AnyAgent,
+    arm: int,
+    goals: NDArray[np.float64],
+    numbers: Iterable[int],
+    seed: int,
+    controller: AgentController | None = None,
+) -> list[Movement]:
+    """Return greedy movements of ``agent``, which learns nothing, on a virtual arm.
+
+    Args:
+        agent: what moves it.
+        arm: seed of the arm.
+        goals: range of the goals, shape (joints, 2) [counts].
+        numbers: of the movements; begin state and goal depend on these alone.
+        seed: of the noise of the arm's sensors and of its timing.
+        controller: what acts in its place.
+
+    """
+    with open_arm(f"virtual:seed={arm}", seed) as opened:
+        cycle, controller = ControlCycle(guarded(opened)), controller or AgentController(agent)
+        made = []
+        for number in numbers:
+            random, goal = draw_movement(goals, SEED_OF_MOVEMENTS, True, number)
+            BEGIN.reach(cycle.arm, random)
+            made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
+    return made

@@ -1,0 +1,202 @@
+"""The table of rivals: what planning can achieve, what every method learns, and what it costs to learn it.
+
+python -m benchmarks rivals
+
+On every arm there is one collection and one fit, and every rival gets the same simulation, begin states and goals: in
+the simulation those of ``pneumarm test --seed 0``, on the arm those of the test on arrival of
+``pneumarm transfer --seed 0``. Methods of other libraries train through our Gymnasium environment on the same
+simulation, where stable-baselines3 and sb3-contrib are installed (the extra ``stable-baselines``).
+
+PNEUMARM_RIVALS_ARMS       seeds of virtual arms, by default those of the judging arms, "1001,...,1010"
+PNEUMARM_RIVALS_SEEDS      how many agents each method trains, 3
+PNEUMARM_RIVALS_METHODS    "open loop,closed loop,planning,policy,batched,sarsa,ppo,dqn,qr-dqn:1"; ":1" trains one
+PNEUMARM_RIVALS_MOVEMENTS  greedy movements on the arm for each agent, 500
+PNEUMARM_RIVALS_TESTS      movements in the simulation, 10,000; a tenth of them for what plans or looks ahead
+PNEUMARM_RIVALS_STEPS      steps that the methods of other libraries train for, 450,000
+PNEUMARM_RIVALS_FOLDER     what was measured so far, from where a killed run goes on: "runs/rivals"
+
+The folder holds ``rivals.jsonl`` (a row an agent, every movement on the arm in it), ``rivals.html`` and
+``rivals.png``, and what was collected and fitted. Several such commands may fill one folder at once, each with arms
+of its own; one with all arms then makes the table of what is there.
+
+Training is timed after everything is compiled: wall time, and processor time of all threads together. Rivals of
+other libraries run on one thread. p99 is the processor time of a decision at the 99th percentile; wall time where the
+true physics is planned with.
+"""
+
+import functools
+import json
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.agents import Timed, prepared
+from benchmarks.rivals.learning import OURS, PLANNING, STABLE, learn
+from benchmarks.rivals.table import HEADER, Row, curves, floor, line, pooled, write_page
+from pneumarm.arm import ControlCycle, guarded
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.console import jsonable, peak_memory
+from pneumarm.control import BEGIN, BoundSettings, Movement, PlanAgent, Planned, measure_bound, move
+from pneumarm.control.transfer import begin_and_goal
+from pneumarm.errors import UnusableInput
+from pneumarm.learning import AnyAgent, BeginStates, PolicyAgent, load_agent, test, test_ahead
+from pneumarm.simulation import Simulation
+
+BOUNDS = {"open loop": "open_loop", "closed loop": "closed_loop"}
+METHODS = (*BOUNDS, PLANNING, *OURS, *STABLE)
+SEED = 0
+"""Of begin states, goals and the arm's noise, the same for all."""
+
+
+def asked(name: str, default: str) -> str:
+    return os.environ.get(f"PNEUMARM_RIVALS_{name}", default)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """How much is measured; rows that were measured otherwise are left aside."""
+
+    movements: int
+    tests: int
+    steps: int
+
+
+def measure() -> Iterator[str]:
+    began = time.perf_counter()
+    wanted = Wanted(*(int(asked(*pair)) for pair in (("MOVEMENTS", "500"), ("TESTS", "10000"), ("STEPS", "450000"))))
+    arms = [int(arm) for arm in asked("ARMS", ",".join(str(seed) for seed in range(1001, 1011))).split(",")]
+    folder = Path(asked("FOLDER", "runs/rivals"))
+    folder.mkdir(parents=True, exist_ok=True)
+    methods = dict(each(asked("METHODS", ",".join(METHODS) + ":1")))
+    if missing := unavailable(methods):
+        yield missing
+        methods = {name: seeds for name, seeds in methods.items() if name not in STABLE}
+    rows: list[Row] = []
+    done = known(folder / "rivals.jsonl", wanted)
+    yield HEADER
+    for arm in arms:
+        for method, seeds in methods.items():
+            for seed in range(seeds):
+                if (row := done.get((arm, method, seed))) is None:
+                    row = measured(folder, arm, method, seed, wanted)
+                    append(folder / "rivals.jsonl", row)
+                rows.append(row)
+                yield line(row)
+    yield ""
+    yield from pooled(rows)
+    yield from floor(rows)
+    yield from curves(rows)
+    write_page(folder, rows)
+    yield (
+        f"{folder / 'rivals.html'}, {folder / 'rivals.png'}; {time.perf_counter() - began:.0f} s, "
+        f"at most {max(peak_memory(), *(row['memory_mb'] for row in rows)):.0f} MB of memory"
+    )
+
+
+def each(methods: str) -> Iterator[tuple[str, int]]:
+    """Give methods with the number of their agents; what needs no training is there once."""
+    for entry in methods.split(","):
+        name, _, seeds = entry.strip().partition(":")
+        if name not in METHODS:
+            raise UnusableInput(f"no method is called {name!r}; there are {', '.join(METHODS)}")
+        yield name, int(seeds or asked("SEEDS", "3")) if name in (*OURS, *STABLE) else 1
+
+
+def unavailable(methods: dict[str, int]) -> str:
+    """Return why methods of other libraries are left out, or nothing."""
+    wanted = [name for name in methods if name in STABLE]
+    try:
+        import sb3_contrib  # noqa: F401
+        import stable_baselines3  # noqa: F401
+    except ImportError as error:
+        return f"left out, {error}: {', '.join(wanted)}" if wanted else ""
+    return ""
+
+
+def known(file: Path, wanted: Wanted) -> dict[tuple[int, str, int], Row]:
+    """Return the rows that were measured before by arm, method and seed."""
+    found = {}
+    for text in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
+        try:
+            row = json.loads(text)
+        except ValueError:
+            continue  # the run was killed while it wrote this line
+        if row["wanted"] == vars(wanted):
+            found[row["arm"], row["method"], row["seed"]] = row
+    return found
+
+
+def append(file: Path, row: Row) -> None:
+    """Add ``row`` on a line of its own, even after one that was cut short."""
+    cut = file.exists() and not file.read_bytes().endswith(b"\n")
+    with open(file, "a", encoding="utf-8") as opened:
+        opened.write(("\n" if cut else "") + json.dumps(jsonable(row)) + "\n")
+        opened.flush()
+        os.fsync(opened.fileno())
+
+
+def measured(folder: Path, arm: int, method: str, seed: int, wanted: Wanted) -> Row:
+    """Return the row of an agent: what its training took, and what came of it in the simulation and on the arm."""
+    simulation, begin = prepared(folder, arm)
+    row: Row = {"arm": arm, "method": method, "seed": seed, "wanted": vars(wanted)}
+    if method in BOUNDS:
+        planned = bound(folder, arm, wanted.movements)[BOUNDS[method]]
+        made, p99 = planned.episodes, planned.results()["decision_ms"]["p99"]
+        row |= {"wall": 0.0, "cpu": 0.0, "curve": [], "simulation": None}
+        switches = [one.switches for one in made]
+    else:
+        learned = learn(method, simulation, begin, seed, wanted.steps)
+        if method != PLANNING:
+            agent = folder / f"{arm}-{method}-{seed}.agent"
+            learned.agent.save(agent)
+            learned = replace(learned, agent=load_agent(agent))  # what is measured is what anyone could use
+        row |= {"wall": learned.wall, "cpu": learned.cpu, "curve": learned.curve}
+        row["simulation"] = tested(learned.agent, simulation, begin, wanted.tests)
+        made, p99 = moved(learned.agent, arm, wanted.movements)
+        switches = [int(one.switches.sum()) for one in made]
+    return row | {
+        "reward": [one.reward for one in made],
+        "success": [int(one.success) for one in made],
+        "actions": [one.actions for one in made],
+        "switches": switches,
+        "p99_ms": p99,
+        "memory_mb": peak_memory(),
+    }
+
+
+@functools.cache
+def bound(folder: Path, arm: int, movements: int) -> dict[str, Planned]:
+    """Return what planning with the true physics achieves in the movements of every rival."""
+    simulation, _ = prepared(folder, arm)
+    settings = BoundSettings(episodes=movements)
+    return dict(measure_bound(VirtualArm(draw_parameters(arm)), simulation.goal_range, settings, seed=SEED))
+
+
+def tested(agent: AnyAgent, simulation: Simulation, begin: BeginStates, episodes: int) -> dict[str, Any]:
+    """Return the figures of a test in the simulation, of the agent as it moves on an arm."""
+    slow = max(1, episodes // 10)
+    if isinstance(agent, PlanAgent):
+        return test(agent, simulation, begin, slow, SEED).results()
+    if isinstance(agent, PolicyAgent) and (ahead := test_ahead(agent, simulation, begin, slow, SEED)) is not None:
+        return ahead.results()
+    return test(agent, simulation, begin, episodes, SEED).results()
+
+
+def moved(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
+    """Return movements on a virtual arm as on arrival, and the 99th percentile of a decision's time [ms]."""
+    controller, made = Timed(agent), []
+    controller.reset(agent.goal_range.mean(axis=1))
+    with VirtualArm(draw_parameters(arm), seed=SEED) as opened:
+        controller.act(opened.read())  # compiles
+    with VirtualArm(draw_parameters(arm), seed=SEED) as opened:
+        cycle = ControlCycle(guarded(opened))
+        for number in range(movements):
+            random, goal = begin_and_goal(agent, SEED, True, number)
+            BEGIN.reach(cycle.arm, random)
+            made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
+    return made, 1e3 * float(np.quantile(controller.seconds[1:], 0.99))

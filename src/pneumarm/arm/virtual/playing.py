@@ -1,0 +1,309 @@
+"""How a virtual arm plays a plan of faults.
+
+An arm without faults does nothing here. With some, waits are cut where a fault begins, ends or has to be followed
+(a falling supply, a filling buffer, air rushing past a sensor); between the cuts the same kernels run on constants
+that the faults have changed. So a fault costs what it needs, and the physics knows of none.
+"""
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.virtual.constants import COUNTS_PER_DEGREE, GRAVITY, HIGHEST_COUNT, Constants
+from pneumarm.arm.virtual.faults import (
+    Cold,
+    DeadPotentiometer,
+    Fault,
+    FrozenPotentiometer,
+    Leak,
+    LogarithmicPotentiometer,
+    Payload,
+    Plan,
+    ReducerLeak,
+    SensorNoise,
+    StuckValve,
+    SupplyLoss,
+    SwappedMuscles,
+    SwappedValves,
+    ValveSideSensor,
+    WornPotentiometer,
+    check_plan,
+)
+from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
+from pneumarm.arm.virtual.sensors import TRACK
+from pneumarm.arm.virtual.state import INLET, OUTLET
+from pneumarm.errors import UnusableInput
+
+FOLLOWED = 0.05
+"""A pressure of the supply that changes is followed in steps of this [s]."""
+FOLLOWED_IDLE = 10.0
+"""... or of this, while a buffer fills and no inlet is open [s]."""
+_SIDES = {"inlet": INLET, "outlet": OUTLET}
+_SETTLED = 3.0  # time constants in which 95 % are gone
+
+
+class FaultPlayer:
+    """Plays ``plan`` on the records of a virtual arm: its constants, valves and readings.
+
+    Args:
+        plan: the faults.
+        parameters: of the arm.
+        fixed: its constants; changed in place, and put back by :meth:`restore`.
+        muscles: its MUSCLE records (joints, 2); read, and in :class:`Cold` changed.
+        surroundings: its SURROUNDINGS record (1,).
+        asked: the valves (joints, 2) as they were last asked for.
+
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        parameters: ArmParameters,
+        fixed: Constants,
+        muscles: NDArray[Any],
+        joints: NDArray[Any],
+        surroundings: NDArray[Any],
+        asked: NDArray[np.int8],
+    ) -> None:
+        count = len(parameters.joints)
+        self.plan = check_plan(plan, count)
+        self._parameters = parameters
+        self._fixed = fixed
+        self.sound = Constants(*(record.copy() for record in fixed))
+        """The constants as they are without faults."""
+        self._muscles, self._joints, self._surroundings = muscles, joints, surroundings
+        self._state = np.zeros(1, _state_dtype(count, len(self.plan)))
+        self._state["asked"] = asked
+        self._state["frozen"] = np.nan
+        self.track: NDArray[Any] = np.zeros(count, TRACK)
+        """What faults have made of the potentiometers, shape (joints,)."""
+        self._now: list[Fault] = []
+        self._wear()
+        self.update(self.time)
+
+    @property
+    def time(self) -> float:
+        """The arm's clock [s]."""
+        return float(self._surroundings["time"][0])
+
+    @property
+    def leap(self) -> NDArray[np.float64]:
+        """What the pressure sensors read too much, shape (joints, 2) [Pa]."""
+        air: NDArray[np.float64] = self._state["leap"][0]
+        return air
+
+    @property
+    def asked(self) -> NDArray[np.int8]:
+        """The valves as they were last asked for, shape (joints, 2)."""
+        valves: NDArray[np.int8] = self._state["asked"][0]
+        return valves
+
+    def digest(self) -> bytes:
+        """Return what distinguishes this plan from others."""
+        return msgspec.json.encode(self.plan)
+
+    def restore(self) -> None:
+        """Put the arm's constants back to what they were."""
+        for record, sound in zip(self._fixed, self.sound, strict=True):
+            record[...] = sound
+
+    def route(self, asked: NDArray[np.int8]) -> NDArray[np.int64]:
+        """Return which valves open, (joints, 2, inlet and outlet) of 0 or 1, when ``asked`` for (joints, 2)."""
+        self._state["asked"] = asked
+        told = asked.astype(np.int64)
+        for fault in self._now:
+            if isinstance(fault, SwappedMuscles):
+                told[fault.index], told[fault.other] = told[fault.other], told[fault.index]
+        for fault in self._now:
+            if isinstance(fault, SwappedValves):
+                told[fault.index] = -told[fault.index]
+        sides = np.stack([told == 1, told == -1], axis=-1).astype(np.int64)
+        for fault in self._now:
+            if isinstance(fault, StuckValve):
+                sides[(*fault.index, _SIDES[fault.valve])] = fault.position == "open"
+        return np.ascontiguousarray(sides)
+
+    def next_change(self) -> float:
+        """Return when :meth:`update` must be called next [s]."""
+        now = self.time
+        edges = [edge for fault in self.plan for edge in (fault.begin, fault.end) if edge is not None and edge > now]
+        following = min(edges, default=math.inf)
+        for fault in self._now:
+            if isinstance(fault, SupplyLoss) and now < fault.begin + fault.over:
+                following = min(following, now + FOLLOWED)
+            elif isinstance(fault, ReducerLeak):
+                following = min(following, now + (FOLLOWED if self._inlets() else FOLLOWED_IDLE))
+            elif isinstance(fault, ValveSideSensor):
+                muscle = self._muscles[fault.index]
+                due = [muscle["toggles"][side][0] for side in _SIDES.values() if muscle["pending"][side] > 0]
+                following = min([following, *(time for time in due if time > now)])
+        return following
+
+    def update(self, time: float, *, afresh: bool = False) -> bool:
+        """Bring everything to ``time``, which is now [s]; return whether faults have begun or ended.
+
+        ``afresh`` changes the constants again, after another player has put them back.
+        """
+        state = self._state[0]
+        elapsed, state["time"] = time - float(state["time"]), time
+        self._fill(elapsed)
+        self._leap(elapsed)
+        playing = [fault for fault in self.plan if fault.is_on(time)]
+        changed = playing != self._now
+        self._now = playing
+        if changed:
+            self._begin(time)
+        if changed or afresh or any(isinstance(fault, SupplyLoss | ReducerLeak) for fault in playing):
+            self._change(time)
+        return changed
+
+    def _inlets(self) -> int:
+        """Return how many inlets are open or about to be."""
+        side = self._muscles["pending"][..., INLET] + self._muscles["open"][..., INLET]
+        return int((side > 0).sum())
+
+    def _fill(self, elapsed: float) -> None:
+        """Let the buffer behind a leaking reducer fill or empty for ``elapsed`` [s]."""
+        for fault in self._now:
+            if isinstance(fault, ReducerLeak):
+                above = fault.source * BAR - (self._sound_supply - ATMOSPHERE)
+                excess = float(self._state["excess"][0])
+                inflow = fault.rate * BAR * max(0.0, 1 - excess / above) if above > 0 else 0.0
+                drawn = fault.consumption * BAR * self._inlets()
+                self._state["excess"] = min(max(excess + elapsed * (inflow - drawn), 0.0), max(above, 0.0))
+
+    @property
+    def _sound_supply(self) -> float:
+        return float(self.sound.surroundings["supply"][0])
+
+    def _leap(self, elapsed: float) -> None:
+        """Let what a sensor at the valve's side reads too much follow the air for ``elapsed`` [s]."""
+        supply = float(self._surroundings["supply"][0])
+        for fault in self._now:
+            if isinstance(fault, ValveSideSensor):
+                muscle = self._muscles[fault.index]
+                pressure = float(muscle["pressure"])
+                drop = (supply - pressure) * muscle["open"][INLET] + (ATMOSPHERE - pressure) * muscle["open"][OUTLET]
+                target = fault.share * drop
+                leap = self._state["leap"][0]
+                leap[fault.index] += (leap[fault.index] - target) * math.expm1(-_SETTLED * elapsed / fault.settling)
+
+    def _begin(self, time: float) -> None:
+        """Do what is done once, where a fault begins, and undo what ended."""
+        state = self._state[0]
+        for number, fault in enumerate(self.plan):
+            playing = fault.is_on(time)
+            begins = playing and not state["begun"][number]
+            state["begun"][number] = playing
+            if isinstance(fault, FrozenPotentiometer) and begins:
+                angle = COUNTS_PER_DEGREE * math.degrees(float(self._joints["angle"][fault.place]))
+                reading = math.floor(HIGHEST_COUNT / 2 + angle + 0.5)
+                state["frozen"][fault.place] = min(max(reading, 0.0), HIGHEST_COUNT)
+            if isinstance(fault, Cold) and begins:
+                self._muscles["temperature"] = fault.temperature
+                self._surroundings["temperature"] = fault.temperature
+        if not any(isinstance(fault, ReducerLeak) for fault in self._now):
+            state["excess"] = 0.0
+        sides = {fault.index for fault in self._now if isinstance(fault, ValveSideSensor)}
+        for index in np.ndindex(state["leap"].shape):
+            if index not in sides:
+                state["leap"][index] = 0.0
+
+    def _change(self, time: float) -> None:
+        """Change the constants to what the faults that are on make of them."""
+        self.restore()
+        self._wear()
+        fixed = self._fixed
+        for fault in self._now:
+            match fault:
+                case Leak():
+                    fixed.muscles["leak"][fault.index] *= fault.factor
+                case Payload():
+                    joint: Any = fixed.joints[fault.place : fault.place + 1]
+                    weight = self._parameters.joints[fault.place]
+                    joint["inertia"] += fault.mass * weight.distance**2
+                    joint["weight"] += fault.mass * GRAVITY * weight.distance
+                case SupplyLoss():
+                    left = max(0.0, 1 - (time - fault.begin) / fault.over) if fault.over else 0.0
+                    low = min(fault.to * BAR + ATMOSPHERE, self._sound_supply)
+                    fixed.surroundings["supply"] = low + left * (self._sound_supply - low)
+                    for name in ("fluctuation", "compressor"):  # what does not come in does not fluctuate
+                        share = (fixed.surroundings["supply"] - ATMOSPHERE) / (self._sound_supply - ATMOSPHERE)
+                        fixed.surroundings[name] *= share
+                case ReducerLeak():
+                    fixed.surroundings["supply"] += self._state["excess"]
+                    valve = fault.source if fault.safety_valve is None else fault.safety_valve
+                    fixed.surroundings["safety_valve"] = valve * BAR + ATMOSPHERE
+                case Cold():
+                    fixed.surroundings["cold"] = fixed.surroundings["warm"] = fault.temperature
+                case SensorNoise():
+                    fixed.sensors["angle_noise"] = fault.angle
+                    fixed.sensors["pressure_noise"] = fault.pressure
+                    fixed.sensors["noise_limit"] = max(
+                        4 * fault.angle, 4 * fault.pressure, float(self.sound.sensors["noise_limit"][0])
+                    )
+
+    def _wear(self) -> None:
+        """Make the potentiometers what the faults that are on make of them."""
+        self.track[...] = 0
+        self.track["rail"] = self.track["frozen"] = np.nan
+        self.track["worn_width"] = 1.0
+        for fault in self._now:
+            match fault:
+                case DeadPotentiometer():
+                    self.track["rail"][fault.place] = 0.0 if fault.rail == "low" else HIGHEST_COUNT
+                case FrozenPotentiometer():
+                    self.track["frozen"][fault.place] = self._state["frozen"][0][fault.place]
+                case LogarithmicPotentiometer():
+                    self.track["bend"][fault.place] = 2 * math.log(1 / fault.middle - 1)
+                case WornPotentiometer():
+                    place: Any = self.track[fault.place : fault.place + 1]
+                    place["worn_at"] = HIGHEST_COUNT / 2 + COUNTS_PER_DEGREE * fault.angle
+                    place["worn_width"] = COUNTS_PER_DEGREE * fault.width
+                    place["worn_height"], place["worn_contact"] = fault.height, fault.contact
+
+    # ---- saved states
+
+    def get_state(self) -> bytes:
+        """Return all that the future depends on besides plan and arm."""
+        return self._state.tobytes()
+
+    @property
+    def state_size(self) -> int:
+        """Length of a state [bytes]."""
+        return self._state.nbytes
+
+    def check_state(self, state: bytes, name: str) -> NDArray[Any]:
+        """Return a ``state`` of :meth:`get_state` of the arm ``name`` as a record.
+
+        Raises:
+            UnusableInput: it is none.
+
+        """
+        found: NDArray[Any] = np.frombuffer(state, self._state.dtype)
+        finite = all(np.isfinite(found[name]).all() for name in ("time", "excess", "leap"))
+        if found.shape != (1,) or not finite or not np.isin(found["asked"], (-1, 0, 1)).all():
+            raise UnusableInput(f"{name}: the saved state is damaged: that of its faults holds impossible numbers")
+        return found
+
+    def set_state(self, found: NDArray[Any]) -> None:
+        """Take up what :meth:`check_state` returned, after the arm has taken up its own state."""
+        self._state[...] = found
+        self._now = [fault for number, fault in enumerate(self.plan) if found["begun"][0][number]]
+        self._change(self.time)
+
+
+def _state_dtype(joints: int, faults: int) -> np.dtype[Any]:
+    return np.dtype(
+        [
+            ("time", "f8"),  # of the last update [s]
+            ("excess", "f8"),  # pressure that a leaking reducer added to the supply [Pa]
+            ("leap", "f8", (joints, 2)),  # what sensors at the valves read too much [Pa]
+            ("frozen", "f8", (joints,)),  # [counts]
+            ("asked", "i1", (joints, 2)),  # valves
+            ("begun", "i1", (faults,)),
+        ]
+    )

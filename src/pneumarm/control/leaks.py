@@ -1,0 +1,105 @@
+"""How much every muscle leaks: fill all muscles, close them, and watch their pressures fall.
+
+While an arm moves a leak cannot be told from what moving does to pressures: a muscle that leaks three times as much
+as usual loses 0.03 % of its pressure more in a control period. With closed valves it is the only thing that lasts.
+The rate is that of an exponential fitted to the readings by least squares; what the rubber does by itself (creep
+after the filling) is waited for, and as far as it lasts, it is in the rate of the healthy arm too.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.guard import guarded
+from pneumarm.arm.seam import Arm
+from pneumarm.errors import UnusableInput
+
+
+@dataclass(frozen=True)
+class LeakTest:
+    """How a leak test is made."""
+
+    fill: float = 1.5
+    """Time that all inlets are open [s]."""
+    settle: float = 8.0
+    """Time that is waited before the pressures are watched [s]."""
+    watch: float = 45.0
+    """Time that they are watched [s]."""
+    surely: float = 4.0
+    """Standard errors by which a rate must exceed the healthy one."""
+    drift: float = 0.002
+    """... and by how much besides, because rates change with temperature and creep [1/minute] ..."""
+    more: float = 1.25
+    """... and times as large as that it must be."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0 < value < math.inf:
+                raise UnusableInput(f"LeakTest: {name} cannot be {value!r}; see its docstring")
+
+
+class LeakRates(NamedTuple):
+    """What a leak test found."""
+
+    rate: NDArray[np.float64]
+    """Part of its pressure that each muscle loses, shape (joints, 2) [1/minute]."""
+    error: NDArray[np.float64]
+    """Standard error of that, shape (joints, 2) [1/minute]."""
+    seconds: float
+    """Time that the test took on the arm's clock [s]."""
+
+
+def leak_test(arm: Arm, test: LeakTest | None = None) -> LeakRates:
+    """Fill all muscles, close them, and return how fast their pressures fall; the arm is left closed.
+
+    Raises:
+        UnusableInput: a muscle holds too little air to be watched: its supply or its valves are to be seen to first.
+
+    """
+    test, guard = test or LeakTest(), guarded(arm)
+    closed = np.zeros((arm.spec.joints, 2), np.int8)
+    begin = guard.read().time
+    guard.set_valves(closed + 1)
+    guard.wait(test.fill)
+    guard.set_valves(closed)
+    guard.wait(test.settle)
+    times, pressures = [], []
+    for _ in range(max(3, round(test.watch / arm.spec.period))):
+        reading = guard.read()
+        times.append(reading.time)
+        pressures.append(reading.pressure)
+        guard.wait(arm.spec.period)
+    time, pressure = np.array(times), np.array(pressures)
+    if (pressure.mean(axis=0) < 0.2 * arm.spec.max_pressure_counts).any():
+        low = arm.spec.bar(pressure.mean(axis=0)).round(2).tolist()
+        raise UnusableInput(f"{arm.spec.name}: filled muscles hold only {low} bar; see to supply and valves first")
+    rate, error = _falling(time, pressure)
+    return LeakRates(rate, error, float(time[-1] - begin))
+
+
+def _falling(
+    time: NDArray[np.float64], pressure: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the rates (joints, 2) [1/minute] at which pressures (n, joints, 2) fall, and their standard errors."""
+    minutes = (time - time.mean()) / 60
+    mean = pressure.mean(axis=0)
+    slope = np.tensordot(minutes, pressure, axes=1) / (minutes @ minutes)
+    left = pressure - mean - minutes[:, None, None] * slope
+    error = np.sqrt((left**2).sum(axis=0) / (len(time) - 2) / (minutes @ minutes))
+    return -slope / mean, error / mean
+
+
+def leaking(healthy: LeakRates, now: LeakRates, test: LeakTest | None = None) -> NDArray[np.bool_]:
+    """Return which muscles (joints, 2) leak more ``now`` than when they were ``healthy``; of a joint's at most one.
+
+    The other muscle of the joint is stretched by the one that leaks, so that its pressure falls too: the muscle
+    with more is named.
+    """
+    test = test or LeakTest()
+    more = now.rate - healthy.rate
+    surely = test.surely * np.hypot(healthy.error, now.error) + test.drift
+    leaks: NDArray[np.bool_] = (more > surely) & (now.rate > test.more * healthy.rate)
+    return leaks & (more >= more.max(axis=1, keepdims=True))

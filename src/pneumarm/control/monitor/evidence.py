@@ -1,0 +1,248 @@
+"""Weighing what was read against what was expected: one kernel call a reading.
+
+For every hypothesis h the log-likelihood ratio of a reading against the healthy arm is summed, never below 0:
+
+    S_h <- max(0, S_h + log p(reading | h) - log p(reading | healthy))
+
+(the cumulative sum test: E. S. Page, "Continuous inspection schemes", Biometrika 41, 1954). Residuals follow a
+Student distribution of four degrees of freedom, and a single reading counts for little: what a simulation gets wrong
+in a fast movement must not look like a fault. Where h and the healthy arm differ by little, nothing is summed: there
+a lasting error of the simulation, however small, would prove either in the end. When S_h last was 0 tells since when.
+Whether the readings agree with the simulation at all is weighed in the same way, against residuals that are several
+times as large as usual.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.control.monitor.expectation import expect_by_rules, expect_by_simulation
+from pneumarm.kernels import kernel, part
+
+FREEDOM = 4.0
+"""Degrees of freedom of the Student distribution of residuals."""
+
+
+class Thresholds(NamedTuple):
+    """What the kernel compares with. Made by :class:`~pneumarm.control.monitor.Monitor`."""
+
+    most: float
+    """Evidence of a single reading at most."""
+    alarm: float
+    """Evidence of a fault from which on it counts as found; evidence is kept up to twice this."""
+    telling: float
+    """Expected pressures that differ by less than so many standard deviations tell nothing."""
+    inflation: float
+    """Standard deviations of the simulation's error on held-out sequences that count as one here."""
+    full: float
+    """In a muscle over this pressure an open inlet tells nothing: the supply is not much higher [counts]."""
+    empty: float
+    """A muscle below this is empty; how much air it takes until its pressure rises is uncertain [counts]."""
+    clear: float
+    """Expected pressures of an empty muscle that differ by less tell nothing [counts]."""
+    unsure: float
+    """Standard deviation of a filling or emptying as a part of it."""
+    calm: float
+    """A joint slower than this hardly moves [counts/ms]."""
+    fast: float
+    """Speed at which errors are larger by the root of two than at rest [counts/ms]."""
+    apart: float
+    """Residuals of an arm that has changed, in those of one that has not."""
+    changed: float
+    """Evidence from which on the arm counts as changed."""
+    low: float
+    """Lowest reading of an angle [counts]."""
+    high: float
+    """Highest reading of an angle [counts]."""
+    jump: float
+    """An angle that goes farther than this, and than twice the last movement, onto a rail has jumped [counts]."""
+    acted: float
+    """Change of a pressure that shows that valves act [counts]."""
+
+
+class Memory(NamedTuple):
+    """What a monitor remembers. Made by :func:`new_memory`; saved and restored as a whole."""
+
+    observed: NDArray[np.float64]
+    """Observations, newest first, shape (history, joints, 4) [sensor units]."""
+    command: NDArray[np.float64]
+    """Valves chosen after them, shape (history, muscles)."""
+    clock: NDArray[np.float64]
+    """Time of the newest reading [s]; readings in a row; rows that a window needs."""
+    score: NDArray[np.float64]
+    """S_h, shape (hypotheses,)."""
+    since: NDArray[np.float64]
+    """When each was 0 the last time, shape (hypotheses,) [s]."""
+    disagreement: NDArray[np.float64]
+    """Evidence that angle, pressure 1, pressure 2 are not those of the simulation's arm, shape (joints, 3)."""
+    disagreement_since: NDArray[np.float64]
+    """Shape (joints, 3) [s]."""
+    same: NDArray[np.float64]
+    """By joint: readings of the same angle in a row; since when [s]; least and most pressures meanwhile; (j, 6)."""
+    rail: NDArray[np.float64]
+    """By joint: readings on a rail in a row; since when [s]; whether it jumped there, its last movement; (j, 4)."""
+    expected: NDArray[np.float64]
+    """Pressures expected at the newest reading, shape (hypotheses, muscles) [counts]."""
+    std: NDArray[np.float64]
+    """Their standard deviations, shape (muscles,) [counts]."""
+    angle: NDArray[np.float64]
+    """Angles expected of a healthy arm, shape (joints,) [counts]."""
+
+
+def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
+    """Return an empty memory; ``history`` is at least 2."""
+    return Memory(
+        observed=np.zeros((history, joints, 4)),
+        command=np.zeros((history, 2 * joints)),
+        clock=np.zeros(3),
+        score=np.zeros(hypotheses),
+        since=np.zeros(hypotheses),
+        disagreement=np.zeros((joints, 3)),
+        disagreement_since=np.zeros((joints, 3)),
+        same=np.zeros((joints, 6)),
+        rail=np.zeros((joints, 4)),
+        expected=np.zeros((hypotheses, 2 * joints)),
+        std=np.zeros(2 * joints),
+        angle=np.zeros(joints),
+    )
+
+
+@kernel
+def see_by_rules(rules, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
+    """Weigh a reading without a simulation; the valves chosen after it go into ``memory.command[0]``."""
+    if memory.clock[1] >= 1.0:
+        expect_by_rules(rules, readings, memory, angle, memory.expected, memory.std)
+        weigh_hypotheses(thresholds, readings, memory, time, pressure)
+    look_at_potentiometers(thresholds, memory, time, angle, pressure)
+    observe(memory, time, angle, pressure)
+
+
+@kernel
+def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
+    """Weigh a reading by a simulation; the valves chosen after it go into ``memory.command[0]``."""
+    if memory.clock[1] >= memory.clock[2]:
+        expect_by_simulation(predictor, readings, memory, memory.expected, memory.angle)
+        for m in range(memory.std.shape[0]):
+            memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2]
+        weigh_hypotheses(thresholds, readings, memory, time, pressure)
+        for j in range(angle.shape[0]):
+            error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
+            weigh_disagreement(thresholds, memory, j, 0, error, time)
+            for side in range(2):
+                m = 2 * j + side
+                error = (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
+                weigh_disagreement(thresholds, memory, j, 1 + side, error, time)
+    look_at_potentiometers(thresholds, memory, time, angle, pressure)
+    observe(memory, time, angle, pressure)
+
+
+@part
+def usual(thresholds, memory, j):  # type: ignore[no-untyped-def]
+    """Return how many standard deviations count as one; a simulation is worse where a joint moves fast."""
+    fast = memory.observed[0, j, 1] / thresholds.fast
+    return thresholds.inflation * math.sqrt(1.0 + fast * fast)
+
+
+@part
+def surprise(error):  # type: ignore[no-untyped-def]
+    """Return -log p of a standardised residual, up to a constant."""
+    return 0.5 * (FREEDOM + 1.0) * math.log1p(error * error / FREEDOM)
+
+
+@part
+def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ignore[no-untyped-def]
+    """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis."""
+    for h in range(1, memory.score.shape[0]):
+        evidence = 0.0
+        for m in range(memory.std.shape[0]):
+            difference = memory.expected[h, m] - memory.expected[0, m]
+            before, read = memory.observed[0, m // 2, 2 + m % 2], pressure[m // 2, m % 2]
+            least = thresholds.telling * memory.std[m]
+            if before < thresholds.empty and read < thresholds.empty:
+                least = max(least, thresholds.clear)
+            telling = abs(difference) > least and not (before > thresholds.full and memory.command[0, m] > 0.0)
+            if readings.leak[h, m] > 0.0:
+                telling = is_calm(thresholds, memory, m)
+            if telling:
+                std = math.sqrt(memory.std[m] ** 2 + (thresholds.unsure * difference) ** 2)
+                evidence += surprise((read - memory.expected[0, m]) / std)
+                evidence -= surprise((read - memory.expected[h, m]) / std)
+        evidence = min(max(evidence, -thresholds.most), thresholds.most)
+        if memory.score[h] <= 0.0:
+            memory.since[h] = time
+        memory.score[h] = min(max(memory.score[h] + evidence, 0.0), 2.0 * thresholds.alarm)
+
+
+@part
+def is_calm(thresholds, memory, m):  # type: ignore[no-untyped-def]
+    """Return whether muscle ``m`` is closed for as long as the window reaches, and its joint hardly moves."""
+    calm = abs(memory.observed[0, m // 2, 1]) < thresholds.calm
+    for lag in range(memory.command.shape[0]):
+        calm = calm and memory.command[lag, m] == 0.0
+    return calm
+
+
+@part
+def weigh_disagreement(thresholds, memory, j, q, error, time):  # type: ignore[no-untyped-def]
+    """Add the evidence of a standardised residual that residuals are ``apart`` times as large as usual."""
+    evidence = surprise(error) - surprise(error / thresholds.apart) - math.log(thresholds.apart)
+    if memory.disagreement[j, q] <= 0.0:
+        memory.disagreement_since[j, q] = time
+    total = memory.disagreement[j, q] + min(evidence, thresholds.most)
+    memory.disagreement[j, q] = min(max(total, 0.0), 2.0 * thresholds.changed)
+
+
+@kernel
+def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
+    """Count readings on a rail, and equal readings in a row, with what the pressures did meanwhile."""
+    for j in range(angle.shape[0]):
+        before, rail, same = memory.observed[0, j, 0], memory.rail[j], memory.same[j]
+        fresh = memory.clock[1] < 1.0
+        if not (angle[j] <= thresholds.low or angle[j] >= thresholds.high):
+            rail[0] = 0.0
+            rail[3] = 0.0 if fresh else angle[j] - before
+        elif rail[0] == 0.0:
+            far = abs(angle[j] - before)
+            onward = (angle[j] - before) * rail[3] > 0.0
+            limit = thresholds.jump + (2.0 * abs(rail[3]) if onward else 0.0)
+            rail[0], rail[1] = 1.0, time
+            rail[2] = 1.0 if not fresh and far > limit else 0.0
+        else:
+            rail[0] += 1.0
+        if fresh or angle[j] != before or rail[0] > 0.0:
+            same[0], same[1] = 1.0, time
+            same[2], same[4] = pressure[j, 0], pressure[j, 0]
+            same[3], same[5] = pressure[j, 1], pressure[j, 1]
+        else:
+            same[0] += 1.0
+            for side in range(2):
+                same[2 + side] = min(same[2 + side], pressure[j, side])
+                same[4 + side] = max(same[4 + side], pressure[j, side])
+
+
+@part
+def observe(memory, time, angle, pressure):  # type: ignore[no-untyped-def]
+    """Shift the window and put a reading in front, its velocity derived (thesis section 2.3.4)."""
+    history = memory.observed.shape[0]
+    first = memory.clock[1] < 1.0
+    for lag in range(history - 1, 0, -1):
+        for m in range(memory.command.shape[1]):
+            memory.command[lag, m] = memory.command[lag - 1, m]
+        for j in range(angle.shape[0]):
+            for q in range(4):
+                memory.observed[lag, j, q] = memory.observed[lag - 1, j, q]
+    for j in range(angle.shape[0]):
+        velocity = (angle[j] - memory.observed[0, j, 0]) / (1e3 * (time - memory.clock[0]))
+        memory.observed[0, j, 0] = angle[j]
+        memory.observed[0, j, 1] = 0.0 if first else velocity
+        memory.observed[0, j, 2] = pressure[j, 0]
+        memory.observed[0, j, 3] = pressure[j, 1]
+    if first:
+        for lag in range(1, history):
+            for j in range(angle.shape[0]):
+                for q in range(4):
+                    memory.observed[lag, j, q] = memory.observed[0, j, q]
+    memory.clock[0] = time
+    memory.clock[1] += 1.0

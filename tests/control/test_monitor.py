@@ -1,0 +1,205 @@
+"""The monitor: what it finds, how soon, and that it leaves healthy arms alone."""
+
+import time
+from functools import cache
+
+import numpy as np
+import pytest
+from benchmarks.faults import KINDS, played, watched_steps
+
+from pneumarm.arm import Reading
+from pneumarm.arm.virtual import DeadPotentiometer, Leak, StuckValve, SupplyLoss, VirtualArm, draw_parameters
+from pneumarm.control import Finding, LeakTest, Monitor, leak_test, leaking
+from pneumarm.control.monitor import marks_of
+from pneumarm.control.monitor.hypotheses import hypotheses
+from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.simulation.fit import FitSettings, fit_store
+from pneumarm.transitions import CollectSettings, Store, Window, collect, transitions
+
+
+@pytest.fixture(scope="module")
+def simulation(tmp_path_factory):
+    arm = VirtualArm(draw_parameters(3), seed=3)
+    with Store.for_arm(tmp_path_factory.mktemp("monitor") / "db", arm.spec) as store:
+        collect(arm, store, 10_000, 3)
+        return fit_store(store, FitSettings(epochs=12)).simulation
+
+
+@cache
+def by_name():
+    return {kind.name: kind for kind in KINDS}
+
+
+@pytest.mark.parametrize(
+    ("name", "within"),
+    [
+        ("inlet stuck closed", 4.0),
+        ("inlet stuck open", 8.0),
+        ("outlet stuck closed", 4.0),
+        ("inlet and outlet swapped", 2.0),
+        ("muscles swapped", 2.0),
+        ("supply lost", 4.0),
+        ("potentiometer dead", 0.17),
+        ("potentiometer frozen", 1.0),
+    ],
+)
+def test_finds_faults_with_a_simulation(simulation, name, within):
+    for seed in range(3):
+        case = played(by_name()[name], 3, seed, simulation, patience=20.0)
+        assert case.found is not None
+        assert case.early == 0
+        assert case.since_contradiction <= within
+
+
+@pytest.mark.parametrize("name", ["inlet stuck closed", "muscles swapped", "supply lost", "potentiometer dead"])
+def test_finds_faults_before_there_is_a_simulation(name):
+    for arm in (1, 2):
+        case = played(by_name()[name], arm, arm, None, patience=30.0)
+        assert case.found is not None
+        assert case.early == 0
+
+
+def test_leaves_healthy_arms_alone(simulation):
+    arm = VirtualArm(draw_parameters(3), seed=8)
+    monitor = Monitor(arm.spec, simulation)
+    for _ in watched_steps(arm, monitor, 8):
+        if arm.time > 600:
+            break
+    assert monitor.findings == []
+    for seed in (4, 5, 6):
+        arm = VirtualArm(draw_parameters(seed), seed=seed)
+        monitor = Monitor(arm.spec)
+        for _ in watched_steps(arm, monitor, seed):
+            if arm.time > 300:
+                break
+        assert monitor.findings == []
+
+
+def test_a_fault_that_ends_is_over():
+    arm = VirtualArm(draw_parameters(3), seed=2, faults=[SupplyLoss(begin=20.0, end=60.0)])
+    monitor = Monitor(arm.spec)
+    for _ in watched_steps(arm, monitor, 2):
+        if arm.time > 120:
+            break
+    assert {one.kind for one in monitor.findings} == {"low-supply"}
+    assert all(20.0 < one.since < 70.0 for one in monitor.findings)
+    assert monitor.now == []
+
+
+def test_goes_on_from_its_state_as_if_nothing_had_happened(simulation):
+    faults = [StuckValve(begin=18.0)]
+    runs = []
+    for interrupted in (False, True):
+        arm = VirtualArm(draw_parameters(3), seed=2, faults=faults)
+        monitor = Monitor(arm.spec, simulation)
+        for step in watched_steps(arm, monitor, 2):
+            if interrupted and 15.0 < arm.time < 25.0 and step.valves is None:
+                state = monitor.get_state()
+                monitor.findings = []
+                monitor.set_state(state)
+            if arm.time > 40:
+                break
+        runs.append((monitor.findings, monitor.get_state()))
+    assert runs[0] == runs[1]
+    assert runs[0][0]
+    with pytest.raises(UnusableInput, match="monitor"):
+        Monitor(arm.spec).set_state(runs[0][1])
+
+
+def test_an_angle_that_is_swept_onto_a_rail_is_no_broken_wire():
+    arm = VirtualArm()
+    monitor = Monitor(arm.spec)
+    angles = [600, 800, 1000, 1023, 1023, 1023, 1023, 1023]
+    for k, angle in enumerate(angles):
+        monitor.see(Reading(k / 30, np.array([angle], float), np.full((1, 2), 50.0)), np.zeros((1, 2), np.int8))
+    assert monitor.findings == []
+    monitor = Monitor(arm.spec)
+    for k, angle in enumerate([600, 610, 0, 0, 0]):
+        monitor.see(Reading(k / 30, np.array([angle], float), np.full((1, 2), 50.0)), np.zeros((1, 2), np.int8))
+    (found,) = monitor.findings
+    assert (found.kind, found.since) == ("dead-potentiometer", pytest.approx(2 / 30))
+
+
+def test_hypotheses_are_told_apart_for_any_number_of_joints():
+    for joints in (1, 2, 3):
+        names, readings = hypotheses(joints)
+        muscles = 2 * joints
+        assert len(names) == len(readings.source) == 3 + 6 * muscles + muscles * (muscles - 1) // 2
+        kept = [np.concatenate([*map(np.ravel, parts)]).tobytes() for parts in zip(*readings, strict=True)]
+        assert len(set(kept)) == len(names)
+
+
+def test_marks_are_the_rows_from_since_to_until():
+    time_, step = np.arange(10.0), np.array([0, 1, 2, 3, 5, 6, 7, 8, 9, 10])
+    finding = Finding("stuck-valve", "stuck", 1, 1, since=2.5, noticed=4.0, until=5.0)
+    (mark,) = marks_of([finding], time_, step)
+    assert (mark.first, mark.last) == (3, 6)
+    assert marks_of([Finding("changed", "warmer", 1, None, since=0.0, noticed=1.0)], time_, step) == ()
+
+
+def test_costs_less_than_50_microseconds_a_reading(simulation):
+    arm = VirtualArm(draw_parameters(3), seed=1)
+    monitor, valves = Monitor(arm.spec, simulation), np.zeros((1, 2), np.int8)
+    readings = [arm.read() for _ in range(500)]
+    best = np.inf
+    for _ in range(5):
+        monitor.begin(at_rest=True)
+        begin = time.process_time()
+        for k, reading in enumerate(readings):
+            monitor.see(Reading(k / 30, reading.angle, reading.pressure), valves)
+        best = min(best, (time.process_time() - begin) / 500)
+    assert best < 50e-6
+
+
+def test_collecting_marks_what_a_fault_spoiled_and_nothing_is_learned_from_it(tmp_path):
+    fault = SupplyLoss(begin=100.0, end=130.0)
+    arm = VirtualArm(draw_parameters(3), seed=3, faults=[fault])
+    watch = Monitor(arm.spec)
+    with Store.for_arm(tmp_path / "db", arm.spec) as store:
+        collect(arm, store, 4_000, 3, watch=watch)
+        store.check()
+        marks = store.marks()
+        assert marks
+        kept = np.concatenate([transitions(rows, Window()).time for rows in store])
+        everything = np.concatenate([rows.time for rows in store.blocks(marked=True)])
+        assert store.transitions >= 4_000
+    found = [one for one in watch.findings if one.kind == "low-supply"]
+    assert found
+    for one in found:
+        assert not ((kept >= one.since) & (kept <= (one.until or np.inf))).any()
+        assert ((everything >= one.since) & (everything <= (one.until or np.inf))).any()
+    assert abs(found[0].since - 100.0) < 15.0
+
+
+def test_collecting_gives_up_on_an_arm_that_stays_broken_and_says_why(tmp_path):
+    arm = VirtualArm(draw_parameters(3), seed=3, faults=[DeadPotentiometer(begin=15.0), StuckValve(begin=15.0)])
+    with (
+        Store.for_arm(tmp_path / "db", arm.spec) as store,
+        pytest.raises(ArmFailure, match="stuck-valve"),
+    ):
+        collect(arm, store, 20_000, 3, watch=Monitor(arm.spec))
+
+
+def test_a_watched_collection_is_resumed_bit_for_bit(tmp_path):
+    stores = []
+    for name, parts in (("once", (4_000,)), ("twice", (2_000, 4_000))):
+        for count in parts:
+            arm = VirtualArm(draw_parameters(3), seed=3, faults=[SupplyLoss(begin=60.0, end=75.0)])
+            with Store.for_arm(tmp_path / name, arm.spec) as store:
+                collect(arm, store, count, 3, watch=Monitor(arm.spec), settings=CollectSettings())
+        with Store.open(tmp_path / name) as store:
+            stores.append((store.marks(), np.concatenate([rows.angle for rows in store.blocks(marked=True)])))
+    assert stores[0][0] == stores[1][0] != {}
+    np.testing.assert_array_equal(stores[0][1], stores[1][1])
+
+
+def test_a_leak_three_times_as_large_is_found_within_a_minute():
+    for seed in (1, 2):
+        arm = VirtualArm(draw_parameters(seed), seed=seed)
+        arm.wait(300.0)
+        healthy = leak_test(arm, LeakTest(watch=120.0))
+        assert not leaking(healthy, leak_test(arm)).any()
+        arm.faults = (Leak(muscle=2, factor=3, begin=arm.time),)
+        now = leak_test(arm)
+        assert now.seconds < 60
+        assert leaking(healthy, now).tolist() == [[False, True]]

@@ -1,0 +1,96 @@
+"""What long benchmarks rely on: rows that outlast a kill, the same movements for all, failures told apart."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from benchmarks import minutes, success
+from benchmarks._trials import Rows, collected, moved
+
+from pneumarm.control import Movement
+from pneumarm.learning import load_agent
+from pneumarm.transitions import Recorded
+
+
+def test_rows_outlast_a_kill_in_the_middle_of_a_line(tmp_path: Path) -> None:
+    rows = Rows(tmp_path / "rows", "arm", "block")
+    for block in range(3):
+        rows.add({"arm": 1, "block": block, "reward": [block, 1.5]})
+    written = (tmp_path / "rows").read_bytes()
+    (tmp_path / "rows").write_bytes(written[:-4])
+    resumed = Rows(tmp_path / "rows", "arm", "block")
+    assert resumed.get(1, 1) == {"arm": 1, "block": 1, "reward": [1, 1.5]}
+    assert resumed.get(1, 2) is None
+    resumed.add({"arm": 1, "block": 2, "reward": [2, 1.5]})
+    assert (tmp_path / "rows").read_bytes() == written
+    assert list(Rows(tmp_path / "rows", "arm", "block")) == [json.loads(line) for line in written.splitlines()]
+
+
+def test_a_row_measured_again_counts_once(tmp_path: Path) -> None:
+    rows = Rows(tmp_path / "rows", "arm")
+    rows.add({"arm": 1, "reward": 1})
+    rows.add({"arm": 1, "reward": 2})
+    assert list(Rows(tmp_path / "rows", "arm")) == [{"arm": 1, "reward": 2}]
+
+
+def test_collecting_ends_with_the_first_sequence_after_the_minutes(tmp_path: Path) -> None:
+    transitions, took = collected(tmp_path / "db", arm=3, seed=0, minutes=2.5)
+    assert 2.5 <= took < 2.5 + 0.2
+    again = collected(tmp_path / "db", arm=3, seed=0, minutes=2.5)  # there is enough already
+    assert again == (transitions, took)
+    more, longer = collected(tmp_path / "db", arm=3, seed=0, transitions=transitions + 1)
+    assert (more, longer > took) == (transitions + 200, True)
+
+
+def movement(angle: list[float], goal: float) -> Movement:
+    n = len(angle)
+    column = np.array(angle, np.float64)[:, None]
+    recorded = Recorded(np.arange(n) / 30, column, np.zeros((n, 1, 2)), np.zeros((n, 1, 2)), np.arange(n))
+    return Movement(np.array([goal]), n - 1, np.zeros(1, np.int64), -100.0, False, np.zeros(1), recorded)
+
+
+@pytest.mark.parametrize(
+    ("angle", "goal", "kind"),
+    [
+        ([500.0] * 30, 540.0, "stands still near the goal"),
+        ([500.0] * 30, 700.0, "stands still far from the goal"),
+        ([500.0, 560.0] * 15, 530.0, "moves about near the goal"),
+        ([500.0, 560.0] * 15, 800.0, "moves about far from the goal"),
+    ],
+)
+def test_failures_are_told_apart_and_counted(angle: list[float], goal: float, kind: str) -> None:
+    row = success.failure(7, 1203, movement(angle, goal))
+    assert (row["kind"], row["block"], row["goal"], row["angle"]) == (kind, 2, [goal], [[a] for a in angle])
+    lines = list(success.table([3, 7], [json.loads(json.dumps(row))]))
+    counted = [line for line in lines if line.startswith(kind)]
+    assert len(counted) == 1
+    assert counted[0].split() == [*kind.split(), "1", "1", "on", "7"]
+    assert "movement 1203" in lines[-1]
+
+
+def test_movements_depend_on_their_numbers_alone(small_run: Path) -> None:
+    agent = load_agent(small_run / "agent.safetensors")
+    together = moved(agent, 1, agent.goal_range, range(4), seed=0)
+    later = moved(agent, 1, agent.goal_range, range(2, 4), seed=0)
+    for one, other in zip(together[2:], later, strict=True):
+        np.testing.assert_array_equal(one.goal, other.goal)
+        # from the same inflations; what the muscles did before is felt a little
+        np.testing.assert_allclose(one.recorded.angle[0], other.recorded.angle[0], atol=25)
+    assert len({float(one.goal[0]) for one in together}) == 4
+
+
+def rows_of(rewards: list[float], took: float) -> list[dict[str, Any]]:
+    same = {"minutes": took, "asked": took, "movements": 100, "successes": 99}
+    return [{**same, "reward": reward} for reward in rewards]
+
+
+def test_differences_to_the_longest_are_taken_arm_by_arm() -> None:
+    longest, short = rows_of([30.0, 40.0, 38.0], 110.0), rows_of([29.0, 38.0, 35.0], 5.0)
+    gained = minutes.differences(short, longest)
+    np.testing.assert_array_equal(gained, [-1, -2, -3])
+    assert minutes.half_width(gained) == pytest.approx(4.302653 / np.sqrt(3), rel=1e-6)  # t of two degrees of freedom
+    left, right = minutes.curve([short, longest]).axes
+    assert [label.get_text() for label in left.get_xticklabels()] == ["5", "110"]
+    np.testing.assert_allclose(right.lines[-1].get_ydata(), [1, 1])  # percent failed

@@ -51,6 +51,14 @@ COMMANDS = {
         "Say what can be achieved on a virtual arm at all, by planning with its true physics.",
         "pneumarm bound --arm virtual:seed=7 --episodes 500",
     ),
+    "taguchi": (
+        "Analyse a table of trials and runs by the design that they were made with.",
+        "pneumarm taguchi analyse results.csv --goal larger --design design.toml --out analysis",
+    ),
+    "experiment": (
+        "Do an experiment of the thesis again.",
+        "pneumarm experiment all-goals --out laboratory --runs 8",
+    ),
     "report": (
         "Write the report of a finished run again.",
         "pneumarm report runs/first",

@@ -75,7 +75,7 @@ def _chunk(joints: int, count: int, method: str = "q-learning") -> dict[str, lis
     env = environment(simulation, synthetic_begin_states(simulation), settings)
     weights = pack(draw_networks(simulation.window, settings, np.random.default_rng(0)), simulation.window)
     one = episode(env, random_state(4))
-    performance, steps = train_episodes(
+    performance, steps, _ = train_episodes(
         env, learner(weights, settings), Schedule(150.0, 0.5, 20.0, 0.002), one, room(one), count, 0.5
     )
     return {
@@ -114,6 +114,6 @@ def test_performance_is_the_moving_average_of_successes(simulation: Simulation, 
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     work = learner(pack(networks, simulation.window), settings)
-    performance, steps = train_episodes(env, work, GREEDY, one, room(one), 500, 0.2)
+    performance, steps, _ = train_episodes(env, work, GREEDY, one, room(one), 500, 0.2)
     assert steps == 500
     assert performance == pytest.approx(1 - 0.8 * 0.998**500, rel=1e-9)

@@ -66,6 +66,8 @@ class Schedule(NamedTuple):
     temperature: float
     performance_rate: float
     """Weight of the newest episode in the performance."""
+    enough: float = np.inf
+    """Performance at which training episodes end early, looked at after every one of them."""
 
 
 @part
@@ -114,13 +116,15 @@ def train_episode(environment, learner, schedule, episode, room):  # type: ignor
 
 @part
 def train_episodes(environment, learner, schedule, episode, room, count, performance):  # type: ignore[no-untyped-def]
-    """Run ``count`` episodes; return the performance (thesis eq. 4.14) after them, and the actions taken."""
+    """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes."""
     steps = 0
-    for _ in range(count):
+    for e in range(count):
         actions, _, success = train_episode(environment, learner, schedule, episode, room)
         steps += actions
         performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
-    return performance, steps
+        if performance >= schedule.enough:
+            return performance, steps, e + 1
+    return performance, steps, count
 
 
 class Movements(NamedTuple):

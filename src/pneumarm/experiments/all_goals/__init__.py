@@ -1,0 +1,31 @@
+"""All goal angles (section 5.4.2, appendix C.2): which settings of the learning method matter, and which are best?
+
+Five factors of the method on L16, eight runs from different weights, tested on all goals.
+
+    pneumarm experiment all-goals
+"""
+
+from dataclasses import replace
+
+from pneumarm.experiments.design.assignment import thesis_design
+from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.factorial import Factorial
+from pneumarm.learning import TrainSettings
+
+LONGEST = 100_000
+"""Episodes after which a training that does not meet the criterium ends; the thesis' longest took 48,000."""
+BASE = replace(TrainSettings(), max_episodes=LONGEST)
+"""What no factor sets (section 5.4.2)."""
+
+EXPERIMENT = Factorial(
+    name="all-goals",
+    title="All goal angles",
+    question="Which settings of the learning method matter when all goals are learned, and which are best?",
+    source="Thesis section 5.4.2, appendix C.2",
+    runs=8,
+    design=thesis_design(),
+    base=BASE,
+    thesis={
+        name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
+    },
+)

@@ -1,0 +1,25 @@
+"""Punishing a switch (section 5.4.1, appendix C.1): what does it do to the movements, and to the training?
+
+As all-goals, with the punishment (-8 or none) in place of the discount factor and the single goal 650; three runs.
+
+    pneumarm experiment switch-punishment
+"""
+
+from pneumarm.experiments.all_goals import BASE
+from pneumarm.experiments.design.assignment import packaged_design
+from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.factorial import Factorial
+
+EXPERIMENT = Factorial(
+    name="switch-punishment",
+    title="Punishing a switch",
+    question="What does a punishment of -8 for a switch do to the movements, and to the training?",
+    source="Thesis section 5.4.1, appendix C.1",
+    runs=3,
+    design=packaged_design(__name__),
+    base=BASE,
+    thesis={
+        name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
+    },
+    goal=650.0,
+)

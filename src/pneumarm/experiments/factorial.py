@@ -4,12 +4,11 @@ The same class does all of them; what they are is data, in the folder of each.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
-import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.experiments.comparison import side_by_side
@@ -17,12 +16,27 @@ from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_ta
 from pneumarm.experiments.design.assignment import Design
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
 from pneumarm.experiments.preparation import Simulated, simulated
-from pneumarm.experiments.trainings import CRITERIA, train_and_test, with_settings
+from pneumarm.experiments.trainings import CRITERIA, EXPLORING, train_and_test, with_settings
 from pneumarm.learning import TrainSettings
 
-Array = NDArray[np.float64]
-SURE = 0.05
-"""Probability by chance below which an effect is taken as real."""
+Array = NDArray[Any]
+ALL = tuple(part for name in ("reward", "actions", "switches") for part in (name, EXPLORING + name))
+"""What a test gives, greedy and exploring."""
+
+
+def _goal(criterion: str) -> Goal:
+    return "larger" if criterion.removeprefix(EXPLORING) in ("reward", "gain") else "smaller"
+
+
+class Said(NamedTuple):
+    """What the thesis says of the effect of a column of two levels on a criterion."""
+
+    criterion: str
+    column: int
+    raises: bool
+    """Whether it is the higher level that gives more."""
+    loss: str = "mean"
+    """Or std: whether the runs spread more."""
 
 
 @dataclass(frozen=True)
@@ -43,15 +57,10 @@ class Factorial(Experiment):
     """The only angle to learn [counts]; None for all."""
     continued: int | None = None
     """Episodes until which training goes on after the criterium is met; then ``gain`` is what it changed."""
-    criteria: Mapping[str, Goal] = field(
-        default_factory=lambda: {
-            "reward": "larger",
-            "actions": "smaller",
-            "switches": "smaller",
-            "episodes": "smaller",
-        }
-    )
-    """What is analysed, and which way it is good."""
+    criteria: tuple[str, ...] = (*ALL, "episodes")
+    """What is analysed."""
+    said: tuple[Said, ...] = ()
+    """What the thesis concludes."""
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -94,10 +103,10 @@ class Factorial(Experiment):
         from pneumarm.experiments.design.page import table_sections
 
         ours = {
-            name: analyse_table(self.design, rows.table(name, list(self.trials)), goal)
-            for name, goal in self.criteria.items()
+            name: analyse_table(self.design, rows.table(name, list(self.trials)), _goal(name))
+            for name in self.criteria
         }
-        theirs = {name: analyse_table(self.design, table, self.criteria[name]) for name, table in self.thesis.items()}
+        theirs = {name: analyse_table(self.design, table, _goal(name)) for name, table in self.thesis.items()}
         sections = [side_by_side(self.trials, {n: a.results for n, a in ours.items()}, self.thesis, self.words)]
         for name, analysis in ours.items():
             sections += table_sections(analysis, self.words.get(name, name), name)
@@ -106,7 +115,10 @@ class Factorial(Experiment):
             figures={
                 "rows": len(rows.rows),
                 "arms": list(rows.arms),
-                "success_rate": float(rows.table("success_rate", list(self.trials)).mean()),
+                **{
+                    name: float(rows.table(name, list(self.trials)).mean())
+                    for name in ("success_rate", EXPLORING + "success_rate")
+                },
                 "ours": {name: analysis.figures() for name, analysis in ours.items()},
                 "thesis": {name: analysis.figures() for name, analysis in theirs.items()},
             },
@@ -120,12 +132,12 @@ class Factorial(Experiment):
         return {**CRITERIA, "gain": "change of the reward by training on"}
 
     def claims(self, ours: Mapping[str, TableAnalysis], theirs: Mapping[str, TableAnalysis]) -> tuple[Claim, ...]:
-        """Return what can be said of the effects of single factors: the thesis' sign next to ours with its p."""
+        """Return what the thesis says of single effects, its effect next to ours, greedy and exploring."""
         found = []
-        for name, their in theirs.items():
-            our = ours[name]
-            for column in their.significant("mean"):
-                found.append(_effect_claim(self.words[name], their, our, column))
+        for said in self.said:
+            for name in (said.criterion, EXPLORING + said.criterion):
+                if name in ours:
+                    found.append(_effect_claim(said, self.words[name], theirs[said.criterion], ours[name]))
         return tuple(found)
 
     def _best(self, ours: Mapping[str, TableAnalysis]) -> str:
@@ -136,15 +148,20 @@ class Factorial(Experiment):
         )
 
 
-def _effect_claim(quantity: str, their: TableAnalysis, our: TableAnalysis, column: int) -> Claim:
-    """Return whether an effect that is beyond Lenth's margin in the thesis has the same sign here, surely."""
-    name = their.names[column - 1]
-    theirs, ours = (float(a.effects["mean"].signed[column - 1]) for a in (their, our))
-    p = next(source.p for source in our.variance if source.name == name)
-    same = "holds" if np.sign(theirs) == np.sign(ours) else "does not hold"
+def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis) -> Claim:
+    """Return whether an effect has the sign that the thesis says, beyond what chance could make of it."""
+    column = said.column
+    theirs, ours = (float(a.effects[said.loss].signed[column - 1]) for a in (their, our))
+    if abs(ours) <= our.margin(said.loss):
+        verdict = "open"
+    else:
+        verdict = "holds" if (ours > 0) == said.raises else "does not hold"
+    factor = our.design.on(column)
+    what = f"{factor.name} at {factor.levels[-1]}" if factor else f"the higher level of {our.design.label(column)}"
+    of = "" if said.loss == "mean" else "standard deviation of the "
     return Claim(
-        f"{name}: the higher level {'raises' if theirs > 0 else 'lowers'} the {quantity}",
-        f"{theirs:+.2f}",
-        f"{ours:+.2f} (p {p:.2g})",
-        same if p < SURE else "open",  # type: ignore[arg-type]
+        f"{what} (column {column}) {'raises' if said.raises else 'lowers'} the {of}{quantity}",
+        f"{theirs:+.2f} ± {their.margin(said.loss):.2f}",
+        f"{ours:+.2f} ± {our.margin(said.loss):.2f}",
+        verdict,  # type: ignore[arg-type]
     )

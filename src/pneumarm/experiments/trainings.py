@@ -10,6 +10,8 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.learning import TrainSettings, test
+from pneumarm.learning.environment import environment
+from pneumarm.learning.testing import TEST, TestResult, run_test
 from pneumarm.learning.training import train
 
 CRITERIA = {
@@ -19,7 +21,13 @@ CRITERIA = {
     "episodes": "episodes of training",
     "success_rate": "share of successful episodes",
 }
-"""What a trained agent is judged by (thesis section 5.2), in words."""
+"""What a trained agent is judged by (thesis section 5.2), in words: greedy, and exploring as when training ended.
+
+The thesis says that the learning rate is 0 in the test, but not whether exploration ends; so both are measured.
+"""
+EXPLORING = "exploring "
+"""Prefix of the figures of the test with exploration."""
+CRITERIA |= {EXPLORING + name: f"{text}, exploring" for name, text in CRITERIA.items() if name != "episodes"}
 _TEST_SEED = 0  # the same begin states and goals for every agent of every experiment
 
 
@@ -66,13 +74,23 @@ def train_and_test(
     most = laboratory.max_episodes or settings.max_episodes
     one = replace(settings, agents=1, validation_episodes=1, max_episodes=most)
     training = train(simulation, material.begin, one, run_seed(laboratory, run), threads=1)
-    tested = test(training.agent, simulation, material.begin, laboratory.test_episodes, _TEST_SEED)
+    agent, count = training.agent, laboratory.test_episodes
+    greedy = _means(test(agent, simulation, material.begin, count, _TEST_SEED))
+    env = environment(simulation, material.begin, one)
+    exploring = _means(run_test(env, agent.weights(), one, count, (_TEST_SEED, TEST), one.exploration))
+    return {
+        **greedy,
+        **{EXPLORING + name: value for name, value in exploring.items()},
+        "episodes": float(training.episodes[0]),
+        "steps": float(training.steps[0]),
+        "met": float(training.met[0]),
+    }
+
+
+def _means(tested: TestResult) -> dict[str, float]:
     return {
         "reward": float(tested.reward.mean()),
         "success_rate": float(tested.success.mean()),
         "actions": float(tested.actions.mean()),
         "switches": float(tested.switches.sum(axis=1).mean()),
-        "episodes": float(training.episodes[0]),
-        "steps": float(training.steps[0]),
-        "met": float(training.met[0]),
     }

@@ -164,8 +164,11 @@ def movements(episodes: int, joints: int) -> Movements:
 
 
 @part
-def test_episodes(environment, learner, episode, room, random, record):  # type: ignore[no-untyped-def]
-    """Fill ``record`` with greedy episodes over all begin states and goals, drawn from ``random``."""
+def test_episodes(environment, learner, schedule, episode, room, random, record):  # type: ignore[no-untyped-def]
+    """Fill ``record`` with episodes over all begin states and goals, drawn from ``random``.
+
+    Actions are greedy where the epsilon of ``schedule`` is 0; else they explore, by random numbers of the episode.
+    """
     task, x = environment.task, episode.state.x
     for e in range(record.actions.shape[0]):
         begin_episode(environment, episode, np.inf, random)
@@ -176,7 +179,11 @@ def test_episodes(environment, learner, episode, room, random, record):  # type:
         while not is_reached and record.actions[e] < task.cutoff:
             for joint in range(episode.goal.shape[0]):
                 action_values(learner, joint, x, room.values)
-                room.actions[joint] = greedy(room.values)
+                if schedule.epsilon == 0.0:
+                    room.actions[joint] = greedy(room.values)
+                else:
+                    epsilon, temperature = schedule.epsilon, schedule.temperature
+                    room.actions[joint] = choose(room.values, epsilon, temperature, room.odds, episode.state.random)
             is_reached = take(environment, episode, room.actions)
             record.actions[e] += 1
             record.reward[e] += task.reward_goal if is_reached else task.reward_action

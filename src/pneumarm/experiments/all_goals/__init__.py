@@ -9,11 +9,11 @@ from dataclasses import replace
 
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
-from pneumarm.experiments.factorial import Factorial
+from pneumarm.experiments.factorial import Factorial, Said
 from pneumarm.learning import TrainSettings
 
-LONGEST = 100_000
-"""Episodes after which a training that does not meet the criterium ends; the thesis' longest took 48,000."""
+LONGEST = 50_000
+"""Episodes after which a training that does not meet the criterium ends (the thesis' longest took 48,000)."""
 BASE = replace(TrainSettings(), max_episodes=LONGEST)
 """What no factor sets (section 5.4.2)."""
 
@@ -28,4 +28,17 @@ EXPERIMENT = Factorial(
     thesis={
         name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
     },
+    said=(
+        Said("reward", 4, raises=False),
+        Said("reward", 4, raises=True, loss="std"),
+        Said("reward", 8, raises=False, loss="std"),
+        Said("reward", 2, raises=False),
+        Said("reward", 2, raises=True, loss="std"),
+        Said("reward", 1, raises=False),
+        Said("reward", 11, raises=False),
+        Said("reward", 12, raises=True),
+        Said("reward", 12, raises=True, loss="std"),
+        Said("episodes", 12, raises=False),
+        Said("episodes", 11, raises=True),
+    ),
 )

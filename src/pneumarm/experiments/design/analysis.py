@@ -1,5 +1,6 @@
 """The whole analysis of a table of trials by runs: losses, effects, rankings, tests, best settings."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -11,6 +12,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.design.anova import Source, anova, smallest
 from pneumarm.experiments.design.assignment import Design, Level
 from pneumarm.experiments.design.best import Best, Confirmation, Criterion, confirm, derive
+from pneumarm.experiments.design.distributions import t_quantile
 from pneumarm.experiments.design.effects import Effects, effects
 from pneumarm.experiments.design.half_normal import Lenth, lenth
 from pneumarm.experiments.design.loss import Loss, loss
@@ -52,6 +54,17 @@ class TableAnalysis:
         """Mean square of the error and its degrees of freedom."""
         source = self.variance[-2]
         return source.mean_square, source.freedom
+
+    def margin(self, loss_name: str) -> float:
+        """Return how large the effect of a two-level column on a loss may be by chance, with 95 % confidence.
+
+        On the mean half its confidence interval, t sqrt(4 V_error / results); on other losses Lenth's margin of
+        error. Infinite where neither is known.
+        """
+        if loss_name == "mean":
+            square, freedom = self.error
+            return t_quantile(0.95, freedom) * math.sqrt(4 * square / self.results.size)
+        return self.lenth[loss_name].margin if loss_name in self.lenth else math.inf
 
     def significant(self, loss_name: str) -> tuple[int, ...]:
         """Return the columns whose effect on a loss is beyond Lenth's margin of error, largest first."""

@@ -8,7 +8,7 @@ The first three runs of all-goals, trained on; ``gain`` is what that changed in 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
-from pneumarm.experiments.factorial import Factorial
+from pneumarm.experiments.factorial import ALL, Factorial, Said
 
 EXPERIMENT = Factorial(
     name="long-training",
@@ -20,5 +20,6 @@ EXPERIMENT = Factorial(
     base=BASE,
     thesis={name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "gain", "actions", "switches")},
     continued=50_000,
-    criteria={"gain": "larger", "reward": "larger", "actions": "smaller", "switches": "smaller"},
+    criteria=("gain", *ALL),
+    said=(Said("gain", 4, raises=True, loss="std"),),
 )

@@ -8,7 +8,7 @@ As all-goals, with the punishment (-8 or none) in place of the discount factor a
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.design.table import packaged_table
-from pneumarm.experiments.factorial import Factorial
+from pneumarm.experiments.factorial import Factorial, Said
 
 EXPERIMENT = Factorial(
     name="switch-punishment",
@@ -22,4 +22,9 @@ EXPERIMENT = Factorial(
         name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
     },
     goal=650.0,
+    said=(
+        Said("switches", 12, raises=True),
+        Said("actions", 12, raises=False),
+        Said("episodes", 12, raises=True),
+    ),
 )

@@ -65,7 +65,8 @@ class OrthogonalArray:
         """Return the columns that the interaction of two columns falls on.
 
         These are the columns whose level is decided by the levels of the two. Two columns of p levels have p - 1 of
-        them in a linear array; in L18 most have none, because their interaction spreads over many columns.
+        them in a linear array. In L18 most have none, because their interaction spreads over many columns, and some
+        have one of the two that would be needed.
         """
         if first == second:
             raise UnusableInput(f"a column has no interaction with itself, asked for column {first} twice")

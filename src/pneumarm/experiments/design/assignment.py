@@ -145,6 +145,8 @@ def assign(array: OrthogonalArray, factors: Sequence[Wanted], interactions: Sequ
     """
     labels = [factor.label for factor in factors]
     pairs = [_pair(word, labels) for word in interactions]
+    for factor in factors:
+        array.column(factor.column or 1)
     for columns in _assignments(array, factors, pairs, ()):
         placed = [
             Factor(f.label, f.name, f.levels, column, f.setting) for f, column in zip(factors, columns, strict=True)
@@ -163,6 +165,12 @@ def _pair(word: str, labels: Sequence[str]) -> tuple[int, int]:
     raise UnusableInput(f"interaction {word!r}: expected the labels of two factors among {', '.join(labels)}")
 
 
+def _is_whole(array: OrthogonalArray, first: int, second: int, columns: Sequence[int]) -> bool:
+    """Return whether ``columns`` have all degrees of freedom of the interaction of two columns."""
+    free = array.counts - 1
+    return int(free[first - 1] * free[second - 1]) == sum(int(free[column - 1]) for column in columns)
+
+
 def _assignments(
     array: OrthogonalArray, factors: Sequence[Wanted], pairs: Sequence[tuple[int, int]], chosen: tuple[int, ...]
 ) -> Iterator[tuple[int, ...]]:
@@ -171,7 +179,7 @@ def _assignments(
     for first, second in pairs:
         if second < len(chosen):
             found = array.interaction(chosen[first], chosen[second])
-            if not found:
+            if not _is_whole(array, chosen[first], chosen[second], found):
                 return  # it spreads over columns and cannot be told apart
             used.extend(found)
     if len(set(used)) != len(used):

@@ -4,6 +4,7 @@ Student's t and Fisher's F follow from the regularised incomplete beta function 
 fraction of Abramowitz and Stegun, 26.5.8, evaluated by Lentz' method.
 """
 
+import functools
 import math
 from statistics import NormalDist
 
@@ -52,6 +53,7 @@ def f_tail(ratio: float, numerator: float, denominator: float) -> float:
     return incomplete_beta(denominator / (denominator + numerator * ratio), denominator / 2, numerator / 2)
 
 
+@functools.lru_cache(maxsize=256)
 def t_quantile(probability: float, freedom: float) -> float:
     """Return t with P(|T| <= t) = ``probability`` for Student's T with ``freedom`` degrees, which may be broken."""
 

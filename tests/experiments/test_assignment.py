@@ -12,7 +12,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.design import Wanted, assign, load_design, orthogonal_array, thesis_design
 
 # Thesis table 5.3: the labels of the columns, and the levels of its 16 trials.
-LABELS = tuple(["a", "b", "ab", "c", "ac", "bc", "de", "ce", "bd", "ad", "d", "e", "ae", "be", "cd"])
+LABELS = ("a", "b", "ab", "c", "ac", "bc", "de", "ce", "bd", "ad", "d", "e", "ae", "be", "cd")
 TABLE = (
     "---------------",
     "-------++++++++",

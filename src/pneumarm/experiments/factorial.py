@@ -109,6 +109,8 @@ class Factorial(Experiment):
         theirs = {name: analyse_table(self.design, table, _goal(name)) for name, table in self.thesis.items()}
         sections = [side_by_side(self.trials, {n: a.results for n, a in ours.items()}, self.thesis, self.words)]
         for name, analysis in ours.items():
+            if name.startswith(EXPLORING):
+                continue  # these are in the table above; their pictures would double the page
             sections += table_sections(analysis, self.words.get(name, name), name)
         return Analysis(
             summary=[self.question, self._best(ours)],

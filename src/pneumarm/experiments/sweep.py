@@ -22,6 +22,7 @@ from pneumarm.files import require_folder
 from pneumarm.learning.training import cores
 
 ROWS = "rows.jsonl"
+_PATIENCE = 10.0  # s, for a scheduler to answer
 Progress = Callable[[str], AbstractContextManager[Report]]
 
 
@@ -126,7 +127,7 @@ def _client(address: str) -> Iterator[None]:
     except ImportError as error:
         raise UnusableInput("a cluster needs dask: pip install 'pneumarm[dask]'") from error
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=_PATIENCE)
     except (OSError, ValueError, TimeoutError) as error:
         raise UnusableInput(f"{address}: no scheduler of a dask cluster answers there ({error})") from error
     with client:

@@ -55,9 +55,9 @@ def _learning_rate() -> tuple[bool, str]:
     reached = analysis.results[(best.trial or 0) - 1]
     shown = step.column == column and best.settings["a"] == 0.10 and best.trial == 10
     return shown, (
-        f"column {step.column} (ac) is best at its higher level, column 4 is fixed to its lower one, so column 1 is at "
-        f"its higher level: {best.settings['a']:.2f}. These settings are trial {best.trial}, with a mean reward of "
-        f"{reached.mean():.2f} (standard deviation {reached.std(ddof=1):.2f}); the printed ones were confirmed with "
+        f"column {step.column} (ac) is best at its higher level, column 4 is fixed to its lower one, so "
+        f"column 1 is at its higher level: {best.settings['a']:.2f}. These are trial {best.trial}, whose mean "
+        f"reward is {reached.mean():.2f} (standard deviation {reached.std(ddof=1):.2f}); the printed ones were confirmed with "
         f"{printed.mean():.2f} ({printed.std(ddof=1):.2f})"
     )
 
@@ -100,7 +100,7 @@ ERRATA = (
     Erratum("Figures C.1 and C.2", 'The captions say "for 7 runs separately".', _runs_of_figures, "Eight are drawn."),
     Erratum(
         "Section 5.4.2, optimal settings",
-        'Column 1 is fixed "to its higher level, i.e. the learning rate 0.05"; in table 5.4 the higher level is 0.10.',
+        'Column 1 is fixed "to its higher level, i.e. the learning rate 0.05"; in table 5.4 that is 0.10.',
         _learning_rate,
         "The rule is applied as stated; both settings are confirmed (pneumarm experiment optimal-settings).",
     ),

@@ -57,7 +57,7 @@ def _learning_rate() -> tuple[bool, str]:
     return shown, (
         f"column {step.column} (ac) is best at its higher level, column 4 is fixed to its lower one, so "
         f"column 1 is at its higher level: {best.settings['a']:.2f}. These are trial {best.trial}, whose mean "
-        f"reward is {reached.mean():.2f} (standard deviation {reached.std(ddof=1):.2f}); the printed ones were confirmed with "
+        f"reward is {reached.mean():.2f} (standard deviation {reached.std(ddof=1):.2f}); the printed ones got "
         f"{printed.mean():.2f} ({printed.std(ddof=1):.2f})"
     )
 

@@ -20,6 +20,7 @@ from pneumarm.experiments.design.half_normal import lenth, percentages, position
 from pneumarm.experiments.design.loss import loss
 
 NUMBERS = st.floats(-1e3, 1e3)
+UNHURRIED = settings(deadline=None, max_examples=40)
 
 
 def test_losses_by_hand() -> None:
@@ -48,6 +49,7 @@ def test_effects_by_hand() -> None:
 
 
 @given(any_array(np.float64, 16, elements=NUMBERS), st.integers(1, 15), st.floats(0.1, 100))
+@UNHURRIED
 def test_an_effect_put_in_comes_out(losses: np.ndarray, column: int, size: float) -> None:
     """Adding to all trials at one level changes the effect of that column only: the columns are orthogonal."""
     array = orthogonal_array("L16")
@@ -88,11 +90,13 @@ def test_lenth_seldom_finds_effects_in_noise_and_always_large_ones() -> None:
 
 
 @given(st.floats(0, 1), st.floats(0.2, 60), st.floats(0.2, 60))
+@UNHURRIED
 def test_incomplete_beta_is_scipys(x: float, a: float, b: float) -> None:
     assert incomplete_beta(x, a, b) == pytest.approx(stats.beta.cdf(x, a, b), abs=1e-10)
 
 
 @given(st.floats(0, 50), st.integers(1, 12), st.integers(1, 120))
+@UNHURRIED
 def test_f_tail_is_scipys(ratio: float, numerator: int, denominator: int) -> None:
     assert f_tail(ratio, numerator, denominator) == pytest.approx(
         stats.f.sf(ratio, numerator, denominator), abs=1e-10, rel=1e-6
@@ -100,6 +104,7 @@ def test_f_tail_is_scipys(ratio: float, numerator: int, denominator: int) -> Non
 
 
 @given(st.floats(0.01, 0.999), st.floats(0.7, 200))
+@UNHURRIED
 def test_quantiles_are_scipys(probability: float, freedom: float) -> None:
     assert t_quantile(probability, freedom) == pytest.approx(stats.t.ppf((1 + probability) / 2, freedom), rel=1e-6)
     assert half_normal_quantile(probability) == pytest.approx(stats.halfnorm.ppf(probability), rel=1e-9)
@@ -153,7 +158,7 @@ def test_anova_of_results_that_do_not_vary() -> None:
 
 
 @given(st.permutations(range(5)), st.lists(st.booleans(), min_size=5, max_size=5))
-@settings(max_examples=30)
+@UNHURRIED
 def test_the_derivation_finds_the_best_of_additive_results(order: list[int], raises: list[bool]) -> None:
     """Where only factors matter, in any order of importance, each gets its better level."""
     design = thesis_design()

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pneumarm.errors import UnusableInput
@@ -92,6 +92,7 @@ def test_interactions_spread_in_the_mixed_array() -> None:
 
 
 @given(st.integers(0, 5), st.integers(0, 5))
+@settings(deadline=None)
 def test_differences_in_the_scheme_are_balanced(first: int, second: int) -> None:
     scheme = difference_scheme()
     counts = np.bincount((scheme[:, first] - scheme[:, second]) % 3, minlength=3)

@@ -30,7 +30,7 @@ def experiment_(
     Parameters
     ----------
     name
-        switch-punishment, all-goals, long-training, optimal-settings or no-shaping.
+        Of the experiment, such as all-goals; a name that there is not makes the command list those that there are.
     out
         Folder of the laboratory, shared by all experiments; made where there is none.
     arms

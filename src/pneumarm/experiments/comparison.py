@@ -1,38 +1,45 @@
 """The thesis' numbers next to ours."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.experiments.trainings import EXPLORING
 from pneumarm.report.page import Section, Table
 
 Array = NDArray[np.float64]
+Results = Mapping[str, Sequence[Any] | Array]
+"""By criterion the results of every trial: (trials, runs), or an array of runs for each trial."""
 
 
-def side_by_side(
-    trials: Mapping[int, str], ours: Mapping[str, Array], thesis: Mapping[str, Array], words: Mapping[str, str]
-) -> Section:
-    """Return means and standard deviations over the runs of every trial, ours and the thesis'.
+def side_by_side(trials: Mapping[int, str], ours: Results, thesis: Results, words: Mapping[str, str]) -> Section:
+    """Return means and standard deviations over the runs of every trial, ours and the thesis', a table a criterion.
 
     Args:
         trials: in words, by number.
-        ours: results (trials, runs) by criterion.
+        ours: greedy and, where the test was also made so, exploring.
         thesis: the same, for the criteria that the thesis has.
         words: criteria in words.
 
     """
-    header, cells = ["trial", "settings"], [[str(trial), text] for trial, text in trials.items()]
-    for name, results in ours.items():
-        header += [name, *([f"{name}, thesis"] if name in thesis else [])]
-        for row, values in zip(cells, results, strict=True):
-            row.append(mean_and_spread(values))
+    tables = []
+    for name, greedy in ours.items():
+        if name.startswith(EXPLORING):
+            continue
+        columns = {"here": greedy}
+        if EXPLORING + name in ours:
+            columns = {"here, greedy": greedy, "here, exploring": ours[EXPLORING + name]}
         if name in thesis:
-            for row, values in zip(cells, thesis[name], strict=True):
-                row.append(mean_and_spread(values))
-    explained = "; ".join(f"{name}: {words.get(name, name)}" for name in ours)
-    text = [f"Mean ± standard deviation over the runs. {explained[0].upper()}{explained[1:]}."]
-    return Section("The thesis beside ours", text, tables=[Table(header, cells, "All trials.")])
+            columns["thesis"] = thesis[name]
+        rows = [
+            [str(trial), text, *(mean_and_spread(results[place]) for results in columns.values())]
+            for place, (trial, text) in enumerate(trials.items())
+        ]
+        text = words.get(name, name)
+        tables.append(Table(["trial", "settings", *columns], rows, f"{text[0].upper()}{text[1:]}."))
+    return Section("The thesis beside ours", ["Mean ± standard deviation over the runs."], tables=tables)
 
 
 def mean_and_spread(values: Array) -> str:

@@ -79,7 +79,7 @@ class Confirmation(Experiment):
             figures={
                 name: {"mean": table.mean(axis=1).tolist(), "runs": table.tolist()} for name, table in ours.items()
             },
-            sections=[side_by_side(self.trials, ours, thesis, CRITERIA)],  # type: ignore[arg-type]
+            sections=[side_by_side(self.trials, ours, thesis, CRITERIA)],
             claims=[
                 Claim(
                     "The rule's settings (learning rate 0.10) give more reward than the printed ones (0.05)",

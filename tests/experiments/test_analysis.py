@@ -16,6 +16,7 @@ from pneumarm.experiments.design.anova import anova, smallest
 from pneumarm.experiments.design.best import Criterion, confirm, derive, level_at, predict
 from pneumarm.experiments.design.distributions import f_tail, half_normal_quantile, incomplete_beta, t_quantile
 from pneumarm.experiments.design.effects import effects
+from pneumarm.experiments.design.figures import half_normal_figure
 from pneumarm.experiments.design.half_normal import lenth, percentages, positions
 from pneumarm.experiments.design.loss import loss
 
@@ -149,6 +150,14 @@ def test_anova_pools_small_effects_where_there_is_one_run() -> None:
     assert sources["error"].freedom == 4
     assert sources["1"].p < 1e-3
     assert not {str(column) for column in pooled} & sources.keys()
+
+
+def test_pictures_of_results_that_do_not_vary() -> None:
+    """As the episodes of a training that always ends at its limit: all effects 0, an axis that is not empty."""
+    analysis = analyse_table(thesis_design(), np.full((16, 3), 16_000.0), "smaller")
+    figure = half_normal_figure(analysis, ("mean", "std"), "episodes")
+    assert [axes.get_xlim() for axes in figure.axes] == [(0.0, 1.0)] * 2
+    assert analysis.significant("mean") == ()
 
 
 def test_anova_of_results_that_do_not_vary() -> None:

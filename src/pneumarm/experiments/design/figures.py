@@ -57,11 +57,11 @@ def half_normal_figure(analysis: TableAnalysis, names: tuple[str, ...], quantity
         ascending = np.array(found.ranking[::-1]) - 1
         sizes = found.sizes[ascending]
         axis.plot(sizes, y, "o", color=DARK, label="effects")
-        if name in analysis.lenth:
+        limit = 1.25 * float(sizes[-1]) or 1.0  # where nothing varies all effects are 0
+        if name in analysis.lenth and analysis.lenth[name].pseudo_standard_error > 0:
             test = analysis.lenth[name]
-            top = min(y[-1], sizes[-1] / max(test.pseudo_standard_error, 1e-12))
+            top = min(y[-1], sizes[-1] / test.pseudo_standard_error)
             axis.plot([0, top * test.pseudo_standard_error], [0, top], color=GREY, linewidth=1, label="noise (Lenth)")
-            limit = 1.25 * sizes[-1]
             for margin, style, label in (
                 (test.margin, "--", "margin of error"),
                 (test.simultaneous_margin, ":", "simultaneous margin"),
@@ -74,7 +74,7 @@ def half_normal_figure(analysis: TableAnalysis, names: tuple[str, ...], quantity
                 label, (sizes[place], y[place]), xytext=(5, -3), textcoords="offset points", fontsize=7, color=INK
             )
         axis.set_yticks(y, [f"{p:.1f}" for p in percent])
-        axis.set_xlim(0, 1.25 * max(float(sizes[-1]), 1e-12))
+        axis.set_xlim(0, limit)
         axis.set_ylim(0, y[-1] * 1.08)
         axis.set_xlabel(f"estimated effect on the {name}{_unit(quantity)}")
         axis.set_title(name)

@@ -3,6 +3,9 @@
 The first three runs of all-goals, trained on; ``gain`` is what that changed in the reward.
 
     pneumarm experiment long-training
+
+On the nominal virtual arm (seed 0) training on raises the reward by 14 on average, four times as much as in the
+thesis, and no factor decides by how much.
 """
 
 from pneumarm.experiments.all_goals import BASE

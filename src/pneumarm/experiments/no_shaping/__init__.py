@@ -4,6 +4,9 @@ As all-goals, from all begin states from the first episode on, epsilon 0.09 and 
 of training is looked for after every episode, as table C.22 shows.
 
     pneumarm experiment no-shaping
+
+On the nominal virtual arm (seed 0) 96 % of the agents meet the criterium without shaping, as all do in the thesis.
+Their reward is -20 on average, against -15 in all-goals.
 """
 
 from dataclasses import replace

@@ -3,6 +3,9 @@
 As all-goals, with the punishment (-8 or none) in place of the discount factor and the single goal 650; three runs.
 
     pneumarm experiment switch-punishment
+
+On the nominal virtual arm (seed 0) agents that are punished switch 1.4 times a movement, others 4.2 times: less than
+half, as in the thesis. They also need fewer actions (12.5 against 17.8), where the thesis' need more.
 """
 
 from pneumarm.experiments.all_goals import BASE

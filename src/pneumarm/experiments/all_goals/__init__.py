@@ -5,8 +5,8 @@ Five factors of the method on L16, eight runs from different weights, tested on 
     pneumarm experiment all-goals
 
 On the nominal virtual arm (seed 0) few effects are beyond chance: a learning rate of 0.10, 10 neurons, traces and
-gamma 0.98 each cost about 20 of reward, largely because together (trial 14) they diverge; SARSA and Q-learning are not
-told apart. Agents reach 84 % of their goals, where the thesis' reach nearly all.
+gamma 0.98 each cost about 20 of reward, largely because together (trial 14) they diverge; SARSA and Q-learning are
+not told apart. Agents reach 84 % of their goals, where the thesis' reach nearly all.
 """
 
 from dataclasses import replace

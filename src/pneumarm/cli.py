@@ -68,6 +68,14 @@ COMMANDS = {
         "Click every valve, one by one, saying which; before the air is on.",
         "pneumarm arm valves virtual",
     ),
+    "taguchi analyse": (
+        "Analyse a table of trials and runs by the design that they were made with.",
+        "pneumarm taguchi analyse results.csv --goal larger --design design.toml --out analysis",
+    ),
+    "experiment": (
+        "Do an experiment of the thesis again.",
+        "pneumarm experiment all-goals --out laboratory --runs 8",
+    ),
     "report": (
         "Write the report of a finished run again.",
         "pneumarm report runs/first",
@@ -81,7 +89,10 @@ app = App(
     version=__version__,
     suppress_keyboard_interrupt=False,
 )
-_groups = {"arm": App(name="arm", help="Check an arm, calibrate it, try its valves.")}
+_groups = {
+    "arm": App(name="arm", help="Check an arm, calibrate it, try its valves."),
+    "taguchi": App(name="taguchi", help="Design of experiments."),
+}
 for _group in _groups.values():
     app.command(_group)
 for _name, (_help, _example) in COMMANDS.items():

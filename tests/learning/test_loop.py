@@ -75,7 +75,7 @@ def _chunk(joints: int, count: int, method: str = "q-learning") -> dict[str, lis
     env = environment(simulation, synthetic_begin_states(simulation), settings)
     weights = pack(draw_networks(simulation.window, settings, np.random.default_rng(0)), simulation.window)
     one = episode(env, random_state(4))
-    performance, steps = train_episodes(
+    performance, steps, _ = train_episodes(
         env, learner(weights, settings), Schedule(150.0, 0.5, 20.0, 0.002), one, room(one), count, 0.5
     )
     return {
@@ -114,6 +114,24 @@ def test_performance_is_the_moving_average_of_successes(simulation: Simulation, 
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     work = learner(pack(networks, simulation.window), settings)
-    performance, steps = train_episodes(env, work, GREEDY, one, room(one), 500, 0.2)
+    performance, steps, _ = train_episodes(env, work, GREEDY, one, room(one), 500, 0.2)
     assert steps == 500
     assert performance == pytest.approx(1 - 0.8 * 0.998**500, rel=1e-9)
+
+
+def test_training_ends_with_the_episode_in_which_the_performance_is_enough(
+    simulation: Simulation, begin: BeginStates
+) -> None:
+    """From p = 0.2 with successes only: 1 - 0.8 * 0.998^n reaches 0.5 after n = 235 episodes, of one action each."""
+    settings = TrainSettings(noise=QUIET)
+    simulation = replace(simulation, goal_range=np.array([[500.0, 500.0]]))
+    nearest = np.abs(begin.angle[:, 0] - 500).argmin()
+    begin = BeginStates(begin.window, begin.states[[nearest]], begin.angle[[nearest]])
+    networks = network_shapes(simulation.window, 5)
+    networks.output_bias[0, 4] = 0.5
+    env = environment(simulation, begin, settings)
+    one = episode(env, random_state(0))
+    work = learner(pack(networks, simulation.window), settings)
+    performance, steps, count = train_episodes(env, work, GREEDY._replace(enough=0.5), one, room(one), 500, 0.2)
+    assert (steps, count) == (235, 235)
+    assert 0.5 <= performance < 0.5 + 0.002

@@ -66,6 +66,8 @@ class Schedule(NamedTuple):
     temperature: float
     performance_rate: float
     """Weight of the newest episode in the performance."""
+    enough: float = np.inf
+    """Performance at which training episodes end early, looked at after every one of them."""
 
 
 @part
@@ -114,13 +116,15 @@ def train_episode(environment, learner, schedule, episode, room):  # type: ignor
 
 @part
 def train_episodes(environment, learner, schedule, episode, room, count, performance):  # type: ignore[no-untyped-def]
-    """Run ``count`` episodes; return the performance (thesis eq. 4.14) after them, and the actions taken."""
+    """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes."""
     steps = 0
-    for _ in range(count):
+    for e in range(count):
         actions, _, success = train_episode(environment, learner, schedule, episode, room)
         steps += actions
         performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
-    return performance, steps
+        if performance >= schedule.enough:
+            return performance, steps, e + 1
+    return performance, steps, count
 
 
 class Movements(NamedTuple):
@@ -160,8 +164,11 @@ def movements(episodes: int, joints: int) -> Movements:
 
 
 @part
-def test_episodes(environment, learner, episode, room, random, record):  # type: ignore[no-untyped-def]
-    """Fill ``record`` with greedy episodes over all begin states and goals, drawn from ``random``."""
+def test_episodes(environment, learner, schedule, episode, room, random, record):  # type: ignore[no-untyped-def]
+    """Fill ``record`` with episodes over all begin states and goals, drawn from ``random``.
+
+    Actions are greedy where the epsilon of ``schedule`` is 0; else they explore, by random numbers of the episode.
+    """
     task, x = environment.task, episode.state.x
     for e in range(record.actions.shape[0]):
         begin_episode(environment, episode, np.inf, random)
@@ -172,7 +179,11 @@ def test_episodes(environment, learner, episode, room, random, record):  # type:
         while not is_reached and record.actions[e] < task.cutoff:
             for joint in range(episode.goal.shape[0]):
                 action_values(learner, joint, x, room.values)
-                room.actions[joint] = greedy(room.values)
+                if schedule.epsilon == 0.0:
+                    room.actions[joint] = greedy(room.values)
+                else:
+                    epsilon, temperature = schedule.epsilon, schedule.temperature
+                    room.actions[joint] = choose(room.values, epsilon, temperature, room.odds, episode.state.random)
             is_reached = take(environment, episode, room.actions)
             record.actions[e] += 1
             record.reward[e] += task.reward_goal if is_reached else task.reward_action

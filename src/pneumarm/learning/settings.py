@@ -141,6 +141,8 @@ class TrainSettings:
     """Return that a network's output of 1 stands for (thesis: outputs are normalised; returns are about -50..50)."""
     max_episodes: int = 50_000
     """Episodes after which training ends although the criterium is not met (thesis: the longest is 50,000)."""
+    stops: bool = True
+    """Whether training ends when the criterium is met; otherwise at ``max_episodes`` (thesis: yes; not in 5.4.3)."""
     validation_episodes: int = 2_000
     """Greedy episodes on which the best agent is chosen."""
     reward: Reward = field(default_factory=Reward)

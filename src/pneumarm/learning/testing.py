@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.environment import Environment, episode
-from pneumarm.learning.loop import movements, room, test_episodes
-from pneumarm.learning.settings import TrainSettings
+from pneumarm.learning.loop import Schedule, movements, room, test_episodes
+from pneumarm.learning.settings import Exploration, TrainSettings
 from pneumarm.learning.values import learner
 from pneumarm.random import random_state
 from pneumarm.statistics import summarise
@@ -46,13 +46,23 @@ class TestResult:
         return summarise(self.reward, self.success, self.actions, self.switches)
 
 
+GREEDY = Exploration(epsilon=0.0)
+"""No exploration."""
+
+
 def run_test(
-    env: Environment, weights: NDArray[np.float32], settings: TrainSettings, episodes: int, seed: tuple[int, ...]
+    env: Environment,
+    weights: NDArray[np.float32],
+    settings: TrainSettings,
+    episodes: int,
+    seed: tuple[int, ...],
+    exploration: Exploration = GREEDY,
 ) -> TestResult:
     """Test the networks ``weights`` in ``env``; begin states and goals are drawn by ``seed``, and so is the noise."""
     if episodes < 1:
         raise UnusableInput(f"a test needs at least one episode, got {episodes}")
     one = episode(env, random_state((*seed, NOISE)))
     record = movements(episodes, one.goal.size)
-    test_episodes(env, learner(weights, settings), one, room(one), random_state(seed), record)
+    schedule = Schedule(np.inf, float(exploration.epsilon), float(exploration.temperature), 0.0)
+    test_episodes(env, learner(weights, settings), schedule, one, room(one), random_state(seed), record)
     return TestResult(*record)

@@ -121,8 +121,9 @@ def train(
 
     Training of an agent ends when its deviation is the whole range of angles and its performance meets the
     criterium (section 5.2), or after ``settings.max_episodes`` (difference from the thesis, where some seed might
-    train for ever). The same seed gives the same agents, bit for bit, with any number of ``threads`` (default: one a
-    core). With a ``checkpoint`` a killed training goes on from there; the file is left when training is done.
+    train for ever); where ``settings.stops`` is false, only then. The same seed gives the same agents, bit for bit,
+    with any number of ``threads`` (default: one a core). With a ``checkpoint`` a killed training goes on from there;
+    the file is left when training is done.
 
     Raises:
         UnusableInput: begin states and simulation do not fit, or the checkpoint is of another training.
@@ -201,7 +202,7 @@ def _fresh(simulation: Simulation, settings: TrainSettings, seed: int) -> _Agent
 
 
 def _ended(agents: _Agents, settings: TrainSettings) -> NDArray[np.bool_]:
-    return agents.met | (agents.episodes >= settings.max_episodes)
+    return (agents.met & settings.stops) | (agents.episodes >= settings.max_episodes)
 
 
 def _chunk(
@@ -216,7 +217,7 @@ def _chunk(
     worker = _apart(learner(agents.weights[a], settings))
     remembered = _apart(room(one))
     began = time.thread_time()
-    performance, steps = train_episodes(
+    performance, steps, count = train_episodes(
         env, worker, now.schedule, one, remembered, count, float(agents.performance[a])
     )
     spent = time.thread_time() - began
@@ -224,7 +225,7 @@ def _chunk(
     agents.performance[a] = performance
     agents.episodes[a] += count
     agents.steps[a] += steps
-    agents.met[a] = now.whole and performance >= now.criterium
+    agents.met[a] |= now.whole and performance >= now.criterium
     row = [agents.episodes[a], agents.deviation[a], now.criterium, performance, *now.schedule[1:3]]
     agents.deviation[a] = adjusted(agents.deviation[a], performance, settings, simulation.spec)
     return row, spent

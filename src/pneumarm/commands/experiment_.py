@@ -1,0 +1,55 @@
+"""``pneumarm experiment``."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pneumarm.commands.common import Json, Settings
+from pneumarm.console import progress, say, show, table
+from pneumarm.experiments.experiment import LaboratorySettings
+from pneumarm.experiments.page import write_page
+from pneumarm.experiments.registry import experiment
+from pneumarm.experiments.sweep import sweep
+
+
+def experiment_(
+    name: str,
+    /,
+    *,
+    out: Path = Path("laboratory"),
+    arms: str = "virtual",
+    runs: int | None = None,
+    workers: int | None = None,
+    dask: str | None = None,
+    settings: Annotated[LaboratorySettings, Settings] = LaboratorySettings(),
+    json: Json = False,
+) -> None:
+    """Do an experiment of the thesis again and write its page.
+
+    A second call computes only the rows that are missing, also after a call that was killed or asked for fewer runs.
+
+    Parameters
+    ----------
+    name
+        Of the experiment, such as all-goals; a name that there is not makes the command list those that there are.
+    out
+        Folder of the laboratory, shared by all experiments; made where there is none.
+    arms
+        Names of the arms, separated by commas.
+    runs
+        How often every trial is done, each time from other weights; otherwise as often as in the thesis.
+    workers
+        Rows computed at once; by default as many as there are cores.
+    dask
+        Address of the scheduler of a dask cluster, such as tcp://127.0.0.1:8786, to compute there.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    chosen = experiment(name)
+    done = sweep(chosen, out, arms.split(","), runs, settings, workers=workers, dask=dask, progress=progress)
+    analysis = chosen.analyse(done.rows)
+    page = write_page(chosen, out / chosen.name, analysis, done.rows.runs, done.rows.arms)
+    found = {"experiment": name, "rows": len(done.rows.rows), "computed": done.computed, "seconds": done.seconds}
+    claims = [(claim.text, claim.thesis, claim.ours, claim.verdict) for claim in analysis.claims]
+    tables = [table(("claim", "thesis", "here", "verdict"), claims)] if claims else []
+    show({**found, **analysis.figures, "page": str(page)}, json, lambda: [*tables, *analysis.summary])
+    say(f"{done.computed} rows computed in {done.seconds:.1f} s; page: {page}")

@@ -1,0 +1,24 @@
+"""The laboratory: experiments that anyone can run again, next to the thesis' own numbers.
+
+``pneumarm experiment NAME`` computes the rows that are missing, a row a trial and run, and draws a page from them.
+All experiments of a laboratory share a folder:
+
+    LABORATORY/arms/ARM/                  transitions and simulation of each arm, made once
+    LABORATORY/NAME/settings.json         what decides the rows; other settings need another laboratory
+    LABORATORY/NAME/rows.jsonl            the rows, appended durably, never computed twice
+    LABORATORY/NAME/results.json          what they say, for programs
+    LABORATORY/NAME/page.html             what they say, for people
+
+To add an experiment, make a folder (a package) here and name it in :mod:`.registry`. The folder holds
+
+- ``__init__.py``, whose docstring is the question, the factors, the command and the answer in two sentences, and
+  whose ``EXPERIMENT`` is an :class:`~.experiment.Experiment`: trials in words, ``settings`` (JSON that decides the
+  rows), ``prepare`` (what is needed of an arm; :func:`~.preparation.simulated` collects and fits), ``measure`` (a
+  row: pure, seeded by :func:`~.experiment.run_seed`, so that all trials of a run begin alike) and ``analyse`` (rows
+  to sections, figures and claims; runs nothing);
+- its settings as data: a ``design.toml`` where there is an orthogonal array;
+- the thesis' results as ``thesis_*.csv``, trials by runs.
+
+Trainings of the thesis' agent by an orthogonal array need no code: :class:`~.factorial.Factorial` is such an
+experiment. :mod:`.design` is of use for tables from anywhere (``pneumarm taguchi analyse``).
+"""

@@ -1,0 +1,181 @@
+"""An analysis as sections of a page."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from pneumarm.experiments.design.analysis import TableAnalysis
+from pneumarm.experiments.design.assignment import Level
+from pneumarm.experiments.design.effects import Effects
+from pneumarm.experiments.design.figures import effects_figure, half_normal_figure
+from pneumarm.report.page import Picture, Section, Table
+
+
+def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "") -> list[Section]:
+    """Return the sections on one table of results of a ``quantity``; ``prefix`` keeps titles of several apart."""
+    before = f"{prefix}: " if prefix else ""
+    return [
+        Section(
+            f"{before}results",
+            [f"{analysis.goal.capitalize()} is better. Losses are of all runs of a trial."],
+            tables=[results_table(analysis, quantity)],
+        ),
+        Section(f"{before}effects", [_significance(analysis)], pictures(analysis, quantity), [_rankings(analysis)]),
+        Section(
+            f"{before}analysis of variance",
+            [
+                "Runs are blocks: in each, all trials begin with the same weights."
+                if analysis.results.shape[1] > 1
+                else ""
+            ],
+            tables=[_variance(analysis)],
+        ),
+        Section(f"{before}best settings", derivation(analysis)),
+    ]
+
+
+def results_table(analysis: TableAnalysis, quantity: str) -> Table:
+    """Return the loss table: trials with their settings, results and losses."""
+    factors, runs = analysis.design.factors, analysis.results.shape[1]
+    losses = list(analysis.losses)
+    rows = []
+    for trial, results in enumerate(analysis.results, 1):
+        settings = analysis.design.settings(trial)
+        rows.append(
+            [
+                str(trial),
+                *(f"{settings[f.label]}" for f in factors),
+                *(f"{value:.2f}" for value in results),
+                *(f"{analysis.losses[name][trial - 1]:.2f}" for name in losses),
+            ]
+        )
+    header = ["trial", *(f"{f.label}: {f.name}" for f in factors), *(f"run {r + 1}" for r in range(runs)), *losses]
+    return Table(header, rows, f"Loss table: {quantity} by trial and run (thesis table 5.5, C.7), and its losses.")
+
+
+def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
+    """Return the effects plots and the half-normal plots."""
+    largest = _column(analysis, analysis.effects["mean"].ranking[0])
+    drawn = []
+    if len(analysis.runs) > 1:
+        lines = {f"run {number}": found for number, found in enumerate(analysis.runs, 1)}
+        drawn.append(
+            Picture(
+                effects_figure(analysis, lines, quantity),
+                f"Effects on the {quantity} for all runs apart (thesis fig. 5.1).",
+                f"{len(lines)} lines in {analysis.design.array.columns} columns.",
+            )
+        )
+    names = tuple(name for name in ("mean", "std") if name in analysis.effects)
+    for name, number in zip(names, ("5.2", "5.3"), strict=False):
+        largest = _column(analysis, analysis.effects[name].ranking[0])
+        drawn.append(
+            Picture(
+                effects_figure(analysis, {name: analysis.effects[name]}, f"{name} of {quantity}"),
+                f"Effects on the {name} of the {quantity} (thesis fig. {number}).",
+                f"The largest effect is that of column {largest}.",
+            )
+        )
+    drawn.append(
+        Picture(
+            half_normal_figure(analysis, names, quantity),
+            "Half-normal probability plots of the effects (thesis eq. 5.3, fig. 5.4, 5.5), with Lenth's margins.",
+            "; ".join(f"{name}: beyond the margin {_listed(analysis, name)}" for name in names),
+        )
+    )
+    return drawn
+
+
+def derivation(analysis: TableAnalysis) -> list[str]:
+    """Return in words how the best settings were come by."""
+    design, best = analysis.design, analysis.best
+    steps = [
+        f"{design.factor(s.factor).name} {design.factor(s.factor).levels[s.level]} "
+        f"(column {_column(analysis, s.column)}, rank {s.rank} of the {s.criterion})"
+        for s in best.steps
+    ]
+    text = [
+        f"Fixed in this order: {'; '.join(steps)}.",
+        f"The best settings are {described(best.settings, analysis)}.",
+    ]
+    if best.trial is None:
+        text.append("No trial has them: a confirmation run is needed.")
+    else:
+        results = analysis.results[best.trial - 1]
+        spread = f", standard deviation {results.std(ddof=1):.2f}" if len(results) > 1 else ""
+        rank = int((np.sort(analysis.losses["mean"])[::-1] > results.mean()).sum()) + 1
+        text.append(
+            f"Trial {best.trial} has them: mean {results.mean():.2f}{spread}, "
+            f"the {_ordinal(rank)} highest mean of {design.array.trials}."
+        )
+    return text
+
+
+def described(settings: Mapping[str, Level], analysis: TableAnalysis) -> str:
+    """Return ``settings`` in words."""
+    return ", ".join(f"{analysis.design.factor(label).name} {level}" for label, level in settings.items())
+
+
+def _significance(analysis: TableAnalysis) -> str:
+    names = [name for name in ("mean", "std") if name in analysis.lenth]
+    return " ".join(f"Beyond Lenth's margin for the {name}: {_listed(analysis, name)}." for name in names)
+
+
+def _listed(analysis: TableAnalysis, name: str) -> str:
+    return ", ".join(_column(analysis, column) for column in analysis.significant(name)) or "none"
+
+
+def _column(analysis: TableAnalysis, column: int) -> str:
+    label = analysis.design.label(column)
+    return f"{column} ({label})" if label else str(column)
+
+
+def _rankings(analysis: TableAnalysis) -> Table:
+    names = [name for name in ("mean", "std") if name in analysis.effects]
+    found: Sequence[Effects] = [analysis.effects[name] for name in names]
+    rows = []
+    for rank in range(analysis.design.array.columns):
+        row = [str(rank + 1)]
+        for effect in found:
+            column = effect.ranking[rank]
+            row += [_column(analysis, column), f"{effect.sizes[column - 1]:.2f}"]
+        rows.append(row)
+    header = ["rank", *(part for name in names for part in (name, "effect"))]
+    return Table(header, rows, "Columns by the size of their effects (thesis tables 5.6 and 5.9).")
+
+
+def _variance(analysis: TableAnalysis) -> Table:
+    rows = [
+        [
+            source.name,
+            f"{source.squares:.1f}",
+            str(source.freedom),
+            *(
+                "" if np.isnan(v) else form(v)
+                for v, form in ((source.ratio, _two), (source.p, _p), (source.share, _share))
+            ),
+        ]
+        for source in analysis.variance
+    ]
+    return Table(
+        ["source", "sum of squares", "freedom", "F", "p", "share"], rows, "Analysis of variance of the results."
+    )
+
+
+def _two(value: float) -> str:
+    return f"{value:.2f}"
+
+
+def _p(value: float) -> str:
+    return "< 0.0001" if value < 1e-4 else f"{value:.4f}"
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.1f} %"
+
+
+def _ordinal(rank: int) -> str:
+    if rank == 1:
+        return "very"
+    suffix = "th" if 10 <= rank % 100 <= 20 else {1: "st", 2: "nd", 3: "rd"}.get(rank % 10, "th")
+    return f"{rank}{suffix}"

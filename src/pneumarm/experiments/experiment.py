@@ -1,0 +1,171 @@
+"""What an experiment is: trials as data, a measurement of one trial in one run, and an analysis of the rows."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.errors import UnusableInput
+from pneumarm.learning.settings import check
+
+if TYPE_CHECKING:
+    from pneumarm.report.page import Section
+
+Figures = Mapping[str, float]
+"""What was measured, by name."""
+Report = Callable[[float, float], None]
+"""Told what is done and the total."""
+
+
+@dataclass(frozen=True)
+class LaboratorySettings:
+    """What decides the rows of an experiment, besides the experiment itself. More arms and runs only add rows."""
+
+    seed: int = 0
+    """Of everything that is drawn at random."""
+    transitions: int = 200_000
+    """How many to collect on each arm (thesis section 3.2.2: 200,000, two hours)."""
+    test_episodes: int = 10_000
+    """Greedy movements that every agent is tested with (thesis section 5.2)."""
+    max_episodes: int | None = None
+    """Training episodes at most; otherwise as many as the experiment says."""
+
+    def __post_init__(self) -> None:
+        check(
+            self,
+            seed=self.seed >= 0,
+            test_episodes=self.test_episodes >= 1,
+            max_episodes=self.max_episodes is None or self.max_episodes >= 1,
+        )
+
+
+class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What one trial gave in one run on one arm."""
+
+    arm: str
+    trial: int
+    """From 1."""
+    run: int
+    """From 1."""
+    figures: dict[str, float]
+    seconds: float
+    """That it took [s]."""
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        """What a row is told from the others by."""
+        return self.arm, self.trial, self.run
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rows of an experiment, sorted by arm, trial and run."""
+
+    rows: tuple[Row, ...]
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Arms in the order of their names."""
+        return tuple(sorted({row.arm for row in self.rows}))
+
+    @property
+    def runs(self) -> int:
+        """Highest number of a run."""
+        return max((row.run for row in self.rows), default=0)
+
+    def table(self, figure: str, trials: Sequence[int], arm: str | None = None) -> NDArray[np.float64]:
+        """Return ``figure`` by trial and run, shape (trials, runs); the runs of several arms side by side.
+
+        Raises:
+            UnusableInput: a row is missing, because the sweep is not finished.
+
+        """
+        arms = self.arms if arm is None else (arm,)
+        found = {row.key: row.figures[figure] for row in self.rows}
+        keys = [[(a, t, r) for a in arms for r in range(1, self.runs + 1)] for t in trials]
+        missing = [key for line in keys for key in line if key not in found]
+        if missing:
+            raise UnusableInput(f"{len(missing)} rows are missing, the first is {missing[0]}; finish the sweep first")
+        return np.array([[found[key] for key in line] for line in keys])
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something that the thesis says, next to what was found here."""
+
+    text: str
+    thesis: str
+    """Its evidence."""
+    ours: str
+    """Ours, with an interval where there is one."""
+    verdict: Literal["holds", "does not hold", "open"]
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What an experiment says."""
+
+    summary: Sequence[str]
+    """Paragraphs."""
+    figures: Mapping[str, Any]
+    """For programs: what ``results.json`` holds."""
+    sections: Sequence["Section"]
+    """Of the page."""
+    claims: Sequence[Claim] = field(default=())
+
+
+class Experiment(ABC):
+    """An experiment of the laboratory. It is sent to other processes, so it must be data."""
+
+    name: str
+    """On the command line."""
+    title: str
+    question: str
+    """A sentence."""
+    source: str
+    """Where in the thesis."""
+    runs: int
+    """By default."""
+
+    @property
+    @abstractmethod
+    def trials(self) -> Mapping[int, str]:
+        """Trials by number, in words."""
+
+    @abstractmethod
+    def settings(self) -> Any:
+        """Return what decides the rows, as JSON: a folder is gone on with only where it is the same."""
+
+    @abstractmethod
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
+        """Return what :meth:`measure` needs of ``arm``, making it in ``folder`` where it is missing.
+
+        ``folder`` belongs to the arm and is shared by all experiments of a laboratory. What is returned goes to
+        other processes, perhaps on other machines: let it be data rather than paths.
+        """
+
+    @abstractmethod
+    def measure(self, material: Any, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Return the figures of ``trial`` in ``run``. The same arguments give the same figures, bit for bit."""
+
+    @abstractmethod
+    def analyse(self, rows: Rows) -> Analysis:
+        """Return what the complete ``rows`` say; runs nothing."""
+
+
+def run_seed(settings: LaboratorySettings, run: int) -> int:
+    """Return the seed that all trials of ``run`` share, so that they begin with the same weights (section 5.3).
+
+    It is the same in all experiments, so that run 1 of one can be compared with run 1 of another.
+    """
+    return int(np.random.SeedSequence([settings.seed, run]).generate_state(1)[0])
+
+
+def sorted_rows(rows: Iterable[Row]) -> Rows:
+    """Return ``rows`` in their order."""
+    return Rows(tuple(sorted(rows, key=lambda row: row.key)))

@@ -1,0 +1,169 @@
+"""Experiments with the thesis' agent: its settings varied by a design, every trial trained and tested (section 5.4).
+
+The same class does all of them; what they are is data, in the folder of each.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+from numpy.typing import NDArray
+
+from pneumarm.experiments.comparison import side_by_side
+from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_table
+from pneumarm.experiments.design.assignment import Design
+from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.preparation import Simulated, simulated
+from pneumarm.experiments.trainings import CRITERIA, EXPLORING, train_and_test, with_settings
+from pneumarm.learning import TrainSettings
+
+Array = NDArray[Any]
+ALL = tuple(part for name in ("reward", "actions", "switches") for part in (name, EXPLORING + name))
+"""What a test gives, greedy and exploring."""
+
+
+def _goal(criterion: str) -> Goal:
+    return "larger" if criterion.removeprefix(EXPLORING) in ("reward", "gain") else "smaller"
+
+
+class Said(NamedTuple):
+    """What the thesis says of the effect of a column of two levels on a criterion."""
+
+    criterion: str
+    column: int
+    raises: bool
+    """Whether it is the higher level that gives more."""
+    loss: str = "mean"
+    """Or std: whether the runs spread more."""
+
+
+@dataclass(frozen=True)
+class Factorial(Experiment):
+    """Trainings by an orthogonal array, each tested; all criteria of section 5.2."""
+
+    name: str
+    title: str
+    question: str
+    source: str
+    runs: int
+    design: Design
+    base: TrainSettings
+    """What no factor sets."""
+    thesis: Mapping[str, Array]
+    """The thesis' results by criterion, shapes (trials, its runs)."""
+    goal: float | None = None
+    """The only angle to learn [counts]; None for all."""
+    continued: int | None = None
+    """Episodes until which training goes on after the criterium is met; then ``gain`` is what it changed."""
+    criteria: tuple[str, ...] = (*ALL, "episodes")
+    """What is analysed."""
+    said: tuple[Said, ...] = ()
+    """What the thesis concludes."""
+
+    @property
+    def trials(self) -> Mapping[int, str]:
+        """Trials of the array."""
+        return {
+            trial: ", ".join(f"{label} {level}" for label, level in self.design.settings(trial).items())
+            for trial in range(1, self.design.array.trials + 1)
+        }
+
+    def settings(self) -> Any:
+        """Return the settings of every trial, the goal, and how long training goes on."""
+        return {
+            "trials": {str(trial): msgspec.to_builtins(self.train_settings(trial)) for trial in self.trials},
+            "goal": self.goal,
+            "continued": self.continued,
+        }
+
+    def train_settings(self, trial: int) -> TrainSettings:
+        """Return the settings of the training of ``trial``."""
+        levels = self.design.settings(trial)
+        return with_settings(self.base, {factor.setting: levels[factor.label] for factor in self.design.factors})
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
+        """Return the arm's simulation."""
+        return simulated(arm, folder, settings, progress)
+
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Train and test one agent."""
+        wanted = self.train_settings(trial)
+        found = dict(train_and_test(material, wanted, run, settings, self.goal))
+        if self.continued is None:
+            return found
+        # The same seed: the first episodes of this training are those of the one above.
+        longer = replace(wanted, stops=False, max_episodes=self.continued)
+        later = train_and_test(material, longer, run, settings, self.goal)
+        return {**later, "gain": later["reward"] - found["reward"], "episodes": found["episodes"]}
+
+    def analyse(self, rows: Rows) -> Analysis:
+        """Return rankings, effects and tests of every criterion, beside the thesis'."""
+        from pneumarm.experiments.design.page import table_sections
+
+        ours = {
+            name: analyse_table(self.design, rows.table(name, list(self.trials)), _goal(name))
+            for name in self.criteria
+        }
+        theirs = {name: analyse_table(self.design, table, _goal(name)) for name, table in self.thesis.items()}
+        sections = [side_by_side(self.trials, {n: a.results for n, a in ours.items()}, self.thesis, self.words)]
+        for name, analysis in ours.items():
+            if name.startswith(EXPLORING):
+                continue  # these are in the table above; their pictures would double the page
+            sections += table_sections(analysis, self.words.get(name, name), name)
+        return Analysis(
+            summary=[self.question, self._best(ours)],
+            figures={
+                "rows": len(rows.rows),
+                "arms": list(rows.arms),
+                **{
+                    name: float(rows.table(name, list(self.trials)).mean())
+                    for name in ("success_rate", EXPLORING + "success_rate")
+                },
+                "ours": {name: analysis.figures() for name, analysis in ours.items()},
+                "thesis": {name: analysis.figures() for name, analysis in theirs.items()},
+            },
+            sections=sections,
+            claims=self.claims(ours, theirs),
+        )
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """Criteria in words."""
+        return {**CRITERIA, "gain": "change of the reward by training on"}
+
+    def claims(self, ours: Mapping[str, TableAnalysis], theirs: Mapping[str, TableAnalysis]) -> tuple[Claim, ...]:
+        """Return what the thesis says of single effects, its effect next to ours, greedy and exploring."""
+        found = []
+        for said in self.said:
+            for name in (said.criterion, EXPLORING + said.criterion):
+                if name in ours:
+                    found.append(_effect_claim(said, self.words[name], theirs[said.criterion], ours[name]))
+        return tuple(found)
+
+    def _best(self, ours: Mapping[str, TableAnalysis]) -> str:
+        first = next(iter(ours.values()))
+        settings = ", ".join(f"{self.design.factor(f).name} {level}" for f, level in first.best.settings.items())
+        return f"Best settings by the ranked effects here: {settings}" + (
+            f" (trial {first.best.trial})." if first.best.trial else " (not among the trials)."
+        )
+
+
+def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis) -> Claim:
+    """Return whether an effect has the sign that the thesis says, beyond what chance could make of it."""
+    column = said.column
+    theirs, ours = (float(a.effects[said.loss].signed[column - 1]) for a in (their, our))
+    if abs(ours) <= our.margin(said.loss):
+        verdict = "open"
+    else:
+        verdict = "holds" if (ours > 0) == said.raises else "does not hold"
+    factor = our.design.on(column)
+    what = f"{factor.name} at {factor.levels[-1]}" if factor else f"the higher level of {our.design.label(column)}"
+    of = "" if said.loss == "mean" else "standard deviation of the "
+    return Claim(
+        f"{what} (column {column}) {'raises' if said.raises else 'lowers'} the {of}{quantity}",
+        f"{theirs:+.2f} ± {their.margin(said.loss):.2f}",
+        f"{ours:+.2f} ± {our.margin(said.loss):.2f}",
+        verdict,  # type: ignore[arg-type]
+    )

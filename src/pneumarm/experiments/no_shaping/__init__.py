@@ -1,0 +1,31 @@
+"""No shaping (section 5.4.4, appendix C.5): is shaping needed, and what is it good for?
+
+As all-goals, from all begin states from the first episode on, epsilon 0.09 and T 10 throughout; three runs. The end
+of training is looked for after every episode, as table C.22 shows.
+
+    pneumarm experiment no-shaping
+
+On the nominal virtual arm (seed 0) 96 % of the agents meet the criterium without shaping, as all do in the thesis.
+Their reward is -20 on average, against -15 in all-goals.
+"""
+
+from dataclasses import replace
+
+from pneumarm.experiments.all_goals import BASE
+from pneumarm.experiments.design.assignment import thesis_design
+from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.factorial import Factorial
+from pneumarm.learning import Exploration
+
+EXPERIMENT = Factorial(
+    name="no-shaping",
+    title="No shaping",
+    question="Is shaping needed to learn the task at all, and what does it do for the result?",
+    source="Thesis section 5.4.4, appendix C.5",
+    runs=3,
+    design=thesis_design(),
+    base=replace(BASE, shaping=None, exploration=Exploration(0.09, 10.0)),
+    thesis={
+        name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
+    },
+)

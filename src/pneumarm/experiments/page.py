@@ -1,0 +1,28 @@
+"""What an experiment leaves: its page and its results as JSON, drawn from the rows alone."""
+
+from pathlib import Path
+
+from pneumarm.console import jsonable
+from pneumarm.experiments.experiment import Analysis, Experiment
+from pneumarm.files import write_json, write_text
+from pneumarm.report.page import Section, Table, render
+
+PAGE = "page.html"
+RESULTS = "results.json"
+
+
+def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: int, arms: tuple[str, ...]) -> Path:
+    """Write ``page.html`` and ``results.json`` to ``folder`` and return the path of the page."""
+    claims = [{"claim": c.text, "thesis": c.thesis, "ours": c.ours, "verdict": c.verdict} for c in analysis.claims]
+    write_json(folder / RESULTS, jsonable({"experiment": experiment.name, **analysis.figures, "claims": claims}))
+    where = f"{experiment.source}. {runs} runs of {len(experiment.trials)} trials on {', '.join(arms)}."
+    sections = [*analysis.sections]
+    if analysis.claims:
+        rows = [[c.text, c.thesis, c.ours, c.verdict] for c in analysis.claims]
+        table = Table(
+            ["claim", "thesis", "here", "verdict"], rows, "What the thesis found, and what holds here.", words=True
+        )
+        sections.insert(0, Section("Claims", tables=[table]))
+    page = folder / PAGE
+    write_text(page, render(experiment.title, [where, *analysis.summary], sections))
+    return page

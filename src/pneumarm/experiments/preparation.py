@@ -1,0 +1,74 @@
+"""What most experiments need of an arm: transitions, a simulation fitted to them, begin states."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from pneumarm.arm import open_arm
+from pneumarm.errors import UnusableInput
+from pneumarm.experiments.experiment import LaboratorySettings, Report
+from pneumarm.files import write_json
+from pneumarm.learning import BeginStates, begin_states
+from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.transitions import Store, collect
+
+STORE = "transitions.db"
+SIMULATION = "simulation.safetensors"
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """An arm's simulation and the begin states that go with it."""
+
+    simulation: Simulation
+    begin: BeginStates
+
+
+def simulated(arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
+    """Return the simulation of ``arm``, collecting and fitting where ``folder`` does not hold it yet; resumable.
+
+    Raises:
+        UnusableInput: no arm has this name, or the folder was begun with other settings.
+
+    """
+    wanted = {"arm": arm, "seed": settings.seed, "transitions": settings.transitions}
+    claim(folder, wanted)
+    if not (folder / SIMULATION).exists():
+        with open_arm(arm, settings.seed) as opened, Store.for_arm(folder / STORE, opened.spec) as store:
+            collect(opened, store, settings.transitions, settings.seed, progress=progress)
+        with Store.open(folder / STORE) as store:
+            fit_store(store, FitSettings(seed=settings.seed)).simulation.save(folder / SIMULATION)
+    simulation = Simulation.load(folder / SIMULATION)
+    with Store.open(folder / STORE) as store:
+        return Simulated(simulation, begin_states(store, simulation.window, simulation.scaling))
+
+
+def claim(folder: Path, wanted: object) -> None:
+    """Make ``folder`` hold what was made with the settings ``wanted`` (JSON) and nothing else.
+
+    Raises:
+        UnusableInput: it was begun with others.
+
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / "settings.json"
+    wanted = json.loads(json.dumps(wanted))
+    if not file.exists():
+        write_json(file, wanted)
+        return
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UnusableInput(f"{file}: cannot be read ({error}); remove the folder {folder}") from error
+    if found != wanted:
+        raise UnusableInput(
+            f"{folder}: was begun with other settings ({_difference(found, wanted)}); give the same ones or another "
+            "folder with --out"
+        )
+
+
+def _difference(found: object, wanted: object) -> str:
+    if not isinstance(found, dict) or not isinstance(wanted, dict):
+        return f"was {found!r}, is {wanted!r}"
+    names = sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
+    return "; ".join(f"{name}: {_difference(found.get(name), wanted.get(name))}" for name in names)

@@ -1,0 +1,28 @@
+"""Experiments by name, loaded when they are asked for."""
+
+import importlib
+
+from pneumarm.errors import UnusableInput
+from pneumarm.experiments.experiment import Experiment
+
+PLACES = {
+    "switch-punishment": "switch_punishment",
+    "all-goals": "all_goals",
+    "long-training": "long_training",
+    "optimal-settings": "optimal_settings",
+    "no-shaping": "no_shaping",
+}
+"""Name: package below this one; each has an ``EXPERIMENT``."""
+
+
+def experiment(name: str) -> Experiment:
+    """Return the experiment called ``name``.
+
+    Raises:
+        UnusableInput: there is none.
+
+    """
+    if name not in PLACES:
+        raise UnusableInput(f"no experiment {name!r}; there are {', '.join(PLACES)}")
+    found: Experiment = importlib.import_module(f"pneumarm.experiments.{PLACES[name]}").EXPERIMENT
+    return found

@@ -110,7 +110,9 @@ def test_bad_line(w: Wired, faults: str, share: float) -> None:
         steps.append(step)
     assert (w.wire.stale > 0) == (faults != "dropped")
     assert w.wire.stale_applied == 0
-    assert cycle.missed_deadlines <= (0.1 * turns if (faults, share) in (("dropped", 0.5), ("late", 0.5)) else 3)
+    # With half of the frames lost each way a quarter of the attempts is answered: of those there is room for 16.
+    halved = share == 0.5 and faults != "doubled"
+    assert cycle.missed_deadlines <= (0.15 * turns if halved else 3)
     recorded = Recorded.from_steps(steps, w.arm.spec)
     joined = np.diff(recorded.step) == 1
     assert (np.abs(np.diff(recorded.time)[joined] / PERIOD - 1) < 0.5).all()

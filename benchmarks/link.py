@@ -1,18 +1,18 @@
 """The serial link on bad lines: how well the loop keeps its rate, in lock-step on the emulated board.
 
-The limits: no stale request ever acts, and a loop at 30 Hz misses no more deadlines than 1 % with a fifth of all frames
-lost, doubled or late in both directions.
+The limits: no stale request ever acts, and a loop at 30 Hz misses no more deadlines than 1 % with a fifth of all
+frames lost, doubled or late in both directions.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from tests.arm.serial.wired import wired
 
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.serial import LineFaults
 from pneumarm.errors import ArmFailure
-from tests.arm.serial.wired import wired
 
 SHARES = (0.05, 0.2, 0.5)
 KINDS = ("dropped", "doubled", "late")
@@ -23,7 +23,8 @@ RATES = (30, 100)
 def measure() -> Iterator[str]:
     """Run the control cycle with random valves on the virtual arm behind the board."""
     yield f"{TURNS:,} control periods, 0.5 ms each way, late ones 50 ms; shares of the frames in each direction"
-    yield f"{'rate':>6} {'fault':>8} {'share':>6} {'missed':>7} {'retries':>8} {'late turn p99':>14} {'stale':>6} applied"
+    head = f"{'rate':>6} {'fault':>8} {'share':>6} {'missed':>7} {'retries':>8} {'late turn p99':>14}"
+    yield f"{head} {'stale':>6} applied"
     for rate in RATES:
         yield row(rate, "none", LineFaults())
         for share in SHARES:

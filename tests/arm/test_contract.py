@@ -14,7 +14,6 @@ from pneumarm.simulation import SimulationArm
 from simple_simulation import simulation
 
 
-
 def emulated(arm):
     """Return ``arm`` behind the emulated board."""
     return SerialArm(BoardLine(EmulatedBoard(arm)), arm.spec)

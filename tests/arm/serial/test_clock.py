@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.arm.serial.wired import all_valves, wired
 
 import pneumarm.arm
 from pneumarm.arm.serial.clock import WRAP, ControllerClock
-from tests.arm.serial.wired import all_valves, wired
 
 ROUND_TRIP = 1e-3
 

@@ -8,6 +8,8 @@ from cobs import cobs
 from crc import Calculator, Crc16
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.firmware import wire
+from tests.firmware.mutations import mutated
 
 from pneumarm.arm.serial import protocol
 from pneumarm.arm.serial.protocol import (
@@ -27,8 +29,6 @@ from pneumarm.arm.serial.protocol import (
     unpack_valves,
     unstuff,
 )
-from tests.firmware import wire
-from tests.firmware.mutations import mutated
 
 X25 = Calculator(Crc16.X25)
 KINDS = {**wire.REQUEST, **wire.REPLY}

@@ -78,9 +78,7 @@ class ControllerClock:
         controller = sum(w * e.controller for w, e in zip(weights, kept, strict=True)) / total
         host = sum(w * e.host for w, e in zip(weights, kept, strict=True)) / total
         spread = sum(w * (e.controller - controller) ** 2 for w, e in zip(weights, kept, strict=True)) / total
-        together = sum(
-            w * (e.controller - controller) * (e.host - host) for w, e in zip(weights, kept, strict=True)
-        )
+        together = sum(w * (e.controller - controller) * (e.host - host) for w, e in zip(weights, kept, strict=True))
         rate = together / total / spread if spread > STRETCH**2 / 64 else 1.0
         self.rate = min(max(rate, 1 - MOST_OFF), 1 + MOST_OFF)
         self._origin = (controller, host)

@@ -167,7 +167,7 @@ def test_missing_columns_are_told(imported, header, message):
         ("period = 0.1", "", "needs the period"),
         ("period = 0.1", "period = -1", "period cannot be -1"),
         ("period = 0.1", 'period = "fast"', "fast|float"),
-        ("counts_per_bar", "count_per_bar", "has no count_per_bar; it has angle_range"),
+        ("counts_per_bar", "count_per_bar", "has no count_per_bar; it has angle_limits"),
         ("period = 0.1", "period = 0.1\njoints = 2", "has no joints"),
         ("full_scale = 0.5", "full_scale = nan", "full_scale of 'p2' must be over 0"),
         ("full_scale = 0.5", "half_scale = 0.5", "unknown field `half_scale`"),

@@ -199,6 +199,7 @@ class Monitor:
         memory.score[[one.kind in _CHANGES for one in self._hypotheses]] = 0.0
         for key in [key for key in self._open if key[0] in _CHANGES]:
             self._close(key, float(memory.clock[0]))
+        memory.clock[3] = self._width()
 
     def _packed(self) -> Thresholds:
         settings, spec = self.settings, self.spec
@@ -268,6 +269,11 @@ class Monitor:
                 self.findings.append(Finding(kind, detail, joint, muscle, since, now))
         for key in [key for key in self._open if key not in holding]:
             self._close(key, now)
+        self._memory.clock[3] = self._width()
+
+    def _width(self) -> float:
+        """Return how large residuals are, in usual ones: a simulation of another arm is no proof of a stuck valve."""
+        return self.settings.apart if any(key[0] == "changed" for key in self._open) else 1.0
 
     def _close(self, key: _Key, now: float) -> None:
         place = self._open.pop(key)

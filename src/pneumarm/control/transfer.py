@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.control.agent import AgentController
-from pneumarm.control.monitor import Monitor
+from pneumarm.control.monitor import Finding, Monitor
 from pneumarm.control.movement import Movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -132,6 +132,8 @@ class Transferred:
     learning_rate: float
     adapted: Adapted | None = None
     """How a policy adapted; None for an agent that does not, or learns while it moves."""
+    findings: tuple[Finding, ...] = ()
+    """What the monitor found wrong with the arm."""
 
     @property
     def adaptations(self) -> int:
@@ -150,6 +152,7 @@ class Transferred:
             "episodes": len(self.phase("learning")),
             "learning_rate": self.learning_rate,
             "adaptations": self.adaptations,
+            "findings": [str(found) for found in self.findings],
             **({} if self.adapted is None else self._adapted(self.adapted)),
         }
 
@@ -293,7 +296,7 @@ def transfer(
     adapted = None
     if adapting is not None:
         adapted = Adapted(adapting.version, adapting.quantities, np.array(squares), adapting.events)
-    return Transferred(done, shown(), rate, adapted)
+    return Transferred(done, shown(), rate, adapted, tuple(watch.findings))
 
 
 _SQUARES = "squares"  # place of a movement's errors beside its figures in the store

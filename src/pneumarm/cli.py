@@ -64,6 +64,10 @@ COMMANDS = {
         "Measure an arm's sensors and write what everything else needs to know of it.",
         "pneumarm arm calibrate virtual:seed=7 --out arm.toml",
     ),
+    "arm errors": (
+        "Show what the errors of the thesis' appendix A look like, on one page.",
+        "pneumarm arm errors --out errors.html --transitions 4000",
+    ),
     "arm valves": (
         "Click every valve, one by one, saying which; before the air is on.",
         "pneumarm arm valves virtual",

@@ -1,6 +1,7 @@
 """The monitor: what it finds, how soon, and that it leaves healthy arms alone."""
 
 import time
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -106,6 +107,33 @@ def test_goes_on_from_its_state_as_if_nothing_had_happened(simulation):
         Monitor(arm.spec).set_state(runs[0][1])
 
 
+def test_an_arm_that_has_changed_is_not_complained_of_once_it_is_adapted_to(simulation):
+    arm = VirtualArm(draw_parameters(3), seed=5)
+    # An arm has changed if its angles are several times as far from the simulation's as this says of itself.
+    changed = replace(simulation, error_std=simulation.error_std * [0.2, 1, 1, 1])
+    monitor, adapted_at = Monitor(arm.spec, changed), 0.0
+    for step in watched_steps(arm, monitor, 5):
+        if arm.time > 90 and not adapted_at and step.valves is None:
+            assert {one.kind for one in monitor.findings} == {"changed"}
+            assert monitor.spoiled_since() is None
+            found = len(monitor.findings)
+            monitor.judge_by(simulation)
+            monitor.judge_by(simulation)
+            assert monitor.now == []
+            adapted_at = arm.time
+        if arm.time > 240:
+            break
+    assert adapted_at
+    assert len(monitor.findings) == found
+    arm.faults = (StuckValve(valve="outlet", begin=arm.time),)
+    for _ in watched_steps(arm, monitor, 6):  # what the one before knew of faults is known still
+        if arm.time > 300 or len(monitor.findings) > found:
+            break
+    assert (monitor.findings[found].kind, monitor.findings[found].muscle) == ("stuck-valve", 1)
+    with pytest.raises(UnusableInput, match="adapted from"):
+        Monitor(arm.spec).judge_by(simulation)
+
+
 def test_an_angle_that_is_swept_onto_a_rail_is_no_broken_wire():
     arm = VirtualArm()
     monitor = Monitor(arm.spec)
@@ -134,7 +162,8 @@ def test_marks_are_the_rows_from_since_to_until():
     finding = Finding("stuck-valve", "stuck", 1, 1, since=2.5, noticed=4.0, until=5.0)
     (mark,) = marks_of([finding], time_, step)
     assert (mark.first, mark.last) == (3, 6)
-    assert marks_of([Finding("changed", "warmer", 1, None, since=0.0, noticed=1.0)], time_, step) == ()
+    for kind in ("changed", "leak"):  # what is read then is what the arm is like
+        assert marks_of([Finding(kind, "another arm", 1, None, since=0.0, noticed=1.0)], time_, step) == ()
 
 
 def test_costs_less_than_50_microseconds_a_reading(simulation):

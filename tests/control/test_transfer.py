@@ -100,9 +100,15 @@ def test_a_policy_that_was_interrupted_while_adapting_goes_on_as_if_nothing_had_
     assert sorted(path.name for path in (folder / "agents").iterdir()) == [Path(name).name for name in versions]
     for name in ("episodes.csv", "adapted.safetensors", "adaptation.json", *versions):
         assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    assert _watch_of(folder) == _watch_of(tmp_path / "whole")
     assert (folder / "adapted.safetensors").read_bytes() != _saved(policy, tmp_path)
     assert (folder / "agents/000.safetensors").read_bytes() == _saved(policy, tmp_path)
     assert transfer_into(folder, policy, VirtualArm(seed=4), POLICY, seed=1) == whole  # there is nothing left to do
+
+
+def _watch_of(folder: Path) -> bytes | None:
+    with Store.open(folder / "transitions.db") as store:
+        return store.state("watch")
 
 
 @pytest.fixture(scope="module")

@@ -266,6 +266,20 @@ def test_movements_of_a_test_take_nothing_back(agent: PolicyAgent, adapted: byte
     assert adapting.version == 1
 
 
+def test_movements_of_an_arm_with_a_fault_are_counted_and_tell_nothing(
+    agent: PolicyAgent, adapted: bytes, changed_rows: Rows
+) -> None:
+    adapting = resumed(agent, adapted)
+    known = adapting.movements, len(adapting.events)
+    broken = moved(changed(agent.simulation, 10.0), 20, seed=2)
+    for number in range(20):
+        adapting.saw(movement(broken, number), -100.0, sound=False)
+    assert (adapting.movements, len(adapting.events)) == (known[0] + 20, known[1])
+    assert adapting.version == 1
+    told_of(adapting, broken, -100.0)
+    assert len(adapting.events) > known[1]  # without a fault they would have told a lot
+
+
 def test_it_is_reproducible_and_its_state_is_all_there_is(
     agent: PolicyAgent, adapted: bytes, changed_rows: Rows
 ) -> None:

@@ -18,6 +18,8 @@ MOVED = 0.10
 """A pressure moved if it changed by so much [bar]; the other muscle, stretched or slackened, moves by less."""
 WHITE = 0.25
 """Noise whose autocorrelation at any of the first lags exceeds this is not white."""
+NOISY = 3.5
+"""Readings are noisy whose standard deviation at rest exceeds so many counts (thesis A.1.3: 4 is relatively high)."""
 LAGS = 20
 LEAK = 12.0
 """A muscle leaks if it loses more than so many percent of its pressure a minute."""
@@ -36,7 +38,7 @@ Kind = Literal[
     "muscles swapped", "pressure sensors swapped", "valves swapped", "inlet stuck closed", "inlet stuck open",
     "exhaust stuck closed", "exhaust stuck open", "low supply", "leak", "angle reversed", "angle dead",
     "angle frozen", "pressure frozen", "angle logarithmic", "angle worn", "pressure at the valve's side",
-    "noise not white", "jitter",
+    "noise", "noise not white", "jitter",
 ]  # fmt: skip
 
 
@@ -318,7 +320,7 @@ def _of_valves(
         elif muscle.leak > max(LEAK, 0.5 * most):
             told = f"closed, it loses {muscle.leak:.0f} % a minute"
             yield Finding("leak", where, told, "Look for the leak with soap water: clamps, hose, exhaust valve")
-        elif muscle.leap > LEAP:
+        elif muscle.leap > max(LEAP, _CLEAR * muscle.noise / checkup.spec.counts_per_bar):
             told = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
             remedy = "Move the pressure sensor to the far end of the muscle (thesis A.1.1)"
             yield Finding("pressure at the valve's side", where, told, remedy)
@@ -345,15 +347,21 @@ def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
         ("angle", test.rest.angle),
         *((f"pressure {m + 1}", test.rest.pressure[:, m]) for m in (0, 1)),
     ):
-        correlation = autocorrelation(detrended(test.rest.time, values))
+        clean = detrended(test.rest.time, values)
+        correlation = autocorrelation(clean)
         worst = int(np.argmax(np.abs(correlation[1:]))) + 1
         unlikely = ljung_box(correlation, len(values)) > _LIKELY
         if unlikely and abs(correlation[worst]) > WHITE:
             told = f"at rest its readings {worst} apart have a correlation of {correlation[worst]:.2f}"
             remedy = "Look for hum of the mains, a bad ground, or a filter; medians of such readings help little"
             yield Finding("noise not white", f"{name}, {what}", told, remedy)
+        elif clean.std() > NOISY and not (what == "angle" and len(_worn(test)[0])):
+            told = f"at rest its readings vary by {clean.std():.1f} counts, each one by chance"
+            remedy = "Let the controller take the median of more conversions (thesis A.1.3); see to ground and shield"
+            yield Finding("noise", f"{name}, {what}", told, remedy)
 
 
+_CLEAR = 5.0  # standard deviations of the noise: what stands out of hundreds of readings
 _LIKELY = 90.0
 """White noise gives a larger statistic of Ljung and Box once in 10^10 times, with 20 lags."""
 
@@ -365,13 +373,22 @@ def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, 
         )
         remedy = "Put in a linear one, or let `pneumarm arm calibrate` linearise it"
         yield Finding("angle logarithmic", name, told, remedy)
-    places, off = irregularity(test)
-    worn = places[off > WORN]
+    worn, off = _worn(test)
     if len(worn):
         degrees = ", ".join(f"{d:.0f}" for d in checkup.spec.degrees(worn))
         told = f"readings are off by up to {off.max():.0f} counts at {degrees} degrees"
         remedy = "Put in a new potentiometer, and mount it so that nothing presses on its axis (thesis A.1.2)"
         yield Finding("angle worn", name, told, remedy)
+
+
+def _worn(test: JointTest) -> tuple[Array, Array]:
+    """Return worn places of the angle [counts], and how irregular its readings are at all places [counts]."""
+    places, off = irregularity(test)
+    usual = float(np.median(off)) if len(off) else 0.0  # noise is as wide everywhere
+    return places[off > max(WORN, _CLEARLY * usual)], off
+
+
+_CLEARLY = 3.0  # times as irregular as elsewhere
 
 
 def _is_frozen(test: JointTest, m: int) -> bool:

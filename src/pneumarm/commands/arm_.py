@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from pneumarm.appendix_a.runs import RunsSettings
 from pneumarm.arm import Arm, guarded, open_arm
 from pneumarm.arm.spec_file import save_arm_file
 from pneumarm.checkup import (
@@ -22,6 +23,7 @@ from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_text
+from pneumarm.transitions.window import QUANTITIES
 
 
 def _measured(opened: Arm, settings: CheckupSettings) -> Checkup:
@@ -154,8 +156,53 @@ def calibrate_(
     show(result, json, lambda: [table((str(out), ""), list(result["spec"].items()))])  # type: ignore[attr-defined]
 
 
-_NO_HINDRANCE = ("angle logarithmic", "low supply", "leak", "noise not white", "jitter")
+_NO_HINDRANCE = ("angle logarithmic", "low supply", "leak", "noise", "noise not white", "jitter")
 """Findings with which the sensors can be calibrated all the same."""
+
+
+def errors_(
+    *,
+    out: Path,
+    seed: int = 0,
+    settings: Annotated[RunsSettings, Settings] = RunsSettings(),
+    json: Json = False,
+) -> None:
+    """Show what the errors of the thesis' appendix A look like: a virtual arm with and without each, on one page.
+
+    Parameters
+    ----------
+    out
+        Page to write, errors.html.
+    seed
+        Of the virtual arm; 0 is the nominal one.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    from pneumarm.appendix_a.errors import lived
+    from pneumarm.appendix_a.page import errors_page
+
+    require_folder(out)
+    with progress("living through them") as report:
+        errors = lived(seed, settings, progress=report)
+    write_text(out, errors_page(errors, f"virtual:seed={seed}" if seed else "the nominal virtual arm"))
+    say(f"page: {out}")
+    result = {
+        error.title: {
+            case.name: {
+                "checkup": list(case.complaints),
+                "monitor": list(case.monitor),
+                "error": dict(zip(QUANTITIES, case.residue.std(axis=0).mean(axis=0).tolist(), strict=True)),
+            }
+            for case in error.cases
+        }
+        for error in errors
+    }
+    rows = [
+        (title, name, " ".join(said["checkup"]) or "-", " ".join(said["monitor"]) or "-")
+        for title, cases in result.items()
+        for name, said in cases.items()
+    ]
+    show(result, json, lambda: [table(("error", "run", "check-up", "monitor"), rows)])
 
 
 def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Json = False) -> None:

@@ -37,5 +37,7 @@ def run_(
     rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
     show(results, json, lambda: [table(("", *COLUMNS), rows, title="Ledger")])
     say_history(out)
+    for found in results["transfer"].get("findings", []):
+        say(f"found: {found}")
     seconds = sum(results["wall_seconds"].values())
     say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory")

@@ -39,6 +39,8 @@ def transfer_(
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
         result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
     say_history(out)
+    for found in result["findings"]:
+        say(f"found: {found}")
     say(f"adapted agent: {out / 'adapted.safetensors'}")
     show(
         result,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.control.agent import AgentController
-from pneumarm.control.monitor import Monitor
+from pneumarm.control.monitor import Finding, Monitor
 from pneumarm.control.movement import Movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -21,7 +21,7 @@ from pneumarm.learning import AdaptationSettings, AnyAgent, adaptation, fingerpr
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
-from pneumarm.transitions.watch import Watch, keep_watch
+from pneumarm.transitions.watch import keep_watch
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
@@ -132,6 +132,8 @@ class Transferred:
     learning_rate: float
     adapted: Adapted | None = None
     """How a policy adapted; None for an agent that does not, or learns while it moves."""
+    findings: tuple[Finding, ...] = ()
+    """What the monitor found wrong with the arm."""
 
     @property
     def adaptations(self) -> int:
@@ -150,6 +152,7 @@ class Transferred:
             "episodes": len(self.phase("learning")),
             "learning_rate": self.learning_rate,
             "adaptations": self.adaptations,
+            "findings": [str(found) for found in self.findings],
             **({} if self.adapted is None else self._adapted(self.adapted)),
         }
 
@@ -172,7 +175,7 @@ def transfer(
     seed: int = 0,
     progress: Callable[[float, float], None] | None = None,
     keep_version: Callable[[int, AnyAgent], None] | None = None,
-    watch: Watch | None = None,
+    watch: Monitor | None = None,
 ) -> Transferred:
     """Test ``agent`` on ``arm``, let it learn there, test it again; every movement goes into ``store``.
 
@@ -181,7 +184,8 @@ def transfer(
 
     A transfer that was interrupted goes on after the last movement that was stored, on an arm that can be put into
     a saved state as if nothing had happened. What ``watch`` finds spoiled, by default a :class:`Monitor` with the
-    agent's simulation, is stored but not learned from; it counts in the figures, because it happened.
+    agent's simulation, is stored but not learned from; it counts in the figures, because it happened. It goes on with
+    the simulation of an adapted agent: an arm that has changed is not complained of once it is adapted to.
 
     Raises:
         UnusableInput: arm and agent do not fit, or the store holds a transfer with other settings.
@@ -212,6 +216,8 @@ def transfer(
     cycle = ControlCycle(guarded(arm), settings.close_while_computing)
     waiting: list[Recorded] = []
     watch = watch or Monitor(arm.spec, getattr(agent, "simulation", None))  # not every kind of agent keeps one
+    if adapting is not None:
+        watch.judge_by(adapting.agent.simulation)
     if done and (seen := store.state("watch")) is not None:
         watch.set_state(seen)
 
@@ -230,9 +236,10 @@ def transfer(
         episode = Episode.of(phase, movement)
         info = asdict(episode)
         if adapting is not None:
-            judges = adapts and phase == "learning"
-            squares.append(adapting.saw(rows_of(movement.recorded), movement.reward, judges=judges))
+            judges, sound = adapts and phase == "learning", not watch.marks(movement.recorded)
+            squares.append(adapting.saw(rows_of(movement.recorded), movement.reward, judges=judges, sound=sound))
             info[_SQUARES] = squares[-1]
+            watch.judge_by(adapting.agent.simulation)
         done.append(episode)
         waiting.append(replace(movement.recorded, info=info))
 
@@ -243,8 +250,10 @@ def transfer(
         keep()  # it learns from what is stored, so that an interruption changes nothing
         made = [entry.number for entry in store.catalogue(number)][-adapting.usable :]
         blocks = list(store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
-        if blocks and adapting.learn(joined(blocks)) and keep_version is not None:
-            keep_version(adapting.version, adapting.agent)
+        if blocks and adapting.learn(joined(blocks)):
+            watch.judge_by(adapting.agent.simulation)
+            if keep_version is not None:
+                keep_version(adapting.version, adapting.agent)
 
     def shown() -> AnyAgent:
         if adapting is not None:
@@ -287,7 +296,7 @@ def transfer(
     adapted = None
     if adapting is not None:
         adapted = Adapted(adapting.version, adapting.quantities, np.array(squares), adapting.events)
-    return Transferred(done, shown(), rate, adapted)
+    return Transferred(done, shown(), rate, adapted, tuple(watch.findings))
 
 
 _SQUARES = "squares"  # place of a movement's errors beside its figures in the store

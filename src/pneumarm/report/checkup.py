@@ -86,7 +86,7 @@ def noise(checkup: Checkup, j: int) -> Figure:
     styles = ((DARK, "-", "angle"), (MIDDLE, "--", "pressure 1"), (LIGHT, "-.", "pressure 2"))
     for values, (color, line, name) in zip((rest.angle, *rest.pressure.T), styles, strict=True):
         clean = detrended(rest.time, values)
-        frequency, power = _spectrum(clean, step)
+        frequency, power = spectrum(clean, step)
         axes[0, 0].semilogy(frequency, np.maximum(power, 1e-12), line, color=color, label=name)
         axes[0, 1].plot(autocorrelation(clean), line, color=color, marker="o", markersize=2.5)
     band = 2.58 / np.sqrt(len(rest.time))
@@ -99,7 +99,7 @@ def noise(checkup: Checkup, j: int) -> Figure:
     return figure
 
 
-def _spectrum(values: np.ndarray, step: float, pieces: int = 8) -> tuple[np.ndarray, np.ndarray]:
+def spectrum(values: np.ndarray, step: float, pieces: int = 8) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies [Hz] and the power density, the mean over pieces (Bartlett)."""
     length = len(values) // pieces
     cuts = values[: pieces * length].reshape(pieces, length)

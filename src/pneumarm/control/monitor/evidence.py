@@ -70,7 +70,8 @@ class Memory(NamedTuple):
     command: NDArray[np.float64]
     """Valves chosen after them, shape (history, muscles)."""
     clock: NDArray[np.float64]
-    """Time of the newest reading [s]; readings in a row; rows that a window needs."""
+    """Time of the newest reading [s]; readings in a row; rows that a window needs; by how much larger residuals are
+    than usual: 1, or ``apart`` of an arm that has changed, of which a simulation proves less."""
     score: NDArray[np.float64]
     """S_h, shape (hypotheses,)."""
     since: NDArray[np.float64]
@@ -96,7 +97,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
     return Memory(
         observed=np.zeros((history, joints, 4)),
         command=np.zeros((history, 2 * joints)),
-        clock=np.zeros(3),
+        clock=np.array([0.0, 0.0, 0.0, 1.0]),
         score=np.zeros(hypotheses),
         since=np.zeros(hypotheses),
         disagreement=np.zeros((joints, 3)),
@@ -125,14 +126,14 @@ def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pres
     if memory.clock[1] >= memory.clock[2]:
         expect_by_simulation(predictor, readings, memory, memory.expected, memory.angle)
         for m in range(memory.std.shape[0]):
-            memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2]
+            memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2] * memory.clock[3]
         weigh_hypotheses(thresholds, readings, memory, time, pressure)
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
             weigh_disagreement(thresholds, memory, j, 0, error, time)
             for side in range(2):
                 m = 2 * j + side
-                error = (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
+                error = memory.clock[3] * (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
                 weigh_disagreement(thresholds, memory, j, 1 + side, error, time)
     look_at_potentiometers(thresholds, memory, time, angle, pressure)
     observe(memory, time, angle, pressure)

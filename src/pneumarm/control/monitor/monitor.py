@@ -23,6 +23,8 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
+_CHANGES = ("changed", "leak")
+"""Kinds of findings with which valves do as they are told and sensors tell the truth: of another arm than before."""
 
 
 @dataclass(frozen=True)
@@ -121,9 +123,9 @@ class Finding:
     def spoils(self) -> bool:
         """Whether nothing may be learned from what was read meanwhile.
 
-        An arm that has changed is still an arm: what it does then is what there is to learn.
+        An arm that has changed, or leaks, is still an arm: what it does then is what there is to learn.
         """
-        return self.kind != "changed"
+        return self.kind not in _CHANGES
 
     def __str__(self) -> str:
         place = "" if self.joint is None else f"joint {self.joint}"
@@ -171,23 +173,45 @@ class Monitor:
         self._hypotheses, self._readings = hypotheses(spec.joints)
         history = 2 if simulation is None else max(2, simulation.window.history)
         self._memory = new_memory(spec.joints, history, len(self._hypotheses))
-        self._has_simulation = simulation is not None
+        self._simulation = simulation
         self._thresholds = self._packed()
         self._expects = rule_parameters(self.settings.rules, spec) if simulation is None else predictor(simulation)
         self._see = see_by_rules if simulation is None else see_by_simulation
         self.begin(at_rest=True)
 
+    def judge_by(self, simulation: Simulation) -> None:
+        """Expect from now on what ``simulation`` says, which was adapted from the one before.
+
+        What an adapted simulation says is how the arm is: the evidence that it has changed or leaks was against the
+        one before, and is dropped; such findings are over. Evidence of other faults stays.
+
+        Raises:
+            UnusableInput: the monitor had no simulation, or one with another window.
+
+        """
+        if simulation is self._simulation:
+            return
+        if self._simulation is None or simulation.window != self._simulation.window:
+            raise UnusableInput("a monitor can go on only with a simulation that was adapted from the one it has")
+        self._simulation, self._expects = simulation, predictor(simulation)
+        memory = self._memory
+        memory.disagreement[...] = 0.0
+        memory.score[[one.kind in _CHANGES for one in self._hypotheses]] = 0.0
+        for key in [key for key in self._open if key[0] in _CHANGES]:
+            self._close(key, float(memory.clock[0]))
+        memory.clock[3] = self._width()
+
     def _packed(self) -> Thresholds:
         settings, spec = self.settings, self.spec
         return Thresholds(
             most=settings.most,
-            alarm=settings.alarm if self._has_simulation else settings.alarm_by_rules,
+            alarm=settings.alarm if self._simulation is not None else settings.alarm_by_rules,
             telling=settings.telling,
             inflation=settings.inflation,
             full=settings.full * spec.max_pressure_counts,
             empty=settings.empty * spec.counts_per_bar,
             clear=settings.clear * spec.counts_per_bar,
-            unsure=settings.unsure if self._has_simulation else settings.unsure_by_rules,
+            unsure=settings.unsure if self._simulation is not None else settings.unsure_by_rules,
             calm=1e-3 * settings.calm * spec.counts_per_degree,
             fast=1e-3 * settings.fast * spec.counts_per_degree,
             apart=settings.apart,
@@ -237,15 +261,23 @@ class Monitor:
         holding: dict[_Key, float] = {}
         holding |= self._judge_potentiometers()
         holding |= self._judge_valves()
-        holding |= self._judge_agreement(any(self.findings[i].spoils for i in self._open.values()) or bool(holding))
+        holding |= self._judge_agreement(bool(holding) or any(key[0] != "changed" for key in self._open))
         for key, since in holding.items():
             if key not in self._open:
                 kind, detail, joint, muscle = key
                 self._open[key] = len(self.findings)
                 self.findings.append(Finding(kind, detail, joint, muscle, since, now))
         for key in [key for key in self._open if key not in holding]:
-            place = self._open.pop(key)
-            self.findings[place] = replace(self.findings[place], until=now)
+            self._close(key, now)
+        self._memory.clock[3] = self._width()
+
+    def _width(self) -> float:
+        """Return how large residuals are, in usual ones: a simulation of another arm is no proof of a stuck valve."""
+        return self.settings.apart if any(key[0] == "changed" for key in self._open) else 1.0
+
+    def _close(self, key: _Key, now: float) -> None:
+        place = self._open.pop(key)
+        self.findings[place] = replace(self.findings[place], until=now)
 
     def _judge_potentiometers(self) -> dict[_Key, float]:
         memory, settings = self._memory, self.settings
@@ -311,7 +343,7 @@ class Monitor:
         state = {
             "memory": {name: values.tolist() for name, values in self._memory._asdict().items()},
             "findings": [asdict(one) for one in self.findings],
-            "simulation": self._has_simulation,
+            "simulation": self._simulation is not None,
         }
         return json.dumps(state).encode()
 
@@ -328,7 +360,7 @@ class Monitor:
             findings = [Finding(**one) for one in saved["findings"]]
             memory = Memory(**arrays)
             same = [a.shape == b.shape for a, b in zip(memory, self._memory, strict=True)]
-            if not all(same) or saved["simulation"] is not self._has_simulation:
+            if not all(same) or saved["simulation"] is not (self._simulation is not None):
                 raise ValueError("it has other sizes")
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise UnusableInput(f"the state of the monitor is damaged or of another arm ({error})") from error

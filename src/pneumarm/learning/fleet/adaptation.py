@@ -132,14 +132,20 @@ class Adaptation:
         """Error of the simulation in the last movements over that of its fit, shape (outputs,)."""
         return self._watch.ratio
 
-    def saw(self, rows: Rows, reward: float, *, judges: bool = True) -> list[list[float]]:
+    def saw(self, rows: Rows, reward: float, *, judges: bool = True, sound: bool = True) -> list[list[float]]:
         """Take notice of a movement: its ``rows`` and its ``reward``; with ``judges`` an agent may be taken back.
+
+        A movement that is not ``sound``, of an arm with a fault, is counted and nothing else: it tells neither how
+        the arm is nor what an agent is worth.
 
         Returns the mean standardised squared errors in it (2, outputs) of the simulation that arrived and of the one
         in use, for people.
         """
         now = standardised_squares(self.agent.simulation, rows)
         arrived = now if self.version == 0 else standardised_squares(self._origin.simulation, rows)
+        if not sound:
+            self._watch.skip()
+            return [arrived.tolist(), now.tolist()]
         if self._watch.saw(now):
             self._notice()
         if self.version == self._trusted_version:

@@ -79,6 +79,11 @@ class Watch:
         self.alarmed, self.since = True, int(self._began[over].min())
         return True
 
+    def skip(self) -> None:
+        """Count a movement that tells nothing."""
+        self.movements += 1
+        self._began[self._sums == 0] = self.movements
+
     def reset(self) -> None:
         """Begin anew, with a simulation that fits the arm as it is now."""
         self.alarmed = False

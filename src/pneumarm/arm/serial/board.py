@@ -100,8 +100,11 @@ class EmulatedBoard:
         self._hung = True
         self._hung_at = self._time
 
-    def run_until(self, time: float) -> None:
-        """Let time pass until ``time`` [s], with the dead-man and the limits watched; the arm may wake a little late."""
+    def run_until(self, time: float, *, late: bool = False) -> None:
+        """Let time pass until ``time`` [s], with the dead-man and the limits watched.
+
+        ``late`` lets it be a little more, where the arm has that of a host that sleeps until then.
+        """
         while self._time < time:
             near = bool((self._now.pressure.ravel() > NEAR * np.array(self._limits[: self._now.pressure.size])).any())
             step = min(self._time + (SAMPLE if near else SELDOM), time)
@@ -112,7 +115,7 @@ class EmulatedBoard:
                 step = min(step, max(self._fed + DEAD_MAN_MS / 1e3, self._time))
             if self._hung:
                 step = min(step, max(self._hung_at + WATCHDOG_MS / 1e3, self._time))
-            if step == time:
+            if late and step == time:
                 self.arm.wait_until(step)
             else:
                 self.arm.wait(step - self._time)
@@ -289,8 +292,8 @@ class BoardLine(Line):
         return self.board.time
 
     def sleep_until(self, time: float) -> None:
-        """Let the arm's time pass until ``time`` [s]."""
-        self.board.run_until(time)
+        """Let the arm's time pass until ``time`` [s], or a little later where the arm has that of a host."""
+        self.board.run_until(time, late=True)
 
     def close(self) -> None:
         """Close the arm."""

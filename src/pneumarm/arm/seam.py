@@ -36,6 +36,10 @@ class ArmSpec:
     """An inlet that was open for so long [s] stays closed until its muscle has rested (:mod:`pneumarm.arm.guard`)."""
     angle_limits: tuple[float, float] | None = None
     """At these angles [counts] valves that push further out stay closed; None where the end stops bear that."""
+    velocity_sensor: bool = False
+    """Whether readings carry the velocity that the arm measures itself, as a controller does that samples faster.
+
+    Nobody learns from it yet: states are made of angles."""
     latency: float = 0.0
     """Time [s] between reading and acting that the control cycle has to let pass on this arm.
 
@@ -48,6 +52,7 @@ class ArmSpec:
         lowest, highest = self.angle_limits or (-1.0, 1.0)
         checks = {
             "joints": isinstance(self.joints, int) and self.joints >= 1,
+            "velocity_sensor": isinstance(self.velocity_sensor, bool),
             "period": _positive(self.period),
             "counts_per_degree": _positive(self.counts_per_degree),
             "counts_per_bar": _positive(self.counts_per_bar),

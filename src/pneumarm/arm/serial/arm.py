@@ -1,6 +1,7 @@
 """An arm behind a microcontroller that speaks the protocol."""
 
 import secrets
+from contextlib import suppress
 from typing import NoReturn
 
 import numpy as np
@@ -44,8 +45,14 @@ FED = 0.1
 """While waiting the valves are sent again this often [s], so that the controller does not take us for dead."""
 BOOT = 3.0
 """Longest time to wait for a controller that opening the port has reset [s]."""
-KNOCK = 0.15
+KNOCK = 0.1
 """Time between two CONNECTs to a controller that may still be booting [s]."""
+_CAUSES = {
+    Cause.POWER_ON: "power on",
+    Cause.EXTERNAL: "reset pin",
+    Cause.BROWN_OUT: "supply too low",
+    Cause.WATCHDOG: "its program hung",
+}
 
 
 class SerialArm(Arm):
@@ -56,7 +63,7 @@ class SerialArm(Arm):
     a movement where only the silence of this host was the cause.
 
     Args:
-        line: to the controller.
+        line: to the controller; it is opened again by :meth:`rearm` if it failed.
         spec: what the arm is.
         conversions: 5, 7 or 9, of which each value is the median.
         velocity_ms: time over which the controller averages the velocity [ms].
@@ -145,13 +152,12 @@ class SerialArm(Arm):
             self._arm()
 
     def rearm(self) -> None:
-        """Connect again if the link was lost or the controller began anew, and arm: a person has looked at the arm.
+        """Connect again, opening the line anew if it had failed, and arm: a person has looked at the arm.
 
         Raises:
             ArmFailure: a cause remains.
 
         """
-        self.link.begin()
         self._connect()
         self._arm()
 
@@ -171,31 +177,38 @@ class SerialArm(Arm):
     def _connect(self) -> None:
         """Have a controller that may still be booting answer, then configure it."""
         self._armed = False
-        self._session = secrets.randbits(32)
-        try:
-            self._line.write(b"\0")  # ends whatever an earlier host left unfinished
-        except OSError as error:
-            raise ArmFailure(f"{self.spec.name}: the line is gone ({error})") from error
         begun = self._line.now()
         while True:
-            self.link.begin()
             try:
-                answer = self.link.ask(Request.CONNECT, VERSION, self._session, give_up=KNOCK)
+                self._greet()
                 break
+            except OSError as error:
+                raise ArmFailure(f"{self.spec.name}: the line is gone ({error})") from error
             except ArmFailure as error:
+                if self.link.broken:
+                    raise
                 if self._line.now() - begun >= BOOT:
                     raise ArmFailure(
-                        f"{self.spec.name}: nobody answered for {BOOT:g} s; is this the right port, is the controller "
-                        "powered, is pneumarm's firmware on it?"
+                        f"{self.spec.name}: nobody answered for {BOOT:g} s; is this the right port, is the "
+                        "controller powered, is pneumarm's firmware on it?"
                     ) from error
-        if answer.frame.kind != Reply.HELLO:
+        self._clock = ControllerClock()
+        self._status(self.link.ask(Request.CONFIGURE, *self._settings))
+
+    def _greet(self) -> None:
+        """Begin a session, on a line that works."""
+        if self.link.broken:
+            self._line.reopen()
+        self.link.begin()
+        self._line.write(b"\0")  # ends whatever an earlier host left unfinished
+        self._session = secrets.randbits(32)
+        frame = self.link.knock(Request.CONNECT, VERSION, self._session, wait=KNOCK).frame
+        if frame.kind != Reply.HELLO or frame.values[0] != VERSION:
             raise UnusableInput(
                 f"{self.spec.name}: the controller speaks another protocol than version {VERSION}; "
                 "flash the firmware that came with this pneumarm"
             )
-        self.hello = Hello(*answer.frame.values)
-        self._clock = ControllerClock()
-        self._status(self.link.ask(Request.CONFIGURE, *self._settings))
+        self.hello = Hello(*frame.values)
 
     def _arm(self) -> None:
         self._status(self.link.ask(Request.ARM, self._session))
@@ -224,7 +237,7 @@ class SerialArm(Arm):
             self._clock.map(sensors.time, answer.sent, answer.received),
             np.array(sensors.angle[:joints], np.float64),
             np.array(sensors.pressure[: 2 * joints], np.float64).reshape(joints, 2),
-            np.array(sensors.velocity[:joints]) / VELOCITY_SCALE,
+            np.array(sensors.velocity[:joints]) / VELOCITY_SCALE if self.spec.velocity_sensor else None,
         )
 
     def _status(self, answer: Answer) -> Flag:
@@ -243,15 +256,22 @@ class SerialArm(Arm):
         if refused.reason in (Reason.NOT_CONNECTED, Reason.NOT_ARMED):
             self._armed = False
         if refused.reason == Reason.NOT_CONNECTED:
-            raise ArmFailure(
-                f"{self.spec.name}: the controller began anew while in use, all muscles are vented; "
-                "look at its power, its plug and, after a hang, its firmware"
-            )
+            self._began_anew()
         if flags & LATCHES or refused.reason == Reason.CAUSE_REMAINS:
             self._fail(flags)
         reasons = {int(reason): reason.name.lower().replace("_", " ") for reason in Reason}
         why = reasons.get(refused.reason, f"reason {refused.reason}")
         raise ArmFailure(f"{self.spec.name}: the controller refused: {why}")
+
+    def _began_anew(self) -> NoReturn:
+        """Ask the controller why it began anew, and raise that; nothing more is asked until :meth:`rearm`."""
+        with suppress(OSError, ArmFailure):  # then it says so the next time
+            self._greet()
+        causes = f" ({', '.join(self.reset_causes())})" if self.link.lost is None and self.reset_causes() else ""
+        raise self.link.lose(
+            f"the controller began anew while in use{causes}, all muscles are vented; look at its power, its plug "
+            "and, after a hang, its firmware"
+        )
 
     def _fail(self, flags: Flag) -> NoReturn:
         """Raise what a latch means."""
@@ -276,6 +296,4 @@ class SerialArm(Arm):
     def reset_causes(self) -> list[str]:
         """Return why the controller last began anew, in words; several may be true."""
         causes = Cause(self.hello.reset_cause) if self.hello is not None else Cause(0)
-        words = {Cause.POWER_ON: "power on", Cause.EXTERNAL: "reset pin", Cause.BROWN_OUT: "supply too low"}
-        words[Cause.WATCHDOG] = "its program hung"
-        return [text for cause, text in words.items() if causes & cause]
+        return [text for cause, text in _CAUSES.items() if causes & cause]

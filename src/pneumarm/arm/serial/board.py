@@ -1,5 +1,7 @@
 """A controller in pure Python, with any arm on it: the same bytes and the same rules as the firmware's."""
 
+from collections import deque
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -270,21 +272,35 @@ def _count(value: float) -> int:
 
 
 class BoardLine(Line):
-    """A line to a board in the same process, whose time is the arm's: as fast as the arm can be computed."""
+    """A line to a board in the same process, whose time is the arm's: as fast as the arm can be computed.
 
-    def __init__(self, board: EmulatedBoard) -> None:
+    Args:
+        board: at the other end.
+        delay: time that bytes take each way [s]; half a round trip of the real board is 0.5e-3.
+
+    """
+
+    def __init__(self, board: EmulatedBoard, delay: float = 0.0) -> None:
         self.board = board
-        self._came = b""
+        self.delay = delay
+        self._out: deque[tuple[float, bytes]] = deque()
+        self._in: deque[tuple[float, bytes]] = deque()
 
     def write(self, data: bytes) -> None:
-        """Have the board take ``data``, in no time."""
-        self._came += self.board.receive(data)
+        """Send ``data``; without a delay the board takes it in no time."""
+        self._out.append((self.now() + self.delay, data))
+        self._deliver()
 
     def read(self, timeout: float) -> bytes:
         """Return the board's answers; time passes only where there are none."""
-        if not self._came and timeout > 0:
-            self.board.run_until(self.board.time + timeout)
-        came, self._came = self._came, b""
+        until = self.now() + timeout
+        while not (self._in and self._in[0][0] <= self.now()) and self.now() < until:
+            due = min([until, *(queue[0][0] for queue in (self._out, self._in) if queue)])
+            self.board.run_until(due)
+            self._deliver()
+        came = b""
+        while self._in and self._in[0][0] <= self.now():
+            came += self._in.popleft()[1]
         return came
 
     def now(self) -> float:
@@ -293,8 +309,18 @@ class BoardLine(Line):
 
     def sleep_until(self, time: float) -> None:
         """Let the arm's time pass until ``time`` [s], or a little later where the arm has that of a host."""
+        while self._out and self._out[0][0] < time:
+            self.board.run_until(self._out[0][0])
+            self._deliver()
         self.board.run_until(time, late=True)
 
     def close(self) -> None:
         """Close the arm."""
         self.board.arm.close()
+
+    def _deliver(self) -> None:
+        """Have the board take what has arrived at it."""
+        while self._out and self._out[0][0] <= self.now():
+            answer = self.board.receive(self._out.popleft()[1])
+            if answer:
+                self._in.append((self.now() + self.delay, answer))

@@ -32,8 +32,6 @@ class ControllerClock:
 
     def __init__(self) -> None:
         self._kept: deque[_Exchange] = deque(maxlen=STRETCHES)
-        self._raw: int | None = None
-        self._wraps = 0
         self._last: tuple[float, float] | None = None
         self.rate = 1.0
         """Seconds of the host per second of the controller."""
@@ -41,7 +39,7 @@ class ControllerClock:
 
     def map(self, raw: int, sent: float, received: float) -> float:
         """Return the host's time [s] of a reading made at ``raw`` [us] in an exchange between two host times [s]."""
-        controller = self._unwrapped(raw)
+        controller = self._unwrapped(raw, received)
         if self._last is not None and controller == self._last[0]:
             return self._last[1]
         self._keep(_Exchange(controller, (sent + received) / 2, received - sent))
@@ -52,11 +50,17 @@ class ControllerClock:
         self._last = (controller, mapped)
         return mapped
 
-    def _unwrapped(self, raw: int) -> float:
-        if self._raw is not None and raw < self._raw:
-            self._wraps += 1
-        self._raw = raw
-        return 1e-6 * (raw + self._wraps * WRAP)
+    def _unwrapped(self, raw: int, received: float) -> float:
+        """Return the controller's time [s] with the number of wraps that fits best to the host's clock.
+
+        In a pause of hours it wraps several times; the host's clock tells how often, for it is wrong by far less
+        than half a wrap.
+        """
+        time = 1e-6 * raw
+        if self._kept:
+            predicted = self._origin[0] + (received - self._origin[1]) / self.rate
+            time += 1e-6 * WRAP * round((predicted - time) / (1e-6 * WRAP))
+        return time
 
     def _keep(self, exchange: _Exchange) -> None:
         kept = self._kept

@@ -28,3 +28,11 @@ class Line(ABC):
     @abstractmethod
     def close(self) -> None:
         """Let go of the line. May be called twice."""
+
+    def reopen(self) -> None:  # noqa: B027 - a line that never fails has nothing to do
+        """Open the line again after it failed.
+
+        Raises:
+            OSError: it is still gone.
+
+        """

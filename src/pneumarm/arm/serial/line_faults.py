@@ -1,11 +1,15 @@
 """A line that loses, doubles, delays and spoils frames, as real ones do (thesis A.1.4), or is pulled out."""
 
+import math
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from pneumarm.arm.serial.line import Line
 from pneumarm.errors import UnusableInput
+
+CLAIMED_EMPTY = 0.005
+"""For so long a driver says that nothing came [s], once it does."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class LineFaults:
 
 
 class FaultyLine(Line):
-    """``line`` with faults, which may be changed at any time by assigning to ``faults``."""
+    """``line`` with faults. They may be changed at any time by assigning to ``faults``, which seeds their chance."""
 
     def __init__(self, line: Line, faults: LineFaults | None = None) -> None:
         self.line = line
@@ -43,10 +47,19 @@ class FaultyLine(Line):
         """Whether the wire is cut: nothing arrives, and nobody is told."""
         self.sent_late = 0
         """Requests that were delivered after their time."""
-        self._random = np.random.default_rng(self.faults.seed)
         self._late_out: list[tuple[float, bytes]] = []
         self._late_in: list[tuple[float, bytes]] = []
         self._rest = b""
+
+    @property
+    def faults(self) -> LineFaults:
+        """What happens to frames from now on."""
+        return self._faults
+
+    @faults.setter
+    def faults(self, faults: LineFaults) -> None:
+        self._faults = faults
+        self._random = np.random.default_rng(faults.seed)
 
     def write(self, data: bytes) -> None:
         """Send what is left of ``data``."""
@@ -57,29 +70,47 @@ class FaultyLine(Line):
                 self.line.write(whole)
 
     def read(self, timeout: float) -> bytes:
-        """Return what is left of what came."""
-        self._check()
-        self._deliver_late()
-        data = self.line.read(timeout)
-        self._check()
+        """Return what is left of what came, waiting up to ``timeout`` [s] for it."""
+        until = self.now() + timeout
+        while True:
+            self._check()
+            self._deliver_late()
+            came = self._arrived(self.line.read(max(min(until, self._next_late()) - self.now(), 0.0)))
+            if came or self.now() >= until:
+                self._check()
+                return came
+
+    def _arrived(self, data: bytes) -> bytes:
+        """Return what arrives now, given what the line behind gave."""
         if data and self._random.random() < self.faults.claims_empty:
-            self._late_in.append((self.line.now(), data))  # it is still there, for another time
-            return b""
+            self._late_in.append((self.now() + CLAIMED_EMPTY, data))  # it is still there, for another time
+            data = b""
         *frames, self._rest = (self._rest + data).split(b"\0")
         came = b"".join(b"".join(self._treated(frame + b"\0", self._late_in)) for frame in frames)
-        now = self.line.now()
-        due = [frame for time, frame in self._late_in if time <= now]
-        self._late_in = [(time, frame) for time, frame in self._late_in if time > now]
-        return came + b"".join(due)
+        due = self._due(self._late_in)
+        return came if self.cut else came + b"".join(due)
 
     def now(self) -> float:
         """Return the host's time [s]."""
         return self.line.now()
 
     def sleep_until(self, time: float) -> None:
-        """Let time pass."""
+        """Let time pass; what is late arrives in it."""
+        while (late := min((at for at, _ in self._late_out), default=time)) < time:
+            self.line.sleep_until(late)
+            self._deliver_late()
         self.line.sleep_until(time)
         self._deliver_late()
+
+    def reopen(self) -> None:
+        """Open the line behind again, if the plug is in.
+
+        Raises:
+            OSError: it is not.
+
+        """
+        self._check()
+        self.line.reopen()
 
     def close(self) -> None:
         """Close the line."""
@@ -89,12 +120,20 @@ class FaultyLine(Line):
         if self.unplugged:
             raise OSError("no such device")
 
+    def _next_late(self) -> float:
+        """Return when the next late frame arrives, on either side [s]."""
+        return min((time for time, _ in self._late_out + self._late_in), default=math.inf)
+
+    def _due(self, late: list[tuple[float, bytes]]) -> list[bytes]:
+        """Return the frames in ``late`` whose time has come, and take them out."""
+        now = self.now()
+        due = [frame for time, frame in late if time <= now]
+        late[:] = [(time, frame) for time, frame in late if time > now]
+        return due
+
     def _deliver_late(self) -> None:
-        now = self.line.now()
-        due = [frame for time, frame in self._late_out if time <= now]
-        self._late_out = [(time, frame) for time, frame in self._late_out if time > now]
-        if not self.cut and not self.unplugged:
-            for frame in due:
+        for frame in self._due(self._late_out):
+            if not self.cut and not self.unplugged:
                 self.sent_late += 1
                 self.line.write(frame)
 

@@ -1,16 +1,16 @@
-"""One request at a time over a line: sent again until it is answered, and given up when the controller is gone."""
+"""One request at a time over a line: asked again until it is answered, and given up when the controller is gone."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from pneumarm.arm.serial.line import Line
-from pneumarm.arm.serial.protocol import DEAD_MAN_MS, REPLIES, SEQUENCES, Frame, Request, Splitter, encode
+from pneumarm.arm.serial.pace import FEWEST, Pace
+from pneumarm.arm.serial.protocol import ANSWER, DEAD_MAN_MS, SEQUENCES, Frame, Reply, Request, Splitter, encode
 from pneumarm.errors import ArmFailure
 
 GIVE_UP = DEAD_MAN_MS / 1e3
-"""Silence after which a link is lost [s]: by then the controller has vented the arm by itself."""
-SHORTEST_TIMEOUT = 0.004
-"""A request is never sent again sooner [s]: a reply takes 1 to 2 ms."""
+"""Silence after which any link is lost [s]: by then the controller has vented the arm by itself."""
+_ADVICE = f"it vents all muscles by itself after {GIVE_UP:g} s. Look at plug and power"
 
 
 @dataclass
@@ -20,9 +20,9 @@ class LinkCounts:
     requests: int = 0
     """Requests answered."""
     retries: int = 0
-    """Requests sent again, because no answer came."""
+    """Attempts besides the first of each request, because no answer came."""
     silences: int = 0
-    """Requests that went without an answer for two control periods."""
+    """Requests that went without an answer for a control period or longer."""
     foreign: int = 0
     """Replies to something else than what was asked: late, or doubled."""
     corrupt: int = 0
@@ -34,19 +34,25 @@ class Answer(NamedTuple):
 
     frame: Frame
     sent: float
+    """When the very attempt was sent that it answers."""
     received: float
 
 
 class Link:
     """Asks a controller, one request under way.
 
-    A request that is not answered in time is sent again with the same sequence: the controller does not act on it
-    twice. Replies of another sequence are dropped. A line that fails, or a controller that is silent for
-    :data:`GIVE_UP`, makes the link ``lost``: nothing more is sent until :meth:`begin`.
+    A request that is not answered in time is sent again, as a request of its own: with the next sequence. All
+    requests say what shall be, none what shall be changed, so that doing one twice does no harm; and of each answer
+    it is known which attempt it belongs to, and so when the controller can have read, and that it fed the dead-man.
+    The attempt before is stale from then on, in case it still comes; an answer to it is as good. Replies of other
+    sequences are dropped.
+
+    A line that fails, or a controller that is silent for too long (:class:`~pneumarm.arm.serial.pace.Pace`, or
+    :data:`GIVE_UP` at the latest), makes the link ``lost``: nothing more is sent until :meth:`begin`.
 
     Args:
         line: carries the bytes.
-        period: control period [s]; a request is sent again within it.
+        period: control period [s].
         name: what messages call the arm.
         sequence: the number of the last request before the first one.
 
@@ -57,63 +63,85 @@ class Link:
         self.counts = LinkCounts()
         self.lost: str | None = None
         """Why nothing can be asked any more; None while all is well."""
-        self._timeout = max(0.4 * period, SHORTEST_TIMEOUT)
-        self._silence = 2 * period
+        self.broken = False
+        """Whether it is lost because the line itself failed, so that it has to be opened again."""
+        self._period = period
         self._name = name
         self._sequence = sequence
+        self._pace = Pace(period)
         self._splitter = Splitter()
 
     def begin(self) -> None:
         """Take the link up again after it was lost; CONNECT comes next."""
         self.lost = None
+        self.broken = False
+        self._pace = Pace(self._period)
 
-    def ask(self, request: Request, *values: int, give_up: float = GIVE_UP) -> Answer:
+    def ask(self, request: Request, *values: int) -> Answer:
         """Return the answer to ``request``.
 
         Raises:
-            ArmFailure: the line fails, or nothing is heard for ``give_up`` [s].
+            ArmFailure: the line fails, or nothing is heard for too long.
 
         """
+        return self._asked(request, values, None)
+
+    def knock(self, request: Request, *values: int, wait: float) -> Answer:
+        """Return the answer to ``request``, which is sent once and waited for for ``wait`` [s].
+
+        Raises:
+            ArmFailure: the line fails, or nothing is heard.
+
+        """
+        return self._asked(request, values, wait)
+
+    def _asked(self, request: Request, values: tuple[int, ...], wait: float | None) -> Answer:
         if self.lost is not None:
-            raise ArmFailure(f"{self._name}: {self.lost}; connect it again before anything else")
-        self._sequence = (self._sequence + 1) % SEQUENCES
-        frame = encode(request, self._sequence, *values)
+            raise ArmFailure(f"{self._name}: {self.lost}")
         try:
-            return self._ask(frame, give_up)
+            return self._ask(request, values, wait)
         except OSError as error:
-            raise self._lose(f"the line to the controller is gone ({error})") from error
+            self.broken = True
+            raise self.lose(f"the line to the controller is gone ({error}); {_ADVICE}") from error
         finally:
             self.counts.corrupt = self._splitter.corrupt
 
-    def _ask(self, frame: bytes, give_up: float) -> Answer:
-        begun = sent = self.line.now()
-        self.line.write(frame)
-        silent = False
+    def _ask(self, request: Request, values: tuple[int, ...], wait: float | None) -> Answer:
+        sent: dict[int, float] = {}  # when each attempt was sent, by its sequence
+        kinds = (ANSWER[request], Reply.REFUSED)
+        begun = self.line.now()
         while True:
-            now = self.line.now()
-            if not silent and now - begun >= self._silence:
-                silent = True
-                self.counts.silences += 1
-            if now - begun >= give_up:
-                raise self._lose(f"the controller has not answered for {now - begun:.2f} s")
-            if now - sent >= self._timeout:
-                self.counts.retries += 1
-                sent = now
-                self.line.write(frame)
-            data = self.line.read(max(min(sent + self._timeout, begun + give_up) - now, 0.0))
+            self._sequence = (self._sequence + 1) % SEQUENCES
+            asked = sent[self._sequence] = self.line.now()
+            self.line.write(encode(request, self._sequence, *values))
+            timeout = self._pace.timeout if wait is None else wait
+            answer = self._listen(kinds, sent, asked + timeout)
+            silence = self.line.now() - begun
+            self.counts.silences += silence >= self._period > asked - begun
+            if answer is not None:
+                self.counts.requests += 1
+                self._pace.answered(answer.received - answer.sent, silence, len(sent))
+                return answer
+            late = silence >= GIVE_UP and len(sent) >= FEWEST
+            if wait is not None or late or self._pace.hopeless(silence, len(sent)):
+                raise self.lose(f"the controller has not answered for {silence:.2f} s; {_ADVICE}")
+            self.counts.retries += 1
+
+    def _listen(self, kinds: tuple[Reply, Reply], sent: dict[int, float], until: float) -> Answer | None:
+        """Return the first answer of these ``kinds`` to an attempt ``sent``, None where none comes ``until`` [s]."""
+        while True:
+            data = self.line.read(max(until - self.line.now(), 0.0))
             received = self.line.now()
             answer = None
             for reply in self._splitter.feed(data):
-                if reply.kind in REPLIES and reply.sequence == self._sequence and answer is None:
-                    answer = Answer(reply, sent, received)
+                if answer is None and reply.kind in kinds and reply.sequence in sent:
+                    answer = Answer(reply, sent[reply.sequence], received)
                 else:
                     self.counts.foreign += 1
-            if answer is not None:
-                self.counts.requests += 1
+            if answer is not None or received >= until:
                 return answer
 
-    def _lose(self, why: str) -> ArmFailure:
+    def lose(self, why: str) -> ArmFailure:
+        """Ask nothing more until :meth:`begin`, and return the failure to raise."""
         self.lost = why
-        return ArmFailure(
-            f"{self._name}: {why}; it vents all muscles by itself after {GIVE_UP:g} s. Look at plug and power"
-        )
+        return ArmFailure(f"{self._name}: {why}")

@@ -23,15 +23,21 @@ class SerialPort(Line):
     """
 
     def __init__(self, path: str) -> None:
-        holder = _holder(path)
-        if holder is not None:
-            raise UnusableInput(f"serial:{path}: in use by {holder}; end that first")
+        self._path = path
+        self._port = _opened(path)
+
+    def reopen(self) -> None:
+        """Open the port again, as after the plug was out.
+
+        Raises:
+            OSError: it is still gone, or another program took it.
+
+        """
+        self.close()
         try:
-            # exclusive: two programs on one port would each get half of the other's replies.
-            self._port = serial.Serial(path, BAUD, timeout=0, exclusive=True)
-        except (serial.SerialException, ValueError, OSError) as error:
-            raise UnusableInput(f"serial:{path}: {_advice(path, error)}") from error
-        _lower_latency(path, self._port)
+            self._port = _opened(self._path)
+        except UnusableInput as error:
+            raise OSError(str(error)) from error
 
     def write(self, data: bytes) -> None:
         """Send ``data``."""
@@ -65,6 +71,23 @@ class SerialPort(Line):
             self._port.close()
 
 
+def _opened(path: str) -> serial.Serial:
+    """Return the port at ``path``, opened.
+
+    Opening it resets an Uno or Nano: where another program uses it, that is not even tried.
+    """
+    holder = _holder(path)
+    if holder is not None:
+        raise UnusableInput(f"serial:{path}: in use by {holder}; end that first")
+    try:
+        # exclusive: two programs on one port would each get half of the other's replies.
+        port = serial.Serial(path, BAUD, timeout=0, exclusive=True)
+    except (serial.SerialException, ValueError, OSError) as error:
+        raise UnusableInput(f"serial:{path}: {_advice(path, error)}") from error
+    _lower_latency(path, port)
+    return port
+
+
 def _lower_latency(path: str, port: serial.Serial) -> None:
     """Have bytes delivered at once where the driver can: an FTDI chip else keeps them for up to 16 ms."""
     with suppress(OSError, ValueError, AttributeError, NotImplementedError):
@@ -75,13 +98,36 @@ def _lower_latency(path: str, port: serial.Serial) -> None:
 
 
 def _holder(path: str) -> str | None:
-    """Return the name of another process that has ``path`` open, where the system tells."""
+    """Return the name of a process that uses ``path``, where the system tells: who locked it, or has it open."""
     try:
         wanted = os.stat(path)
     except OSError:
         return None
-    if not path.startswith("/dev/tty"):
-        return None  # a pseudo-terminal is always open at its other end
+    held = _locked_by(wanted)
+    # The program behind a pseudo-terminal has it open too, and is its other end.
+    if held is None and not path.startswith("/dev/pts/"):
+        held = _opened_by(wanted)
+    if held is None:
+        return None
+    name = ""
+    with suppress(OSError):
+        name = f" ({Path(f'/proc/{held}/comm').read_text().strip()})"
+    return f"process {held}{name}" if held != os.getpid() else "this process itself"
+
+
+def _locked_by(wanted: os.stat_result) -> int | None:
+    """Return the process that has locked a file."""
+    place = f"{os.major(wanted.st_dev):02x}:{os.minor(wanted.st_dev):02x}:{wanted.st_ino}"
+    with suppress(OSError):
+        for line in Path("/proc/locks").read_text().splitlines():
+            fields = line.split()  # 1: FLOCK ADVISORY WRITE process device:device:inode begin end
+            if fields[1] == "FLOCK" and fields[-3] == place and int(fields[-4]) > 0:
+                return int(fields[-4])
+    return None
+
+
+def _opened_by(wanted: os.stat_result) -> int | None:
+    """Return another process that has a file open."""
     for process in Path("/proc").glob("[0-9]*"):
         if int(process.name) == os.getpid():
             continue
@@ -90,8 +136,7 @@ def _holder(path: str) -> str | None:
                 with suppress(OSError):
                     found = descriptor.stat()
                     if (found.st_dev, found.st_ino) == (wanted.st_dev, wanted.st_ino):
-                        name = (process / "comm").read_text().strip()
-                        return f"process {process.name} ({name})"
+                        return int(process.name)
     return None
 
 

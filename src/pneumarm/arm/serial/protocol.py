@@ -4,6 +4,7 @@ A frame is ``COBS(type u8, sequence u16, payload, crc u16) 0x00``; see the page 
 """
 
 import struct
+from binascii import crc_hqx
 from collections.abc import Iterator
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
@@ -117,6 +118,15 @@ PAYLOAD: dict[int, struct.Struct] = {
     Reply.REFUSED: struct.Struct("<BHB"),
 }
 """Layout of each payload."""
+ANSWER = {
+    Request.CONNECT: Reply.HELLO,
+    Request.CONFIGURE: Reply.STATUS,
+    Request.ARM: Reply.STATUS,
+    Request.DISARM: Reply.STATUS,
+    Request.EXCHANGE: Reply.READING,
+    Request.READ: Reply.READING,
+}
+"""The reply to each request that is not refused."""
 REQUESTS = frozenset(map(int, Request))
 REPLIES = frozenset(map(int, Reply))
 _HEAD = struct.Struct("<BH")
@@ -205,24 +215,16 @@ def decode(frame: bytes) -> Frame | None:
     return Frame(kind, sequence, layout.unpack(content[_HEAD.size : -_CRC.size]))
 
 
-def _crc_table() -> tuple[int, ...]:
-    table = []
-    for value in range(256):
-        for _ in range(8):
-            value = value >> 1 ^ (0x8408 if value & 1 else 0)
-        table.append(value)
-    return tuple(table)
-
-
-_TABLE = _crc_table()
+_MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
 def crc(content: bytes) -> int:
-    """Return CRC-16/X-25 of ``content``."""
-    value = 0xFFFF
-    for byte in content:
-        value = value >> 8 ^ _TABLE[(value ^ byte) & 0xFF]
-    return value ^ 0xFFFF
+    """Return CRC-16/X-25 of ``content``.
+
+    It is the mirror image of the CRC that the standard library computes in C: bits are mirrored before and after.
+    """
+    mirrored = crc_hqx(content.translate(_MIRRORED), 0xFFFF)
+    return (_MIRRORED[mirrored & 0xFF] << 8 | _MIRRORED[mirrored >> 8]) ^ 0xFFFF
 
 
 def stuff(content: bytes) -> bytes:
@@ -233,6 +235,8 @@ def stuff(content: bytes) -> bytes:
             stuffed += b"\xff" + part[:0xFE]
             part = part[0xFE:]
         stuffed += bytes([len(part) + 1]) + part
+    if content and content[-1] and not part:
+        del stuffed[-1]  # a full block at the very end needs no empty one after it
     return bytes(stuffed)
 
 

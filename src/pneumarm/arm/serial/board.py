@@ -91,6 +91,7 @@ class EmulatedBoard:
         self._last_reason: Reason | None = None
         self._limits = [HIGHEST_COUNT] * MUSCLES
         self._over = [0] * MUSCLES
+        self._sampled = self._time
         self._velocity_s = SAMPLE
         self._asked = np.full((self.arm.spec.joints, 2), -1, np.int8)
         self._fed = self._time
@@ -143,6 +144,9 @@ class EmulatedBoard:
         self._now = self._look()
         if before.time <= velocity_from + 1e-9 or self._earlier.time < velocity_from - MOST_VELOCITY_MS / 1e3:
             self._earlier = before
+        if self._now.time < self._sampled + SAMPLE - 1e-9:
+            return  # looks at other times are no samples of their own
+        self._sampled = self._now.time
         limits = self._limits
         for muscle, pressure in enumerate(self._now.pressure.ravel().tolist()):
             self._over[muscle] = self._over[muscle] + 1 if pressure > limits[muscle] else 0

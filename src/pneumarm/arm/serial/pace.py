@@ -1,0 +1,73 @@
+"""When to ask again, and when to give a link up: learned from how it answered so far."""
+
+import math
+
+SHORTEST = 0.002
+"""No attempt is waited for less long [s]: a reply takes 1 to 1.5 ms."""
+SOONEST = 0.03
+"""No link is given up sooner [s], however short the period is: a computer is busy elsewhere for 10 ms at times."""
+SURE = 1e-6
+"""A link is given up when a living one would be so silent with this probability."""
+FEWEST = 3
+"""... but never after fewer attempts: a host that was stopped itself has not listened."""
+_MEAN, _DEVIATION = 1 / 8, 1 / 4
+"""Weights of a new round trip in their means (Jacobson, Congestion avoidance and control, 1988)."""
+_REMEMBERED = 64.0
+"""Attempts of which the share of answered ones is taken."""
+_FORGETS = 0.999
+"""The slowest answer weighs less after each request by this factor."""
+
+
+class Pace:
+    """How long to wait for an answer before asking again, and when to stop asking.
+
+    *Asking again*: after the smoothed round trip and four mean deviations, between :data:`SHORTEST` and a third of
+    the control period, so that at least two more attempts fit into a period.
+
+    *Giving up*: as soon as k attempts without an answer are less likely than :data:`SURE` on this link,
+    ``(1 - p)^k`` with p the share of attempts that it answered lately; but not before most of a period has passed,
+    nor before thrice the time of its slowest answer lately. A healthy link that falls silent is so given up within
+    two periods, a bad one is kept for longer.
+
+    Args:
+        period: control period [s].
+
+    """
+
+    def __init__(self, period: float) -> None:
+        self._longest = max(period / 3, SHORTEST)
+        self._patience = max(0.9 * period, SOONEST)
+        self._round_trip: float | None = None
+        self._deviation = 0.0
+        self._slowest = 0.0
+        self._attempts = self._answered = 0.0
+
+    @property
+    def timeout(self) -> float:
+        """Time after which to ask again [s]."""
+        if self._round_trip is None:
+            return self._longest
+        return min(max(self._round_trip + 4 * self._deviation, SHORTEST), self._longest)
+
+    @property
+    def share(self) -> float:
+        """Estimated share of attempts that are answered."""
+        return (self._answered + 1) / (self._attempts + 2)
+
+    def answered(self, round_trip: float, took: float, attempts: int) -> None:
+        """Learn from an answer, ``round_trip`` [s] after its attempt and ``took`` [s] after the first of them all."""
+        if self._round_trip is None:
+            self._round_trip, self._deviation = round_trip, round_trip / 2
+        error = round_trip - self._round_trip
+        self._round_trip += _MEAN * error
+        self._deviation += _DEVIATION * (abs(error) - self._deviation)
+        self._slowest = max(took, _FORGETS * self._slowest)
+        kept = max(1 - attempts / _REMEMBERED, 0.0)
+        self._attempts = kept * self._attempts + attempts
+        self._answered = kept * self._answered + 1
+
+    def hopeless(self, silence: float, attempts: int) -> bool:
+        """Return whether a link is gone that gave no answer to ``attempts`` in a ``silence`` [s]."""
+        if attempts < FEWEST or silence < max(self._patience, 3 * self._slowest):
+            return False
+        return attempts * math.log1p(-self.share) < math.log(SURE)

@@ -130,15 +130,18 @@ def policy(small_run: Path) -> AnyAgent:
 
 
 def test_finished_movements_are_kept_when_the_link_is_lost_in_a_transfer(agent: Agent, tmp_path: Path) -> None:
-    folder, finished = tmp_path / "moved", [0.0]
+    folder, arm = tmp_path / "moved", emulated()
+
+    def pull_out(done: float, total: float) -> None:
+        if done == 5:
+            arm._line.left = 70  # type: ignore[attr-defined]  # in the next movement
+
     with pytest.raises(ArmFailure, match="line to the controller is gone"):
-        transfer_into(folder, agent, emulated(1_500), SHORT, seed=1, progress=lambda done, _: finished.append(done))
+        transfer_into(folder, agent, arm, SHORT, seed=1, progress=pull_out)
     with Store.open(folder / "transitions.db") as store:
         kinds = [entry.kind for entry in store.catalogue()]
-        broken = store.marks(len(kinds))[len(kinds)]
-    assert 0 < finished[-1] < 24
-    assert finished[-1] % 10  # some of them waited to be stored with others
-    assert kinds == ["episode"] * int(finished[-1]) + ["broken episode"]
+        assert kinds == ["episode"] * 5 + ["broken episode"]
+        broken = store.marks(6)[6]
     assert "broke off here" in broken[0].reason
     with pytest.raises(ArmFailure, match="line to the controller is gone"):
         transfer_into(folder, agent, emulated(300), SHORT, seed=1)
@@ -148,7 +151,6 @@ def test_finished_movements_are_kept_when_the_link_is_lost_in_a_transfer(agent: 
     with Store.open(folder / "transitions.db") as store:
         kinds = [entry.kind for entry in store.catalogue()]
         assert kinds.count("episode") == 24
-        assert kinds.count("broken episode") == 2
         store.check()
 
 
@@ -197,14 +199,18 @@ class Counting(VirtualArm):
         from numba.core.dispatcher import Dispatcher
         self.begun += 1
         if self.begun > 1:
-            print(self.counts[0], self.counts[-1], len(self.counts))
+            print(len(self.counts), *sorted(self.counts[-1] - self.counts[0]))
             raise Enough
-        self.kernels = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
+        self.kernels = [
+            one
+            for one in gc.get_objects()
+            if isinstance(one, Dispatcher) and not one.__module__.startswith("pneumarm.arm.virtual")
+        ]
         self.counts = []
 
     def set_valves(self, valves):
         if self.counts != ():
-            self.counts.append(sum(len(one.overloads) for one in self.kernels))
+            self.counts.append({f"{one.__module__}.{one.__name__}" for one in self.kernels if one.overloads})
         super().set_valves(valves)
 
 arm = Counting(seed=3)
@@ -240,7 +246,6 @@ def test_nothing_is_compiled_while_an_arm_moves(
     command = [sys.executable, "-c", COUNTING, str(tmp_path), job, str(files.get(what, what))]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    first, last, turns = map(int, done.stdout.split())
-    assert turns > 5
-    assert first > 0
-    assert last == first
+    turns, *compiled = done.stdout.split()
+    assert int(turns) > 5
+    assert not compiled

@@ -1,0 +1,248 @@
+"""What must hold when the line, the host or the controller fails: faults injected, consequences measured."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from pneumarm.arm import ControlCycle, guarded
+from pneumarm.arm.serial import LineFaults
+from pneumarm.arm.serial.arm import BOOT
+from pneumarm.arm.serial.protocol import Cause, Request
+from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.transitions import Recorded
+from tests.arm.serial.wired import Wired, all_valves, wired
+
+PERIOD = 1 / 30
+
+
+@pytest.fixture
+def w() -> Iterator[Wired]:
+    found = wired()
+    with found.arm:
+        yield found
+
+
+def in_motion(w: Wired, turns: int = 30) -> None:
+    """Have the arm move for some control periods."""
+    rng = np.random.default_rng(turns)
+    for _ in range(turns):
+        begun = w.arm.read().time
+        w.arm.set_valves(rng.integers(-1, 2, (1, 2)).astype(np.int8))
+        w.arm.wait_until(begun + PERIOD)
+    w.arm.set_valves(all_valves(w.arm, 1))
+
+
+def until_failure(w: Wired) -> tuple[float, str]:
+    """Go on in the control cycle; return when [s] it failed after now, and why."""
+    begun = w.line.now()
+    cycle = ControlCycle(guarded(w.arm))
+    with pytest.raises(ArmFailure) as failed:
+        for _ in cycle.run(lambda reading: all_valves(w.arm, 1)):
+            assert w.line.now() < begun + 5
+    return w.line.now() - begun, str(failed.value)
+
+
+def vented_after(w: Wired, begun: float) -> float:
+    """Return the time [s] from ``begun`` until all muscles were vented."""
+    w.wire.sleep_until(begun + 0.4)
+    assert w.is_vented
+    return w.muscles.set[-1][0] - begun
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("fault", ["unplugged", "cut"])
+def test_line_that_goes_in_an_episode(w: Wired, fault: str, phase: float) -> None:
+    in_motion(w)
+    fed = w.line.now()
+    w.arm.wait(phase * PERIOD)
+    gone = w.line.now()
+    setattr(w.line, fault, True)
+    w.line.sleep_until(fed + PERIOD)  # the turn under way
+    took, why = until_failure(w)
+    assert w.line.now() - gone <= 2 * PERIOD + 2e-3
+    assert ("gone" if fault == "unplugged" else "not answered") in why
+    assert vented_after(w, fed) <= 0.251
+    setattr(w.line, fault, False)
+    known = len(w.muscles.set)
+    for use in (w.arm.read, w.arm.make_ready, lambda: w.arm.set_valves(all_valves(w.arm, 1))):
+        with pytest.raises(ArmFailure, match="Look at plug and power"):
+            use()
+    w.wire.sleep_until(w.line.now() + 1)
+    assert len(w.muscles.set) == known  # nothing moved
+    w.arm.rearm()
+    w.arm.set_valves(all_valves(w.arm, 1))
+    assert w.applied == [[1, 1]]
+
+
+def test_line_that_stays_gone_is_said_to_be(w: Wired) -> None:
+    in_motion(w)
+    w.line.unplugged = True
+    begun = w.line.now()
+    for _ in range(3):
+        with pytest.raises(ArmFailure, match="gone"):
+            w.arm.rearm()
+    assert w.line.now() == begun  # at once
+    w.line.unplugged, w.line.cut = False, True
+    with pytest.raises(ArmFailure, match="nobody answered"):
+        w.arm.rearm()
+    assert w.line.now() - begun <= BOOT + 0.2
+
+
+KINDS = ("dropped", "doubled", "late")
+CASES = [(kind, share) for kind in KINDS for share in (0.05, 0.2, 0.5)]
+
+
+@pytest.mark.parametrize(("faults", "share"), [*CASES, ("all", 0.05), ("all", 0.2)])
+def test_bad_line(w: Wired, faults: str, share: float) -> None:
+    """Nothing stale acts, nothing is acknowledged that was not done, the loop keeps its rate, gaps stay gaps."""
+    w.line.faults = LineFaults(**dict.fromkeys(KINDS if faults == "all" else (faults,), share), seed=5)
+    rng, turns, steps = np.random.default_rng(1), 300, []
+    cycle = ControlCycle(guarded(w.arm))
+
+    def decide(reading):
+        assert reading.time <= w.line.now()
+        return rng.integers(-1, 2, (1, 2)).astype(np.int8) if len(steps) < turns else None
+
+    for step in cycle.run(decide):
+        if step.valves is not None:
+            assert w.applied == step.valves.tolist()  # what was acknowledged is so
+        steps.append(step)
+    assert (w.wire.stale > 0) == (faults != "dropped")
+    assert w.wire.stale_applied == 0
+    assert cycle.missed_deadlines <= (0.1 * turns if (faults, share) in (("dropped", 0.5), ("late", 0.5)) else 3)
+    recorded = Recorded.from_steps(steps, w.arm.spec)
+    joined = np.diff(recorded.step) == 1
+    assert (np.abs(np.diff(recorded.time)[joined] / PERIOD - 1) < 0.5).all()
+    assert recorded.transitions == joined.sum()
+
+
+def test_times_of_readings_are_true_on_a_bad_line(w: Wired) -> None:
+    w.line.faults = LineFaults(dropped=0.2, late=0.3, lateness=0.015)
+    booted, errors = w.board._booted, []
+    for _ in range(300):
+        answer = w.arm.link.ask(Request.READ)
+        mapped = w.arm._reading(answer).time
+        errors.append(mapped - (booted + 1e-6 * answer.frame.values[0]))
+        w.arm.wait(PERIOD)
+    assert np.median(np.abs(errors)) < 1e-4
+    assert np.abs(errors).max() < 2e-3
+
+
+def test_waiting_on_a_bad_line_keeps_the_arm_alive() -> None:
+    for seed in range(10):
+        w = wired(seed=1)
+        w.line.faults = LineFaults(dropped=0.3, late=0.2, seed=seed)
+        w.arm.set_valves(all_valves(w.arm, 0))
+        w.arm.wait(20.0)
+        assert w.board.armed
+
+
+def test_driver_that_claims_an_empty_buffer_costs_time_only(w: Wired) -> None:
+    w.line.faults = LineFaults(claims_empty=0.5)
+    in_motion(w, 100)
+    assert w.applied == [[1, 1]]
+
+
+def test_a_wire_that_corrupts_never_sets_other_valves(w: Wired) -> None:
+    w.line.faults = LineFaults(corrupted=0.3, seed=2)
+    rng = np.random.default_rng(3)
+    for _ in range(1000):
+        valves = rng.integers(-1, 2, (1, 2)).astype(np.int8)
+        known = len(w.muscles.set)
+        w.arm.set_valves(valves)
+        assert all(one == valves.tolist() for _, one in w.muscles.set[known:])
+        w.arm.wait(0.005)
+    assert w.arm.link.counts.corrupt > 200
+
+
+@pytest.mark.parametrize("stall", [0.1, 0.24, 0.26, 1.0, 10.0])
+def test_host_that_stalls(w: Wired, stall: float) -> None:
+    in_motion(w)
+    fed = w.line.now()
+    w.wire.sleep_until(fed + stall)  # no line's business: the process was stopped
+    if stall < 0.249:
+        w.arm.set_valves(all_valves(w.arm, -1))
+        return
+    vented = next(time for time, valves in w.muscles.set if valves == [[-1, -1]] and time > fed)
+    assert vented - fed <= 0.251
+    for _ in range(2):
+        with pytest.raises(ArmFailure, match="heard nothing for a quarter of a second"):
+            w.arm.set_valves(all_valves(w.arm, 1))
+    assert w.is_vented
+    w.arm.make_ready()
+    w.arm.set_valves(all_valves(w.arm, 1))
+    assert w.applied == [[1, 1]]
+
+
+@pytest.mark.parametrize(
+    ("cause", "words"),
+    [(Cause.EXTERNAL, "reset pin"), (Cause.BROWN_OUT, "supply too low"), (Cause.POWER_ON, "power on")],
+)
+def test_controller_that_begins_anew(w: Wired, cause: Cause, words: str) -> None:
+    in_motion(w)
+    w.board.reset(cause)
+    assert w.is_vented
+    took, why = until_failure(w)
+    assert took <= 2 * PERIOD
+    assert f"began anew while in use ({words})" in why
+    with pytest.raises(ArmFailure, match="began anew"):
+        w.arm.make_ready()
+    assert w.is_vented
+    begun = w.line.now()
+    w.arm.rearm()
+    assert w.line.now() - begun < 2
+    assert w.arm.reset_causes() == [words]
+    w.arm.set_valves(all_valves(w.arm, 1))
+    assert w.applied == [[1, 1]]
+
+
+def test_controller_that_hangs(w: Wired) -> None:
+    in_motion(w)
+    hung = w.line.now()
+    w.board.hang()
+    took, why = until_failure(w)
+    assert took <= 2 * PERIOD + 2e-3
+    assert "not answered" in why
+    w.wire.sleep_until(hung + 0.2)
+    vented = next(time for time, valves in w.muscles.set if valves == [[-1, -1]] and time > hung)
+    assert vented - hung <= 0.150
+    begun = w.line.now()
+    w.arm.rearm()
+    assert w.line.now() - begun < 2
+    assert w.arm.reset_causes() == ["its program hung"]
+
+
+def test_controller_that_still_boots_is_waited_for(w: Wired) -> None:
+    in_motion(w)
+    w.line.cut = True
+    until_failure(w)
+    begun = w.line.now()
+    line_read = w.line.line.read
+
+    def read(timeout: float) -> bytes:
+        w.line.cut = w.line.now() < begun + 1.8
+        return line_read(timeout)
+
+    w.line.line.read = read  # type: ignore[method-assign]
+    w.arm.rearm()
+    assert 1.8 <= w.line.now() - begun < 2.0
+
+
+def test_a_controller_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pneumarm.arm.serial.board.VERSION", 2)
+    with pytest.raises(UnusableInput, match="flash the firmware"):
+        wired()
+
+
+def test_shares_are_shares() -> None:
+    with pytest.raises(UnusableInput, match="dropped is a share of 0 to 1"):
+        LineFaults(dropped=1.5)
+
+
+def test_the_same_seed_gives_the_same_faults_again(w: Wired) -> None:
+    def lost() -> list[float]:
+        w.line.faults = LineFaults(dropped=0.5, seed=7)
+        return [w.line._random.random() for _ in range(20)]
+
+    assert lost() == lost()

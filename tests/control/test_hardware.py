@@ -122,7 +122,9 @@ def agent(small_run: Path) -> Agent:
 
 @pytest.fixture(scope="module")
 def policy(small_run: Path) -> AnyAgent:
-    settings = PolicySettings(agents=1, updates=5, arms=16, steps=16, hidden=(8,), validation_episodes=20, lookahead=8)
+    settings = PolicySettings(
+        agents=1, updates=5, arms=16, steps=16, hidden=(8,), validation_episodes=20, lookahead=8
+    )
     simulation = Simulation.load(small_run / "simulation.safetensors")
     with Store.open(small_run / "transitions.db") as store:
         begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)

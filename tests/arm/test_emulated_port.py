@@ -5,11 +5,12 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -18,12 +19,13 @@ from pneumarm.arm import open_arm
 from pneumarm.arm.serial.emulate import serve
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import Monitor, TransferSettings, transfer_into
-from pneumarm.errors import UnusableInput
+from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.learning import Agent
 from pneumarm.run import Run
-from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
+from pneumarm.transitions import CollectBegin, CollectResult, CollectSettings, Store, collect
 from small import SMALL
 
+Result = TypeVar("Result")
 START = "from pneumarm.cli import main; main()"
 
 
@@ -77,17 +79,36 @@ def test_collecting_and_moving_in_real_time(small_run: Path, tmp_path: Path, mon
     quick = CollectSettings(actions=60, begin=CollectBegin(deflate=0.3, inflate=0.3, settle=0.3))
     agent = Agent.load(small_run / "agent.safetensors")
     link = tmp_path / "arm.port"
-    with port(link):
+    settings = TransferSettings(episodes=0, test_episodes=1)
+
+    def collected() -> CollectResult:
         with open_arm(f"serial:{link}") as arm, Store.for_arm(tmp_path / "arm.db", arm.spec) as store:
-            watch = Monitor(arm.spec)
-            collected = collect(arm, store, 120, settings=quick, watch=watch)
+            result = collect(arm, store, 120, settings=quick, watch=watch)
             store.check()
-        assert collected.transitions >= 120
-        assert watch.findings == []
-        settings = TransferSettings(episodes=0, test_episodes=1)
+            return result
+
+    def moved() -> dict[str, Any]:
         with open_arm(f"serial:{link}") as arm:
-            result = transfer_into(tmp_path / "moved", agent, arm, settings, seed=1)
+            return transfer_into(tmp_path / "moved", agent, arm, settings, seed=1)
+
+    with port(link):
+        with open_arm(f"serial:{link}") as arm:
+            watch = Monitor(arm.spec)
+        assert persistent(collected).transitions >= 120
+        assert watch.findings == []
+        result = persistent(moved)
         assert [result[phase]["episodes"] for phase in ("before", "after")] == [1, 1]
+
+
+def persistent(job: Callable[[], Result], tries: int = 10) -> Result:
+    """Do ``job``; again where this computer was too busy for the dead-man of a quarter of a second."""
+    for _ in range(tries):
+        try:
+            return job()
+        except ArmFailure as error:
+            if "too busy" not in str(error) and "has not answered" not in str(error):
+                raise
+    raise AssertionError(f"this computer was too busy {tries} times")
 
 
 @pytest.mark.soak
@@ -95,7 +116,7 @@ def test_the_whole_job_in_real_time(tmp_path: Path) -> None:
     with port(tmp_path / "arm.port"):
         transfer = TransferSettings(episodes=12, test_episodes=6)
         settings = replace(SMALL, arm=f"serial:{tmp_path / 'arm.port'}", transitions=2_000, transfer=transfer)
-        results = Run(tmp_path / "run", settings).do()
+        results = persistent(lambda: Run(tmp_path / "run", settings).do())
     assert results["collect"]["transitions"] >= 2_000
     assert results["transfer"]["after"]["episodes"] == 6
     assert "is no virtual arm" in results["bound"]["missing"]

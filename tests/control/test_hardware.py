@@ -1,9 +1,7 @@
 """Hardware fails and stalls where a virtual arm never does: nothing recorded is lost, and moving goes on."""
 
-import json
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 

@@ -45,7 +45,7 @@ def check_(
     Parameters
     ----------
     arm
-        virtual, virtual:seed=N, serial:PORT or python:module:callable; ``,spec=arm.toml`` behind it names a calibration.
+        virtual, virtual:seed=N, serial:PORT or python:module:callable; ``,spec=arm.toml`` names a calibration.
     out
         Folder for a page with curves; made where there is none.
     seed

@@ -138,7 +138,7 @@ def looped(path: str, rate: int, seconds: float) -> str:
     middle, last = np.quantile(late, [0.5, 0.99])
     median, p99 = np.quantile(round_trips, [0.5, 0.99])
     return (
-        f"{rate} Hz for {seconds:g} s: missed deadlines {cycle.missed_deadlines}, period off by {middle:.2f} ms at p50, "
-        f"{last:.2f} at p99; round trip {median:.2f} ms at p50, {p99:.2f} at p99; "
+        f"{rate} Hz for {seconds:g} s: missed deadlines {cycle.missed_deadlines}, period off by {middle:.2f} ms at "
+        f"p50, {last:.2f} at p99; round trip {median:.2f} ms at p50, {p99:.2f} at p99; "
         f"{counts.retries} of {counts.requests} requests sent again; load {os.getloadavg()[0]:.1f}{ended}"
     )

@@ -1,16 +1,32 @@
 """One contract for every arm: whatever stands behind the seam, the same may be relied on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
 from pneumarm.arm.seam import checked
+from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.simulation import SimulationArm
 from simple_simulation import simulation
 
+
+def emulated(arm):
+    """Return ``arm`` behind the emulated board."""
+    return SerialArm(BoardLine(EmulatedBoard(arm)), arm.spec)
+
+
+def punctual(parameters):
+    """Return the parameters of an arm whose host is never late: its waits end when they should."""
+    return replace(parameters, jitter=0.0)
+
+
 ARMS = {
+    "emulated": lambda smallest: emulated(VirtualArm(punctual(draw_parameters(7)), seed=1)),
+    "emulated, a user's with two joints": lambda smallest: emulated(smallest(joints=2)),
     "virtual": lambda smallest: VirtualArm(seed=1),
     "virtual, supply of 2 bar": lambda smallest: VirtualArm(preset_parameters("C"), seed=1),
     "virtual, drawn": lambda smallest: VirtualArm(draw_parameters(7), seed=1, name="virtual:seed=7"),
@@ -56,15 +72,17 @@ def test_readings_are_kept_apart(arm):
 
 
 def test_time_advances_by_waiting_and_by_nothing_else(arm):
+    # A controller's clock counts microseconds, which the host maps to its own.
+    tolerance = 2e-6 if isinstance(arm, SerialArm) else 1e-9
     begin = arm.read().time
     arm.set_valves(all_valves(arm, 0))
-    assert arm.read().time == begin
+    assert arm.read().time == pytest.approx(begin, abs=tolerance)
     arm.wait(0.25)
-    assert arm.read().time == pytest.approx(begin + 0.25)
+    assert arm.read().time == pytest.approx(begin + 0.25, abs=tolerance)
     arm.wait(0.0)
-    assert arm.read().time == pytest.approx(begin + 0.25)
+    assert arm.read().time == pytest.approx(begin + 0.25, abs=tolerance)
     arm.wait_until(begin + 0.4)
-    assert begin + 0.4 - 1e-9 <= arm.read().time < begin + 0.42
+    assert begin + 0.4 - tolerance <= arm.read().time < begin + 0.42
     now = arm.read().time
     arm.wait_until(begin)
     assert arm.read().time == now
@@ -160,7 +178,9 @@ def test_closing_closes_the_valves_also_twice_and_after_an_error(arm):
     with pytest.raises(RuntimeError, match="in the middle"):
         fail_while_moving()
     arm.close()
-    if isinstance(arm, VirtualArm):
+    if isinstance(arm, SerialArm):
+        assert not arm.link.line.board.armed
+    elif isinstance(arm, VirtualArm):
         arm.wait(0.1)
         before = arm.pressure
         arm.wait(1.0)

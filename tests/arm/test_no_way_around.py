@@ -23,9 +23,11 @@ SOURCE = Path(pneumarm.__file__).parent
 GUARDED = {
     "arm/guard.py": "the guard itself",
     "arm/corrected.py": "an arm, behind the guard like any other",
+    "arm/serial/board.py": "a controller, which does what it is asked behind the guard",
     "arm/virtual/arm.py": "an arm that sets its own valves on closing and resting",
     "arm/cycle.py": "takes a GuardedArm",
     "gym/on_arm.py": "guards its arm",
+    "control/leaks.py": "guards its arm",
     "checkup/measure.py": "takes a GuardedArm",
     "commands/arm_.py": "guards its arm",
 }

@@ -4,13 +4,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from tests.firmware import wire
+from tests.firmware.chip import FREQUENCY, HIGHEST_COUNT, Change
+from tests.firmware.host import Host
 
 from pneumarm.arm import Arm, ArmSpec, Reading
 from pneumarm.arm.serial import EmulatedBoard
 from pneumarm.arm.serial.protocol import JOINTS, Cause, pack_valves
-from tests.firmware import wire
-from tests.firmware.chip import FREQUENCY, HIGHEST_COUNT, Change
-from tests.firmware.host import Host
 
 SENSORS = 3
 """Of a joint: angle and two pressures."""

@@ -4,15 +4,15 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from tests.arm.serial.table_board import EmulatedChip, TableArm, armed
+from tests.firmware import test_line, test_requests, test_safety, wire
+from tests.firmware.host import SESSION, Host
 
 from pneumarm.arm.serial import EmulatedBoard, board
 from pneumarm.arm.serial.protocol import HIGHEST_COUNT, VELOCITY_SCALE, Cause, Flag
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.arm.virtual.parameters import without_noise
 from pneumarm.errors import UnusableInput
-from tests.arm.serial.table_board import EmulatedChip, TableArm, armed
-from tests.firmware import test_line, test_requests, test_safety, wire
-from tests.firmware.host import SESSION, Host
 
 OF_THE_LINE = {
     "test_frames_split_anywhere",

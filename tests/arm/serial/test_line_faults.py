@@ -1,9 +1,12 @@
 """What must hold when the line, the host or the controller fails: faults injected, consequences measured."""
 
+from collections import deque
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 import pytest
+from tests.arm.serial.wired import Wired, all_valves, wired
 
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.serial import LineFaults
@@ -11,7 +14,6 @@ from pneumarm.arm.serial.arm import BOOT
 from pneumarm.arm.serial.protocol import Cause, Request
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.transitions import Recorded
-from tests.arm.serial.wired import Wired, all_valves, wired
 
 PERIOD = 1 / 30
 
@@ -35,11 +37,9 @@ def in_motion(w: Wired, turns: int = 30) -> None:
 
 def until_failure(w: Wired) -> tuple[float, str]:
     """Go on in the control cycle; return when [s] it failed after now, and why."""
-    begun = w.line.now()
-    cycle = ControlCycle(guarded(w.arm))
+    begun, turns = w.line.now(), ControlCycle(guarded(w.arm)).run(lambda reading: all_valves(w.arm, 1))
     with pytest.raises(ArmFailure) as failed:
-        for _ in cycle.run(lambda reading: all_valves(w.arm, 1)):
-            assert w.line.now() < begun + 5
+        deque(islice(turns, 150), maxlen=0)
     return w.line.now() - begun, str(failed.value)
 
 
@@ -59,7 +59,7 @@ def test_line_that_goes_in_an_episode(w: Wired, fault: str, phase: float) -> Non
     gone = w.line.now()
     setattr(w.line, fault, True)
     w.line.sleep_until(fed + PERIOD)  # the turn under way
-    took, why = until_failure(w)
+    _, why = until_failure(w)
     assert w.line.now() - gone <= 2 * PERIOD + 2e-3
     assert ("gone" if fault == "unplugged" else "not answered") in why
     assert vented_after(w, fed) <= 0.251
@@ -110,7 +110,9 @@ def test_bad_line(w: Wired, faults: str, share: float) -> None:
         steps.append(step)
     assert (w.wire.stale > 0) == (faults != "dropped")
     assert w.wire.stale_applied == 0
-    assert cycle.missed_deadlines <= (0.1 * turns if (faults, share) in (("dropped", 0.5), ("late", 0.5)) else 3)
+    # With half of the frames lost each way a quarter of the attempts is answered: of those there is room for 16.
+    halved = share == 0.5 and faults != "doubled"
+    assert cycle.missed_deadlines <= (0.15 * turns if halved else 3)
     recorded = Recorded.from_steps(steps, w.arm.spec)
     joined = np.diff(recorded.step) == 1
     assert (np.abs(np.diff(recorded.time)[joined] / PERIOD - 1) < 0.5).all()

@@ -8,6 +8,8 @@ from cobs import cobs
 from crc import Calculator, Crc16
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.firmware import wire
+from tests.firmware.mutations import mutated
 
 from pneumarm.arm.serial import protocol
 from pneumarm.arm.serial.protocol import (
@@ -27,8 +29,6 @@ from pneumarm.arm.serial.protocol import (
     unpack_valves,
     unstuff,
 )
-from tests.firmware import wire
-from tests.firmware.mutations import mutated
 
 X25 = Calculator(Crc16.X25)
 KINDS = {**wire.REQUEST, **wire.REPLY}
@@ -84,7 +84,8 @@ def test_stuffing_and_crc_of_all_lengths() -> None:
         for content in (bytes(length), b"\7" * length, bytes(rng.choice((0, 1, 255)) for _ in range(length))):
             assert stuff(content) == cobs.encode(content)
             assert unstuff(stuff(content)) == content
-            assert protocol.crc(content) == X25.checksum(content)
+        if length % 20 == 0:
+            assert protocol.crc(content) == X25.checksum(content) == wire.crc(content)
     for zero in (0, 1, 253, 254, 255, 508, 599):
         content = b"\7" * zero + b"\0" + b"\7" * (599 - zero)
         assert stuff(content) == cobs.encode(content)

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from tests.firmware import wire
+from tests.firmware.mutations import is_request
 
 from pneumarm.arm import Arm
 from pneumarm.arm.serial import BoardLine, EmulatedBoard, FaultyLine, SerialArm
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
-from tests.firmware import wire
-from tests.firmware.mutations import is_request
 
 DELAY = 0.5e-3
 """Time that bytes take each way [s], about that of the real board."""

@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import Arm, Reading
+from pneumarm.arm.seam import Arm, Reading, checked
 from pneumarm.arm.serial.line import Line
 from pneumarm.arm.serial.protocol import (
     DEAD_MAN_MS,
@@ -135,7 +135,7 @@ class EmulatedBoard:
         return b"".join(self._answered(frame) for frame in self._splitter.feed(data))
 
     def _look(self) -> Reading:
-        reading = self.arm.read()
+        reading = checked(self.arm.read(), self.arm.spec)
         self._time = reading.time
         return reading
 

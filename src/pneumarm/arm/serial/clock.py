@@ -9,6 +9,8 @@ STRETCH = 1.0
 """Of the exchanges of a stretch [s] the quickest is kept: its reading is known best."""
 STRETCHES = 30
 """So many stretches tell the rate: a ceramic resonator is off by up to 0.5 %, and drifts with its temperature."""
+SURELY = 1e-4
+"""No exchange is taken to be known better than if it had taken so long [s]."""
 MOST_OFF = 0.02
 """No clock is taken to be wrong by more than this share."""
 
@@ -27,7 +29,7 @@ class ControllerClock:
 
     The reading of an exchange was made between sending the request and receiving the reply; the quicker the
     exchange, the better its time is known. A straight line through the quickest of each second gives rate and
-    offset. Mapped times never go back.
+    offset, each weighing by its quickness. Mapped times never go back.
     """
 
     def __init__(self) -> None:
@@ -70,10 +72,13 @@ class ControllerClock:
             kept[-1] = exchange
         else:
             return
-        n = len(kept)
-        controller, host = sum(e.controller for e in kept) / n, sum(e.host for e in kept) / n
-        spread = sum((e.controller - controller) ** 2 for e in kept)
-        together = sum((e.controller - controller) * (e.host - host) for e in kept)
-        rate = together / spread if spread > STRETCH**2 / 4 else 1.0
+        # The middle is wrong by up to half a round trip: each weighs as much as it is known.
+        weights = [1 / max(e.round_trip, SURELY) ** 2 for e in kept]
+        total = sum(weights)
+        controller = sum(w * e.controller for w, e in zip(weights, kept, strict=True)) / total
+        host = sum(w * e.host for w, e in zip(weights, kept, strict=True)) / total
+        spread = sum(w * (e.controller - controller) ** 2 for w, e in zip(weights, kept, strict=True)) / total
+        together = sum(w * (e.controller - controller) * (e.host - host) for w, e in zip(weights, kept, strict=True))
+        rate = together / total / spread if spread > STRETCH**2 / 64 else 1.0
         self.rate = min(max(rate, 1 - MOST_OFF), 1 + MOST_OFF)
         self._origin = (controller, host)

@@ -56,15 +56,19 @@ class Pace:
 
     def answered(self, round_trip: float, took: float, attempts: int) -> None:
         """Learn from an answer, ``round_trip`` [s] after its attempt and ``took`` [s] after the first of them all."""
+        if round_trip <= self._longest:  # nobody would wait for one that is slower
+            self._learn(round_trip)
+        self._slowest = max(took, _FORGETS * self._slowest)
+        kept = max(1 - attempts / _REMEMBERED, 0.0)
+        self._attempts = kept * self._attempts + attempts
+        self._answered = kept * self._answered + 1
+
+    def _learn(self, round_trip: float) -> None:
         if self._round_trip is None:
             self._round_trip, self._deviation = round_trip, round_trip / 2
         error = round_trip - self._round_trip
         self._round_trip += _MEAN * error
         self._deviation += _DEVIATION * (abs(error) - self._deviation)
-        self._slowest = max(took, _FORGETS * self._slowest)
-        kept = max(1 - attempts / _REMEMBERED, 0.0)
-        self._attempts = kept * self._attempts + attempts
-        self._answered = kept * self._answered + 1
 
     def hopeless(self, silence: float, attempts: int) -> bool:
         """Return whether a link is gone that gave no answer to ``attempts`` in a ``silence`` [s]."""

@@ -6,9 +6,9 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-import serial
 from serial.tools import list_ports
 
+import serial
 from pneumarm.arm.serial.line import Line
 from pneumarm.arm.serial.protocol import BAUD
 from pneumarm.errors import UnusableInput

@@ -72,6 +72,10 @@ COMMANDS = {
         "Click every valve, one by one, saying which; before the air is on.",
         "pneumarm arm valves virtual",
     ),
+    "arm emulate": (
+        "Serve a virtual arm behind an emulated microcontroller and serial port, in real time.",
+        "pneumarm arm emulate virtual:seed=7 --link arm.port",
+    ),
     "taguchi analyse": (
         "Analyse a table of trials and runs by the design that they were made with.",
         "pneumarm taguchi analyse results.csv --goal larger --design design.toml --out analysis",
@@ -94,7 +98,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 _groups = {
-    "arm": App(name="arm", help="Check an arm, calibrate it, try its valves."),
+    "arm": App(name="arm", help="Check an arm, calibrate it, try its valves; emulate one."),
     "taguchi": App(name="taguchi", help="Design of experiments."),
 }
 for _group in _groups.values():

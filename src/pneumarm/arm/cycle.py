@@ -1,6 +1,7 @@
 """The control cycle of thesis section 2.4.3 on any arm, and bringing the arm to rest at a random begin state."""
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from time import monotonic
 from typing import NamedTuple
@@ -72,7 +73,7 @@ class ControlCycle:
                     valves, raised = arm.applied, error
                 if valves is None:
                     yield Step(reading, None)
-                    return
+                    break
                 late = self._lateness(reading) if monotonic() - began > period else 0.0
                 if latency:
                     arm.wait(latency)
@@ -85,7 +86,14 @@ class ControlCycle:
                 self.applied = arm.applied
                 yield Step(reading, arm.applied)
                 arm.wait_until(due)
-        finally:
+        except Exception:
+            with suppress(PneumarmError, OSError):  # the first failure is the one to tell of
+                arm.set_valves(closed)
+            raise
+        except BaseException:
+            arm.set_valves(closed)
+            raise
+        else:
             arm.set_valves(closed)
 
     def _lateness(self, reading: Reading) -> float:

@@ -1,6 +1,8 @@
-"""``pneumarm arm check``, ``calibrate`` and ``valves``."""
+"""``pneumarm arm check``, ``calibrate``, ``valves`` and ``emulate``."""
 
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -45,7 +47,7 @@ def check_(
     Parameters
     ----------
     arm
-        virtual, virtual:seed=N or python:module:callable; ``,spec=arm.toml`` behind it names a calibration.
+        virtual, virtual:seed=N, serial:PORT or python:module:callable; ``,spec=arm.toml`` names a calibration.
     out
         Folder for a page with curves; made where there is none.
     seed
@@ -124,7 +126,7 @@ def calibrate_(
     Parameters
     ----------
     arm
-        virtual, virtual:seed=N or python:module:callable.
+        virtual, virtual:seed=N, serial:PORT or python:module:callable.
     out
         File to write, arm.toml.
     angles
@@ -211,7 +213,7 @@ def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Jso
     Parameters
     ----------
     arm
-        virtual, virtual:seed=N or python:module:callable.
+        virtual, virtual:seed=N, serial:PORT or python:module:callable.
     open_for
         How long each is open [s].
     pause
@@ -238,3 +240,39 @@ def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Jso
                 guard.set_valves(closed)
                 guard.wait(pause)
     show({"clicked": clicked}, json, lambda: [table(("valve", "opened"), [list(c.values()) for c in clicked])])
+
+
+def emulate_(arm: str, /, *, link: Path | None = None, seed: int = 0, json: Json = False) -> None:
+    """Serve a virtual arm behind an emulated microcontroller and serial port, in real time, until interrupted.
+
+    ``serial:PATH``, with the path that it prints, names this arm on every other command line, as a real one would be
+    named by its port. It answers by the same protocol as the firmware, with the same dead-man and limits.
+
+    Parameters
+    ----------
+    arm
+        virtual or virtual:seed=N, with ,faults=PLAN.toml if you like.
+    link
+        Path of a symbolic link to the port, for a name that stays the same; removed in the end.
+    seed
+        Of the arm's noise.
+    json
+        Print one JSON object on stdout, once the port can be used, and nothing else there.
+    """
+    from pneumarm.arm.serial.emulate import serve
+
+    opened = open_arm(arm, seed)
+    if opened.get_state() is None:
+        opened.close()
+        raise UnusableInput(f"arm {arm!r}: expected a virtual arm, whose time passes only when it is asked to")
+
+    def tell(path: str) -> None:
+        say(f"{arm} is at serial:{path}, until Ctrl-C")
+        if json:
+            show({"port": path, "arm": f"serial:{path}"}, json, list)
+        else:
+            print(path)
+        sys.stdout.flush()
+
+    with suppress(KeyboardInterrupt):  # that is how it is meant to end
+        serve(opened, tell, link=link)

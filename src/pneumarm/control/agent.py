@@ -7,6 +7,7 @@ from pneumarm.arm.seam import Reading, checked
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Actor, AnyAgent, StateTracker
+from pneumarm.transitions.watch import made_up_readings
 
 
 class AgentController:
@@ -56,3 +57,22 @@ class AgentController:
         state = self._tracker.push(reading.time, reading.angle, reading.pressure)
         self.actor.observe(reward, state, terminal)
         self._seen = reading.time
+
+
+def warm_up(agent: AnyAgent, learning_rate: float = 0.0, explores: bool = False) -> None:
+    """Have a controller of ``agent`` of its own make some turns with made-up readings, and learn from them.
+
+    The first turns of a kind of agent compile or load its kernels, for up to seconds; an arm that moves would have
+    been vented by its dead-man by then.
+    """
+    actor = agent.actor(learning_rate, explores=explores)
+    controller = AgentController(agent, actor)
+    controller.reset(agent.goal_range.mean(axis=1))
+    first, *others = made_up_readings(agent.spec)
+    valves = controller.act(first)
+    for reading in others:
+        controller.observe(reading, valves, np.full(agent.spec.joints, -1.0), False)
+        valves = controller.act(reading)
+    controller.reset(agent.goal_range.mean(axis=1))
+    for reading in (first, *others):
+        controller.act(reading)

@@ -1,15 +1,21 @@
 """One movement on an arm: from where it stands to a goal, counted as the thesis counts an episode (5.1, 5.2)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import ControlCycle, Controller, Reading
+from pneumarm.arm import ControlCycle, Controller, Reading, Step
 from pneumarm.learning import Reward
-from pneumarm.transitions.rows import Recorded
+from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.watch import Watch, watched
+
+MOVEMENT = "episode"
+"""Kind of the sequence that a movement is."""
+BROKEN = "broken episode"
+"""Kind of one that broke off, with the arm or the link."""
 
 
 @runtime_checkable
@@ -59,6 +65,7 @@ def move(
     reward: Reward,
     cutoff: int = 100,
     watch: Watch | None = None,
+    broken: Callable[[Recorded], None] | None = None,
 ) -> Movement:
     """Move the arm, at rest with closed valves, until ``goal`` is reached or the movement is cut off.
 
@@ -69,12 +76,20 @@ def move(
         reward: what is paid for an action, and when the goal is reached.
         cutoff: actions after which a movement that has not reached its goal ends (thesis section 5.4.2: 100).
         watch: sees every reading, such as a :class:`~pneumarm.control.Monitor`.
+        broken: given what there is of a movement that breaks off, of the kind :data:`BROKEN`, before that is raised.
 
     """
+
+    def keep(steps: list[Step], why: BaseException) -> None:
+        info = {"goal": count.goal.tolist()}
+        recorded = broken_off(steps, cycle.arm.spec, why, kind=BROKEN, at_rest=True, info=info)
+        if recorded is not None and broken is not None:
+            broken(recorded)
+
     count = _Count(cycle, controller, np.asarray(goal, np.float64), reward, cutoff)
     controller.reset(count.goal)
-    steps = watched(cycle.run(count.decide), watch, at_rest=True)
-    recorded = Recorded.from_steps(steps, cycle.arm.spec, kind="episode", at_rest=True)
+    steps = watched(cycle.run(count.decide), watch, at_rest=True, broken=keep)
+    recorded = Recorded.from_steps(steps, cycle.arm.spec, kind=MOVEMENT, at_rest=True)
     return Movement(count.goal, len(steps) - 1, count.switches, count.total, count.success, count.velocity, recorded)
 
 

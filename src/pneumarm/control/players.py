@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pneumarm.arm import Arm, Controller
-from pneumarm.control.agent import AgentController
+from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
@@ -36,6 +36,7 @@ def open_controller(name: str, arm: Arm) -> Iterator[Controller | None]:
     else:
         agent = open_agent(Path(name))
         check_fit(agent, arm)
+        warm_up(agent)
         yield AgentController(agent)
 
 

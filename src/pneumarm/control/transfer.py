@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -11,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
-from pneumarm.control.agent import AgentController
+from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.monitor import Finding, Monitor
-from pneumarm.control.movement import Movement, move
+from pneumarm.control.movement import MOVEMENT, Movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder, write_text
@@ -21,7 +22,9 @@ from pneumarm.learning import AdaptationSettings, AnyAgent, adaptation, fingerpr
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
+from pneumarm.transitions.store import SequenceEntry
 from pneumarm.transitions.watch import keep_watch
+from pneumarm.transitions.watch import warm_up as warm_up_watch
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
@@ -194,7 +197,7 @@ def transfer(
     """
     check_fit(agent, arm)
     number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": fingerprint(agent)})
-    stored = [dict(entry.info) for entry in store.catalogue(number)]
+    stored = [dict(entry.info) for entry in _movements(store, number)]
     squares = [info.pop(_SQUARES) for info in stored if _SQUARES in info]
     done = [Episode(**info) for info in stored]
     arm_state = store.state("arm")
@@ -212,12 +215,18 @@ def transfer(
             adapting.set_state(store.state("adaptation") or adapting.get_state())
     elif keep_version is not None and adapting is not None:
         keep_version(0, agent)
+    task = agent.settings
     total = sum(settings.movements(phase) for phase in PHASES)
     cycle = ControlCycle(guarded(arm), settings.close_while_computing)
     waiting: list[Recorded] = []
+    broken: list[Recorded] = []
     watch = watch or Monitor(arm.spec, getattr(agent, "simulation", None))  # not every kind of agent keeps one
     if adapting is not None:
         watch.judge_by(adapting.agent.simulation)
+    warm_up_watch(watch, arm.spec)
+    warm_up(agent)
+    if agent.learns:
+        warm_up(agent, rate, explores=True)
     if done and (seen := store.state("watch")) is not None:
         watch.set_state(seen)
 
@@ -227,9 +236,16 @@ def transfer(
         keep_watch(store, watch, number)
         if adapting is not None:
             state["adaptation"] = adapting.get_state()
-        recorded = [replace(one, marks=watch.marks(one)) for one in waiting]
+        recorded = [replace(one, marks=(*watch.marks(one), *one.marks)) for one in waiting]
         store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
         waiting.clear()
+
+    def keep_rest() -> None:
+        """Keep what waits, and nothing twice: a signal may have come between keeping and forgetting it."""
+        kept = max(len(waiting) - (len(done) - len(_movements(store, number))), 0)
+        waiting[:] = [*waiting[kept:], *broken]
+        if waiting:
+            keep()
 
     def note(phase: Phase, movement: Movement) -> None:
         """Keep what came of a movement, and let the agent take notice of it."""
@@ -248,7 +264,7 @@ def transfer(
         if adapting is None or not adapts or not adapting.is_due():
             return
         keep()  # it learns from what is stored, so that an interruption changes nothing
-        made = [entry.number for entry in store.catalogue(number)][-adapting.usable :]
+        made = [entry.number for entry in _movements(store, number)][-adapting.usable :]
         blocks = list(store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
         if blocks and adapting.learn(joined(blocks)):
             watch.judge_by(adapting.agent.simulation)
@@ -278,7 +294,7 @@ def transfer(
                     controller = AgentController(moving)
                 random, goal = begin_and_goal(agent, seed, greedy, i)
                 BEGIN.reach(cycle.arm, random)
-                movement = move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff, watch)
+                movement = move(cycle, controller, goal, task.reward, task.cutoff, watch, broken.append)
                 if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * count:
                     mean.add(learner.weights())
                 note(phase, movement)
@@ -286,9 +302,12 @@ def transfer(
                     keep()
                 if progress is not None:
                     progress(len(done), total)
-    except PneumarmError:
-        raise
-    except Exception as error:
+    except BaseException as error:
+        if arm.get_state() is None:  # no arm can make these movements again
+            with suppress(Exception):  # the first failure is the one to tell of
+                keep_rest()
+        if isinstance(error, PneumarmError) or not isinstance(error, Exception):
+            raise
         raise ArmFailure(
             f"{arm.spec.name}: failed in movement {len(done) + 1} ({type(error).__name__}: {error}); "
             "see to the arm and run the same command again"
@@ -297,6 +316,11 @@ def transfer(
     if adapting is not None:
         adapted = Adapted(adapting.version, adapting.quantities, np.array(squares), adapting.events)
     return Transferred(done, shown(), rate, adapted, tuple(watch.findings))
+
+
+def _movements(store: Store, run: int) -> list[SequenceEntry]:
+    """Return the movements of ``run`` that were finished, in order."""
+    return [entry for entry in store.catalogue(run) if entry.kind == MOVEMENT]
 
 
 _SQUARES = "squares"  # place of a movement's errors beside its figures in the store

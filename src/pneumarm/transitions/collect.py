@@ -26,15 +26,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.controller import Controller
-from pneumarm.arm.cycle import BeginState, ControlCycle
+from pneumarm.arm.cycle import BeginState, ControlCycle, Step
 from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, Reading
 from pneumarm.arm.valves import ACTIONS, to_valves
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.transitions.players import Trajectory
-from pneumarm.transitions.rows import Recorded
+from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.store import Store
-from pneumarm.transitions.watch import Watch, keep_watch, watched
+from pneumarm.transitions.watch import Watch, keep_watch, warm_up, watched
 
 KINDS = ("zero-velocity", "velocity", "controller")
 """Kinds of the sequences made here."""
@@ -153,8 +153,9 @@ def collect(
 
     Raises:
         UnusableInput: fewer than 2,000 transitions, another arm or other settings than the store was begun with.
-        ArmFailure: the arm failed; what was stored before stays, the sequence that it failed in is not stored.
-            Or something has been wrong for several sequences.
+        ArmFailure: the arm failed, or something has been wrong for several sequences; what was stored before stays.
+            The sequence that it failed in is not stored of an arm with a state, which can make it again; of one
+            without, such as hardware, all of it that was read is, its last row marked.
 
     """
     settings = settings or CollectSettings()
@@ -167,11 +168,23 @@ def collect(
     guard = guarded(arm)
     if watch is not None and number and (seen := store.state("watch")) is not None:
         watch.set_state(seen)
+    if watch is not None:
+        warm_up(watch, arm.spec)
     wrong = 0
+
+    def keep_broken(recorded: Recorded) -> None:
+        """Store what there is of a sequence that no arm can make again."""
+        state = {"collect": json.dumps(asdict(tally)).encode()}
+        if watch is not None:
+            recorded = replace(recorded, marks=(*watch.marks(recorded), *recorded.marks))
+            keep_watch(store, watch, run)
+            state["watch"] = watch.get_state()
+        store.append(recorded, state)
+
     try:
         while done < transitions:
             random = np.random.default_rng([seed, number])
-            recorded = _sequence(guard, tally, settings, random, controller, goals, watch)
+            recorded = _sequence(guard, tally, settings, random, controller, goals, watch, keep_broken)
             state = {"collect": json.dumps(asdict(tally)).encode()}
             if (arm_state := guard.get_state()) is not None:
                 state["arm"] = arm_state
@@ -262,6 +275,7 @@ def _sequence(
     controller: Controller | None,
     goals: ArrayLike | None,
     watch: Watch | None,
+    keep_broken: Callable[[Recorded], None],
 ) -> Recorded:
     """Bring the arm to a begin state, carry out one sequence, and return what was read."""
     interventions = arm.interventions
@@ -283,7 +297,13 @@ def _sequence(
     def decide(reading: Reading) -> NDArray[np.int8] | None:
         return None if next(remaining, None) is None else actor.act(reading)
 
-    steps = watched(cycle.run(decide), watch, at_rest=True)
+    def broken(steps: list[Step], why: BaseException) -> None:
+        recorded = broken_off(steps, arm.spec, why, kind=kind, at_rest=True, info=info)
+        if recorded is not None and arm.get_state() is None:
+            with suppress(Exception):  # the first failure is the one to tell of
+                keep_broken(recorded)
+
+    steps = watched(cycle.run(decide), watch, at_rest=True, broken=broken)
     tally.add(arm, arm.interventions - interventions, cycle.missed_deadlines, steps[-1].reading.time - start)
     return Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info)
 

@@ -1,7 +1,7 @@
 """Rows of the store as arrays: what was measured, raw, and what was commanded, in order of time."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from pneumarm.errors import UnusableInput
 
 LONGEST_REASON = 1000
 """Most characters of a mark's reason."""
+_SHORTEST = 2  # rows of a sequence: fewer hold no transition
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,27 @@ class Recorded:
 
     def __len__(self) -> int:
         return len(self.time)
+
+
+def broken_off(
+    steps: Sequence[Step],
+    spec: ArmSpec,
+    why: BaseException,
+    *,
+    kind: str,
+    at_rest: bool = False,
+    info: Mapping[str, Any] | None = None,
+) -> Recorded | None:
+    """Return what there is of a sequence that broke off, its last row marked with ``why``; None where it is nothing.
+
+    The rows before the last were read, and their valves acknowledged, while all was well.
+    """
+    if len(steps) < _SHORTEST:
+        return None
+    recorded = Recorded.from_steps(steps, spec, kind=kind, at_rest=at_rest, info=info)
+    last = int(recorded.step[-1])
+    reason = f"broke off here: {str(why) or type(why).__name__}"[:LONGEST_REASON]
+    return replace(recorded, marks=(Mark(last, last, reason),))
 
 
 def rows_of(recorded: Recorded, sequence: int = 0) -> Rows:

@@ -1,13 +1,14 @@
 """What watches an arm while it is recorded, and marks what nothing may be learned from."""
 
-from collections.abc import Iterator
+import copy
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.cycle import Step
-from pneumarm.arm.seam import Reading
+from pneumarm.arm.seam import ArmSpec, Reading
 from pneumarm.transitions.rows import Mark, Recorded
 from pneumarm.transitions.store import Store
 
@@ -34,16 +35,46 @@ class Watch(Protocol):
         """Take up a state of ``get_state``."""
 
 
-def watched(steps: Iterator[Step], watch: Watch | None, *, at_rest: bool) -> list[Step]:
-    """Return all ``steps`` of a control cycle, each seen by ``watch`` as it happens."""
-    if watch is None:
-        return list(steps)
-    watch.begin(at_rest=at_rest)
+def watched(
+    steps: Iterator[Step],
+    watch: Watch | None,
+    *,
+    at_rest: bool,
+    broken: Callable[[list[Step], BaseException], None] | None = None,
+) -> list[Step]:
+    """Return all ``steps`` of a control cycle, each seen by ``watch`` as it happens.
+
+    ``broken`` is given the steps that there were where the cycle breaks off, and why, before that is raised.
+    """
+    if watch is not None:
+        watch.begin(at_rest=at_rest)
     seen: list[Step] = []
-    for step in steps:
-        watch.see(step.reading, step.valves)
-        seen.append(step)
+    try:
+        for step in steps:
+            if watch is not None:
+                watch.see(step.reading, step.valves)
+            seen.append(step)
+    except BaseException as error:
+        if broken is not None:
+            broken(seen, error)
+        raise
     return seen
+
+
+def warm_up(watch: Watch, spec: ArmSpec) -> None:
+    """Have a copy of ``watch`` see made-up readings: nothing is to be compiled while an arm waits for its valves."""
+    rehearsing = copy.deepcopy(watch)
+    rehearsing.begin(at_rest=True)
+    closed = np.zeros((spec.joints, 2), np.int8)
+    for reading in made_up_readings(spec):
+        rehearsing.see(reading, closed)
+
+
+def made_up_readings(spec: ArmSpec, count: int = 4) -> list[Reading]:
+    """Return ``count`` readings of an arm that stands still in the middle, half full."""
+    angle = np.full(spec.joints, sum(spec.angle_range) / 2)
+    pressure = np.full((spec.joints, 2), spec.max_pressure_counts / 2)
+    return [Reading(k * spec.period, angle.copy(), pressure.copy()) for k in range(count)]
 
 
 def keep_watch(store: Store, watch: Watch, run: int) -> int:

@@ -6,9 +6,9 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-import serial
 from serial.tools import list_ports
 
+import serial
 from pneumarm.arm.serial.line import Line
 from pneumarm.arm.serial.protocol import BAUD
 from pneumarm.errors import UnusableInput
@@ -105,7 +105,7 @@ def _holder(path: str) -> str | None:
         return None
     held = _locked_by(wanted)
     # The program behind a pseudo-terminal has it open too, and is its other end.
-    if held is None and not path.startswith("/dev/pts/"):
+    if held is None and not os.path.realpath(path).startswith("/dev/pts/"):
         held = _opened_by(wanted)
     if held is None:
         return None

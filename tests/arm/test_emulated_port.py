@@ -1,0 +1,123 @@
+"""An emulated board behind a serial port, in real time: the command, the driver, and the whole way to movements."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any, TypeVar
+
+import numpy as np
+import pytest
+
+from pneumarm.arm import open_arm
+from pneumarm.arm.serial.emulate import serve
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.control import Monitor, TransferSettings, transfer_into
+from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.learning import Agent
+from pneumarm.run import Run
+from pneumarm.transitions import CollectBegin, CollectResult, CollectSettings, Store, collect
+from small import SMALL
+
+Result = TypeVar("Result")
+START = "from pneumarm.cli import main; main()"
+
+
+@contextmanager
+def port(link: Path, arm: str = "virtual:seed=3") -> Iterator[subprocess.Popen[str]]:
+    """Serve ``arm`` at ``link`` by the command; the port can be used within the block."""
+    command = [sys.executable, "-c", START, "arm", "emulate", arm, "--link", str(link), "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            told = process.stdout.readline()
+            assert told, process.communicate()[1]
+            assert json.loads(told) == {"port": str(link), "arm": f"serial:{link}"}
+            yield process
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(10)
+
+
+def test_an_arm_is_served_until_it_is_interrupted_and_leaves_nothing(tmp_path: Path) -> None:
+    link = tmp_path / "arm.port"
+    link.symlink_to("/dev/pts/nobody")  # of one who was killed
+    with port(link) as process:
+        for _ in range(2):  # who comes second finds it as the first one did
+            with open_arm(f"serial:{link}") as arm:
+                begin, began = arm.read(), monotonic()
+                arm.set_valves(np.array([[1, 0]], np.int8))
+                arm.wait(0.5)
+                later, passed = arm.read(), monotonic() - began
+                assert later.time - begin.time == pytest.approx(passed, abs=0.1)
+                assert later.pressure[0, 0] > begin.pressure[0, 0] + 20
+            sleep(0.05)
+    assert process.returncode == 0
+    assert not os.path.lexists(link)
+
+
+def test_what_cannot_be_served_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    with pytest.raises(UnusableInput, match="cannot be made a link"):
+        serve(VirtualArm(seed=1), pytest.fail, link=tmp_path / "mine")
+    assert (tmp_path / "mine").read_text() == "mine"
+    command = [sys.executable, "-c", START, "arm", "emulate", "emulated:virtual"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "expected a virtual arm" in done.stderr
+
+
+def test_collecting_and_moving_in_real_time(small_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Two minutes, the least that is allowed, would be too long for a test.
+    monkeypatch.setattr(sys.modules["pneumarm.transitions.collect"], "FEWEST_TRANSITIONS", 120)
+    quick = CollectSettings(actions=60, begin=CollectBegin(deflate=0.3, inflate=0.3, settle=0.3))
+    agent = Agent.load(small_run / "agent.safetensors")
+    link = tmp_path / "arm.port"
+    settings = TransferSettings(episodes=0, test_episodes=1)
+
+    def collected() -> CollectResult:
+        with open_arm(f"serial:{link}") as arm, Store.for_arm(tmp_path / "arm.db", arm.spec) as store:
+            result = collect(arm, store, 120, settings=quick, watch=watch)
+            store.check()
+            return result
+
+    def moved() -> dict[str, Any]:
+        with open_arm(f"serial:{link}") as arm:
+            return transfer_into(tmp_path / "moved", agent, arm, settings, seed=1)
+
+    with port(link):
+        with open_arm(f"serial:{link}") as arm:
+            watch = Monitor(arm.spec)
+        assert persistent(collected).transitions >= 120
+        assert watch.findings == []
+        result = persistent(moved)
+        assert [result[phase]["episodes"] for phase in ("before", "after")] == [1, 1]
+
+
+def persistent(job: Callable[[], Result], tries: int = 10) -> Result:
+    """Do ``job``; again where this computer was too busy for the dead-man of a quarter of a second."""
+    for _ in range(tries):
+        try:
+            return job()
+        except ArmFailure as error:
+            if "too busy" not in str(error) and "has not answered" not in str(error):
+                raise
+    raise AssertionError(f"this computer was too busy {tries} times")
+
+
+@pytest.mark.soak
+def test_the_whole_job_in_real_time(tmp_path: Path) -> None:
+    with port(tmp_path / "arm.port"):
+        transfer = TransferSettings(episodes=12, test_episodes=6)
+        settings = replace(SMALL, arm=f"serial:{tmp_path / 'arm.port'}", transitions=2_000, transfer=transfer)
+        results = persistent(lambda: Run(tmp_path / "run", settings).do())
+    assert results["collect"]["transitions"] >= 2_000
+    assert results["transfer"]["after"]["episodes"] == 6
+    assert "is no virtual arm" in results["bound"]["missing"]
+    assert (tmp_path / "run" / "report.html").exists()

@@ -1,0 +1,107 @@
+"""pneumarm's own driver on the unmodified firmware, in lock-step: what holds of any arm holds of this one."""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pneumarm.arm import ControlCycle, guarded
+from pneumarm.arm.seam import checked
+from pneumarm.arm.serial import SerialArm
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.control import Monitor, TransferSettings, transfer
+from pneumarm.errors import ArmFailure
+from pneumarm.learning import Agent
+from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
+from tests.firmware.board import SimulatedBoard, single_conversions
+from tests.firmware.build import missing
+from tests.firmware.line import SimulatedLine
+
+pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+LONGEST_EXCHANGE = 2e-3
+"""Time that a request may take on the board's clock [s]."""
+
+
+@pytest.fixture
+def arm() -> Iterator[SerialArm]:
+    """Give arm 3 behind the real firmware."""
+    inner = single_conversions(VirtualArm(draw_parameters(3)), seed=1)
+    with SerialArm(SimulatedLine(SimulatedBoard(inner)), replace(inner.spec, name="firmware")) as arm:
+        yield arm
+
+
+def every(value: int) -> NDArray[np.int8]:
+    return np.full((1, 2), value, np.int8)
+
+
+def test_time_passes_by_waiting_and_a_little_by_asking(arm: SerialArm) -> None:
+    begin = checked(arm.read(), arm.spec).time
+    assert begin < arm.read().time < begin + 2 * LONGEST_EXCHANGE
+    arm.wait_until(begin + 0.4)
+    assert begin + 0.4 <= arm.read().time < begin + 0.4 + 2 * LONGEST_EXCHANGE
+
+
+def test_each_muscle_obeys_its_own_valve_and_holds(arm: SerialArm) -> None:
+    for muscle in range(2):
+        arm.set_valves(every(-1))
+        arm.wait(1.5)
+        valves = every(0)
+        valves[0, muscle] = 1
+        before = arm.read()
+        arm.set_valves(valves)
+        arm.wait(0.4)  # longer than the dead-man waits
+        after = arm.read()
+        change = (after.pressure - before.pressure)[0]
+        assert change[muscle] > 30
+        assert np.argmax(change) == muscle
+        assert np.sign(after.angle - before.angle)[0] == (1 if muscle == 0 else -1)
+        arm.set_valves(every(0))
+        arm.wait(0.3)
+        assert arm.read().pressure[0, muscle] == pytest.approx(after.pressure[0, muscle], abs=12)
+
+
+@pytest.mark.parametrize("rate", [30, 100])
+def test_the_cycle_keeps_its_period(arm: SerialArm, rate: int) -> None:
+    arm.spec = replace(arm.spec, period=1 / rate)
+    cycle, turns = ControlCycle(guarded(arm)), iter(range(rate))
+    steps = list(cycle.run(lambda reading: None if next(turns, None) is None else every(0)))
+    times = np.array([step.reading.time for step in steps])
+    assert len(times) == rate + 1
+    assert times - times[0] == pytest.approx(np.arange(rate + 1) / rate, abs=LONGEST_EXCHANGE)
+    assert cycle.missed_deadlines == 0
+
+
+def test_an_arm_that_nobody_moved_is_vented_and_made_ready(arm: SerialArm) -> None:
+    assert arm.get_state() is None
+    arm.set_valves(every(1))
+    board = arm._line.board  # type: ignore[attr-defined]
+    board.wait(0.3)
+    assert board.chip.valve_pins == 0
+    with pytest.raises(ArmFailure, match="heard nothing for a quarter of a second"):
+        arm.set_valves(every(1))
+    arm.make_ready()
+    arm.set_valves(every(1))
+    assert board.chip.valve_pins != 0
+
+
+def test_collecting_and_moving(
+    arm: SerialArm, small_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Two minutes, the least that is allowed, would be too long for a test.
+    monkeypatch.setattr(sys.modules["pneumarm.transitions.collect"], "FEWEST_TRANSITIONS", 120)
+    quick = CollectSettings(actions=60, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.3))
+    watch = Monitor(arm.spec)
+    agent = Agent.load(small_run / "agent.safetensors")
+    with Store.for_arm(tmp_path / "arm.db", arm.spec) as store:
+        collected = collect(arm, store, 120, settings=quick, watch=watch)
+        settings = TransferSettings(episodes=0, test_episodes=1)
+        moved = transfer(agent, arm, store, settings, seed=1)
+        store.check()
+    assert (collected.transitions, collected.missed_deadlines) == (120, 0)
+    assert watch.findings == []
+    assert len(moved.episodes) == 2
+    assert all(episode.success or episode.actions == agent.settings.cutoff for episode in moved.episodes)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pneumarm.arm.seam import ArmSpec, Reading
 from pneumarm.arm.serial.arm import SerialArm
 from pneumarm.arm.serial.line import Line
-from pneumarm.arm.serial.link import GIVE_UP, Answer, Link
+from pneumarm.arm.serial.link import Answer, Link
 from pneumarm.arm.serial.protocol import SEQUENCES, Reply, Request, encode
 
 _SOON = 0.004  # s; a controller answers within 2 ms
@@ -21,10 +21,10 @@ class HeadlessLink(Link):
     """Readings for which the last ones were taken again."""
     _last: Answer | None = None
 
-    def ask(self, request: Request, *values: int, give_up: float = GIVE_UP) -> Answer:
+    def ask(self, request: Request, *values: int) -> Answer:
         """Return what came, or what came before."""
         if request is not Request.READ or self._last is None:
-            answer = super().ask(request, *values, give_up=give_up)
+            answer = super().ask(request, *values)
             if request is Request.READ:
                 self._last = answer
             return answer

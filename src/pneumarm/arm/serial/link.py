@@ -10,6 +10,8 @@ from pneumarm.errors import ArmFailure
 
 GIVE_UP = DEAD_MAN_MS / 1e3
 """Silence after which any link is lost [s]: by then the controller has vented the arm by itself."""
+MOMENT = 1e-9
+"""Times closer than this [s] are the same: a clock that is computed may end a step of its numbers early."""
 _ADVICE = f"it vents all muscles by itself after {GIVE_UP:g} s. Look at plug and power"
 
 
@@ -138,7 +140,7 @@ class Link:
                     answer = Answer(reply, sent[reply.sequence], received)
                 else:
                     self.counts.foreign += 1
-            if answer is not None or received >= until:
+            if answer is not None or received >= until - MOMENT:
                 return answer
 
     def lose(self, why: str) -> ArmFailure:

@@ -3,6 +3,7 @@
 Collecting and fitting belong to an arm (:func:`prepared`), training and moving to a row (:func:`trained_and_moved`).
 """
 
+import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
@@ -24,6 +25,10 @@ from pneumarm.simulation.quality import propagation
 from pneumarm.transitions import KINDS, QUANTITIES, CollectSettings, Store, collect
 from pneumarm.transitions.choice import joined
 
+ARMS = tuple(f"virtual:seed={number}" for number in range(1, 6))
+"""Arms by default: five to develop on; those to judge on are ``virtual:seed=1001`` to ``1010``."""
+TRANSITIONS = 40_000
+"""Transitions of a simulation, at most as many as the laboratory's: 22 minutes on the arm."""
 MOVEMENTS = 200
 """Movements on the arm that a row is judged by, at most as many as test episodes."""
 BEFORE = "in simulation: "
@@ -31,11 +36,6 @@ BEFORE = "in simulation: "
 AFTER_A_SECOND = " after a second"
 _FEWEST = 2_000  # transitions that can be fitted
 _FIGURES = "figures.json"
-
-
-def settings_of(train: TrainSettings) -> dict[str, object]:
-    """Return ``train`` as JSON."""
-    return dict(json.loads(json.dumps(asdict(train))))
 
 
 def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:
@@ -93,6 +93,8 @@ class Prepared:
 
     arm: str
     recipe: Recipe
+    folder: Path
+    """Where the store and the simulation lie on the machine that made them."""
     simulation: Simulation
     begin: BeginStates
     figures: Figures
@@ -100,14 +102,14 @@ class Prepared:
 
 
 def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySettings, progress: Report) -> Prepared:
-    """Return what ``recipe`` makes of ``arm``, making it in ``folder`` where it is missing; resumable.
+    """Return what ``recipe`` makes of ``arm``, making it where the arm's ``folder`` does not hold it; resumable.
 
     Raises:
-        UnusableInput: no arm has this name, or the folder was begun with other settings.
+        UnusableInput: no arm has this name.
 
     """
     fit = replace(recipe.fit, seed=settings.seed)
-    claim(folder, {"arm": arm, "seed": settings.seed, "recipe": asdict(recipe)})
+    folder = place(folder, {"arm": arm, "seed": settings.seed, "recipe": asdict(recipe)})
     if not (folder / _FIGURES).exists():
         transitions, minutes = collected(folder / STORE, arm, settings.seed, recipe, progress)
         with Store.open(folder / STORE) as store:
@@ -119,7 +121,14 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
     with Store.open(folder / STORE) as store:
         begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
     found = json.loads((folder / _FIGURES).read_text(encoding="utf-8"))
-    return Prepared(arm, recipe, simulation, begin, found)
+    return Prepared(arm, recipe, folder, simulation, begin, found)
+
+
+def place(folder: Path, wanted: object) -> Path:
+    """Return the folder below an arm's ``folder`` of what ``wanted`` (JSON) makes, whichever experiment asks."""
+    digest = hashlib.sha256(json.dumps(wanted, sort_keys=True).encode()).hexdigest()[:12]
+    claim(folder / digest, wanted)
+    return folder / digest
 
 
 def quality(made: StoreFit) -> dict[str, float]:

@@ -30,6 +30,7 @@ def thesis(package: str) -> dict[str, Any]:
 
 def samples(rows: Rows, figure: str, trial: int) -> Array:
     """Return ``figure`` of ``trial``: its means by arm, shape (arms,), or by run where there is one arm."""
+    rows = Rows(tuple(row for row in rows.rows if row.trial == trial))  # others may not have the figure
     by_arm = [rows.table(figure, [trial], arm)[0] for arm in rows.arms]
     return by_arm[0] if len(by_arm) == 1 else np.array([runs.mean() for runs in by_arm])
 

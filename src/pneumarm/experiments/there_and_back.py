@@ -36,6 +36,7 @@ BEFORE = "in simulation: "
 AFTER_A_SECOND = " after a second"
 _FEWEST = 2_000  # transitions that can be fitted
 _FIGURES = "figures.json"
+_SAME = 1e-9
 
 
 def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:
@@ -108,6 +109,9 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
         UnusableInput: no arm has this name.
 
     """
+    with opened(arm, settings.seed) as found:
+        if recipe.frequency is not None and abs(found.spec.period * recipe.frequency - 1) < _SAME:
+            recipe = replace(recipe, frequency=None)  # so that it is shared with experiments that leave it alone
     fit = replace(recipe.fit, seed=settings.seed)
     folder = place(folder, {"arm": arm, "seed": settings.seed, "recipe": asdict(recipe)})
     if not (folder / _FIGURES).exists():

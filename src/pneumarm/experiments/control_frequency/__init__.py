@@ -160,7 +160,8 @@ class ControlFrequency(Experiment):
             summary=[
                 self.question,
                 "What is set per action is the same per time at all frequencies: cut-off, discount, cost of an "
-                "action, correlation of the noise. Goals are those of 30 Hz. Values are means over arms with 95 % intervals.",
+                "action, correlation of the noise. Goals are those of 30 Hz. Values are means over arms with 95 % "
+                "intervals.",
             ],
             figures=numbers(rows, trials, [*step, *second, *agent]),
             sections=[

@@ -13,6 +13,7 @@ pneumarm trains by default.
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -104,14 +105,15 @@ class EnoughData(Experiment):
                     fitted = fit_store(store, FitSettings(seed=seed))
                     enough = enough_data(store, fitted.simulation.window, much=_MUCH)
                     sequences = store.sequences
+                    judged = quality(fitted)
                 fitted.simulation.save(file)
-                figures = {"transitions": transitions, "minutes": took, "new": enough.share, **quality(fitted)}
+                figures = {"transitions": transitions, "minutes": took, "new": enough.share, **judged}
                 write_json(kept, {"sequences": sequences, "figures": figures})
             found = json.loads(kept.read_text(encoding="utf-8"))
             simulation = Simulation.load(file)
             with Store.open(whole / STORE) as store:
                 first = [entry.number for entry in store.catalogue()][: found["sequences"]]
-                part = store.blocks(kinds=KINDS, sequences=lambda numbers, first=first: np.isin(numbers, first))
+                part = store.blocks(kinds=KINDS, sequences=partial(np.isin, test_elements=first))
                 begin = begin_states(part, simulation.window, simulation.scaling)
             made.append(Prepared(arm, recipe, whole, simulation, begin, found["figures"]))
         return made
@@ -150,9 +152,8 @@ class EnoughData(Experiment):
         places, ticks = list(self.minutes), [f"{minutes:g}" for minutes in self.minutes]
 
         def section(title: str, columns: list[Column], caption: str) -> Section:
-            figure = picture(
-                rows, list(trials), places, ticks, "collecting, on the arm's clock [min]", columns, log=True
-            )
+            label = "collecting, on the arm's clock [min]"
+            figure = picture(rows, list(trials), places, ticks, label, columns, log=True)
             shown = Picture(figure, f"{caption} against the minutes of collecting.", seen(rows, trials, columns))
             return Section(title, tables=[table(rows, trials, columns, f"{caption}.")], figures=[shown])
 
@@ -160,8 +161,8 @@ class EnoughData(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                f"The thesis collected 200,000 transitions in two hours. Here {enough}. Values are means over arms with "
-                "95 % intervals.",
+                f"The thesis collected 200,000 transitions in two hours. Here {enough}. Values are means over arms "
+                "with 95 % intervals.",
             ],
             figures=numbers(rows, trials, [*coverage, *fit, *agent]),
             sections=[
@@ -204,7 +205,7 @@ class EnoughData(Experiment):
                 below(gain, _MARGIN),
             ),
             Claim(
-                f"As much again does not fill many more cells: fewer than {100 * _MUCH:g} % are new in the second half",
+                f"As much again fills few more cells: fewer than {100 * _MUCH:g} % are new in the second half",
                 "a way to check it (section 3.2.3); no number",
                 f"of {self.trials[last]}: {plain(new._replace(mean=100 * new.mean, half=100 * new.half), 1)} %",
                 below(new, _MUCH),
@@ -212,8 +213,8 @@ class EnoughData(Experiment):
             Claim(
                 "Fewer transitions would do",
                 "this number might decrease (section 6.1.4)",
-                f"{self._enough(rows)}: {plain(mean(rows, 'transitions', shown), 0)} transitions; reward less that of "
-                f"{self.trials[last]}: {signed(difference(rows, 'reward', shown, last))}",
+                f"{self._enough(rows)}: {plain(mean(rows, 'transitions', shown), 0)} transitions; reward less that "
+                f"of {self.trials[last]}: {signed(difference(rows, 'reward', shown, last))}",
                 "open" if fewest is None else "holds" if fewest < usual else "does not hold",
             ),
             Claim(

@@ -76,7 +76,7 @@ class NoiseForTransfer(Experiment):
             for by_velocity in (False, True):
                 for factor in self.factors:
                     words = f"{kind}, {'by velocity' if by_velocity else 'fixed'}, {factor:g}"
-                    found[words] = NoiseSettings(kind=kind, factor=factor, by_velocity=by_velocity)  # type: ignore[arg-type]
+                    found[words] = NoiseSettings(kind=kind, factor=factor, by_velocity=by_velocity)
         return found
 
     @property
@@ -132,8 +132,8 @@ class NoiseForTransfer(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                "The noise is that of training; in the test in simulation an agent meets its own. Values are means over "
-                "arms with 95 % intervals.",
+                "The noise is that of training; in the test in simulation an agent meets its own. Values are means "
+                "over arms with 95 % intervals.",
             ],
             figures=numbers(rows, trials, columns),
             sections=[
@@ -178,7 +178,7 @@ class NoiseForTransfer(Experiment):
                 above(gain),
             ),
             Claim(
-                f"Too much noise ({max(self.factors):g} times) needs more training, with a marginal effect on the arm",
+                f"Too much noise ({max(self.factors):g} times) needs more training, to a marginal effect on the arm",
                 "[10] found so; no number",
                 f"{signed(longer, 0)} episodes; reward {signed(much)}, marginal being within {_MARGIN:g}",
                 both,  # type: ignore[arg-type]

@@ -43,11 +43,11 @@ from pneumarm.experiments.experiment import (
     Rows,
     run_seed,
 )
+from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
     ARMS,
     BEFORE,
-    STORE,
     TRANSITIONS,
     Prepared,
     Recipe,
@@ -244,9 +244,9 @@ class StateHistory(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                "All states are fitted to the same transitions and judged on the same sequences, which were not fitted. "
-                "Values are means over arms with 95 % intervals. Residues and isoplots of one simulation (figures 3.1 to "
-                "3.5) are made by pneumarm analyse.",
+                "All states are fitted to the same transitions and judged on the same sequences, which were not "
+                "fitted. Values are means over arms with 95 % intervals. Residues and isoplots of one simulation "
+                "(figures 3.1 to 3.5) are made by pneumarm analyse.",
             ],
             figures=numbers(rows, trials, step) | {"agents": numbers(rows, without, agent)["ours"]},
             sections=[

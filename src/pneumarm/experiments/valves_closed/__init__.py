@@ -184,24 +184,24 @@ class ValvesClosed(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                f"Closing takes {1e3 * pause:.0f} of the {1e3 * period:.0f} ms of a control period. Values are means over "
-                "arms with 95 % intervals.",
+                f"Closing takes {1e3 * pause:.0f} of the {1e3 * period:.0f} ms of a control period. Values are means "
+                "over arms with 95 % intervals.",
             ],
             figures=numbers(rows, trials, [*fit, *agent]),
             sections=[
                 Section(
                     "Figure 2.8 measured",
                     [
-                        "The first muscle is inflated from rest for three control periods; the mean of all arms and runs. "
-                        "The pressure goes on changing for some milliseconds in a pause, and the angle with it (figure "
-                        "A.2)."
+                        "The first muscle is inflated from rest for three control periods; the mean of all arms and "
+                        "runs. The pressure goes on changing for some milliseconds in a pause, and the angle with it "
+                        "(figure A.2)."
                     ],
                     figures=[
                         Picture(
                             inflations(np.array(times), traces, period, pause),
-                            "Valve, angle and pressure with the valve left open and closed while computing (figure 2.8).",
-                            f"After {times[-1]} ms the angle has changed by {rises[0]:.1f} counts with the valve left "
-                            f"open and by {rises[1]:.1f} counts with pauses.",
+                            "Valve, angle and pressure, the valve left open or closed while computing (figure 2.8).",
+                            f"After {times[-1]} ms the angle has changed by {rises[0]:.1f} counts with the valve "
+                            f"left open and by {rises[1]:.1f} counts with pauses.",
                         )
                     ],
                 ),
@@ -226,8 +226,8 @@ class ValvesClosed(Experiment):
         reward = difference(rows, "reward", _OPEN, _CLOSED)
         return [
             Claim(
-                "The simulation can extrapolate: with valves left as they are its error, in parts of the change, is no "
-                f"more than {_WORSE:g} % larger",
+                "The simulation can extrapolate: with valves left as they are its error, in parts of the change, is "
+                f"no more than {_WORSE:g} % larger",
                 "from residues and isoplots (section 3.3, appendix A); no number",
                 f"left against closed: {signed(error)} %",
                 below(error, _WORSE),

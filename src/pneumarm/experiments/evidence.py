@@ -22,6 +22,9 @@ from pneumarm.report.style import DARK, GREY, MIDDLE, key, legend_below, panels,
 
 Array = NDArray[np.float64]
 
+_SHORT = 12  # letters that are not broken over lines
+_WIDE = 3  # panels side by side
+
 
 def thesis(package: str) -> dict[str, Any]:
     """Return the thesis' numbers in ``package``/thesis.toml."""
@@ -90,7 +93,7 @@ def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], capt
         header += [column.words, *(["thesis"] if column.thesis else [])]
     lines = []
     for trial, words in trials.items():
-        line = [words]
+        line = [words.replace(" ", "\N{NO-BREAK SPACE}") if len(words) < _SHORT else words]
         for column in columns:
             found = interval(column.factor * samples(rows, column.figure, trial))
             line.append(plain(found, column.digits))
@@ -135,8 +138,8 @@ def picture(
         log: whether the axis is logarithmic.
 
     """
-    width = min(3, len(columns))
-    height = -(-len(columns) // width)
+    height = -(-len(columns) // _WIDE)
+    width = -(-len(columns) // height)
     figure, axes = panels(height, width, 0.4 + 2.5 * height)
     compared = False
     for axis in axes.flat[len(columns) :]:

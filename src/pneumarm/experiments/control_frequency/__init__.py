@@ -115,7 +115,7 @@ class ControlFrequency(Experiment):
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return errors and what agents make of them by frequency."""
-        theirs = {float(one["frequency"]): one for one in thesis(__name__)["error"]}
+        theirs = _printed()
 
         def printed(kind: str, quantity: str) -> dict[int, float] | None:
             found = {
@@ -186,10 +186,12 @@ class ControlFrequency(Experiment):
                     figures=[shown(agent, "What agents make of the control frequency.")],
                 ),
             ],
-            claims=self._claims(rows, theirs),
+            claims=self.claims(rows),
         )
 
-    def _claims(self, rows: Rows, theirs: Mapping[float, Any]) -> list[Claim]:
+    def claims(self, rows: Rows) -> list[Claim]:
+        """Return what the thesis says, and what the rows say to it."""
+        theirs = _printed()
         low, middle, high = (self.frequencies.index(f) + 1 for f in (20.0, 30.0, 40.0))
 
         def step(name: str) -> str:
@@ -242,6 +244,11 @@ class ControlFrequency(Experiment):
                 "does not hold" if better else "holds" if len(worse) == len(others) else "open",
             ),
         ]
+
+
+def _printed() -> dict[float, Any]:
+    """Return the rows of tables 5.1 and 5.2 by frequency."""
+    return {float(one["frequency"]): one for one in thesis(__name__)["error"]}
 
 
 def _word(quantity: str) -> str:

@@ -170,7 +170,7 @@ class EnoughData(Experiment):
                 section("The simulation", fit, "Errors on sequences that were not fitted"),
                 section("The agent on the arm", agent, "What agents make of it"),
             ],
-            claims=self._claims(rows),
+            claims=self.claims(rows),
         )
 
     def _fewest(self, rows: Rows) -> int | None:
@@ -189,7 +189,8 @@ class EnoughData(Experiment):
             return f"nothing less than {last} is shown to be as good, within {_MARGIN:g} of its reward"
         return f"from {self.trials[found]} on the reward is that of {last}, within {_MARGIN:g}"
 
-    def _claims(self, rows: Rows) -> list[Claim]:
+    def claims(self, rows: Rows) -> list[Claim]:
+        """Return what the thesis says, and what the rows say to it."""
         said = thesis(__name__)
         last = len(self.minutes)
         usual = int(np.argmin([abs(minutes - said["minutes"]) for minutes in self.minutes])) + 1

@@ -140,10 +140,11 @@ class NoiseForTransfer(Experiment):
                 Section("Agents", tables=[table(rows, trials, columns, "What agents trained with each noise do.")]),
                 Section("Against the amount", figures=pictures),
             ],
-            claims=self._claims(rows),
+            claims=self.claims(rows),
         )
 
-    def _claims(self, rows: Rows) -> list[Claim]:
+    def claims(self, rows: Rows) -> list[Claim]:
+        """Return what the thesis says, and what the rows say to it."""
         said = thesis(__name__)
         usual = self.trial(said["kind"], said["by_velocity"], said["factor"])
         most = self.trial(said["kind"], said["by_velocity"], max(self.factors))

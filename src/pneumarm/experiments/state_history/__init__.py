@@ -93,7 +93,12 @@ def shortened(whole: Transitions, longest: Window, history: int) -> Transitions:
 
 
 def errors_with_period(
-    kept: Transitions, held_out: Transitions, window: Window, settings: FitSettings, nominal: float | None = None
+    kept: Transitions,
+    held_out: Transitions,
+    window: Window,
+    settings: FitSettings,
+    limits: NDArray[np.float64],
+    nominal: float | None = None,
 ) -> dict[str, float]:
     """Return the standard deviation of the error of a step by quantity, networks knowing how long the step is.
 
@@ -105,6 +110,7 @@ def errors_with_period(
         held_out: transitions to judge by.
         window: of both.
         settings: of the fit.
+        limits: lowest and highest value of each place in a prediction, shape (2, 4 joints), as of a simulation.
         nominal: length that all steps are taken to have [s], which then is no input; by default each step's own is.
 
     """
@@ -129,7 +135,7 @@ def errors_with_period(
         start = nguyen_widrow(x.shape[1], settings.hidden, 1, int(seed))
         network = levenberg_marquardt(x, change_of[:, [column]] / scale[column], start, solver).network
         told = held_out.observation[:, one] + scale[column] * network(apart)[:, 0]
-        error[:, one] = told - held_out.target[:, one]
+        error[:, one] = np.clip(told, *limits[:, one]) - held_out.target[:, one]
     angle = np.arange(0, window.observation_size, len(QUANTITIES))
     velocity = angle + QUANTITIES.index("velocity")
     moved = error[:, angle] + held_out.target[:, angle] - held_out.observation[:, angle]
@@ -191,7 +197,7 @@ class StateHistory(Experiment):
         kept, held_out = (shortened(w, material.longest, history) for w in (material.kept, material.held_out))
         chosen = replace(self.fit, history=history, seed=seed)
         if with_period:
-            found = errors_with_period(kept, held_out, window, chosen)
+            found = errors_with_period(kept, held_out, window, chosen, material.base.simulation.limits)
             return {f"std {name}": value for name, value in found.items()}
         base = material.base
         made = fit(kept, held_out, spec=material.spec, goal_range=base.simulation.goal_range, settings=chosen)
@@ -267,10 +273,11 @@ class StateHistory(Experiment):
                     figures=[shown(without, agent, "Error after a second, and agents on the arm, by history.")],
                 ),
             ],
-            claims=self._claims(rows),
+            claims=self.claims(rows),
         )
 
-    def _claims(self, rows: Rows) -> list[Claim]:
+    def claims(self, rows: Rows) -> list[Claim]:
+        """Return what the thesis says, and what the rows say to it."""
         theirs: int = thesis(__name__)["history"]
         one, three = 1 + self.histories.index(1), 1 + self.histories.index(theirs)
         four, period = three + 1, three + len(self.histories)

@@ -216,10 +216,11 @@ class ValvesClosed(Experiment):
                     figures=[shown(agent, "What agents make of it.")],
                 ),
             ],
-            claims=self._claims(rows),
+            claims=self.claims(rows),
         )
 
-    def _claims(self, rows: Rows) -> list[Claim]:
+    def claims(self, rows: Rows) -> list[Claim]:
+        """Return what the thesis says, and what the rows say to it."""
         error = change(rows, "relative angle", _OPEN, _CLOSED)
         thrust = change(rows, "change velocity", _OPEN, _CLOSED)
         time = difference(rows, "seconds", _OPEN, _CLOSED)

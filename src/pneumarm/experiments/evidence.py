@@ -5,6 +5,7 @@ Where there is one arm alone, its runs are the sample, and what is found is true
 """
 
 import math
+import textwrap
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from pneumarm.report.style import DARK, GREY, MIDDLE, key, legend_below, panels,
 Array = NDArray[np.float64]
 
 _SHORT = 12  # letters that are not broken over lines
+_TITLE = 28  # letters of a panel's title in a line
 _WIDE = 3  # panels side by side
 
 
@@ -154,7 +156,7 @@ def picture(
             compared = True
             there = [(places[i], column.thesis[t]) for i, t in enumerate(trials) if t in column.thesis]
             axis.plot(*zip(*there, strict=True), color=MIDDLE, marker="s", ls="--")
-        axis.set_title(column.words)
+        axis.set_title(textwrap.fill(column.words, _TITLE))
         axis.set_xlabel(label)
         if log:
             axis.set_xscale("log")

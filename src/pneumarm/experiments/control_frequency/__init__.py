@@ -45,6 +45,8 @@ from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
     ARMS,
     BEFORE,
+    MOVEMENTS,
+    TRAINING,
     TRANSITIONS,
     Prepared,
     Recipe,
@@ -93,12 +95,17 @@ class ControlFrequency(Experiment):
 
     def train_settings(self, trial: int) -> TrainSettings:
         """Return the settings of the training in ``trial``."""
-        return at_frequency(TrainSettings(), self.frequencies[trial - 1])
+        return at_frequency(TRAINING, self.frequencies[trial - 1])
 
     def settings(self) -> Any:
         """Return frequencies and trainings."""
         trainings = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
-        return {"frequencies": list(self.frequencies), "transitions": TRANSITIONS, "trainings": trainings}
+        return {
+            "frequencies": list(self.frequencies),
+            "transitions": TRANSITIONS,
+            "movements": MOVEMENTS,
+            "trainings": trainings,
+        }
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of every frequency."""

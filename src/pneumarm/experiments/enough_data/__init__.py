@@ -47,6 +47,8 @@ from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
     ARMS,
     BEFORE,
+    MOVEMENTS,
+    TRAINING,
     Prepared,
     Recipe,
     collected,
@@ -55,7 +57,7 @@ from pneumarm.experiments.there_and_back import (
     trained_and_moved,
 )
 from pneumarm.files import write_json
-from pneumarm.learning import TrainSettings, begin_states
+from pneumarm.learning import begin_states
 from pneumarm.report.page import Picture, Section
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import KINDS, Store, enough_data
@@ -85,7 +87,7 @@ class EnoughData(Experiment):
 
     def settings(self) -> Any:
         """Return minutes and training."""
-        return {"minutes": list(self.minutes), "training": msgspec.to_builtins(TrainSettings())}
+        return {"minutes": list(self.minutes), "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of every part of one collection, which goes on between the fits.
@@ -122,7 +124,7 @@ class EnoughData(Experiment):
         """Train an agent on the part of ``trial`` and move the arm with it, to goals in the range of all data."""
         chosen = material[trial - 1]
         goals = material[-1].simulation.goal_range
-        return {**chosen.figures, **trained_and_moved(chosen, TrainSettings(), run, settings, goals)}
+        return {**chosen.figures, **trained_and_moved(chosen, TRAINING, run, settings, goals)}
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return coverage, fit and performance by minutes."""

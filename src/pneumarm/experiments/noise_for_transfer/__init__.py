@@ -42,13 +42,14 @@ from pneumarm.experiments.experiment import (
 from pneumarm.experiments.there_and_back import (
     ARMS,
     BEFORE,
+    MOVEMENTS,
+    TRAINING,
     TRANSITIONS,
     Prepared,
     Recipe,
     prepared,
     trained_and_moved,
 )
-from pneumarm.learning import TrainSettings
 from pneumarm.report.page import Picture, Section
 from pneumarm.simulation.noise import NoiseSettings
 
@@ -87,7 +88,12 @@ class NoiseForTransfer(Experiment):
     def settings(self) -> Any:
         """Return the noises and the training."""
         noises = {words: msgspec.to_builtins(noise) for words, noise in self.noises.items()}
-        return {"noises": noises, "transitions": TRANSITIONS, "training": msgspec.to_builtins(TrainSettings())}
+        return {
+            "noises": noises,
+            "transitions": TRANSITIONS,
+            "movements": MOVEMENTS,
+            "training": msgspec.to_builtins(TRAINING),
+        }
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Prepared:
         """Return the arm's simulation."""
@@ -96,7 +102,7 @@ class NoiseForTransfer(Experiment):
     def measure(self, material: Prepared, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train an agent with the noise of ``trial``, and move the arm with it."""
         noise = self.noises[self.trials[trial]]
-        return trained_and_moved(material, replace(TrainSettings(), noise=noise), run, settings)
+        return trained_and_moved(material, replace(TRAINING, noise=noise), run, settings)
 
     def trial(self, kind: str, by_velocity: bool, factor: float) -> int:
         """Return the number of a trial."""

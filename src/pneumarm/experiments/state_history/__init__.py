@@ -48,6 +48,8 @@ from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
     ARMS,
     BEFORE,
+    MOVEMENTS,
+    TRAINING,
     TRANSITIONS,
     Prepared,
     Recipe,
@@ -55,7 +57,7 @@ from pneumarm.experiments.there_and_back import (
     prepared,
     trained_and_moved,
 )
-from pneumarm.learning import BeginStates, TrainSettings, begin_states
+from pneumarm.learning import BeginStates, begin_states
 from pneumarm.networks import LevenbergMarquardt, levenberg_marquardt, nguyen_widrow
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.simulation import FitSettings, fit
@@ -169,8 +171,9 @@ class StateHistory(Experiment):
         return {
             "histories": list(self.histories),
             "transitions": TRANSITIONS,
+            "movements": MOVEMENTS,
             "fit": msgspec.to_builtins(self.fit),
-            "training": msgspec.to_builtins(TrainSettings()),
+            "training": msgspec.to_builtins(TRAINING),
         }
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
@@ -207,7 +210,7 @@ class StateHistory(Experiment):
         return {
             **{f"std {name}": value for name, value in over_joints(made.held_out.std).items()},
             **{f"{name}{AFTER_A_SECOND}": value for name, value in over_joints(ahead.measured[-1]).items()},
-            **trained_and_moved(mine, TrainSettings(), run, settings),
+            **trained_and_moved(mine, TRAINING, run, settings),
         }
 
     def analyse(self, rows: Rows) -> Analysis:

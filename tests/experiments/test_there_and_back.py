@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pneumarm.errors import UnusableInput
 from pneumarm.experiments.control_frequency import ControlFrequency, at_frequency
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.enough_data import EnoughData
@@ -18,7 +19,7 @@ from pneumarm.experiments.page import write_page
 from pneumarm.experiments.registry import experiment
 from pneumarm.experiments.state_history import StateHistory, errors_with_period, shortened
 from pneumarm.experiments.sweep import sweep
-from pneumarm.experiments.there_and_back import Prepared, Recipe, over_joints, prepared, trained_and_moved
+from pneumarm.experiments.there_and_back import Prepared, Recipe, opened, over_joints, prepared, trained_and_moved
 from pneumarm.experiments.valves_closed import ValvesClosed, inflation
 from pneumarm.learning import TrainSettings
 from pneumarm.simulation import FitSettings, fit
@@ -200,6 +201,12 @@ def test_the_arm_is_controlled_at_the_frequency(material: Prepared, laboratory: 
     assert slow["actions"] == quick["actions"] == 20
     assert slow["seconds"] == pytest.approx(20 / 30, rel=0.02)
     assert quick["seconds"] == pytest.approx(20 / 60, rel=0.02)
+
+
+def test_a_period_shorter_than_the_latency_is_refused() -> None:
+    assert opened(ARM, 0, 50.0).spec.period == 0.02
+    with pytest.raises(UnusableInput, match="latency"):
+        opened(ARM, 0, 1000.0)
 
 
 def test_shorter_histories_are_cut_out_of_longer_ones(material: Prepared) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
 from pneumarm.control import BEGIN, AgentController, Movement, move
 from pneumarm.control.transfer import draw_movement
+from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
 from pneumarm.files import write_json
@@ -45,10 +46,19 @@ _SAME = 1e-9
 
 
 def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:
-    """Return the arm called ``arm``, controlled at ``frequency`` [Hz] where one is given."""
+    """Return the arm called ``arm``, controlled at ``frequency`` [Hz] where one is given.
+
+    Raises:
+        UnusableInput: no arm has this name, or its latency is no shorter than the period.
+
+    """
     found = open_arm(arm, seed)
     if frequency is not None:
-        found.spec = replace(found.spec, period=1 / frequency)
+        try:
+            found.spec = replace(found.spec, period=1 / frequency)
+        except UnusableInput:
+            found.close()
+            raise
     return found
 
 

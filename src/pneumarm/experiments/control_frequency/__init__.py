@@ -7,8 +7,8 @@ an action costs, and over how long noise is correlated; at 30 Hz these are the t
     pneumarm experiment control-frequency --out laboratory
 
 Answer here: the higher the frequency, the better angle and pressures are predicted a step ahead and the worse the
-velocity, as in the thesis; after a second the error is far less than eq. 3.7 expects. What the agent makes of it on
-the arm decides less clearly for 30 Hz: see the page.
+velocity, as in the thesis, and after a second the error of the angle is what eq. 3.7 expects. On the arm 30 Hz earned
+most on average, clearly more than 60 Hz; against 20 Hz five arms leave it open.
 """
 
 from collections.abc import Mapping

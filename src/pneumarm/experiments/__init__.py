@@ -19,6 +19,9 @@ To add an experiment, make a folder (a package) here and name it in :mod:`.regis
 - its settings as data: a ``design.toml`` where there is an orthogonal array;
 - the thesis' results as ``thesis_*.csv``, trials by runs.
 
+Experiments that vary how an arm is collected from, or judge agents back on it, share :mod:`.there_and_back`; what
+their rows say over arms, with intervals, tables and pictures of trials, is :mod:`.evidence`.
+
 Trainings of the thesis' agent by an orthogonal array need no code: :class:`~.factorial.Factorial` is such an
 experiment. :mod:`.design` is of use for tables from anywhere (``pneumarm taguchi analyse``).
 """

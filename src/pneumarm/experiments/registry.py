@@ -11,6 +11,11 @@ PLACES = {
     "long-training": "long_training",
     "optimal-settings": "optimal_settings",
     "no-shaping": "no_shaping",
+    "control-frequency": "control_frequency",
+    "state-history": "state_history",
+    "enough-data": "enough_data",
+    "noise-for-transfer": "noise_for_transfer",
+    "valves-closed": "valves_closed",
 }
 """Name: package below this one; each has an ``EXPERIMENT``."""
 

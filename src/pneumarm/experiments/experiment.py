@@ -34,6 +34,8 @@ class LaboratorySettings:
     """Greedy movements that every agent is tested with (thesis section 5.2)."""
     max_episodes: int | None = None
     """Training episodes at most; otherwise as many as the experiment says."""
+    exploring: bool = False
+    """Test every agent a second time, exploring as when its training ended; that takes as long as training it."""
 
     def __post_init__(self) -> None:
         check(
@@ -74,12 +76,22 @@ class Rows:
         return tuple(sorted({row.arm for row in self.rows}))
 
     @property
+    def figures(self) -> frozenset[str]:
+        """Names of the figures that every row has."""
+        return frozenset.intersection(*(frozenset(row.figures) for row in self.rows)) if self.rows else frozenset()
+
+    def of(self, trials: Iterable[int]) -> "Rows":
+        """Return the rows of ``trials`` alone."""
+        wanted = set(trials)
+        return Rows(tuple(row for row in self.rows if row.trial in wanted))
+
+    @property
     def runs(self) -> int:
         """Highest number of a run."""
         return max((row.run for row in self.rows), default=0)
 
     def table(self, figure: str, trials: Sequence[int], arm: str | None = None) -> NDArray[np.float64]:
-        """Return ``figure`` by trial and run, shape (trials, runs); the runs of several arms side by side.
+        """Return ``figure`` by trial and run, shape (trials, runs); the runs of several arms side by side, arm by arm.
 
         Raises:
             UnusableInput: a row is missing, because the sweep is not finished.
@@ -104,6 +116,9 @@ class Claim:
     ours: str
     """Ours, with an interval where there is one."""
     verdict: Literal["holds", "does not hold", "open"]
+    about: str = ""
+    """Which of the thesis' conclusions it is about, by its key in ``claims/conclusions.toml``; by default those of
+    its experiment."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +145,8 @@ class Experiment(ABC):
     source: str
     """Where in the thesis."""
     runs: int
+    """By default."""
+    arms: Sequence[str] = ("virtual",)
     """By default."""
 
     @property

@@ -16,7 +16,7 @@ from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_ta
 from pneumarm.experiments.design.assignment import Design
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
 from pneumarm.experiments.preparation import Simulated, simulated
-from pneumarm.experiments.trainings import CRITERIA, EXPLORING, train_and_test, with_settings
+from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, train_and_test, with_settings
 from pneumarm.learning import TrainSettings
 
 Array = NDArray[Any]
@@ -105,6 +105,7 @@ class Factorial(Experiment):
         ours = {
             name: analyse_table(self.design, rows.table(name, list(self.trials)), _goal(name))
             for name in self.criteria
+            if name in rows.figures
         }
         theirs = {name: analyse_table(self.design, table, _goal(name)) for name, table in self.thesis.items()}
         sections = [side_by_side(self.trials, {n: a.results for n, a in ours.items()}, self.thesis, self.words)]
@@ -119,7 +120,8 @@ class Factorial(Experiment):
                 "arms": list(rows.arms),
                 **{
                     name: float(rows.table(name, list(self.trials)).mean())
-                    for name in ("success_rate", EXPLORING + "success_rate")
+                    for name in ("success_rate", EXPLORING + "success_rate", LEARNING)
+                    if name in rows.figures
                 },
                 "ours": {name: analysis.figures() for name, analysis in ours.items()},
                 "thesis": {name: analysis.figures() for name, analysis in theirs.items()},

@@ -11,6 +11,8 @@ PLACES = {
     "long-training": "long_training",
     "optimal-settings": "optimal_settings",
     "no-shaping": "no_shaping",
+    "shaping-settings": "shaping_settings",
+    "fine-tuning": "fine_tuning",
 }
 """Name: package below this one; each has an ``EXPERIMENT``."""
 

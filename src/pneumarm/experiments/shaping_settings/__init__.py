@@ -1,0 +1,322 @@
+"""The settings of shaping (sections 4.3.2 and 5.4.4): which matter, and when is shaping indispensable?
+
+One setting at a time is changed from the thesis': how much the deviation grows and shrinks, how often, which begin
+states are drawn, how much is explored; then no shaping at all (epsilon 0.09 and T 10, as in 5.4.4). The thesis says
+that shaping was indispensable while the potentiometer was worn: both are done again with a worn one.
+
+    pneumarm experiment shaping-settings
+
+Trials are data (``trials.toml``), and so is the wear (``worn.toml``). All use SARSA, 5 neurons, lambda 0, gamma 0.98
+and the learning rate 0.05 (section 5.4.2); differences are taken within runs, which begin with the same weights.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pneumarm.arm import ArmSpec
+from pneumarm.experiments.all_goals import BASE
+from pneumarm.experiments.comparison import mean_and_spread
+from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.differences import Interval, above, below, interval
+from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.forest import forest_figure
+from pneumarm.experiments.preparation import Simulated, simulated
+from pneumarm.experiments.trainings import CRITERIA, LEARNING, train_and_test, with_settings
+from pneumarm.learning import Exploration, TrainSettings
+from pneumarm.learning.shaping import initial_deviation, stage
+from pneumarm.report.page import Picture, Section, Table
+from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
+
+_CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episodes", "met")
+_WORDS = {**CRITERIA, "met": "share of agents that met the criterium at the whole range of angles"}
+_WITHOUT = Exploration(0.09, 10.0)
+_NEVER_MET = 0.5  # share of agents below which a method does not solve the task
+
+
+class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a trial changes."""
+
+    name: str
+    settings: dict[str, Any] = {}
+    """New values by the place of the setting."""
+    shaping: bool = True
+    worn: bool = False
+    """Whether the potentiometer is."""
+
+
+class _Trials(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True)
+class Material:
+    """The simulation of an arm, and of the same arm with a worn potentiometer."""
+
+    whole: Simulated
+    worn: Simulated
+
+
+def _packaged(name: str) -> str:
+    return (resources.files(__name__) / name).read_text(encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class ShapingSettings(Experiment):
+    """Trainings that differ in their shaping."""
+
+    name: str = "shaping-settings"
+    title: str = "The settings of shaping"
+    question: str = "Which settings of shaping matter, and is shaping indispensable where the potentiometer is worn?"
+    source: str = "Thesis sections 4.3.2, 5.2 and 5.4.4"
+    runs: int = 4
+    arms: Sequence[str] = tuple(f"virtual:seed={seed}" for seed in range(1, 6))
+    plan: tuple[Trial, ...] = field(
+        default_factory=lambda: msgspec.convert(tomllib.loads(_packaged("trials.toml")), _Trials).trials
+    )
+    wear: str = field(default_factory=lambda: _packaged("worn.toml"))
+
+    @property
+    def trials(self) -> Mapping[int, str]:
+        """Trials of ``trials.toml``."""
+        return {number: trial.name for number, trial in enumerate(self.plan, 1)}
+
+    def train_settings(self, trial: int) -> TrainSettings:
+        """Return the settings of the training of ``trial``."""
+        chosen = self.plan[trial - 1]
+        base = BASE if chosen.shaping else replace(BASE, shaping=None, exploration=_WITHOUT)
+        places = {k: tuple(v) if isinstance(v, list) else v for k, v in chosen.settings.items()}
+        return with_settings(base, places)
+
+    def settings(self) -> Any:
+        """Return the settings of every trial and the wear."""
+        trials = {str(trial): msgspec.to_builtins(self.train_settings(trial)) for trial in self.trials}
+        return {
+            "trials": trials,
+            "worn": [number for number in self.trials if self.plan[number - 1].worn],
+            "wear": self.wear,
+        }
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
+        """Return the arm's simulation, and that of the arm with the worn potentiometer."""
+        whole = simulated(arm, folder, settings, progress)
+        return Material(whole, simulated(arm, folder / "worn", settings, progress, faults=self.wear))
+
+    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Train and test one agent."""
+        chosen = material.worn if self.plan[trial - 1].worn else material.whole
+        return train_and_test(chosen, self.train_settings(trial), run, settings)
+
+    def analyse(self, rows: Rows) -> Analysis:
+        """Return every trial's results and its difference from the thesis' settings within runs."""
+        tables = {name: rows.table(name, list(self.trials)) for name in _CRITERIA}
+        differences = {name: self._differences(table) for name, table in tables.items()}
+        return Analysis(
+            summary=[self.question, *self._found(differences)],
+            figures={
+                "rows": len(rows.rows),
+                "results": {name: table.mean(axis=1).tolist() for name, table in tables.items()},
+                "differences": {
+                    name: [[each.mean, each.half] if each else None for each in found]
+                    for name, found in differences.items()
+                },
+            },
+            sections=[self._strategy(), self._results(tables, differences)],
+            claims=self._claims(tables),
+        )
+
+    def reference(self, trial: int) -> int:
+        """Return the trial with the thesis' settings on the same kind of arm."""
+        worn = self.plan[trial - 1].worn
+        return next(
+            n for n, other in enumerate(self.plan, 1) if other.worn == worn and other.shaping and not other.settings
+        )
+
+    def _differences(self, table: NDArray[np.float64]) -> list[Interval | None]:
+        """Return each trial's difference from its reference, none for a reference itself."""
+        return [
+            None if self.reference(n) == n else interval(table[n - 1] - table[self.reference(n) - 1])
+            for n in self.trials
+        ]
+
+    def _found(self, differences: Mapping[str, list[Interval | None]]) -> list[str]:
+        """Return in words what matters beyond chance."""
+        text = []
+        for name in ("reward", "episodes"):
+            surely = [
+                f"{self.trials[n]} ({each})"
+                for n, each in zip(self.trials, differences[name], strict=True)
+                if each and abs(each.mean) > each.half
+            ]
+            text.append(
+                f"Surely other than with the thesis' settings: {_WORDS[name]}: {'; '.join(surely) or 'none'}."
+            )
+        return text
+
+    def _results(
+        self, tables: Mapping[str, NDArray[np.float64]], differences: Mapping[str, list[Interval | None]]
+    ) -> Section:
+        header = ["trial", "settings", "reward", "difference within runs", "greedy success", "success, learning on"]
+        header += ["episodes", "difference within runs", "criterium met"]
+        rows = []
+        for place, (trial, name) in enumerate(self.trials.items()):
+            rows.append(
+                [
+                    str(trial),
+                    name,
+                    mean_and_spread(tables["reward"][place]),
+                    str(differences["reward"][place] or "reference"),
+                    *(f"{100 * tables[n][place].mean():.1f} %" for n in ("success_rate", LEARNING)),
+                    mean_and_spread(tables["episodes"][place]),
+                    _whole(differences["episodes"][place]),
+                    f"{100 * tables['met'][place].mean():.0f} %",
+                ]
+            )
+        table = Table(header, rows, "Mean ± standard deviation over runs; differences with 95 % intervals.")
+        shown = {
+            name: [interval(values) for values in tables[name]] for name in ("reward", "success_rate", "episodes")
+        }
+        picture = Picture(
+            forest_figure(list(self.trials.values()), {_WORDS[name]: found for name, found in shown.items()}),
+            "Results by settings of shaping, means with their 95 % intervals.",
+            "; ".join(
+                f"{n}: reward {v.mean():.1f}" for n, v in zip(self.trials.values(), tables["reward"], strict=True)
+            ),
+        )
+        return Section("Results", figures=[picture], tables=[table])
+
+    def _strategy(self) -> Section:
+        settings, spec = self.train_settings(1), ArmSpec()
+        return Section(
+            "The strategy",
+            [
+                "The deviation begins small, grows where the performance exceeds the criterium and shrinks where it "
+                "does not; exploration, temperature and criterium follow it."
+            ],
+            [
+                Picture(
+                    strategy_figure(settings, spec),
+                    "Exploration, temperature and criterium as functions of the deviation (thesis fig. 4.3).",
+                    "Exploration falls from 0.5 to 0.05 and temperature from 20 to 1; the criterium rises to 0.95.",
+                )
+            ],
+        )
+
+    def _claims(self, tables: Mapping[str, NDArray[np.float64]]) -> list[Claim]:
+        by_name = {name: number - 1 for number, name in self.trials.items()}
+        shaped, without, often = (
+            by_name[n] for n in ("as in the thesis", "no shaping", "adjusted every 100 episodes")
+        )
+        worn, worn_without = (by_name[n] for n in ("worn, as in the thesis", "worn, no shaping"))
+        reward, episodes, met = tables["reward"], tables["episodes"], tables["met"]
+        theirs = {
+            kind: {
+                name: packaged_table(f"pneumarm.experiments.{kind}", f"thesis_{name}")
+                for name in ("reward", "episodes")
+            }
+            for kind in ("all_goals", "no_shaping")
+        }
+        their = {
+            name: theirs["all_goals"][name][:, :3] - theirs["no_shaping"][name] for name in ("reward", "episodes")
+        }
+        gain = interval(reward[shaped] - reward[without])
+        solved, worn_solved = (interval(met[place]) for place in (without, worn_without))
+        fewer = interval(episodes[often] - episodes[shaped])
+        return [
+            Claim(
+                "Shaping raises the reward",
+                f"{interval(their['reward'].ravel())} (tables C.7 and C.21, runs 1 to 3, all trials)",
+                str(gain),
+                above(gain),
+                "shaping-improves",
+            ),
+            Claim(
+                "Shaping lowers the standard deviation of the reward over runs",
+                f"{theirs['all_goals']['reward'][:, :3].std(axis=1, ddof=1).mean():.2f} against "
+                f"{theirs['no_shaping']['reward'].std(axis=1, ddof=1).mean():.2f}, mean over trials",
+                *_spread(reward[shaped], reward[without]),
+                "shaping-improves",
+            ),
+            Claim(
+                "Shaping is not indispensable: without it agents meet the criterium",
+                "all 48 agents (table C.22)",
+                _share(met[without]),
+                above(solved, _NEVER_MET),
+                "shaping-not-indispensable",
+            ),
+            Claim(
+                "Without shaping fewer episodes are needed",
+                f"{-interval(their['episodes'].ravel()).mean:+.0f} (tables C.10 and C.22, runs 1 to 3, all trials)",
+                _whole(interval(episodes[without] - episodes[shaped])),
+                below(interval(episodes[without] - episodes[shaped])),
+                "shaping-not-indispensable",
+            ),
+            Claim(
+                "With a worn potentiometer shaping is indispensable: agents without it do not meet the criterium",
+                "no agent reached the whole deviation (section 5.4.4, no numbers)",
+                f"{_share(met[worn_without])}; with shaping {_share(met[worn])}",
+                below(worn_solved, _NEVER_MET),
+                "shaping-worn",
+            ),
+            Claim(
+                "Adjusting the deviation more often than every 500 episodes saves episodes",
+                "supposed (section 5.4.4, no numbers)",
+                _whole(fewer),
+                below(fewer),
+                "shaping-period",
+            ),
+        ]
+
+
+def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64]) -> tuple[str, Any]:
+    """Return both standard deviations, and whether the first is surely smaller (Pitman and Morgan).
+
+    Runs are pairs; the variances differ where sum and difference of the pairs are correlated.
+    """
+    text = f"{shaped.std(ddof=1):.2f} against {without.std(ddof=1):.2f}" if len(shaped) > 1 else "one run"
+    x, y = shaped - without, shaped + without
+    if len(x) < 4 or x.std() == 0 or y.std() == 0:
+        return text, "open"
+    # Fisher's transform: the correlation's arctanh is about normal with this standard deviation.
+    z, half = np.arctanh(np.clip(np.corrcoef(x, y)[0, 1], -1 + 1e-12, 1 - 1e-12)), 1.96 / np.sqrt(len(x) - 3)
+    return text, below(Interval(float(z), float(half), len(x)))
+
+
+def _share(met: NDArray[np.float64]) -> str:
+    return f"{int(met.sum())} of {len(met)} agents"
+
+
+def _whole(found: Interval | None) -> str:
+    if found is None:
+        return "reference"
+    return f"{found.mean:+.0f}" + (f" ± {found.half:.0f}" if np.isfinite(found.half) else "")
+
+
+@styled
+def strategy_figure(settings: TrainSettings, spec: ArmSpec) -> Figure:
+    """Draw exploration, temperature and criterium against the deviation (thesis fig. 4.3)."""
+    low, high = spec.angle_range
+    deviations = np.linspace(initial_deviation(settings, spec), high - low, 50)
+    stages = [stage(float(d), settings, spec) for d in deviations]
+    figure, axes = panels(1, 3, 2.2)
+    for axis, values, label, colour in (
+        (axes[0, 0], [s.schedule.epsilon for s in stages], "exploration ε", DARK),
+        (axes[0, 1], [s.schedule.temperature for s in stages], "temperature T [reward]", MIDDLE),
+        (axes[0, 2], [s.criterium for s in stages], "criterium (success rate)", GREY),
+    ):
+        axis.plot(deviations, values, color=colour)
+        axis.set_xlabel("deviation [counts]")
+        axis.set_ylabel(label)
+        axis.set_ylim(0, None)
+    return figure
+
+
+EXPERIMENT = ShapingSettings()

@@ -91,7 +91,7 @@ class Rows:
         return max((row.run for row in self.rows), default=0)
 
     def table(self, figure: str, trials: Sequence[int], arm: str | None = None) -> NDArray[np.float64]:
-        """Return ``figure`` by trial and run, shape (trials, runs); the runs of several arms side by side, arm by arm.
+        """Return ``figure`` by trial and run, shape (trials, runs); the runs of several arms side by side.
 
         Raises:
             UnusableInput: a row is missing, because the sweep is not finished.
@@ -104,6 +104,14 @@ class Rows:
         if missing:
             raise UnusableInput(f"{len(missing)} rows are missing, the first is {missing[0]}; finish the sweep first")
         return np.array([[found[key] for key in line] for line in keys])
+
+    def samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the independent samples in ``values`` (arms times runs,), a line of a table.
+
+        Runs on one arm share its simulation: where there are several arms they are their means, shape (arms,).
+        """
+        arms = len(self.arms)
+        return values if arms == 1 else values.reshape(arms, -1).mean(axis=1)
 
 
 @dataclass(frozen=True)
@@ -146,7 +154,7 @@ class Experiment(ABC):
     """Where in the thesis."""
     runs: int
     """By default."""
-    arms: Sequence[str] = ("virtual",)
+    arms: tuple[str, ...] = ("virtual",)
     """By default."""
 
     @property

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial, Said
+from pneumarm.experiments.findings import nearly_all_succeed, traces_are_marginal, weights_dominate
 from pneumarm.learning import TrainSettings
 
 LONGEST = 50_000
@@ -33,16 +34,17 @@ EXPERIMENT = Factorial(
         name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
     },
     said=(
-        Said("reward", 4, raises=False),
-        Said("reward", 4, raises=True, loss="std"),
-        Said("reward", 8, raises=False, loss="std"),
-        Said("reward", 2, raises=False),
-        Said("reward", 2, raises=True, loss="std"),
-        Said("reward", 1, raises=False),
-        Said("reward", 11, raises=False),
-        Said("reward", 12, raises=True),
-        Said("reward", 12, raises=True, loss="std"),
-        Said("episodes", 12, raises=False),
-        Said("episodes", 11, raises=True),
+        Said("reward", 4, raises=False, about="sarsa"),
+        Said("reward", 4, raises=True, loss="std", about="sarsa"),
+        Said("reward", 8, raises=False, loss="std", about="column-8"),
+        Said("reward", 2, raises=False, about="neurons"),
+        Said("reward", 2, raises=True, loss="std", about="neurons"),
+        Said("reward", 1, raises=False, about="learning-rate"),
+        Said("reward", 11, raises=False, about="traces"),
+        Said("reward", 12, raises=True, about="gamma"),
+        Said("reward", 12, raises=True, loss="std", about="gamma"),
+        Said("episodes", 12, raises=False, about="gamma-episodes"),
+        Said("episodes", 11, raises=True, about="traces"),
     ),
+    findings=(weights_dominate, traces_are_marginal, nearly_all_succeed),
 )

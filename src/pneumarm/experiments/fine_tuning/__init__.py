@@ -46,7 +46,7 @@ class FineTuning(Experiment):
     question: str = "Do levels that lie closer together find better settings than those of trial 10?"
     source: str = "Thesis sections 5.3 and 5.4.2"
     runs: int = 4
-    arms: Sequence[str] = tuple(f"virtual:seed={seed}" for seed in range(1, 6))
+    arms: tuple[str, ...] = tuple(f"virtual:seed={seed}" for seed in range(1, 6))
     array: Factorial = field(
         default_factory=lambda: Factorial(
             name="fine-tuning",
@@ -92,7 +92,7 @@ class FineTuning(Experiment):
         found = self.array.analyse(rows.of(self.array.trials))
         reward = rows.table("reward", list(self.trials))
         shown = {
-            CRITERIA[name]: [interval(values) for values in rows.table(name, list(self.trials))]
+            CRITERIA[name]: [interval(rows.samples(values)) for values in rows.table(name, list(self.trials))]
             for name in ("reward", "success_rate", "episodes")
         }
         trials = Section(
@@ -121,8 +121,9 @@ class FineTuning(Experiment):
         if odd.all():
             return Claim(text, thesis, "one run: nothing left to confirm with", "open"), "One run confirms nothing."
         best = int(np.argmax(reward[:-1, odd].mean(axis=1)))
-        difference = interval(reward[best, ~odd] - reward[-1, ~odd])
-        ours = f"{difference} ({mean_and_spread(reward[best, ~odd])} against {mean_and_spread(reward[-1, ~odd])})"
+        even = reward[:, ~odd]
+        difference = interval(rows.samples(even[best] - even[-1]))
+        ours = f"{difference} ({mean_and_spread(even[best])} against {mean_and_spread(even[-1])})"
         return (
             Claim(text, thesis, ours, above(difference)),
             f"Best in odd runs: {self.trials[best + 1]} (trial {best + 1}). In even runs it differs from trial 10 of "

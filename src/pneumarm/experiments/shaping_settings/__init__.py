@@ -10,8 +10,9 @@ Trials are data (``trials.toml``), and so is the wear (``worn.toml``). All use S
 and the learning rate 0.05 (section 5.4.2); differences are taken within runs, which begin with the same weights.
 """
 
+import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -38,8 +39,13 @@ from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
 
 _CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episodes", "met")
 _WORDS = {**CRITERIA, "met": "share of agents that met the criterium at the whole range of angles"}
+_SHOWN = ("reward", "success_rate", "episodes")
 _WITHOUT = Exploration(0.09, 10.0)
 _NEVER_MET = 0.5  # share of agents below which a method does not solve the task
+
+
+Tables = Mapping[str, NDArray[np.float64]]
+"""By figure, shapes (trials, runs)."""
 
 
 class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -78,7 +84,7 @@ class ShapingSettings(Experiment):
     question: str = "Which settings of shaping matter, and is shaping indispensable where the potentiometer is worn?"
     source: str = "Thesis sections 4.3.2, 5.2 and 5.4.4"
     runs: int = 4
-    arms: Sequence[str] = tuple(f"virtual:seed={seed}" for seed in range(1, 6))
+    arms: tuple[str, ...] = tuple(f"virtual:seed={seed}" for seed in range(1, 6))
     plan: tuple[Trial, ...] = field(
         default_factory=lambda: msgspec.convert(tomllib.loads(_packaged("trials.toml")), _Trials).trials
     )
@@ -118,7 +124,9 @@ class ShapingSettings(Experiment):
     def analyse(self, rows: Rows) -> Analysis:
         """Return every trial's results and its difference from the thesis' settings within runs."""
         tables = {name: rows.table(name, list(self.trials)) for name in _CRITERIA}
-        differences = {name: self._differences(table) for name, table in tables.items()}
+        # From here on columns are samples: runs where there is one arm, else the arms.
+        samples = {name: np.stack([rows.samples(line) for line in table]) for name, table in tables.items()}
+        differences = {name: self._differences(table) for name, table in samples.items()}
         return Analysis(
             summary=[self.question, *self._found(differences)],
             figures={
@@ -129,8 +137,8 @@ class ShapingSettings(Experiment):
                     for name, found in differences.items()
                 },
             },
-            sections=[self._strategy(), self._results(tables, differences)],
-            claims=self._claims(tables),
+            sections=[self._strategy(), self._results(tables, samples, differences)],
+            claims=self._claims(tables, samples, len(rows.arms)),
         )
 
     def reference(self, trial: int) -> int:
@@ -161,9 +169,7 @@ class ShapingSettings(Experiment):
             )
         return text
 
-    def _results(
-        self, tables: Mapping[str, NDArray[np.float64]], differences: Mapping[str, list[Interval | None]]
-    ) -> Section:
+    def _results(self, tables: Tables, samples: Tables, differences: Mapping[str, list[Interval | None]]) -> Section:
         header = ["trial", "settings", "reward", "difference within runs", "greedy success", "success, learning on"]
         header += ["episodes", "difference within runs", "criterium met"]
         rows = []
@@ -181,15 +187,11 @@ class ShapingSettings(Experiment):
                 ]
             )
         table = Table(header, rows, "Mean ± standard deviation over runs; differences with 95 % intervals.")
-        shown = {
-            name: [interval(values) for values in tables[name]] for name in ("reward", "success_rate", "episodes")
-        }
+        shown = {name: [interval(values) for values in samples[name]] for name in _SHOWN}
         picture = Picture(
             forest_figure(list(self.trials.values()), {_WORDS[name]: found for name, found in shown.items()}),
             "Results by settings of shaping, means with their 95 % intervals.",
-            "; ".join(
-                f"{n}: reward {v.mean():.1f}" for n, v in zip(self.trials.values(), tables["reward"], strict=True)
-            ),
+            "; ".join(f"{self.trials[n]}: reward {v.mean():.1f}" for n, v in enumerate(tables["reward"], 1)),
         )
         return Section("Results", figures=[picture], tables=[table])
 
@@ -210,26 +212,16 @@ class ShapingSettings(Experiment):
             ],
         )
 
-    def _claims(self, tables: Mapping[str, NDArray[np.float64]]) -> list[Claim]:
+    def _claims(self, tables: Tables, samples: Tables, arms: int) -> list[Claim]:
         by_name = {name: number - 1 for number, name in self.trials.items()}
-        shaped, without, often = (
-            by_name[n] for n in ("as in the thesis", "no shaping", "adjusted every 100 episodes")
-        )
-        worn, worn_without = (by_name[n] for n in ("worn, as in the thesis", "worn, no shaping"))
-        reward, episodes, met = tables["reward"], tables["episodes"], tables["met"]
-        theirs = {
-            kind: {
-                name: packaged_table(f"pneumarm.experiments.{kind}", f"thesis_{name}")
-                for name in ("reward", "episodes")
-            }
-            for kind in ("all_goals", "no_shaping")
-        }
-        their = {
-            name: theirs["all_goals"][name][:, :3] - theirs["no_shaping"][name] for name in ("reward", "episodes")
-        }
+        shaped, without = by_name["as in the thesis"], by_name["no shaping"]
+        worn, worn_without = by_name["worn, as in the thesis"], by_name["worn, no shaping"]
+        reward, episodes, met = (samples[name] for name in ("reward", "episodes", "met"))
+        theirs = {kind: _thesis(kind) for kind in ("all_goals", "no_shaping")}
+        their = {name: theirs["all_goals"][name] - theirs["no_shaping"][name] for name in ("reward", "episodes")}
         gain = interval(reward[shaped] - reward[without])
         solved, worn_solved = (interval(met[place]) for place in (without, worn_without))
-        fewer = interval(episodes[often] - episodes[shaped])
+        fewer = interval(episodes[by_name["adjusted every 100 episodes"]] - episodes[shaped])
         return [
             Claim(
                 "Shaping raises the reward",
@@ -240,15 +232,15 @@ class ShapingSettings(Experiment):
             ),
             Claim(
                 "Shaping lowers the standard deviation of the reward over runs",
-                f"{theirs['all_goals']['reward'][:, :3].std(axis=1, ddof=1).mean():.2f} against "
+                f"{theirs['all_goals']['reward'].std(axis=1, ddof=1).mean():.2f} against "
                 f"{theirs['no_shaping']['reward'].std(axis=1, ddof=1).mean():.2f}, mean over trials",
-                *_spread(reward[shaped], reward[without]),
+                *_spread(tables["reward"][shaped], tables["reward"][without], arms),
                 "shaping-improves",
             ),
             Claim(
                 "Shaping is not indispensable: without it agents meet the criterium",
                 "all 48 agents (table C.22)",
-                _share(met[without]),
+                _share(tables["met"][without]),
                 above(solved, _NEVER_MET),
                 "shaping-not-indispensable",
             ),
@@ -262,7 +254,7 @@ class ShapingSettings(Experiment):
             Claim(
                 "With a worn potentiometer shaping is indispensable: agents without it do not meet the criterium",
                 "no agent reached the whole deviation (section 5.4.4, no numbers)",
-                f"{_share(met[worn_without])}; with shaping {_share(met[worn])}",
+                f"{_share(tables['met'][worn_without])}; with shaping {_share(tables['met'][worn])}",
                 below(worn_solved, _NEVER_MET),
                 "shaping-worn",
             ),
@@ -276,18 +268,29 @@ class ShapingSettings(Experiment):
         ]
 
 
-def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64]) -> tuple[str, Any]:
-    """Return both standard deviations, and whether the first is surely smaller (Pitman and Morgan).
+def _thesis(kind: str) -> Tables:
+    """Return the thesis' rewards and episodes in runs 1 to 3, which it made with shaping and without."""
+    package = f"pneumarm.experiments.{kind}"
+    return {name: packaged_table(package, f"thesis_{name}")[:, :3] for name in ("reward", "episodes")}
+
+
+def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Any]:
+    """Return both standard deviations on an arm, and whether the first is surely smaller (Pitman and Morgan).
 
     Runs are pairs; the variances differ where sum and difference of the pairs are correlated.
     """
-    text = f"{shaped.std(ddof=1):.2f} against {without.std(ddof=1):.2f}" if len(shaped) > 1 else "one run"
-    x, y = shaped - without, shaped + without
-    if len(x) < 4 or x.std() == 0 or y.std() == 0:
+    apart = [values.reshape(arms, -1) for values in (shaped, without)]
+    x, y = ((values - values.mean(axis=1, keepdims=True)).ravel() for values in apart)
+    freedom = len(x) - arms
+    if freedom < 1:
+        return "one run", "open"
+    text = " against ".join(f"{np.sqrt((v * v).sum() / freedom):.2f}" for v in (x, y))
+    less, more = x - y, x + y
+    if freedom < 4 or less.std() == 0 or more.std() == 0:
         return text, "open"
-    # Fisher's transform: the correlation's arctanh is about normal with this standard deviation.
-    z, half = np.arctanh(np.clip(np.corrcoef(x, y)[0, 1], -1 + 1e-12, 1 - 1e-12)), 1.96 / np.sqrt(len(x) - 3)
-    return text, below(Interval(float(z), float(half), len(x)))
+    correlation = np.clip(np.corrcoef(less, more)[0, 1], -1 + 1e-12, 1 - 1e-12)
+    # Fisher's transform makes the correlation about normal, with this standard deviation.
+    return text, below(Interval(float(np.arctanh(correlation)), 1.96 / math.sqrt(freedom - 2), freedom))
 
 
 def _share(met: NDArray[np.float64]) -> str:

@@ -119,12 +119,7 @@ class Factorial(Experiment):
         """Return rankings, effects and tests of every criterion, beside the thesis'."""
         from pneumarm.experiments.design.page import table_sections
 
-        ours = {
-            name: analyse_table(self.design, rows.table(name, list(self.trials)), _goal(name))
-            for name in self.criteria
-            if name in rows.figures
-        }
-        theirs = {name: analyse_table(self.design, table, _goal(name)) for name, table in self.thesis.items()}
+        ours, theirs = self.analyses(rows)
         sections = [side_by_side(self.trials, {n: a.results for n, a in ours.items()}, self.thesis, self.words)]
         for name, analysis in ours.items():
             if name.startswith(EXPLORING):
@@ -144,7 +139,7 @@ class Factorial(Experiment):
                 "thesis": {name: analysis.figures() for name, analysis in theirs.items()},
             },
             sections=sections,
-            claims=(*self.claims(rows, ours, theirs), *(find(self, rows, ours, theirs) for find in self.findings)),
+            claims=self.claims(rows, ours, theirs),
         )
 
     @property
@@ -152,8 +147,18 @@ class Factorial(Experiment):
         """Criteria in words."""
         return {**CRITERIA, "gain": "change of the reward by training on"}
 
+    def analyses(self, rows: Rows) -> tuple[Analyses, Analyses]:
+        """Return the analyses of ``rows`` and of the thesis' tables."""
+        names = [name for name in self.criteria if name in rows.figures]
+        tables = {name: rows.table(name, list(self.trials)) for name in names}
+        ours, theirs = (
+            {name: analyse_table(self.design, table, _goal(name)) for name, table in given.items()}
+            for given in (tables, self.thesis)
+        )
+        return ours, theirs
+
     def claims(self, rows: Rows, ours: Analyses, theirs: Analyses) -> tuple[Claim, ...]:
-        """Return what the thesis says of single effects, its effect next to ours, greedy and exploring."""
+        """Return what the thesis says of single effects, its effect next to ours, and what else it concludes."""
         found = []
         for said in self.said:
             for name in (said.criterion, EXPLORING + said.criterion):
@@ -161,7 +166,7 @@ class Factorial(Experiment):
                 if name in ours and (said.loss == "mean" or rows.runs > 1):
                     effect = self.effect(rows, name, said.column, ours[name], said.loss)
                     found.append(_effect_claim(said, self.words[name], theirs[said.criterion], ours[name], effect))
-        return tuple(found)
+        return (*found, *(find(self, rows, ours, theirs) for find in self.findings))
 
     def effect(
         self, rows: Rows, criterion: str, column: int, analysis: TableAnalysis, loss_name: Spread = "mean"

@@ -18,7 +18,6 @@ from typing import Any
 import msgspec
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.comparison import mean_and_spread
@@ -105,7 +104,7 @@ class FineTuning(Experiment):
                 )
             ],
         )
-        claim, text = self._confirmed(rows, reward)
+        claim, text = self.confirmation(rows)
         return Analysis(
             summary=[self.question, text, *found.summary[1:]],
             figures={**found.figures, "reference": float(reward[-1].mean())},
@@ -113,8 +112,9 @@ class FineTuning(Experiment):
             claims=[claim],
         )
 
-    def _confirmed(self, rows: Rows, reward: NDArray[np.float64]) -> tuple[Claim, str]:
-        """Return whether the trial that is best in odd runs beats trial 10 in even ones."""
+    def confirmation(self, rows: Rows) -> tuple[Claim, str]:
+        """Return whether the trial that is best in odd runs beats trial 10 in even ones, and which it is in words."""
+        reward = rows.table("reward", list(self.trials))
         odd = np.tile(np.arange(1, rows.runs + 1) % 2 == 1, len(rows.arms))
         text = "Levels that lie closer together give settings better than those of trial 10"
         thesis = "supposed (sections 5.3 and 5.4.2, no numbers)"

@@ -160,7 +160,7 @@ class ShapingSettings(Experiment):
         text = []
         for name in ("reward", "episodes"):
             surely = [
-                f"{self.trials[n]} ({each})"
+                f"{self.trials[n]} ({each if name == 'reward' else _whole(each)})"
                 for n, each in zip(self.trials, differences[name], strict=True)
                 if each and abs(each.mean) > each.half
             ]
@@ -170,14 +170,13 @@ class ShapingSettings(Experiment):
         return text
 
     def _results(self, tables: Tables, samples: Tables, differences: Mapping[str, list[Interval | None]]) -> Section:
-        header = ["trial", "settings", "reward", "difference within runs", "greedy success", "success, learning on"]
+        header = ["settings", "reward", "difference within runs", "greedy success", "success, learning on"]
         header += ["episodes", "difference within runs", "criterium met"]
         rows = []
         for place, (trial, name) in enumerate(self.trials.items()):
             rows.append(
                 [
-                    str(trial),
-                    name,
+                    f"{trial} {name}",
                     mean_and_spread(tables["reward"][place]),
                     str(differences["reward"][place] or "reference"),
                     *(f"{100 * tables[n][place].mean():.1f} %" for n in ("success_rate", LEARNING)),

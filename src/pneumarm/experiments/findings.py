@@ -15,6 +15,28 @@ _MARGINAL = 8.0  # reward: what a switch costs (section 5.4.1)
 _TRACES, _PUNISHMENT = 11, 12  # columns of table 5.3; in appendix C.1 the second holds the punishment
 
 
+def weights_matter_more_than_settings(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Compare what other weights make of the reward with the same settings, with what all settings together do."""
+    tables = [rows.table("reward", list(made.trials), arm) for arm in rows.arms]
+    claim = "With the same settings other initial weights make more of the reward than all settings together"
+    thesis = f"{100 * _within_settings(theirs['reward'].results):.0f} % of the variance (table C.7)"
+    if rows.runs < 2:
+        return Claim(claim, thesis, "one run", "open", "initial-weights")
+    found = interval([_within_settings(table) for table in tables])
+    return Claim(claim, thesis, f"{_percent(found)} of the variance", above(found, 0.5), "initial-weights")
+
+
+def _within_settings(table: NDArray[np.float64]) -> float:
+    """Return the share of variance within trials, of ``table`` (trials, runs): the intraclass correlation's rest.
+
+    With mean squares B between and W within trials of n runs, W / (W + (B - W) / n), no part below 0.
+    """
+    runs = table.shape[1]
+    within = float(table.var(axis=1, ddof=1).mean())
+    between = max(0.0, float(table.mean(axis=1).var(ddof=1)) - within / runs)
+    return within / (within + between) if within > 0 else 0.0
+
+
 def weights_dominate(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
     """Compare what runs, that is initial weights, make of the reward with what any column does.
 
@@ -31,7 +53,7 @@ def weights_dominate(made: Factorial, rows: Rows, ours: Analyses, theirs: Analys
     thesis = anova(made.design.array, theirs["reward"].results, names)
     text, verdict = _dominance(found) if found else ("one run", "open")
     return Claim(
-        "The initial weights explain more of the reward than any factor or interaction",
+        "Weights are good or bad whatever the settings: they explain more than any factor or interaction",
         f"{_dominance([thesis])[0]} (table C.7)",
         text,
         verdict,

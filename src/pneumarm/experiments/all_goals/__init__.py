@@ -14,7 +14,12 @@ from dataclasses import replace
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial, Said
-from pneumarm.experiments.findings import nearly_all_succeed, traces_are_marginal, weights_dominate
+from pneumarm.experiments.findings import (
+    nearly_all_succeed,
+    traces_are_marginal,
+    weights_dominate,
+    weights_matter_more_than_settings,
+)
 from pneumarm.learning import TrainSettings
 
 LONGEST = 50_000
@@ -46,5 +51,5 @@ EXPERIMENT = Factorial(
         Said("episodes", 12, raises=False, about="gamma-episodes"),
         Said("episodes", 11, raises=True, about="traces"),
     ),
-    findings=(weights_dominate, traces_are_marginal, nearly_all_succeed),
+    findings=(weights_matter_more_than_settings, weights_dominate, traces_are_marginal, nearly_all_succeed),
 )

@@ -7,7 +7,7 @@ import numpy as np
 from pneumarm.experiments.design.analysis import TableAnalysis
 from pneumarm.experiments.design.assignment import Level
 from pneumarm.experiments.design.effects import Effects
-from pneumarm.experiments.design.figures import effects_figure, half_normal_figure
+from pneumarm.experiments.design.figures import effects_figure, half_normal_figure, half_normal_runs_figure
 from pneumarm.report.page import Picture, Section, Table
 
 
@@ -64,6 +64,13 @@ def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
                 effects_figure(analysis, lines, quantity),
                 f"Effects on the {quantity} for all runs apart (thesis fig. 5.1).",
                 f"{len(lines)} lines in {analysis.design.array.columns} columns.",
+            )
+        )
+        drawn.append(
+            Picture(
+                half_normal_runs_figure(analysis, quantity),
+                "Half-normal probability plots for all runs apart (thesis fig. C.2).",
+                f"Largest effects by run: {', '.join(f'{found.sizes.max():.2f}' for found in analysis.runs)}.",
             )
         )
     names = tuple(name for name in ("mean", "std") if name in analysis.effects)

@@ -57,7 +57,7 @@ def weights_dominate(made: Factorial, rows: Rows, ours: Analyses, theirs: Analys
         f"{_dominance([thesis])[0]} (table C.7)",
         text,
         verdict,
-        "initial-weights",
+        "weights-alike",
     )
 
 

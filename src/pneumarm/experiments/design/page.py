@@ -11,6 +11,9 @@ from pneumarm.experiments.design.figures import effects_figure, half_normal_figu
 from pneumarm.report.page import Picture, Section, Table
 
 
+_MOST_RUNS = 8  # side by side; of more only the losses are shown
+
+
 def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "") -> list[Section]:
     """Return the sections on one table of results of a ``quantity``; ``prefix`` keeps titles of several apart."""
     before = f"{prefix}: " if prefix else ""
@@ -36,7 +39,8 @@ def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "") -> 
 
 def results_table(analysis: TableAnalysis, quantity: str) -> Table:
     """Return the loss table: trials with their settings, results and losses."""
-    factors, runs = analysis.design.factors, analysis.results.shape[1]
+    factors = analysis.design.factors
+    runs = analysis.results.shape[1] if analysis.results.shape[1] <= _MOST_RUNS else 0
     losses = list(analysis.losses)
     rows = []
     for trial, results in enumerate(analysis.results, 1):
@@ -45,7 +49,7 @@ def results_table(analysis: TableAnalysis, quantity: str) -> Table:
             [
                 str(trial),
                 *(f"{settings[f.label]}" for f in factors),
-                *(f"{value:.2f}" for value in results),
+                *(f"{value:.2f}" for value in results[:runs]),
                 *(f"{analysis.losses[name][trial - 1]:.2f}" for name in losses),
             ]
         )

@@ -10,7 +10,6 @@ from pneumarm.experiments.design.effects import Effects
 from pneumarm.experiments.design.figures import effects_figure, half_normal_figure, half_normal_runs_figure
 from pneumarm.report.page import Picture, Section, Table
 
-
 _MOST_RUNS = 8  # side by side; of more only the losses are shown
 
 

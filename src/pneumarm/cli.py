@@ -84,6 +84,10 @@ COMMANDS = {
         "Do an experiment of the thesis again.",
         "pneumarm experiment all-goals --out laboratory --runs 8",
     ),
+    "claims": (
+        "Say which of the thesis' conclusions hold here, from the experiments that were done.",
+        "pneumarm claims --out laboratory",
+    ),
     "report": (
         "Write the report of a finished run again.",
         "pneumarm report runs/first",

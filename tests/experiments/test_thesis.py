@@ -106,7 +106,7 @@ def test_the_command_gives_the_rankings(tmp_path: Path, capsys: pytest.CaptureFi
     assert found["best"]["trial"] == 10
     assert found["confirmation"]["observed"] == pytest.approx(6.69)
     page_ = (tmp_path / "page" / "page.html").read_text()
-    assert page_.count("data:image/svg") == 4
+    assert page_.count("data:image/svg") == 5
     assert "Trial 10 has them" in page_
 
 

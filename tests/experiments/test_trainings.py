@@ -14,11 +14,11 @@ from pneumarm.experiments.experiment import LaboratorySettings, run_seed
 from pneumarm.experiments.factorial import Factorial
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.registry import PLACES, experiment
-from pneumarm.experiments.trainings import train_and_test, with_setting, with_settings
+from pneumarm.experiments.trainings import LEARNING, train_and_test, with_setting, with_settings
 from pneumarm.learning import Exploration, TrainSettings
 from pneumarm.learning.training import train
 
-SHORT = LaboratorySettings(test_episodes=200, max_episodes=1000)
+SHORT = LaboratorySettings(test_episodes=200, max_episodes=1000, exploring=True)
 FACTORIALS = [name for name in PLACES if isinstance(experiment(name), Factorial)]
 
 
@@ -76,6 +76,28 @@ def test_exploration_in_the_test_makes_switches(material: Simulated) -> None:
     )
     assert never["exploring reward"] == never["reward"]
     assert always["exploring switches"] != always["switches"]
+
+
+def test_exploring_tests_are_made_when_asked_for(material: Simulated) -> None:
+    asked, not_asked = (
+        train_and_test(material, TrainSettings(), 1, replace(SHORT, exploring=exploring))
+        for exploring in (True, False)
+    )
+    extra = {name for name in asked if name.startswith("exploring ")}
+    assert len(extra) == 4
+    assert {name: value for name, value in asked.items() if name not in extra} == not_asked
+
+
+def test_success_while_learning_on_is_that_of_the_training(material: Simulated) -> None:
+    """An agent that met the criterium of 95 % goes on meeting it; one that learns nothing does as in the test."""
+    laboratory = LaboratorySettings(test_episodes=2000, exploring=True)
+    settings = replace(TrainSettings(), max_episodes=40_000)
+    trained = train_and_test(material, settings, 3, laboratory)
+    assert trained["met"] == 1
+    assert trained[LEARNING] > 0.93
+    still = replace(settings, learning_rate=0.0, max_episodes=1, shaping=None)
+    untrained = train_and_test(material, still, 3, laboratory)
+    assert untrained[LEARNING] == pytest.approx(untrained["exploring success_rate"], abs=0.08)
 
 
 def test_a_single_goal(material: Simulated) -> None:
@@ -169,6 +191,6 @@ def test_the_command_leaves_a_page_and_goes_on(tmp_path: Path, capsys: pytest.Ca
         assert found["rows"] == runs * len(experiment(name).trials)
         page = (laboratory / name / "page.html").read_text()
         assert "The thesis beside ours" in page
-        assert page.count("data:image/svg") == (16 if name == "all-goals" else 0)
+        assert page.count("data:image/svg") == (20 if name == "all-goals" else 0)
     assert len(list((laboratory / "arms").iterdir())) == 1
     assert found["thesis"]["reward"]["ranking"]["mean"][:2] == [4, 12]

@@ -39,7 +39,8 @@ def side_by_side(trials: Mapping[int, str], ours: Results, thesis: Results, word
         ]
         text = words.get(name, name)
         tables.append(Table(["trial", "settings", *columns], rows, f"{text[0].upper()}{text[1:]}."))
-    return Section("The thesis beside ours", ["Mean ± standard deviation over the runs."], tables=tables)
+    title = "The thesis beside ours" if thesis else "Trials by criterion"
+    return Section(title, ["Mean ± standard deviation over the runs."], tables=tables)
 
 
 def mean_and_spread(values: Array) -> str:

@@ -34,6 +34,8 @@ class LaboratorySettings:
     """Greedy movements that every agent is tested with (thesis section 5.2)."""
     max_episodes: int | None = None
     """Training episodes at most; otherwise as many as the experiment says."""
+    exploring: bool = False
+    """Test every agent a second time, exploring as when its training ended; that takes as long as training it."""
 
     def __post_init__(self) -> None:
         check(
@@ -74,6 +76,16 @@ class Rows:
         return tuple(sorted({row.arm for row in self.rows}))
 
     @property
+    def figures(self) -> frozenset[str]:
+        """Names of the figures that every row has."""
+        return frozenset.intersection(*(frozenset(row.figures) for row in self.rows)) if self.rows else frozenset()
+
+    def of(self, trials: Iterable[int]) -> "Rows":
+        """Return the rows of ``trials`` alone."""
+        wanted = set(trials)
+        return Rows(tuple(row for row in self.rows if row.trial in wanted))
+
+    @property
     def runs(self) -> int:
         """Highest number of a run."""
         return max((row.run for row in self.rows), default=0)
@@ -93,6 +105,14 @@ class Rows:
             raise UnusableInput(f"{len(missing)} rows are missing, the first is {missing[0]}; finish the sweep first")
         return np.array([[found[key] for key in line] for line in keys])
 
+    def samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the independent samples in ``values`` (arms times runs,), a line of a table.
+
+        Runs on one arm share its simulation: where there are several arms they are their means, shape (arms,).
+        """
+        arms = len(self.arms)
+        return values if arms == 1 else values.reshape(arms, -1).mean(axis=1)
+
 
 @dataclass(frozen=True)
 class Claim:
@@ -104,6 +124,9 @@ class Claim:
     ours: str
     """Ours, with an interval where there is one."""
     verdict: Literal["holds", "does not hold", "open"]
+    about: str = ""
+    """Which of the thesis' conclusions it is about, by its key in ``claims/conclusions.toml``; by default those of
+    its experiment."""
 
 
 @dataclass(frozen=True)

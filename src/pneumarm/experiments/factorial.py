@@ -3,10 +3,10 @@
 The same class does all of them; what they are is data, in the folder of each.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 from numpy.typing import NDArray
@@ -14,9 +14,12 @@ from numpy.typing import NDArray
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_table
 from pneumarm.experiments.design.assignment import Design
+from pneumarm.experiments.design.effects import effects
+from pneumarm.experiments.design.loss import loss
+from pneumarm.experiments.differences import Interval, above, below, interval
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
 from pneumarm.experiments.preparation import Simulated, simulated
-from pneumarm.experiments.trainings import CRITERIA, EXPLORING, train_and_test, with_settings
+from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, train_and_test, with_settings
 from pneumarm.learning import TrainSettings
 
 Array = NDArray[Any]
@@ -28,6 +31,16 @@ def _goal(criterion: str) -> Goal:
     return "larger" if criterion.removeprefix(EXPLORING) in ("reward", "gain") else "smaller"
 
 
+Analyses = Mapping[str, TableAnalysis]
+"""By criterion."""
+Finding = Callable[["Factorial", Rows, Analyses, Analyses], Claim]
+"""Makes a claim of the rows, their analyses and the thesis'."""
+
+
+Spread = Literal["mean", "std"]
+"""The losses that the thesis ranks by."""
+
+
 class Said(NamedTuple):
     """What the thesis says of the effect of a column of two levels on a criterion."""
 
@@ -35,8 +48,10 @@ class Said(NamedTuple):
     column: int
     raises: bool
     """Whether it is the higher level that gives more."""
-    loss: str = "mean"
+    loss: Spread = "mean"
     """Or std: whether the runs spread more."""
+    about: str = ""
+    """See :attr:`~.experiment.Claim.about`."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +75,9 @@ class Factorial(Experiment):
     criteria: tuple[str, ...] = (*ALL, "episodes")
     """What is analysed."""
     said: tuple[Said, ...] = ()
-    """What the thesis concludes."""
+    """What the thesis concludes of single effects."""
+    findings: tuple["Finding", ...] = ()
+    """What else it concludes (:mod:`.findings`)."""
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -102,11 +119,7 @@ class Factorial(Experiment):
         """Return rankings, effects and tests of every criterion, beside the thesis'."""
         from pneumarm.experiments.design.page import table_sections
 
-        ours = {
-            name: analyse_table(self.design, rows.table(name, list(self.trials)), _goal(name))
-            for name in self.criteria
-        }
-        theirs = {name: analyse_table(self.design, table, _goal(name)) for name, table in self.thesis.items()}
+        ours, theirs = self.analyses(rows)
         sections = [side_by_side(self.trials, {n: a.results for n, a in ours.items()}, self.thesis, self.words)]
         for name, analysis in ours.items():
             if name.startswith(EXPLORING):
@@ -119,13 +132,14 @@ class Factorial(Experiment):
                 "arms": list(rows.arms),
                 **{
                     name: float(rows.table(name, list(self.trials)).mean())
-                    for name in ("success_rate", EXPLORING + "success_rate")
+                    for name in ("success_rate", EXPLORING + "success_rate", LEARNING)
+                    if name in rows.figures
                 },
                 "ours": {name: analysis.figures() for name, analysis in ours.items()},
                 "thesis": {name: analysis.figures() for name, analysis in theirs.items()},
             },
             sections=sections,
-            claims=self.claims(ours, theirs),
+            claims=self.claims(rows, ours, theirs),
         )
 
     @property
@@ -133,14 +147,40 @@ class Factorial(Experiment):
         """Criteria in words."""
         return {**CRITERIA, "gain": "change of the reward by training on"}
 
-    def claims(self, ours: Mapping[str, TableAnalysis], theirs: Mapping[str, TableAnalysis]) -> tuple[Claim, ...]:
-        """Return what the thesis says of single effects, its effect next to ours, greedy and exploring."""
+    def analyses(self, rows: Rows) -> tuple[Analyses, Analyses]:
+        """Return the analyses of ``rows`` and of the thesis' tables."""
+        names = [name for name in self.criteria if name in rows.figures]
+        tables = {name: rows.table(name, list(self.trials)) for name in names}
+        ours, theirs = (
+            {name: analyse_table(self.design, table, _goal(name)) for name, table in given.items()}
+            for given in (tables, self.thesis)
+        )
+        return ours, theirs
+
+    def claims(self, rows: Rows, ours: Analyses, theirs: Analyses) -> tuple[Claim, ...]:
+        """Return what the thesis says of single effects, its effect next to ours, and what else it concludes."""
         found = []
         for said in self.said:
             for name in (said.criterion, EXPLORING + said.criterion):
-                if name in ours:
-                    found.append(_effect_claim(said, self.words[name], theirs[said.criterion], ours[name]))
-        return tuple(found)
+                # One run says nothing of the spread.
+                if name in ours and (said.loss == "mean" or rows.runs > 1):
+                    effect = self.effect(rows, name, said.column, ours[name], said.loss)
+                    found.append(_effect_claim(said, self.words[name], theirs[said.criterion], ours[name], effect))
+        return (*found, *(find(self, rows, ours, theirs) for find in self.findings))
+
+    def effect(
+        self, rows: Rows, criterion: str, column: int, analysis: TableAnalysis, loss_name: Spread = "mean"
+    ) -> Interval:
+        """Return the signed effect of a column of two levels with its interval.
+
+        Where there are several arms they are the sample; of one arm it is the analysis that knows the margin.
+        """
+        if len(rows.arms) == 1:
+            signed = float(analysis.effects[loss_name].signed[column - 1])
+            return Interval(signed, analysis.margin(loss_name), analysis.results.shape[1])
+        tables = [rows.table(criterion, list(self.trials), arm) for arm in rows.arms]
+        found = [effects(self.design.array, loss(table, loss_name)) for table in tables]
+        return interval([effect.signed[column - 1] for effect in found])
 
     def _best(self, ours: Mapping[str, TableAnalysis]) -> str:
         first = next(iter(ours.values()))
@@ -150,20 +190,17 @@ class Factorial(Experiment):
         )
 
 
-def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis) -> Claim:
+def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis, effect: Interval) -> Claim:
     """Return whether an effect has the sign that the thesis says, beyond what chance could make of it."""
-    column = said.column
-    theirs, ours = (float(a.effects[said.loss].signed[column - 1]) for a in (their, our))
-    if abs(ours) <= our.margin(said.loss):
-        verdict = "open"
-    else:
-        verdict = "holds" if (ours > 0) == said.raises else "does not hold"
-    factor = our.design.on(column)
-    what = f"{factor.name} at {factor.levels[-1]}" if factor else f"the higher level of {our.design.label(column)}"
+    column, design = said.column, our.design
+    theirs = float(their.effects[said.loss].signed[column - 1])
+    factor = design.on(column)
+    what = f"{factor.name} at {factor.levels[-1]}" if factor else f"the higher level of {design.label(column)}"
     of = "" if said.loss == "mean" else "standard deviation of the "
     return Claim(
         f"{what} (column {column}) {'raises' if said.raises else 'lowers'} the {of}{quantity}",
         f"{theirs:+.2f} ± {their.margin(said.loss):.2f}",
-        f"{ours:+.2f} ± {our.margin(said.loss):.2f}",
-        verdict,  # type: ignore[arg-type]
+        str(effect),
+        above(effect) if said.raises else below(effect),
+        said.about,
     )

@@ -13,8 +13,12 @@ RESULTS = "results.json"
 
 def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: int, arms: tuple[str, ...]) -> Path:
     """Write ``page.html`` and ``results.json`` to ``folder`` and return the path of the page."""
-    claims = [{"claim": c.text, "thesis": c.thesis, "ours": c.ours, "verdict": c.verdict} for c in analysis.claims]
-    write_json(folder / RESULTS, jsonable({"experiment": experiment.name, **analysis.figures, "claims": claims}))
+    claims = [
+        {"claim": c.text, "thesis": c.thesis, "ours": c.ours, "verdict": c.verdict, "about": c.about}
+        for c in analysis.claims
+    ]
+    of = {"experiment": experiment.name, "arms": list(arms), "runs": runs}
+    write_json(folder / RESULTS, jsonable({**analysis.figures, **of, "claims": claims}))
     where = f"{experiment.source}. {runs} runs of {len(experiment.trials)} trials on {', '.join(arms)}."
     sections = [*analysis.sections]
     if analysis.claims:

@@ -7,13 +7,14 @@ from pathlib import Path
 from pneumarm.arm import open_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings, Report
-from pneumarm.files import write_json
+from pneumarm.files import write_json, write_text
 from pneumarm.learning import BeginStates, begin_states
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import Store, collect
 
 STORE = "transitions.db"
 SIMULATION = "simulation.safetensors"
+PLAN = "faults.toml"
 
 
 @dataclass(frozen=True)
@@ -24,15 +25,21 @@ class Simulated:
     begin: BeginStates
 
 
-def simulated(arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
+def simulated(arm: str, folder: Path, settings: LaboratorySettings, progress: Report, faults: str = "") -> Simulated:
     """Return the simulation of ``arm``, collecting and fitting where ``folder`` does not hold it yet; resumable.
+
+    ``faults`` is the text of a plan (:mod:`pneumarm.arm.virtual.faults`) that a virtual arm is collected with; such
+    an arm needs a folder of its own.
 
     Raises:
         UnusableInput: no arm has this name, or the folder was begun with other settings.
 
     """
     wanted = {"arm": arm, "seed": settings.seed, "transitions": settings.transitions}
-    claim(folder, wanted)
+    claim(folder, wanted | ({"faults": faults} if faults else {}))
+    if faults:
+        write_text(folder / PLAN, faults)
+        arm = f"{arm}{',' if ':' in arm else ':'}faults={folder / PLAN}"
     if not (folder / SIMULATION).exists():
         with open_arm(arm, settings.seed) as opened, Store.for_arm(folder / STORE, opened.spec) as store:
             collect(opened, store, settings.transitions, settings.seed, progress=progress)

@@ -16,6 +16,8 @@ PLACES = {
     "enough-data": "enough_data",
     "noise-for-transfer": "noise_for_transfer",
     "valves-closed": "valves_closed",
+    "shaping-settings": "shaping_settings",
+    "fine-tuning": "fine_tuning",
 }
 """Name: package below this one; each has an ``EXPERIMENT``."""
 

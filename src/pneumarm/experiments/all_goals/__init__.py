@@ -4,9 +4,12 @@ Five factors of the method on L16, eight runs from different weights, tested on 
 
     pneumarm experiment all-goals
 
-On the nominal virtual arm (seed 0) few effects are beyond chance: a learning rate of 0.10, 10 neurons, traces and
-gamma 0.98 each cost about 20 of reward, largely because together (trial 14) they diverge; SARSA and Q-learning are
-not told apart. Agents reach 84 % of their goals, where the thesis' reach nearly all.
+On arms 1 to 5, four runs each, other weights with the same settings make 65 ± 15 % of the variance (in the thesis'
+own table 83 %). A learning rate of 0.10, 10 neurons and traces cost 18 ± 5, 8 ± 7 and 16 ± 7 of reward, largely
+because together with gamma 0.98 (trial 14) they diverge; SARSA and Q-learning are not told apart. Agents reach 85 %
+of their goals in the test, where the thesis' reach nearly all, and 96 % while they learn on, which is what the
+criterium is about: an agent that is stuck unlearns the action that holds it, and the same weights, frozen, stay
+stuck.
 """
 
 from dataclasses import replace
@@ -14,6 +17,12 @@ from dataclasses import replace
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial, Said
+from pneumarm.experiments.findings import (
+    nearly_all_succeed,
+    traces_are_marginal,
+    weights_dominate,
+    weights_matter_more_than_settings,
+)
 from pneumarm.learning import TrainSettings
 
 LONGEST = 50_000
@@ -33,16 +42,17 @@ EXPERIMENT = Factorial(
         name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
     },
     said=(
-        Said("reward", 4, raises=False),
-        Said("reward", 4, raises=True, loss="std"),
-        Said("reward", 8, raises=False, loss="std"),
-        Said("reward", 2, raises=False),
-        Said("reward", 2, raises=True, loss="std"),
-        Said("reward", 1, raises=False),
-        Said("reward", 11, raises=False),
-        Said("reward", 12, raises=True),
-        Said("reward", 12, raises=True, loss="std"),
-        Said("episodes", 12, raises=False),
-        Said("episodes", 11, raises=True),
+        Said("reward", 4, raises=False, about="sarsa"),
+        Said("reward", 4, raises=True, loss="std", about="sarsa"),
+        Said("reward", 8, raises=False, loss="std", about="column-8"),
+        Said("reward", 2, raises=False, about="neurons"),
+        Said("reward", 2, raises=True, loss="std", about="neurons"),
+        Said("reward", 1, raises=False, about="learning-rate"),
+        Said("reward", 11, raises=False, about="traces"),
+        Said("reward", 12, raises=True, about="gamma"),
+        Said("reward", 12, raises=True, loss="std", about="gamma"),
+        Said("episodes", 12, raises=False, about="gamma-episodes"),
+        Said("episodes", 11, raises=True, about="traces"),
     ),
+    findings=(weights_matter_more_than_settings, weights_dominate, traces_are_marginal, nearly_all_succeed),
 )

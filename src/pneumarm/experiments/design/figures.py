@@ -83,5 +83,24 @@ def half_normal_figure(analysis: TableAnalysis, names: tuple[str, ...], quantity
     return figure
 
 
+@styled
+def half_normal_runs_figure(analysis: TableAnalysis, quantity: str) -> Figure:
+    """Draw the effects in each run apart against the half-normal axis, a line a run (thesis fig. C.2)."""
+    figure, axes = panels(1, 1, 3.6)
+    axis, columns = axes[0, 0], analysis.design.array.columns
+    y, percent = positions(columns), percentages(columns)
+    for number, found in enumerate(analysis.runs):
+        colour, style = _STYLES[number % len(_STYLES)]
+        marker = _MARKERS[number % len(_MARKERS)]
+        sizes = np.sort(found.sizes)
+        axis.plot(sizes, y, color=colour, linestyle=style, linewidth=0.8, marker=marker, label=f"run {number + 1}")
+    axis.set_yticks(y, [f"{p:.1f}" for p in percent])
+    axis.set_xlim(0, None)
+    axis.set_xlabel(f"estimated effect on the {quantity}")
+    axis.set_ylabel("probability [%]")
+    figure.legend(loc="outside upper center", ncols=min(8, len(analysis.runs)))
+    return figure
+
+
 def _unit(quantity: str) -> str:
     return f" of the {quantity}" if quantity else ""

@@ -7,8 +7,10 @@ import numpy as np
 from pneumarm.experiments.design.analysis import TableAnalysis
 from pneumarm.experiments.design.assignment import Level
 from pneumarm.experiments.design.effects import Effects
-from pneumarm.experiments.design.figures import effects_figure, half_normal_figure
+from pneumarm.experiments.design.figures import effects_figure, half_normal_figure, half_normal_runs_figure
 from pneumarm.report.page import Picture, Section, Table
+
+_MOST_RUNS = 8  # side by side; of more only the losses are shown
 
 
 def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "") -> list[Section]:
@@ -36,7 +38,8 @@ def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "") -> 
 
 def results_table(analysis: TableAnalysis, quantity: str) -> Table:
     """Return the loss table: trials with their settings, results and losses."""
-    factors, runs = analysis.design.factors, analysis.results.shape[1]
+    factors = analysis.design.factors
+    runs = analysis.results.shape[1] if analysis.results.shape[1] <= _MOST_RUNS else 0
     losses = list(analysis.losses)
     rows = []
     for trial, results in enumerate(analysis.results, 1):
@@ -45,7 +48,7 @@ def results_table(analysis: TableAnalysis, quantity: str) -> Table:
             [
                 str(trial),
                 *(f"{settings[f.label]}" for f in factors),
-                *(f"{value:.2f}" for value in results),
+                *(f"{value:.2f}" for value in results[:runs]),
                 *(f"{analysis.losses[name][trial - 1]:.2f}" for name in losses),
             ]
         )
@@ -64,6 +67,13 @@ def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
                 effects_figure(analysis, lines, quantity),
                 f"Effects on the {quantity} for all runs apart (thesis fig. 5.1).",
                 f"{len(lines)} lines in {analysis.design.array.columns} columns.",
+            )
+        )
+        drawn.append(
+            Picture(
+                half_normal_runs_figure(analysis, quantity),
+                "Half-normal probability plots for all runs apart (thesis fig. C.2).",
+                f"Largest effects by run: {', '.join(f'{found.sizes.max():.2f}' for found in analysis.runs)}.",
             )
         )
     names = tuple(name for name in ("mean", "std") if name in analysis.effects)

@@ -24,5 +24,5 @@ EXPERIMENT = Factorial(
     thesis={name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "gain", "actions", "switches")},
     continued=50_000,
     criteria=("gain", *ALL),
-    said=(Said("gain", 4, raises=True, loss="std"),),
+    said=(Said("gain", 4, raises=True, loss="std", about="q-fluctuates"),),
 )

@@ -14,12 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.comparison import mean_and_spread, side_by_side
-from pneumarm.experiments.design.distributions import t_quantile
 from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.differences import above, interval
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.experiments.trainings import CRITERIA, train_and_test
@@ -75,8 +74,8 @@ class Confirmation(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                f"Reward with 0.10 less that with 0.05, within runs: {_interval(difference)}; "
-                f"the thesis' numbers give {_interval(theirs)}.",
+                f"Reward with 0.10 less that with 0.05, within runs: {interval(difference)}; "
+                f"the thesis' numbers give {interval(theirs)}.",
             ],
             figures={
                 name: {"mean": table.mean(axis=1).tolist(), "runs": table.tolist()} for name, table in ours.items()
@@ -87,26 +86,10 @@ class Confirmation(Experiment):
                     "The rule's settings (learning rate 0.10) give more reward than the printed ones (0.05)",
                     f"{mean_and_spread(thesis['reward'][1])} against {mean_and_spread(thesis['reward'][0])}",
                     f"{mean_and_spread(ours['reward'][1])} against {mean_and_spread(ours['reward'][0])}",
-                    _verdict(difference),
+                    above(interval(difference)),
                 )
             ],
         )
-
-
-def _half(difference: Any) -> float:
-    n = len(difference)
-    return t_quantile(0.95, n - 1) * float(difference.std(ddof=1)) / float(np.sqrt(n)) if n > 1 else float("inf")
-
-
-def _interval(difference: Any) -> str:
-    half = _half(difference)
-    return f"{difference.mean():+.2f}" + (f" ± {half:.2f}" if np.isfinite(half) else "")
-
-
-def _verdict(difference: Any) -> Any:
-    if abs(difference.mean()) <= _half(difference):
-        return "open"
-    return "holds" if difference.mean() > 0 else "does not hold"
 
 
 EXPERIMENT = Confirmation()

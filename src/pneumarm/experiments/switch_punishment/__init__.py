@@ -12,6 +12,7 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial, Said
+from pneumarm.experiments.findings import punishment_halves_switches
 
 EXPERIMENT = Factorial(
     name="switch-punishment",
@@ -26,8 +27,9 @@ EXPERIMENT = Factorial(
     },
     goal=650.0,
     said=(
-        Said("switches", 12, raises=True),
-        Said("actions", 12, raises=False),
-        Said("episodes", 12, raises=True),
+        Said("switches", 12, raises=True, about="punishment"),
+        Said("actions", 12, raises=False, about="punishment"),
+        Said("episodes", 12, raises=True, about="punishment"),
     ),
+    findings=(punishment_halves_switches,),
 )

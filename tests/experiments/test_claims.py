@@ -1,0 +1,197 @@
+"""The page of claims: what is collected, how verdicts add up, what is still to be run."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pneumarm.cli import main
+from pneumarm.errors import UnusableInput
+from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
+from pneumarm.experiments.claims import conclusions, judge, read_results, sections
+from pneumarm.experiments.experiment import Analysis, Claim, Row, Rows, sorted_rows
+from pneumarm.experiments.factorial import Factorial
+from pneumarm.experiments.page import write_page
+from pneumarm.experiments.registry import PLACES, experiment
+from pneumarm.experiments.switch_punishment import EXPERIMENT as PUNISHMENT
+
+OF_THE_THESIS = {
+    *("control-frequency", "state-history", "enough-data", "noise-for-transfer", "switch-punishment", "all-goals"),
+    *("long-training", "optimal-settings", "no-shaping", "transfer", "transferability", "valves-closed", "goal-area"),
+    *("shaping-settings", "fine-tuning", "overnight", "on-the-arm-only", "displacement"),
+}
+
+
+def results(folder: Path, name: str, claims: list[tuple[str, str]], arms: int = 5, runs: int = 4) -> None:
+    """Write the results of an experiment whose claims are about and have the verdict given."""
+    found = [{"claim": a, "thesis": "1", "ours": "2", "verdict": v, "about": a} for a, v in claims]
+    (folder / name).mkdir(parents=True)
+    about = {"experiment": name, "arms": [f"arm {n}" for n in range(arms)], "runs": runs, "claims": found, "rows": 3}
+    (folder / name / "results.json").write_text(json.dumps(about))
+
+
+def judged(folder: Path) -> dict[str, Any]:
+    return {each.conclusion.key: each for each in judge(read_results(folder))}
+
+
+def test_every_conclusion_names_experiments_of_the_thesis() -> None:
+    named = {name for each in conclusions() for name in each.experiments}
+    assert named == OF_THE_THESIS
+    keys = [each.key for each in conclusions()]
+    assert len(set(keys)) == len(keys)
+
+
+@pytest.mark.parametrize("name", [name for name in PLACES if isinstance(experiment(name), Factorial)])
+def test_effects_are_about_conclusions_that_name_their_experiment(name: str) -> None:
+    keys = {each.key for each in conclusions() if name in each.experiments}
+    for said in experiment(name).said:  # type: ignore[attr-defined]
+        assert said.about in keys
+
+
+def test_verdicts_add_up(tmp_path: Path) -> None:
+    verdicts = [("sarsa", "holds"), ("sarsa", "holds"), ("neurons", "holds"), ("neurons", "does not hold")]
+    verdicts += [("gamma", "does not hold"), ("gamma", "open"), ("traces", "open"), ("traces", "holds")]
+    results(tmp_path, "all-goals", verdicts)
+    results(tmp_path, "no-shaping", [("", "open")])
+    found = judged(tmp_path)
+    expected = {"sarsa": "holds", "neurons": "in part", "gamma": "does not hold", "traces": "open"}
+    assert {key: found[key].verdict for key in expected} == expected
+    assert found["learning-rate"].verdict == "open"  # all-goals was run and said nothing of it
+    assert found["q-fluctuates"].verdict == "not run"
+    both = found["shaping-not-indispensable"]
+    assert len(both.claims) == 1
+    assert both.missing == ("shaping-settings",)
+
+
+def test_a_claim_about_nothing_listed_is_not_lost(tmp_path: Path) -> None:
+    results(tmp_path, "all-goals", [("something else", "holds")])
+    found = judged(tmp_path)["all-goals"]
+    assert found.conclusion.says == ALL_GOALS.question
+    assert [claim.claim for _, claim in found.claims] == ["something else"]
+
+
+def test_what_is_missing_has_its_command(tmp_path: Path) -> None:
+    results(tmp_path, "all-goals", [("sarsa", "holds")], arms=1, runs=8)
+    results(tmp_path, "long-training", [("q-fluctuates", "open")], arms=5, runs=4)
+    made = sections(judge(read_results(tmp_path)), tmp_path)
+    commands = {row[0]: row[-1] for row in made[-1].tables[0].rows}
+    assert commands["no-shaping"] == f"pneumarm experiment no-shaping --out {tmp_path}"
+    assert "--runs 4" in commands["all-goals"]
+    assert "virtual:seed=5" in commands["all-goals"]
+    assert set(commands) == OF_THE_THESIS - {"long-training"}
+
+
+def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results(tmp_path, "all-goals", [("sarsa", "holds")])
+    with pytest.raises(SystemExit) as ended:
+        main(["claims", "--out", str(tmp_path), "--json"])
+    assert ended.value.code == 0
+    found = {each["key"]: each for each in json.loads(capsys.readouterr().out)["conclusions"]}
+    assert found["sarsa"]["verdict"] == "holds"
+    assert found["sarsa"]["claims"][0]["runs"] == 20
+    assert "5 arms, 20 runs" in (tmp_path / "claims.html").read_text()
+
+
+def test_a_damaged_result_is_said(tmp_path: Path) -> None:
+    with pytest.raises(UnusableInput, match="expected the folder of a laboratory"):
+        read_results(tmp_path / "nothing")
+    (tmp_path / "all-goals").mkdir()
+    (tmp_path / "all-goals" / "results.json").write_text('{"experiment": "all-goals"}')
+    with pytest.raises(UnusableInput, match=r"results.json: expected results of an experiment .*run it again"):
+        read_results(tmp_path)
+
+
+def rows(made: Factorial, reward: Any, arms: int = 3, runs: int = 4, success: float = 1.0) -> Rows:
+    """Return rows of ``made`` with the reward of a trial in a run on an arm as the function says."""
+    found = []
+    for arm in range(arms):
+        for run in range(1, runs + 1):
+            for trial in made.trials:
+                value = float(reward(arm, trial, run))
+                names = ("reward", "actions", "switches", "episodes")
+                figures = {name: abs(value) + 1 if name == "switches" else value for name in names}
+                figures |= {"success_rate": success, "learning success_rate": 1.0}
+                found.append(Row(f"arm {arm}", trial, run, figures, 0.0))
+    return sorted_rows(found)
+
+
+def claims(made: Factorial, table: Rows) -> list[Claim]:
+    return list(made.claims(table, *made.analyses(table)))
+
+
+def test_weights_dominate_where_runs_decide_and_not_where_a_column_does() -> None:
+    draw = np.random.default_rng(0)
+    column = ALL_GOALS.design.array.column(4)
+
+    def said(weights: float, effect: float) -> Claim:
+        luck = {(arm, run): weights * draw.normal() for arm in range(3) for run in range(1, 5)}
+        table = rows(ALL_GOALS, lambda a, t, r: 50 * a + luck[a, r] + effect * column[t - 1] + draw.normal())
+        (claim,) = (c for c in claims(ALL_GOALS, table) if c.text.startswith("Weights are good or bad"))
+        return claim
+
+    assert said(weights=10, effect=1).verdict == "holds"
+    refuted = said(weights=2, effect=20)
+    assert refuted.verdict == "does not hold"
+    assert "the largest column (4)" in refuted.ours
+
+
+def test_the_share_of_variance_within_settings() -> None:
+    """Runs that differ three times as much as settings make nine tenths of the variance."""
+    draw = np.random.default_rng(1)
+    of_setting = draw.normal(size=17)
+    of_setting /= of_setting[1:].std(ddof=1)
+    for own, verdict, share in ((3.0, "holds", 90), (1 / 3, "does not hold", 10)):
+        table = rows(ALL_GOALS, lambda a, t, r, w=own: of_setting[t] + w * draw.normal() + 50 * a, runs=8)
+        (claim,) = (c for c in claims(ALL_GOALS, table) if c.text.startswith("With the same settings"))
+        assert claim.verdict == verdict
+        assert float(claim.ours.split()[0]) == pytest.approx(share, abs=8)
+
+
+def test_arms_are_the_sample() -> None:
+    """An effect that has another sign on each arm is no effect, however many runs agree on it."""
+    column, signs = ALL_GOALS.design.array.column(11), np.array([12.0, -12.0, 12.0])
+    for spread, sure in ((signs, False), (np.full(3, 12.0), True)):
+        table = rows(ALL_GOALS, lambda a, t, r, s=spread: s[a] * column[t - 1] + a + 0.01 * ((7 * t + 3 * r) % 5))
+        ours, _ = ALL_GOALS.analyses(table)
+        found = ALL_GOALS.effect(table, "reward", 11, ours["reward"])
+        assert found.samples == 3
+        assert (found.low > 0) == sure
+        (traces,) = (c for c in claims(ALL_GOALS, table) if "marginal" in c.text)
+        assert traces.verdict == ("does not hold" if sure else "open")
+
+
+def wobble(arm: int, trial: int, run: int) -> float:
+    return ((5 * trial + 3 * run + arm) % 7) / 50
+
+
+def test_switches_are_compared_by_their_ratio() -> None:
+    column = PUNISHMENT.design.array.column(12)
+    found = {}
+    for more in (0.2, 2.0):
+        table = rows(PUNISHMENT, lambda a, t, r, m=more: m * (column[t - 1] == column.max()) + wobble(a, t, r))
+        (claim,) = (c for c in claims(PUNISHMENT, table) if c.ours.endswith("times"))
+        found[more] = claim
+    assert {more: claim.verdict for more, claim in found.items()} == {0.2: "does not hold", 2.0: "holds"}
+    assert 2.7 < float(found[2.0].ours.split()[0]) < 3.0
+
+
+def test_success_is_judged_greedy_and_told_learning() -> None:
+    for success, verdict in ((0.8, "does not hold"), (1.0, "holds")):
+        table = rows(ALL_GOALS, wobble, success=success)
+        (claim,) = (c for c in claims(ALL_GOALS, table) if c.about == "success")
+        assert claim.verdict == verdict
+        assert claim.ours.startswith(f"{100 * success:.1f}")
+        assert "learn on 100.0" in claim.ours
+
+
+def test_results_carry_what_claims_need(tmp_path: Path) -> None:
+    table = rows(ALL_GOALS, wobble)
+    (tmp_path / "all-goals").mkdir()
+    analysis = Analysis([], {"rows": 3}, [], claims(ALL_GOALS, table))
+    write_page(ALL_GOALS, tmp_path / "all-goals", analysis, table.runs, table.arms)
+    found = read_results(tmp_path)["all-goals"]
+    assert (len(found.arms), found.runs) == (3, 4)
+    named = {each.key for each in conclusions() if "all-goals" in each.experiments}
+    assert {claim.about for claim in found.claims} == named

@@ -1,0 +1,194 @@
+"""What experiments on the arm share: agents trained in its simulation, and their movements on it."""
+
+import functools
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import open_arm
+from pneumarm.arm.virtual import ArmParameters, VirtualArm
+from pneumarm.control.playing import Played, Player
+from pneumarm.control.transfer import BEGIN, draw_movement
+from pneumarm.errors import UnusableInput
+from pneumarm.experiments.experiment import LaboratorySettings, Report, run_seed
+from pneumarm.experiments.preparation import Simulated, simulated
+from pneumarm.experiments.trainings import TEST_SEED
+from pneumarm.learning import Agent, Exploration, TrainSettings
+from pneumarm.learning.environment import environment
+from pneumarm.learning.loop import Movements
+from pneumarm.learning.testing import GREEDY, TEST, run_test
+from pneumarm.learning.training import train
+
+Array = NDArray[np.float64]
+
+ARMS = tuple(f"virtual:seed={n}" for n in range(1, 6))
+"""Five different arms."""
+THESIS = TrainSettings(learning_rate=0.10, agents=8, validation_episodes=1000)
+"""Trial 10 of table 5.3, whose agent was transferred (section 5.5); of eight agents the best.
+
+The thesis took the best of 128 agents, which it had anyway.
+"""
+TEST_MOVEMENTS, MOVEMENTS = 0, 1
+"""Streams of random numbers of goals and begin states on the arm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """An arm by name, and its simulation."""
+
+    arm: str
+    simulated: Simulated
+
+    @property
+    def parameters(self) -> ArmParameters:
+        """What the arm is made of."""
+        return _parameters(self.arm)
+
+
+def _parameters(name: str) -> ArmParameters:
+    with open_arm(name) as arm:
+        if not isinstance(arm, VirtualArm):
+            raise UnusableInput(
+                f"arm {name!r}: this experiment looks into what an arm is made of and moves it for days; "
+                "expected a virtual arm, such as virtual:seed=1"
+            )
+        return arm.parameters
+
+
+def material(arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
+    """Return ``arm`` and its simulation, collecting and fitting where that is missing.
+
+    Raises:
+        UnusableInput: the arm is not a virtual one.
+
+    """
+    _parameters(arm)
+    return Material(arm, simulated(arm, folder, settings, progress))
+
+
+def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Any:
+    """Return the virtual arm as it is in the morning, after a night of rest.
+
+    All trials of a run meet the same noise. ``parameters`` are those of the arm, or others.
+    """
+    return VirtualArm(parameters or of.parameters, seed=run_seed(laboratory, run), name=of.arm)
+
+
+_locks: dict[Any, threading.Lock] = {}
+_guard = threading.Lock()
+
+
+def agent_of(of: Material, settings: TrainSettings, run: int, laboratory: LaboratorySettings) -> Agent:
+    """Return the agent of ``run``, the best of ``settings.agents``; trained once in a process.
+
+    All trials of a run that train alike begin on the arm with the same agent.
+    """
+    chosen = replace(settings, max_episodes=laboratory.max_episodes or settings.max_episodes)
+    key = of, chosen, run_seed(laboratory, run)
+    with _guard:
+        lock = _locks.setdefault(key, threading.Lock())
+    with lock:
+        return _trained(*key)
+
+
+@functools.lru_cache(maxsize=64)
+def _trained(of: Material, settings: TrainSettings, seed: int) -> Agent:
+    return train(of.simulated.simulation, of.simulated.begin, settings, seed, threads=1).agent
+
+
+def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> tuple[Array, Array]:
+    """Return goals (count, joints) [counts] and times of inflation (count, joints, 2) [s] of movements.
+
+    Args:
+        agent: whose goals they are.
+        seed: of the run.
+        count: how many.
+        stream: ``TEST_MOVEMENTS`` or ``MOVEMENTS``.
+        first: number of the first of them.
+
+    """
+    shape = agent.spec.joints, 2
+    drawn = [draw_movement(agent.goal_range, seed, stream == TEST_MOVEMENTS, first + i) for i in range(count)]
+    goals = np.array([goal for _, goal in drawn]).reshape(count, shape[0])
+    return goals, np.array([random.uniform(0.0, BEGIN.inflate, shape) for random, _ in drawn]).reshape(count, *shape)
+
+
+def simulated_test(of: Material, agent: Agent, episodes: int, exploration: Exploration = GREEDY) -> dict[str, float]:
+    """Return the means of a test in the simulation, from all begin states to all goals."""
+    env = environment(of.simulated.simulation, of.simulated.begin, agent.settings)
+    tested = run_test(env, agent.weights(), agent.settings, episodes, (TEST_SEED, TEST), exploration)
+    return means(Movements(**{name: getattr(tested, name) for name in Movements._fields}))
+
+
+def greedy_test(
+    of: Material,
+    agent: Agent,
+    episodes: int,
+    run: int,
+    laboratory: LaboratorySettings,
+    arm: VirtualArm | None = None,
+) -> Played:
+    """Let ``agent`` move greedily on the arm, by default as it is in the morning; the same goals in all trials."""
+    where = arm or new_arm(of, run, laboratory)
+    return Player(agent, where).play(*draws(agent, run_seed(laboratory, run), episodes, TEST_MOVEMENTS))
+
+
+def means(made: Movements, prefix: str = "") -> dict[str, float]:
+    """Return the means of movements; actions and switches also of successful ones, as in the thesis (5.5.1)."""
+    won, switches = made.success, made.switches.sum(axis=1)
+    some = bool(won.any())
+    figures = {
+        "reward": float(made.reward.mean()),
+        "success_rate": float(won.mean()),
+        "actions": float(made.actions.mean()),
+        "switches": float(switches.mean()),
+        "actions of successes": float(made.actions[won].mean()) if some else float("nan"),
+        "switches of successes": float(switches[won].mean()) if some else float("nan"),
+    }
+    return {prefix + name: value for name, value in figures.items()}
+
+
+CURVES = ("reward", "success_rate", "actions of successes", "switches of successes")
+"""What figures 5.9 to 5.14 show."""
+
+
+def course(made: Movements, block: int) -> dict[str, float]:
+    """Return the means of every ``block`` of movements, as ``NAME @BLOCK``, blocks from 1."""
+    found = {}
+    for k in range(len(made.reward) // block):
+        part = Movements(*(a[k * block : (k + 1) * block] for a in made))
+        found |= {f"{name} @{k + 1}": value for name, value in means(part).items() if name in CURVES}
+    return found
+
+
+def course_names(figure: str, known: Mapping[str, float]) -> list[str]:
+    """Return the names of ``figure`` in the blocks that :func:`course` left in ``known``, in order."""
+    names = []
+    while (name := f"{figure} @{len(names) + 1}") in known:
+        names.append(name)
+    return names
+
+
+def series(name: str, values: Any) -> dict[str, float]:
+    """Return an array of one dimension as figures of a row."""
+    return {f"{name} #{i}": float(value) for i, value in enumerate(np.asarray(values, np.float64))}
+
+
+def from_series(figures: Mapping[str, float], name: str) -> Array:
+    """Return what :func:`series` put into the ``figures`` of a row."""
+    found = []
+    while (key := f"{name} #{len(found)}") in figures:
+        found.append(figures[key])
+    return np.array(found)
+
+
+def joined(parts: list[Played]) -> Movements:
+    """Return the movements of several plays, one after the other."""
+    return Movements(*(np.concatenate(arrays) for arrays in zip(*(p.movements for p in parts), strict=True)))
+
+

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import ControlCycle, guarded, open_arm
-from pneumarm.control import BEGIN, AgentController, Movement, move
-from pneumarm.control.transfer import draw_movement
-from pneumarm.learning import AnyAgent, BeginStates, begin_states
-from pneumarm.simulation import FitSettings, StoreFit, fit_store
-from pneumarm.transitions import KINDS, Store, collect
+from pneumarm.arm import open_arm
+from pneumarm.control import AgentController, Movement
+from pneumarm.experiments import there_and_back
+from pneumarm.experiments.there_and_back import Recipe
+from pneumarm.learning import AnyAgent, BeginStates
+from pneumarm.simulation import FitSettings, StoreFit
 
 JUDGING = ",".join(str(seed) for seed in range(1001, 1011))
 """The arms to judge on; nothing is developed on them."""
@@ -62,19 +62,12 @@ def collected(path: Path, arm: int, seed: int, transitions: int = 0, minutes: fl
 
     Whole sequences are stored, so there may be one more than needed. Returns the transitions and the minutes.
     """
-    with open_arm(f"virtual:seed={arm}", seed) as opened, Store.for_arm(path, opened.spec) as store:
-        done = collect(opened, store, max(transitions, 2_000), seed)
-        while done.seconds < 60 * minutes:
-            done = collect(opened, store, done.transitions + 1, seed)
-    return done.transitions, done.seconds / 60
+    return there_and_back.collected(path, f"virtual:seed={arm}", seed, Recipe(transitions, minutes))
 
 
 def fitted(path: Path, seed: int) -> tuple[StoreFit, BeginStates]:
     """Return the simulation fitted to a store, and its begin states."""
-    with Store.open(path) as store:
-        made = fit_store(store, FitSettings(seed=seed))
-        window, scaling = made.simulation.window, made.simulation.scaling
-        return made, begin_states(store.blocks(kinds=KINDS), window, scaling)
+    return there_and_back.fitted(path, FitSettings(seed=seed))
 
 
 def moved(
@@ -97,10 +90,4 @@ def moved(
 
     """
     with open_arm(f"virtual:seed={arm}", seed) as opened:
-        cycle, controller = ControlCycle(guarded(opened)), controller or AgentController(agent)
-        made = []
-        for number in numbers:
-            random, goal = draw_movement(goals, SEED_OF_MOVEMENTS, True, number)
-            BEGIN.reach(cycle.arm, random)
-            made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
-    return made
+        return there_and_back.moved(agent, opened, goals, numbers, SEED_OF_MOVEMENTS, controller)

@@ -16,7 +16,7 @@ def experiment_(
     /,
     *,
     out: Path = Path("laboratory"),
-    arms: str = "virtual",
+    arms: str | None = None,
     runs: int | None = None,
     workers: int | None = None,
     dask: str | None = None,
@@ -34,7 +34,7 @@ def experiment_(
     out
         Folder of the laboratory, shared by all experiments; made where there is none.
     arms
-        Names of the arms, separated by commas.
+        Names of the arms, separated by commas; otherwise those of the experiment.
     runs
         How often every trial is done, each time from other weights; otherwise as often as in the thesis.
     workers
@@ -45,7 +45,8 @@ def experiment_(
         Print one JSON object on stdout and nothing else there.
     """
     chosen = experiment(name)
-    done = sweep(chosen, out, arms.split(","), runs, settings, workers=workers, dask=dask, progress=progress)
+    names = chosen.arms if arms is None else arms.split(",")
+    done = sweep(chosen, out, names, runs, settings, workers=workers, dask=dask, progress=progress)
     analysis = chosen.analyse(done.rows)
     page = write_page(chosen, out / chosen.name, analysis, done.rows.runs, done.rows.arms)
     found = {"experiment": name, "rows": len(done.rows.rows), "computed": done.computed, "seconds": done.seconds}

@@ -131,6 +131,8 @@ class Experiment(ABC):
     """Where in the thesis."""
     runs: int
     """By default."""
+    arms: tuple[str, ...] = ("virtual",)
+    """By default."""
 
     @property
     @abstractmethod

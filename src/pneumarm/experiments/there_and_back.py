@@ -1,0 +1,232 @@
+"""From an arm and back to it: collect, fit, train, move; with what an experiment varies on the way.
+
+Collecting and fitting belong to an arm (:func:`prepared`), training and moving to a row (:func:`trained_and_moved`).
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
+from pneumarm.control import BEGIN, AgentController, Movement, move
+from pneumarm.control.transfer import draw_movement
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.preparation import SIMULATION, STORE, claim
+from pneumarm.files import write_json
+from pneumarm.learning import AnyAgent, BeginStates, TrainSettings, begin_states, test
+from pneumarm.learning.training import train
+from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
+from pneumarm.simulation.quality import propagation
+from pneumarm.transitions import KINDS, QUANTITIES, CollectSettings, Store, collect
+from pneumarm.transitions.choice import joined
+
+MOVEMENTS = 200
+"""Movements on the arm that a row is judged by, at most as many as test episodes."""
+BEFORE = "in simulation: "
+"""Prefix of the figures of the test in the simulation; those on the arm have none."""
+AFTER_A_SECOND = " after a second"
+_FEWEST = 2_000  # transitions that can be fitted
+_FIGURES = "figures.json"
+
+
+def settings_of(train: TrainSettings) -> dict[str, object]:
+    """Return ``train`` as JSON."""
+    return dict(json.loads(json.dumps(asdict(train))))
+
+
+def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:
+    """Return the arm called ``arm``, controlled at ``frequency`` [Hz] where one is given."""
+    found = open_arm(arm, seed)
+    if frequency is not None:
+        found.spec = replace(found.spec, period=1 / frequency)
+    return found
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How the transitions of a simulation are collected and how it is fitted to them."""
+
+    transitions: int = _FEWEST
+    """At least."""
+    minutes: float = 0.0
+    """At least, on the arm's clock."""
+    frequency: float | None = None
+    """Of control [Hz]; None for the arm's own."""
+    close_while_computing: bool = False
+    """Whether the valves are closed between reading and acting."""
+    fit: FitSettings = field(default_factory=FitSettings)
+
+
+def collected(
+    path: Path, arm: str, seed: int, recipe: Recipe, progress: Report = lambda done, total: None
+) -> tuple[int, float]:
+    """Collect into the store ``path`` until there are so many transitions and so many minutes have passed.
+
+    Whole sequences are stored, so there may be one more than needed. Returns the transitions and the minutes on the
+    arm's clock, those between its sequences included.
+    """
+    collecting = CollectSettings(close_while_computing=recipe.close_while_computing)
+    with opened(arm, seed, recipe.frequency) as there, Store.for_arm(path, there.spec) as store:
+        first = max(recipe.transitions, _FEWEST)
+        done = collect(there, store, first, seed, settings=collecting, progress=progress)
+        while done.seconds < 60 * recipe.minutes:
+            progress(done.seconds, 60 * recipe.minutes)
+            done = collect(there, store, done.transitions + 1, seed, settings=collecting)
+    return done.transitions, done.seconds / 60
+
+
+def fitted(path: Path, settings: FitSettings) -> tuple[StoreFit, BeginStates]:
+    """Return the simulation fitted to the store ``path``, and its begin states."""
+    with Store.open(path) as store:
+        made = fit_store(store, settings)
+        window, scaling = made.simulation.window, made.simulation.scaling
+        return made, begin_states(store.blocks(kinds=KINDS), window, scaling)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A simulation of an arm, and what making it gave."""
+
+    arm: str
+    recipe: Recipe
+    simulation: Simulation
+    begin: BeginStates
+    figures: Figures
+    """Of collecting and fitting."""
+
+
+def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySettings, progress: Report) -> Prepared:
+    """Return what ``recipe`` makes of ``arm``, making it in ``folder`` where it is missing; resumable.
+
+    Raises:
+        UnusableInput: no arm has this name, or the folder was begun with other settings.
+
+    """
+    fit = replace(recipe.fit, seed=settings.seed)
+    claim(folder, {"arm": arm, "seed": settings.seed, "recipe": asdict(recipe)})
+    if not (folder / _FIGURES).exists():
+        transitions, minutes = collected(folder / STORE, arm, settings.seed, recipe, progress)
+        with Store.open(folder / STORE) as store:
+            made = fit_store(store, fit)
+            figures = {"transitions": float(transitions), "minutes": minutes, **quality(made)}
+        made.simulation.save(folder / SIMULATION)
+        write_json(folder / _FIGURES, figures)
+    simulation = Simulation.load(folder / SIMULATION)
+    with Store.open(folder / STORE) as store:
+        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+    found = json.loads((folder / _FIGURES).read_text(encoding="utf-8"))
+    return Prepared(arm, recipe, simulation, begin, found)
+
+
+def quality(made: StoreFit) -> dict[str, float]:
+    """Return how good a simulation is on held-out sequences, and how its filter was filled.
+
+    ``std`` is the error of one step (thesis eq. 3.6), ``expected ... after a second`` what eq. 3.7 makes of it,
+    ``measured ... after a second`` the error of running freely for a second. Several joints enter by the root of
+    their mean square.
+    """
+    simulation, held_out = made.simulation, made.result.held_out
+    steps = round(1 / simulation.spec.period)
+    spread = propagation(simulation, joined(list(made.filtered.stream("held-out"))), steps)
+    coverage = made.filtered.coverage
+    figures = {
+        "rows": float(made.result.rows),
+        "occupied": float(coverage.occupied),
+        "unseen": coverage.unseen,
+    }
+    for name, values in (
+        ("std", held_out.std),
+        ("relative", held_out.relative),
+        ("change", held_out.change_std),
+        ("expected{}", spread.expected[-1]),
+        ("measured{}", spread.measured[-1]),
+    ):
+        for quantity, value in over_joints(values).items():
+            after = AFTER_A_SECOND if name.endswith("{}") else ""
+            figures[f"{name.removesuffix('{}')} {quantity}{after}"] = value
+    return figures
+
+
+def over_joints(values: NDArray[np.float64]) -> dict[str, float]:
+    """Return the root mean square over joints of ``values`` (4 joints,) by quantity."""
+    rms = np.sqrt((values.reshape(-1, len(QUANTITIES)) ** 2).mean(axis=0))
+    return {name: float(value) for name, value in zip(QUANTITIES, rms, strict=True)}
+
+
+def trained_and_moved(
+    material: Prepared,
+    train_settings: TrainSettings,
+    run: int,
+    settings: LaboratorySettings,
+    goals: NDArray[np.float64] | None = None,
+) -> Figures:
+    """Train one agent, test it in its simulation, and move the arm with it; nothing is learned on the arm.
+
+    All agents of a run begin with the same weights, and make the same movements on the arm: their begin states and
+    goals depend on the run and their number alone.
+
+    Args:
+        material: the simulation that it is trained in; the arm is controlled as its transitions were collected.
+        train_settings: its number of agents and its validation do not matter.
+        run: that weights and movements are those of.
+        settings: of the laboratory.
+        goals: range of the goals on the arm, shape (joints, 2) [counts]; the simulation's by default.
+
+    """
+    seed, recipe = run_seed(settings, run), material.recipe
+    most = settings.max_episodes or train_settings.max_episodes
+    one = replace(train_settings, agents=1, validation_episodes=1, max_episodes=most)
+    training = train(material.simulation, material.begin, one, seed, threads=1)
+    agent = training.agent
+    simulated = test(agent, material.simulation, material.begin, settings.test_episodes, 0)
+    span = material.simulation.goal_range if goals is None else goals
+    numbers = range(min(MOVEMENTS, settings.test_episodes))
+    with opened(material.arm, seed % 2**31, recipe.frequency) as arm:
+        made = moved(agent, arm, span, numbers, seed, close_while_computing=recipe.close_while_computing)
+    return {
+        BEFORE + "reward": float(simulated.reward.mean()),
+        BEFORE + "success_rate": float(simulated.success.mean()),
+        "reward": float(np.mean([one.reward for one in made])),
+        "success_rate": float(np.mean([one.success for one in made])),
+        "actions": float(np.mean([one.actions for one in made])),
+        "switches": float(np.mean([one.switches.sum() for one in made])),
+        "seconds": float(np.mean([one.time_end - one.time_start for one in made])),
+        "episodes": float(training.episodes[0]),
+        "met": float(training.met[0]),
+    }
+
+
+def moved(
+    agent: AnyAgent,
+    arm: Arm,
+    goals: NDArray[np.float64],
+    numbers: Iterable[int],
+    seed: int,
+    controller: AgentController | None = None,
+    *,
+    close_while_computing: bool = False,
+) -> list[Movement]:
+    """Return greedy movements of ``agent``, which learns nothing, on ``arm``.
+
+    Args:
+        agent: what moves it.
+        arm: any.
+        goals: range of the goals, shape (joints, 2) [counts].
+        numbers: of the movements; with ``seed`` they decide begin state and goal, whoever moves.
+        seed: of the movements.
+        controller: what acts in the agent's place.
+        close_while_computing: close the valves between reading and acting.
+
+    """
+    cycle = ControlCycle(guarded(arm), close_while_computing)
+    controller = controller or AgentController(agent)
+    made = []
+    for number in numbers:
+        random, goal = draw_movement(goals, seed, True, number)
+        BEGIN.reach(cycle.arm, random)
+        made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
+    return made

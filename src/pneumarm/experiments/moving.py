@@ -18,11 +18,13 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.experiments.trainings import TEST_SEED
-from pneumarm.learning import Agent, Exploration, TrainSettings
+from pneumarm.learning import Agent, BeginStates, Exploration, TrainSettings
 from pneumarm.learning.environment import environment
 from pneumarm.learning.loop import Movements
 from pneumarm.learning.testing import GREEDY, TEST, run_test
 from pneumarm.learning.training import train
+from pneumarm.simulation.kernel import scaled_state
+from pneumarm.simulation.noise import NoiseSettings
 
 Array = NDArray[np.float64]
 
@@ -118,9 +120,17 @@ def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> t
     return goals, np.array([random.uniform(0.0, BEGIN.inflate, shape) for random, _ in drawn]).reshape(count, *shape)
 
 
-def simulated_test(of: Material, agent: Agent, episodes: int, exploration: Exploration = GREEDY) -> dict[str, float]:
-    """Return the means of a test in the simulation, from all begin states to all goals."""
-    env = environment(of.simulated.simulation, of.simulated.begin, agent.settings)
+def simulated_test(
+    of: Material,
+    agent: Agent,
+    episodes: int,
+    *,
+    exploration: Exploration = GREEDY,
+    noise: NoiseSettings | None = None,
+) -> dict[str, float]:
+    """Return the means of a test in the simulation, by default with the noise that the agent was trained with."""
+    settings = agent.settings if noise is None else replace(agent.settings, noise=noise)
+    env = environment(of.simulated.simulation, of.simulated.begin, settings)
     tested = run_test(env, agent.weights(), agent.settings, episodes, (TEST_SEED, TEST), exploration)
     return means(Movements(**{name: getattr(tested, name) for name in Movements._fields}))
 
@@ -138,23 +148,25 @@ def greedy_test(
     return Player(agent, where).play(*draws(agent, run_seed(laboratory, run), episodes, TEST_MOVEMENTS))
 
 
+def from_visits(agent: Agent, angle: Array, pressure: Array) -> BeginStates:
+    """Return begin states of what :meth:`Player.visit` saw: ``angle`` (n, joints), ``pressure`` (n, joints, 2)."""
+    window = agent.window
+    observed = np.concatenate([angle[..., None], np.zeros_like(angle)[..., None], pressure], axis=-1)
+    newest = observed.reshape(len(angle), window.observation_size)
+    closed = np.zeros((len(angle), (window.history - 1) * window.command_size))
+    sigma = np.concatenate([np.tile(newest, window.history), closed], axis=1)
+    order = np.argsort(angle[:, 0], kind="stable")
+    states = scaled_state(sigma[order], window, agent.scaling)
+    return BeginStates(window, states, np.ascontiguousarray(angle[order]))
+
+
 def means(made: Movements, prefix: str = "") -> dict[str, float]:
-    """Return the means of movements; actions and switches also of successful ones, as in the thesis (5.5.1)."""
+    """Return the means of movements; actions and switches of successful ones, as in the thesis (5.5.1)."""
     won, switches = made.success, made.switches.sum(axis=1)
-    some = bool(won.any())
-    figures = {
-        "reward": float(made.reward.mean()),
-        "success_rate": float(won.mean()),
-        "actions": float(made.actions.mean()),
-        "switches": float(switches.mean()),
-        "actions of successes": float(made.actions[won].mean()) if some else float("nan"),
-        "switches of successes": float(switches[won].mean()) if some else float("nan"),
-    }
+    figures = {"reward": float(made.reward.mean()), "success_rate": float(won.mean())}
+    if won.any():  # else there is nothing to take the mean of, and the row does not have it
+        figures |= {"actions": float(made.actions[won].mean()), "switches": float(switches[won].mean())}
     return {prefix + name: value for name, value in figures.items()}
-
-
-CURVES = ("reward", "success_rate", "actions of successes", "switches of successes")
-"""What figures 5.9 to 5.14 show."""
 
 
 def course(made: Movements, block: int) -> dict[str, float]:
@@ -162,16 +174,8 @@ def course(made: Movements, block: int) -> dict[str, float]:
     found = {}
     for k in range(len(made.reward) // block):
         part = Movements(*(a[k * block : (k + 1) * block] for a in made))
-        found |= {f"{name} @{k + 1}": value for name, value in means(part).items() if name in CURVES}
+        found |= {f"{name} @{k + 1}": value for name, value in means(part).items()}
     return found
-
-
-def course_names(figure: str, known: Mapping[str, float]) -> list[str]:
-    """Return the names of ``figure`` in the blocks that :func:`course` left in ``known``, in order."""
-    names = []
-    while (name := f"{figure} @{len(names) + 1}") in known:
-        names.append(name)
-    return names
 
 
 def series(name: str, values: Any) -> dict[str, float]:
@@ -190,5 +194,3 @@ def from_series(figures: Mapping[str, float], name: str) -> Array:
 def joined(parts: list[Played]) -> Movements:
     """Return the movements of several plays, one after the other."""
     return Movements(*(np.concatenate(arrays) for arrays in zip(*(p.movements for p in parts), strict=True)))
-
-

@@ -11,6 +11,12 @@ PLACES = {
     "long-training": "long_training",
     "optimal-settings": "optimal_settings",
     "no-shaping": "no_shaping",
+    "transfer": "transfer",
+    "transferability": "transferability",
+    "goal-area": "goal_area",
+    "overnight": "overnight",
+    "on-the-arm-only": "on_the_arm_only",
+    "displacement": "displacement",
 }
 """Name: package below this one; each has an ``EXPERIMENT``."""
 

@@ -8,7 +8,7 @@ other; an agent that learns on the arm alone needs 100,000 s of arm time.
 It is for virtual arms without faults and for agents of the thesis' kind.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,12 +114,18 @@ class _Aims(NamedTuple):
     random: NDArray[np.uint64]
 
 
+def part_of(made: Movements, first: int, end: int) -> Movements:
+    """Return the movements from number ``first`` up to ``end``."""
+    parts: Any = (array[first:end] for array in made)
+    return Movements(*parts)
+
+
 class Player:
     """``agent`` making movements on ``arm``; learns by ``learning_rate``.
 
     Args:
         agent: of the thesis' kind; it is not changed.
-        arm: where it moves. It may be used by other means between two calls of :meth:`play`, if its valves are closed.
+        arm: where it moves. Others may use it between two calls of :meth:`play`, if they close its valves.
         learning_rate: 0 for an agent that does not learn.
         exploration: greedy without it.
         seed: of exploring, and of goals that are drawn near to where the arm stands.
@@ -222,8 +228,7 @@ class Player:
             played,
             float(self.performance),
         )
-        cut = slice(0, count)
-        return Played(Movements(*(a[cut] for a in record)), played.time_start[cut], played.time_end[cut])
+        return Played(part_of(record, 0, count), played.time_start[:count], played.time_end[:count])
 
     def visit(self, durations: Array) -> tuple[Array, Array]:
         """Bring the arm to rest once for each of ``durations`` (n, joints, 2) [s] and only look.

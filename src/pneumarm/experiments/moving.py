@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import ArmParameters, VirtualArm
-from pneumarm.control.playing import Played, Player
+from pneumarm.control.playing import Played, Player, part_of
 from pneumarm.control.transfer import BEGIN, draw_movement
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings, Report, run_seed
@@ -171,10 +171,10 @@ def means(made: Movements, prefix: str = "") -> dict[str, float]:
 
 def course(made: Movements, block: int) -> dict[str, float]:
     """Return the means of every ``block`` of movements, as ``NAME @BLOCK``, blocks from 1."""
-    found = {}
+    found: dict[str, float] = {}
     for k in range(len(made.reward) // block):
-        part = Movements(*(a[k * block : (k + 1) * block] for a in made))
-        found |= {f"{name} @{k + 1}": value for name, value in means(part).items()}
+        part = means(part_of(made, k * block, (k + 1) * block))
+        found |= {f"{name} @{k + 1}": value for name, value in part.items()}
     return found
 
 
@@ -185,7 +185,7 @@ def series(name: str, values: Any) -> dict[str, float]:
 
 def from_series(figures: Mapping[str, float], name: str) -> Array:
     """Return what :func:`series` put into the ``figures`` of a row."""
-    found = []
+    found: list[float] = []
     while (key := f"{name} #{len(found)}") in figures:
         found.append(figures[key])
     return np.array(found)

@@ -145,8 +145,8 @@ class Overnight(Experiment):
                     "Two days on the arm",
                     [
                         f"The drop is the reward of the last {_SPAN * self.sizes.block} movements of the first day "
-                        f"less that of the first {self.sizes.block} of the second; the gain is from there to the last "
-                        f"{_SPAN * self.sizes.block} of the second day. All explore alike."
+                        f"less that of the first {self.sizes.block} of the second; the gain is from there to the "
+                        f"last {_SPAN * self.sizes.block} of the second day. All explore alike."
                     ],
                     tables=[Table(names, lines, "Reward, means over arms with 95 % intervals.")],
                     figures=[self._picture(rows)],

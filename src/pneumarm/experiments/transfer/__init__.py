@@ -8,7 +8,6 @@ with all three; what still differs from the simulation is the error of the model
 apart.
 
     pneumarm experiment transfer
-
 """
 
 from collections.abc import Mapping
@@ -212,8 +211,8 @@ class Transfer(Experiment):
             figures=[
                 Picture(
                     courses_figure(shown, self.sizes.block),
-                    "Reward, success, actions and switches on the arm over the movements since the arrival; means over "
-                    f"arms of {self.sizes.block} movements each (thesis figures 5.9 to 5.12).",
+                    "Reward, success, actions and switches over the movements since the arrival; means over arms, "
+                    f"{self.sizes.block} movements a point (thesis figures 5.9 to 5.12).",
                     courses_alt(shown),
                 )
             ],
@@ -222,7 +221,7 @@ class Transfer(Experiment):
     def _claims(self, rows: Rows) -> list[Claim]:
         said = thesis(__name__)
         drop = over_arms(_arrival(rows, 1, "reward"))
-        success = over_arms(np.concatenate([blocks(rows, "success_rate", t) for t in RATES], axis=1).mean(axis=-1))
+        success = over_arms(np.mean([blocks(rows, "success_rate", t).mean(axis=-1) for t in RATES], axis=0))
         claims = [
             Claim("The reward drops on arrival", f"more than {said['drop']:g}", plain(drop), above(drop)),
             Claim(
@@ -335,8 +334,9 @@ def _causes_section(rows: Rows, causes: Mapping[str, Interval]) -> Section:
     return Section(
         "Causes of the drop",
         [
-            "Each condition of the arm is compared with the arm as it is, movement by movement. The error of the model "
-            "is what is left between the simulation without its noise and an arm without noise, never late and warm."
+            "Each condition of the arm is compared with the arm as it is, movement by movement. The error of the "
+            "model is what is left between the simulation without its noise and an arm without noise, never late "
+            "and warm."
         ],
         tables=[both],
         figures=[

@@ -32,8 +32,9 @@ from pneumarm.experiments.on_arms import (
     thesis,
     values,
 )
-from pneumarm.learning import Exploration, NoiseSettings, Reward, TrainSettings
+from pneumarm.learning import Exploration, Reward, TrainSettings
 from pneumarm.report.page import Picture, Section
+from pneumarm.simulation.noise import NoiseSettings
 
 BASE, NO_SHAPING, NO_PUNISHMENT, NO_NOISE, WHITE, TWICE = range(1, 7)
 KINDS: Mapping[int, tuple[str, TrainSettings]] = {
@@ -118,8 +119,8 @@ class Transferability(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                f"Trial 10 loses {plain(base)} of its reward on the way to the arm. Intervals are over arms, each the "
-                "mean of its runs.",
+                f"Trial 10 loses {plain(base)} of its reward on the way to the arm. Intervals are over arms, each "
+                "the mean of its runs.",
             ],
             figures={
                 "lost": {words: number(over_arms(lost[trial])) for trial, words in self.trials.items()},
@@ -133,7 +134,7 @@ class Transferability(Experiment):
                     figures=[
                         Picture(
                             dots_figure(names, shown),
-                            "What agents earn on the arm, what they lose on the way there, and how often they switch.",
+                            "What agents earn on the arm, what they lose on the way there, how often they switch.",
                             dots_alt(names, shown),
                         )
                     ],

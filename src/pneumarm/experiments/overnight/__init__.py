@@ -100,7 +100,7 @@ class Overnight(Experiment):
 
     def settings(self) -> Any:
         """Return the settings of the agent and the sizes."""
-        return {"agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
+        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
         """Return the arm and its simulation."""

@@ -17,7 +17,6 @@ from pneumarm.control.transfer import BEGIN, draw_movement
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
-from pneumarm.experiments.trainings import TEST_SEED
 from pneumarm.learning import Agent, BeginStates, Exploration, TrainSettings
 from pneumarm.learning.environment import environment
 from pneumarm.learning.loop import Movements
@@ -35,6 +34,7 @@ THESIS = TrainSettings(learning_rate=0.10, agents=8, validation_episodes=1000)
 
 The thesis took the best of 128 agents, which it had anyway.
 """
+_TEST_SEED = 0  # the same begin states and goals for every agent in the simulation
 TEST_MOVEMENTS, MOVEMENTS = 0, 1
 """Streams of random numbers of goals and begin states on the arm."""
 
@@ -131,7 +131,7 @@ def simulated_test(
     """Return the means of a test in the simulation, by default with the noise that the agent was trained with."""
     settings = agent.settings if noise is None else replace(agent.settings, noise=noise)
     env = environment(of.simulated.simulation, of.simulated.begin, settings)
-    tested = run_test(env, agent.weights(), agent.settings, episodes, (TEST_SEED, TEST), exploration)
+    tested = run_test(env, agent.weights(), agent.settings, episodes, (_TEST_SEED, TEST), exploration)
     return means(Movements(**{name: getattr(tested, name) for name in Movements._fields}))
 
 

@@ -140,6 +140,8 @@ def courses_figure(
             if math.isfinite(curve.before):
                 place.axhline(curve.before, color=color, ls=style, lw=0.8, alpha=0.7)
             names[curve.name] = key(color, style, marker=marker)
+        if "%" in label:
+            place.set_ylim(top=min(place.get_ylim()[1], 101.0))
         for where in marks or {}:
             place.axvline(where, color=INK, ls=":", lw=1)
     for where, words in (marks or {}).items():

@@ -28,7 +28,7 @@ The thesis says that the learning rate is 0 in the test, but not whether explora
 EXPLORING = "exploring "
 """Prefix of the figures of the test with exploration."""
 CRITERIA |= {EXPLORING + name: f"{text}, exploring" for name, text in CRITERIA.items() if name != "episodes"}
-TEST_SEED = 0  # the same begin states and goals for every agent of every experiment
+_TEST_SEED = 0  # the same begin states and goals for every agent of every experiment
 
 
 def with_setting(settings: Any, place: str, value: Any) -> Any:
@@ -75,9 +75,9 @@ def train_and_test(
     one = replace(settings, agents=1, validation_episodes=1, max_episodes=most)
     training = train(simulation, material.begin, one, run_seed(laboratory, run), threads=1)
     agent, count = training.agent, laboratory.test_episodes
-    greedy = _means(test(agent, simulation, material.begin, count, TEST_SEED))
+    greedy = _means(test(agent, simulation, material.begin, count, _TEST_SEED))
     env = environment(simulation, material.begin, one)
-    exploring = _means(run_test(env, agent.weights(), one, count, (TEST_SEED, TEST), one.exploration))
+    exploring = _means(run_test(env, agent.weights(), one, count, (_TEST_SEED, TEST), one.exploration))
     return {
         **greedy,
         **{EXPLORING + name: value for name, value in exploring.items()},

@@ -177,8 +177,8 @@ class Transfer(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                f"On arrival the reward of the agent that does not learn is {plain(drop)} lower than in the "
-                f"simulation, where it explores as much (thesis: more than {thesis(__name__)['drop']:g}). Of the "
+                f"On arrival the reward of the agent that does not learn drops by {plain(drop)} from that in the "
+                f"simulation, where it explores as much (thesis: by more than {thesis(__name__)['drop']:g}). Of the "
                 f"causes, measured with greedy movements, the largest is: {largest} ({plain(causes[largest])}).",
                 "Intervals are over arms, each the mean of its runs.",
             ],

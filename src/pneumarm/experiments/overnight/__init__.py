@@ -131,8 +131,8 @@ class Overnight(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                f"The night costs the agent that learns {plain(lost)} of its reward, against the same agent without a "
-                f"night, and the one that never learns {plain(found[FROZEN][0])}. On the second day the latter gains "
+                f"The night costs the agent that learns {plain(lost)} of its reward, against the same agent without "
+                f"one, and the one that never learns {plain(found[FROZEN][0])}. On the second day the latter gains "
                 f"{plain(found[FROZEN][1])}, as the arm warms up; learning after a night gains {plain(adapted)} more "
                 "than learning without one.",
                 "Intervals are over arms, each the mean of its runs.",
@@ -149,8 +149,8 @@ class Overnight(Experiment):
                     [
                         f"The drop is the reward of the last {_SPAN * self.sizes.block} movements of the first day "
                         f"less that of the first {self.sizes.block} of the second; the gain is from there to the "
-                        f"last {_SPAN * self.sizes.block} of the second day. All explore alike. Without a night the first day "
-                        "is the same, movement by movement. An agent that is frozen in the evening also loses what "
+                        f"last {_SPAN * self.sizes.block} of the second day. All explore alike. Without a night the "
+                        "first day is the same, movement by movement. An agent that is frozen in the evening also loses what "
                         "learning on would have mended, night or not: its weights are those of a moment."
                     ],
                     tables=[Table(names, lines, "Reward, means over arms with 95 % intervals.")],

@@ -150,8 +150,8 @@ class Overnight(Experiment):
                         f"The drop is the reward of the last {_SPAN * self.sizes.block} movements of the first day "
                         f"less that of the first {self.sizes.block} of the second; the gain is from there to the "
                         f"last {_SPAN * self.sizes.block} of the second day. All explore alike. Without a night the "
-                        "first day is the same, movement by movement. An agent that is frozen in the evening also loses what "
-                        "learning on would have mended, night or not: its weights are those of a moment."
+                        "first day is the same, movement by movement. An agent that is frozen in the evening also "
+                        "loses what learning on would have mended, night or not: its weights are those of a moment."
                     ],
                     tables=[Table(names, lines, "Reward, means over arms with 95 % intervals.")],
                     figures=[self._picture(rows)],

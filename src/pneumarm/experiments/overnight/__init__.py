@@ -6,6 +6,9 @@ days, learning on the first alone, or never learning (so that what comes back is
 without a night, because what a learning agent earns goes up and down anyway.
 
     pneumarm experiment overnight
+
+On arms 1 to 5, an agent each and 60,000 transitions, there is no hitch: the agent that never learns loses -4.8 ± 4.0
+after 14 h. What the night does to one that learns (-4 ± 20) is lost in what its reward goes up and down by anyway.
 """
 
 from collections.abc import Mapping

@@ -9,9 +9,9 @@ apart.
 
     pneumarm experiment transfer
 
-On arms 1 to 5, an agent each and 60,000 transitions, nothing is surely lost on arrival: the reward drops by -0.7 ± 4.3
-where the thesis lost more than 15, and no single cause takes as much as 5 for sure. Learning with 0.05 or 0.10 does
-not make it better (-3 ± 17 and -15 ± 19 against the agent that does not learn).
+On arms 1 to 5, an agent each and 60,000 transitions, nothing is surely lost on arrival: the reward drops by
+-0.7 ± 4.3 where the thesis lost more than 15, and no cause surely takes anything. Learning with 0.05 or 0.10 does not
+surely help (-3 ± 17 and -15 ± 19 against the agent that does not learn).
 """
 
 from collections.abc import Mapping

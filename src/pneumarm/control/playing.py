@@ -2,8 +2,8 @@
 
 The same as :meth:`BeginState.reach` and :func:`~.movement.move` with an :class:`~.agent.AgentController` behind the
 guard, bit for bit: the same readings with their noise, the same late periods, the same limits of pressure and of
-inflation. Without Python between two periods a movement takes half the time, and threads do not wait for each
-other; an agent that learns on the arm alone needs 100,000 s of arm time.
+inflation. Without Python between two periods a movement takes 1.0 instead of 2.5 ms of processor time, and threads do
+not wait for each other; an agent that learns on the arm alone needs 80,000 s of arm time.
 
 It is for virtual arms without faults and for agents of the thesis' kind.
 """

@@ -15,6 +15,9 @@ Numbered differences from the thesis:
 3. Goals are in the middle 80 % of the range between the ends that the arm reaches at rest.
 
     pneumarm experiment on-the-arm-only
+
+On arms 1 to 5, an agent each, all meet the criterium after 22.8 ± 2.2 h and 16,800 ± 1,600 movements: the guess of
+29 h is right in its order, because movements soon take less than the cut-off that it counts with (4.9 s, not 7.05).
 """
 
 from collections.abc import Mapping

@@ -33,7 +33,7 @@ HELD = 3
 """Control periods in a row without a decision in which the valves are held, 0.1 s at 30 Hz; then they are vented."""
 MOST_REPLACED = 30
 """Decisions in a row that are replaced; the one after stops the controller."""
-_VENTING = 10.0
+VENTING = 10.0
 """How many times faster a muscle recovers from inflation by venting than by resting."""
 
 Reason = Literal["nonsense", "raised", "late"]
@@ -304,7 +304,7 @@ class _Inflation:
                 if self._open_for[i] >= self._limit:
                     self.blocked[i] = self.spent = True
             elif self._open_for[i] > 0:
-                self._open_for[i] -= passed if valve == 0 else _VENTING * passed
+                self._open_for[i] -= passed if valve == 0 else VENTING * passed
                 if self._open_for[i] <= 0 and self.blocked[i]:
                     self.blocked[i] = False
                     self.spent = any(self.blocked)

@@ -18,6 +18,12 @@ PLACES = {
     "valves-closed": "valves_closed",
     "shaping-settings": "shaping_settings",
     "fine-tuning": "fine_tuning",
+    "transfer": "transfer",
+    "transferability": "transferability",
+    "goal-area": "goal_area",
+    "overnight": "overnight",
+    "on-the-arm-only": "on_the_arm_only",
+    "displacement": "displacement",
 }
 """Name: package below this one; each has an ``EXPERIMENT``."""
 

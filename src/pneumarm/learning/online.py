@@ -62,7 +62,7 @@ class OnlineLearner:
         goal = (np.asarray(goal, np.float64).reshape(joints) - offset) / scale
         self._x[self._places.goal : self._places.one] = goal
         self._x[: self._places.command] = self._checked(state)
-        _begin(self._learner, self._schedule, self._x, self._room, self._random)
+        begin_acting(self._learner, self._schedule, self._x, self._room, self._random)
 
     def act(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of the current state; they stay the same until :meth:`observe`."""
@@ -90,7 +90,7 @@ class OnlineLearner:
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state`` without learning, as if an episode began there."""
         self._x[: self._places.command] = self._checked(next_state)
-        _begin(self._learner, self._schedule, self._x, self._room, self._random)
+        begin_acting(self._learner, self._schedule, self._x, self._room, self._random)
 
     def weights(self) -> NDArray[np.float32]:
         """Return a copy of the weights as they are now."""
@@ -105,7 +105,8 @@ class OnlineLearner:
         self.act()
         paid = np.broadcast_to(np.asarray(reward, np.float64), self._room.actions.shape).copy()
         next_state = self._checked(next_state)
-        _observe(self._learner, self._schedule, self._x, self._room, self._random, (paid, next_state), bool(terminal))
+        seen = paid, next_state
+        learn_and_act(self._learner, self._schedule, self._x, self._room, self._random, seen, bool(terminal))
 
     @property
     def agent(self) -> Agent:
@@ -145,14 +146,15 @@ class OnlineLearner:
 
 
 @part
-def _begin(learner, schedule, x, room, random):  # type: ignore[no-untyped-def]
+def begin_acting(learner, schedule, x, room, random):  # type: ignore[no-untyped-def]
+    """Begin an episode in the state and goal ``x``: choose its first actions."""
     for joint in range(room.actions.shape[0]):
         forget_traces(learner, joint)
     look_ahead(learner, schedule, x, room, random)
 
 
 @part
-def _observe(learner, schedule, x, room, random, seen, terminal):  # type: ignore[no-untyped-def]
+def learn_and_act(learner, schedule, x, room, random, seen, terminal):  # type: ignore[no-untyped-def]
     """Do what the training loop does after an action; ``seen`` are the rewards (joints,) and the next state."""
     paid, next_state = seen
     for i in range(x.shape[0]):

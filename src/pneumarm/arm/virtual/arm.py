@@ -47,6 +47,35 @@ class Records(NamedTuple):
     """Random state of the supply's fluctuation, shape (4,)."""
 
 
+class Live(NamedTuple):
+    """All that kernels need to move an arm, its own arrays and not copies. See :attr:`VirtualArm.live`."""
+
+    muscles: NDArray[Any]
+    """MUSCLE, shape (joints, 2)."""
+    muscle_constants: NDArray[Any]
+    """MUSCLE_CONSTANTS, shape (joints, 2)."""
+    joints: NDArray[Any]
+    """JOINT, shape (joints,)."""
+    joint_constants: NDArray[Any]
+    """JOINT_CONSTANTS, shape (joints,)."""
+    air: NDArray[Any]
+    """SURROUNDINGS, shape (1,)."""
+    air_constants: NDArray[Any]
+    """SURROUNDINGS_CONSTANTS, shape (1,)."""
+    sensor_constants: NDArray[Any]
+    """SENSOR_CONSTANTS, shape (1,)."""
+    supply_random: NDArray[np.uint64]
+    """Random state of the supply's fluctuation, shape (4,)."""
+    sensor_random: NDArray[np.uint64]
+    """Random state of the sensors' noise, shape (4,)."""
+    jitter_random: NDArray[np.uint64]
+    """Random state of the control cycle's lateness, shape (4,)."""
+    conversions: NDArray[np.float64]
+    """Room for the conversions of a reading, shape (MOST_CONVERSIONS,)."""
+    lateness: float
+    """Mean lateness of the control cycle [s]."""
+
+
 class VirtualArm(Arm):
     """An arm that exists only as physics: valves, air, braided muscles, a hinge with a weight, and sensors.
 
@@ -164,6 +193,32 @@ class VirtualArm(Arm):
     def records(self) -> Records:
         """The arm's true state as records for kernels."""
         return Records(self._muscles, self._joints, self._surroundings, self._random[_SUPPLY])
+
+    @property
+    def live(self) -> Live:
+        """What kernels move the arm by.
+
+        Raises:
+            UnusableInput: the arm plays faults, which only its own methods do.
+
+        """
+        if self._player is not None:
+            raise UnusableInput(f"{self.spec.name}: kernels cannot move an arm that plays faults; remove them")
+        fixed = self._constants
+        return Live(
+            self._muscles,
+            fixed.muscles,
+            self._joints,
+            fixed.joints,
+            self._surroundings,
+            fixed.surroundings,
+            fixed.sensors,
+            self._random[_SUPPLY],
+            self._random[_SENSORS],
+            self._random[_JITTER],
+            self._scratch,
+            self._lateness,
+        )
 
     @property
     def time(self) -> float:

@@ -1,0 +1,486 @@
+"""Many movements of a learning agent on a virtual arm, compiled as one loop.
+
+The same as :meth:`BeginState.reach` and :func:`~.movement.move` with an :class:`~.agent.AgentController` behind the
+guard, bit for bit: the same readings with their noise, the same late periods, the same limits of pressure and of
+inflation. Without Python between two periods a movement takes 1.0 instead of 2.5 ms of processor time, and threads do
+not wait for each other; an agent that learns on the arm alone needs 80,000 s of arm time.
+
+It is for virtual arms without faults and for agents of the thesis' kind.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import BeginState
+from pneumarm.arm.guard import VENTING
+from pneumarm.arm.valves import VALVES
+from pneumarm.arm.virtual.arm import Live, VirtualArm, pass_for, pass_until
+from pneumarm.arm.virtual.sensors import sense
+from pneumarm.arm.virtual.valve import command
+from pneumarm.errors import UnusableInput
+from pneumarm.kernels import kernel
+from pneumarm.learning.agent import Agent
+from pneumarm.learning.begin import BeginParameters, draw_interval
+from pneumarm.learning.loop import Movements, Room, Schedule, movements, room_of
+from pneumarm.learning.online import begin_acting, learn_and_act
+from pneumarm.learning.settings import Exploration
+from pneumarm.learning.values import Learner, learner
+from pneumarm.random import random_state, uniform
+from pneumarm.simulation.kernel import Places, places
+
+Array = NDArray[np.float64]
+
+
+class Played(NamedTuple):
+    """Movements that were made, an entry a movement."""
+
+    movements: Movements
+    time_start: Array
+    """Arm time of the first reading, shape (n,) [s]."""
+    time_end: Array
+    """Arm time of the last reading, shape (n,) [s]."""
+
+
+class _Watched(NamedTuple):
+    """The guard: what was read, what is set, and for how long inlets have been open."""
+
+    angle: Array
+    """Shape (joints,) [counts]."""
+    pressure: Array
+    """Shape (joints, 2) [counts]."""
+    applied: NDArray[np.int8]
+    """Shape (joints, 2)."""
+    asked: NDArray[np.int8]
+    """Room, shape (joints, 2)."""
+    open_for: Array
+    """Shape (joints, 2) [s]."""
+    blocked: NDArray[np.bool_]
+    """Which inlets stay closed, shape (joints, 2)."""
+    clock: Array
+    """Time of the last reading, NaN before the first, shape (1,) [s]."""
+    limit: float
+    """[counts]"""
+    longest: float
+    """[s]"""
+    period: float
+    """[s]"""
+    latency: float
+    """[s]"""
+
+
+class _Mind(NamedTuple):
+    """The agent acting and learning."""
+
+    learner: Learner
+    x: NDArray[np.float32]
+    sigma: NDArray[np.float32]
+    """State window, shape (state_size,) [scaled]."""
+    room: Room
+    random: NDArray[np.uint64]
+    places: Places
+    offset: Array
+    """Of the observations, shape (joints, 4) [sensor units]."""
+    scale: Array
+    """Shape (joints, 4) [sensor units]."""
+    command_scale: Array
+    """Shape (joints, 2)."""
+    history: int
+
+
+class _Rules(NamedTuple):
+    """What is asked of the arm."""
+
+    goal: float
+    action: float
+    switch: float
+    angle_tolerance: float
+    velocity_tolerance: float
+    cutoff: int
+    deflate: float
+    settle: float
+
+
+class _Aims(NamedTuple):
+    """Where to move."""
+
+    goals: Array
+    """Shape (n, joints) [counts]."""
+    durations: Array
+    """How long muscles are inflated before each movement, shape (n, joints, 2) [s]."""
+    near: BeginParameters
+    """Distribution of goals around the angle at the begin, used where the deviation is finite."""
+    random: NDArray[np.uint64]
+
+
+def part_of(made: Movements, first: int, end: int) -> Movements:
+    """Return the movements from number ``first`` up to ``end``."""
+    parts: Any = (array[first:end] for array in made)
+    return Movements(*parts)
+
+
+class Player:
+    """``agent`` making movements on ``arm``; learns by ``learning_rate``.
+
+    Args:
+        agent: of the thesis' kind; it is not changed.
+        arm: where it moves. Others may use it between two calls of :meth:`play`, if they close its valves.
+        learning_rate: 0 for an agent that does not learn.
+        exploration: greedy without it.
+        seed: of exploring, and of goals that are drawn near to where the arm stands.
+        begin: how the arm gets to a begin state.
+
+    Raises:
+        UnusableInput: agent and arm do not fit, or the arm plays faults.
+
+    """
+
+    def __init__(
+        self,
+        agent: Agent,
+        arm: VirtualArm,
+        learning_rate: float = 0.0,
+        exploration: Exploration | None = None,
+        seed: int = 0,
+        begin: BeginState = BeginState(),
+    ) -> None:
+        spec, window, scaling = arm.spec, agent.window, agent.scaling
+        if window.joints != spec.joints or spec.angle_limits is not None:
+            raise UnusableInput(
+                f"{spec.name}: expected an arm of {window.joints} joint(s) without limits of the angle, got "
+                f"{spec.joints} joint(s) and the limits {spec.angle_limits}"
+            )
+        self.agent, self.arm, self._begin = agent, arm, begin
+        joints, place = spec.joints, places(window)
+        self._schedule = _schedule(exploration)
+        x = np.zeros(place.size, np.float32)
+        x[place.one] = 1
+        self._mind = _Mind(
+            learner(agent.weights(), agent.settings, learning_rate),
+            x,
+            np.zeros(window.state_size, np.float32),
+            room_of(joints, place.size),
+            random_state(seed),
+            place,
+            np.ascontiguousarray(scaling.observation_offset.reshape(joints, 4), np.float64),
+            np.ascontiguousarray(scaling.observation_scale.reshape(joints, 4), np.float64),
+            np.ascontiguousarray(scaling.command_scale.reshape(joints, 2), np.float64),
+            window.history,
+        )
+        both = joints, 2
+        self._watched = _Watched(
+            np.zeros(joints),
+            np.zeros(both),
+            np.zeros(both, np.int8),
+            np.zeros(both, np.int8),
+            np.zeros(both),
+            np.zeros(both, bool),
+            np.full(1, np.nan),
+            float(spec.max_pressure_counts),
+            float(spec.max_inflation),
+            float(spec.period),
+            float(spec.latency),
+        )
+        reward = agent.settings.reward
+        self._rules = _Rules(
+            float(reward.goal),
+            float(reward.action),
+            float(reward.switch),
+            float(reward.angle_tolerance),
+            float(reward.velocity_tolerance),
+            int(agent.settings.cutoff),
+            float(begin.deflate),
+            float(begin.settle),
+        )
+        low, high = agent.goal_range[0]
+        self._near = BeginParameters(
+            np.zeros((0, window.state_size), np.float32),
+            np.zeros((0, joints)),
+            np.zeros(0),
+            np.array([low, high], np.float64),
+            np.cumsum(agent.settings.begin_weights) / np.sum(agent.settings.begin_weights),
+        )
+        self._aim_random = random_state((seed, 1))
+        self.performance = 0.0
+        """Moving average of successes (thesis eq. 4.14) by the schedule of :meth:`play`."""
+
+    def play(self, goals: Array, durations: Array, schedule: Schedule | None = None) -> Played:
+        """Make movements, each from a begin state of its own; ends early where the schedule's demand is met.
+
+        Args:
+            goals: shape (n, joints) [counts].
+            durations: how long each muscle is inflated before a movement, shape (n, joints, 2) [s].
+            schedule: of shaping: where its deviation is finite, goals are not those given but near to where the arm
+                stands (thesis section 4.3.3), by the agent's weights of the sub-intervals of deviations.
+
+        """
+        goals, durations = np.ascontiguousarray(goals, np.float64), np.ascontiguousarray(durations, np.float64)
+        record = movements(len(goals), goals.shape[1])
+        played = Played(record, np.zeros(len(goals)), np.zeros(len(goals)))
+        aims = _Aims(goals, durations, self._near, self._aim_random)
+        count, self.performance = _play(
+            self.arm.live,
+            self._watched,
+            (self._mind, schedule or self._schedule),
+            self._rules,
+            aims,
+            played,
+            float(self.performance),
+        )
+        return Played(part_of(record, 0, count), played.time_start[:count], played.time_end[:count])
+
+    def visit(self, durations: Array) -> tuple[Array, Array]:
+        """Bring the arm to rest once for each of ``durations`` (n, joints, 2) [s] and only look.
+
+        Returns the angles (n, joints) and pressures (n, joints, 2) at rest [counts].
+        """
+        durations = np.ascontiguousarray(durations, np.float64)
+        angle, pressure = np.zeros(durations.shape[:2]), np.zeros(durations.shape)
+        _visit(self.arm.live, self._watched, self._rules, durations, angle, pressure)
+        return angle, pressure
+
+    @property
+    def learned(self) -> Agent:
+        """The agent as it is now."""
+        return self.agent.with_weights(self._mind.learner.weights)
+
+
+def _schedule(exploration: Exploration | None) -> Schedule:
+    chosen = exploration or Exploration(0.0, 1.0)
+    return Schedule(np.inf, float(chosen.epsilon), float(chosen.temperature), 0.0)
+
+
+@kernel
+def _read(live: Live, watched: _Watched) -> float:
+    """Read the sensors, and count for how long inlets have been open; return the time."""
+    time: float = sense(
+        live.muscles,
+        live.joints,
+        live.air,
+        live.sensor_constants,
+        live.sensor_random,
+        live.conversions,
+        watched.angle,
+        watched.pressure,
+    )
+    passed = 0.0 if np.isnan(watched.clock[0]) else time - watched.clock[0]
+    watched.clock[0] = time
+    for j in range(watched.applied.shape[0]):
+        for m in range(2):
+            valve = watched.applied[j, m]
+            if valve > 0:
+                watched.open_for[j, m] += passed
+                if watched.open_for[j, m] >= watched.longest:
+                    watched.blocked[j, m] = True
+            elif watched.open_for[j, m] > 0:
+                watched.open_for[j, m] -= passed if valve == 0 else VENTING * passed
+                if watched.open_for[j, m] <= 0:
+                    watched.blocked[j, m] = False
+    return time
+
+
+@kernel
+def _set(live: Live, watched: _Watched) -> None:
+    """Set the valves as asked, but for inlets of muscles at their limits."""
+    for j in range(watched.applied.shape[0]):
+        for m in range(2):
+            valve = watched.asked[j, m]
+            if valve > 0 and (watched.pressure[j, m] > watched.limit or watched.blocked[j, m]):
+                valve = 0
+            watched.applied[j, m] = valve
+    command(live.muscles, live.air, live.air_constants, watched.applied)
+
+
+@kernel
+def _pass(live: Live, seconds: float) -> None:
+    pass_for(
+        live.muscles,
+        live.muscle_constants,
+        live.joints,
+        live.joint_constants,
+        live.air,
+        live.air_constants,
+        live.supply_random,
+        seconds,
+    )
+
+
+@kernel
+def _wait(live: Live, watched: _Watched, seconds: float) -> None:
+    """Let time pass, looking at the limits every period while an inlet is open."""
+    while seconds > watched.period and (watched.applied > 0).any():
+        _pass(live, watched.period)
+        seconds -= watched.period
+        _read(live, watched)
+        changes = False
+        for j in range(watched.applied.shape[0]):
+            for m in range(2):
+                watched.asked[j, m] = watched.applied[j, m]
+                over = watched.pressure[j, m] > watched.limit or watched.blocked[j, m]
+                changes |= over and watched.applied[j, m] > 0
+        if changes:
+            _set(live, watched)
+    _pass(live, seconds)
+
+
+@kernel
+def _reach(live: Live, watched: _Watched, rules: _Rules, durations: Array) -> None:
+    """As :meth:`BeginState.reach`, with the ``durations`` (joints, 2) [s] given."""
+    _read(live, watched)
+    watched.asked[:] = -1
+    _set(live, watched)
+    _wait(live, watched, rules.deflate)
+    passed = 0.0
+    ends = np.sort(durations.copy().ravel())
+    for k in range(ends.size + 1):
+        end = ends[k - 1] if k > 0 else 0.0
+        if end > passed:
+            _wait(live, watched, end - passed)
+            passed = end
+        _read(live, watched)
+        for j in range(durations.shape[0]):
+            for m in range(2):
+                watched.asked[j, m] = 1 if durations[j, m] > passed else 0
+        _set(live, watched)
+    _wait(live, watched, rules.settle)
+
+
+@kernel
+def _push(mind: _Mind, watched: _Watched, velocity: Array, first: bool) -> None:
+    """Put what was read into the state window, as :class:`~pneumarm.learning.tracker.StateTracker` does."""
+    sigma, observed, commanded = mind.sigma, 4 * velocity.size, 2 * velocity.size
+    oldest = mind.history * observed
+    if first:
+        sigma[:] = 0
+    else:
+        for i in range(oldest - 1, observed - 1, -1):
+            sigma[i] = sigma[i - observed]
+        if mind.history > 1:
+            for i in range(sigma.size - 1, oldest + commanded - 1, -1):
+                sigma[i] = sigma[i - commanded]
+            for j in range(velocity.size):
+                for m in range(2):
+                    valve = np.float64(watched.applied[j, m]) / mind.command_scale[j, m]
+                    sigma[oldest + 2 * j + m] = np.float32(valve)
+    for j in range(velocity.size):
+        for q in range(4):
+            value = watched.angle[j] if q == 0 else (velocity[j] if q == 1 else watched.pressure[j, q - 2])
+            scaled = np.float32((value - mind.offset[j, q]) / mind.scale[j, q])
+            for lag in range(mind.history if first else 1):
+                sigma[lag * observed + 4 * j + q] = scaled
+
+
+@kernel
+def _aim(aims: _Aims, watched: _Watched, deviation: float, goal: Array) -> None:
+    """Put a goal near to where the arm stands into ``goal`` (joints,) (thesis section 4.3.3)."""
+    low, high = aims.near.domain[0], aims.near.domain[1]
+    for j in range(goal.size):
+        here = min(max(watched.angle[j], low), high)
+        first, last = draw_interval(aims.near, here, deviation, aims.random)
+        goal[j] = first + (last - first) * uniform(aims.random)
+
+
+@kernel
+def _move(live, watched, mind, schedule, rules, goal, played, e):  # type: ignore[no-untyped-def]
+    """Make movement ``e`` to ``goal``, as ``move`` does; return whether it succeeded."""
+    record, joints = played.movements, goal.size
+    before, velocity = np.zeros(joints), np.zeros(joints)
+    last, paid = np.zeros((joints, 2), np.int8), np.zeros(joints)
+    place = mind.places
+    success, due, then = False, 0.0, 0.0
+    while True:
+        time = _read(live, watched)
+        if record.actions[e] == 0:
+            played.time_start[e] = time
+            due = time
+            for j in range(joints):
+                record.goal[e, j], record.angle_begin[e, j] = goal[j], watched.angle[j]
+                mind.x[place.goal + j] = np.float32((goal[j] - mind.offset[j, 0]) / mind.scale[j, 0])
+            _push(mind, watched, velocity, True)
+            for i in range(place.command):
+                mind.x[i] = mind.sigma[i]
+            begin_acting(mind.learner, schedule, mind.x, mind.room, mind.random)
+        else:
+            if time - due > watched.period / 2:
+                due = time
+            success = True
+            total = 0
+            for j in range(joints):
+                velocity[j] = (watched.angle[j] - before[j]) / (1e3 * (time - then))
+                if abs(watched.angle[j] - goal[j]) > rules.angle_tolerance:
+                    success = False
+                if abs(velocity[j]) > rules.velocity_tolerance:
+                    success = False
+            for j in range(joints):
+                switched = 0
+                if record.actions[e] > 1 and (last[j] != watched.applied[j]).any():
+                    switched = 1
+                last[j] = watched.applied[j]
+                record.switches[e, j] += switched
+                total += switched
+                paid[j] = (rules.goal if success else rules.action) + rules.switch * switched
+            record.reward[e] += rules.goal if success else rules.action
+            record.reward[e] += rules.switch * total
+            _push(mind, watched, velocity, False)
+            learn_and_act(mind.learner, schedule, mind.x, mind.room, mind.random, (paid, mind.sigma), success)
+            if success or record.actions[e] == rules.cutoff:
+                break
+        for j in range(joints):
+            before[j] = watched.angle[j]
+        then = time
+        record.actions[e] += 1
+        due += watched.period
+        if watched.latency > 0.0:
+            _wait(live, watched, watched.latency)
+        for j in range(joints):
+            for m in range(2):
+                watched.asked[j, m] = VALVES[mind.room.next_actions[j], m]
+        _set(live, watched)
+        pass_until(
+            live.muscles,
+            live.muscle_constants,
+            live.joints,
+            live.joint_constants,
+            live.air,
+            live.air_constants,
+            live.supply_random,
+            live.jitter_random,
+            live.lateness,
+            due,
+        )
+    watched.asked[:] = 0
+    _set(live, watched)
+    played.time_end[e] = time
+    record.success[e] = success
+    for j in range(joints):
+        record.angle_end[e, j], record.velocity_end[e, j] = watched.angle[j], velocity[j]
+    return success
+
+
+@kernel
+def _play(live, watched, mind_schedule, rules, aims, played, performance):  # type: ignore[no-untyped-def]
+    """Fill ``played`` with movements; return how many, and the performance (thesis eq. 4.14) after them."""
+    mind, schedule = mind_schedule
+    goal = np.zeros(aims.goals.shape[1])
+    for e in range(aims.goals.shape[0]):
+        _reach(live, watched, rules, aims.durations[e])
+        for j in range(goal.size):
+            goal[j] = aims.goals[e, j]
+        if schedule.deviation < np.inf:
+            _read(live, watched)
+            _aim(aims, watched, schedule.deviation, goal)
+        success = _move(live, watched, mind, schedule, rules, goal, played, e)
+        performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
+        if performance >= schedule.enough:
+            return e + 1, performance
+    return aims.goals.shape[0], performance
+
+
+@kernel
+def _visit(live, watched, rules, durations, angle, pressure):  # type: ignore[no-untyped-def]
+    for e in range(durations.shape[0]):
+        _reach(live, watched, rules, durations[e])
+        _read(live, watched)
+        angle[e] = watched.angle
+        pressure[e] = watched.pressure

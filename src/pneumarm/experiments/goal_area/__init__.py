@@ -1,0 +1,159 @@
+"""What precision costs (section 5.1): goals of 25 and 12 counts, and speeds at the goal of 1 and 0.5 counts/ms.
+
+The thesis takes 25 counts and 1 count/ms (eq. 5.1, 5.2), "partly by empirical observations", and supposes that 0.5
+may be possible. Agents learn each goal area by themselves and are tested with it, in the simulation and on the arm
+as it is in the morning: greedy and without learning, the same begin states and goals.
+
+    pneumarm experiment goal-area
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from pneumarm.experiments.differences import above, below
+from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.moving import ARMS, THESIS, Material, agent_of, greedy_test, material, means, simulated_test
+from pneumarm.experiments.on_arms import (
+    Column,
+    difference,
+    dots_alt,
+    dots_figure,
+    mean,
+    number,
+    plain,
+    table,
+    thesis,
+)
+from pneumarm.learning import Reward, TrainSettings
+from pneumarm.report.page import Picture, Section
+
+AREAS = {1: (25.0, 1.0), 2: (25.0, 0.5), 3: (12.0, 1.0), 4: (12.0, 0.5)}
+"""Tolerances of angle [counts] and velocity [counts/ms] by trial."""
+_SIMULATION = "simulation: "
+_NEAR_ALL = 0.97
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is moved in a row."""
+
+    test: int = 300
+    """Movements on the arm."""
+
+
+@dataclass(frozen=True)
+class GoalArea(Experiment):
+    """Four goal areas, each learned and tested."""
+
+    name: str = "goal-area"
+    title: str = "The goal area"
+    question: str = "What does a smaller goal area cost, in the simulation and on the arm?"
+    source: str = "Thesis section 5.1, eq. 5.1 and 5.2"
+    runs: int = 4
+    arms: tuple[str, ...] = ARMS
+    agent: TrainSettings = THESIS
+    sizes: Sizes = field(default_factory=Sizes)
+
+    @property
+    def trials(self) -> Mapping[int, str]:
+        """Goal areas."""
+        return {t: f"{angle:g} counts, {velocity:g} counts/ms" for t, (angle, velocity) in AREAS.items()}
+
+    def train_settings(self, trial: int) -> TrainSettings:
+        """Return how the agents of ``trial`` learn."""
+        angle, velocity = AREAS[trial]
+        return replace(self.agent, reward=Reward(angle_tolerance=angle, velocity_tolerance=velocity))
+
+    def settings(self) -> Any:
+        """Return the settings of all agents and the sizes."""
+        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
+        return {"agents": agents, "sizes": asdict(self.sizes)}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
+        """Return the arm and its simulation."""
+        return material(arm, folder, settings, progress)
+
+    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Train, and move in the simulation and on the arm."""
+        agent = agent_of(material, self.train_settings(trial), run, settings)
+        before = simulated_test(material, agent, settings.test_episodes)
+        made = greedy_test(material, agent, self.sizes.test, run, settings).movements
+        speed = np.abs(made.velocity_end).max(axis=1)[made.success]
+        slow = {"half as fast at the end": float((speed <= AREAS[trial][1] / 2).mean())} if made.success.any() else {}
+        return {**{_SIMULATION + name: value for name, value in before.items()}, **means(made), **slow}
+
+    def analyse(self, rows: Rows) -> Analysis:
+        """Return what each goal area costs."""
+        names, base = list(self.trials.values()), 1
+        shown = {
+            "success on the arm [%]": [_percent(mean(rows, "success_rate", t)) for t in AREAS],
+            "actions of successes\non the arm [-]": [mean(rows, "actions", t) for t in AREAS],
+            "reward on the arm [-]": [mean(rows, "reward", t) for t in AREAS],
+        }
+        columns = [
+            Column(_SIMULATION + "reward", "reward, simulation"),
+            Column("reward", "reward, arm"),
+            Column(_SIMULATION + "success_rate", "success, simulation [%]", 1, 100.0),
+            Column("success_rate", "success, arm [%]", 1, 100.0),
+            Column(_SIMULATION + "actions", "actions, simulation"),
+            Column("actions", "actions, arm"),
+            Column("switches", "switches, arm"),
+            Column("half as fast at the end", "end at half the speed allowed [%]", 1, 100.0),
+        ]
+        said = thesis(__name__)
+        slow, half_speed = mean(rows, "half as fast at the end", base), mean(rows, "success_rate", 2)
+        costs = {t: difference(rows, "reward", t, base) for t in AREAS if t != base}
+        return Analysis(
+            summary=[
+                self.question,
+                f"On the arm half the speed costs {plain(costs[2], factor=-1)} of the reward, half the angle "
+                f"{plain(costs[3], factor=-1)}, and both {plain(costs[4], factor=-1)}. Intervals are over arms, each "
+                "the mean of its runs.",
+            ],
+            figures={
+                "reward": {words: number(mean(rows, "reward", t)) for t, words in self.trials.items()},
+                "success_rate": {words: number(mean(rows, "success_rate", t)) for t, words in self.trials.items()},
+                "cost": {self.trials[t]: number(found) for t, found in costs.items()},
+            },
+            sections=[
+                Section(
+                    "Goal areas",
+                    ["Actions and switches are those of successful movements."],
+                    tables=[table(rows, self.trials, columns, "Means over arms with 95 % intervals.")],
+                    figures=[
+                        Picture(
+                            dots_figure(names, shown),
+                            "Success, actions and reward on the arm by goal area.",
+                            dots_alt(names, shown),
+                        )
+                    ],
+                )
+            ],
+            claims=[
+                Claim(
+                    "Most movements end at less than half the speed allowed",
+                    said["slow"],
+                    f"{plain(slow, 1, 100)} %",
+                    above(slow, 0.5),
+                ),
+                Claim(
+                    "Half the speed at the goal is possible (97 % success and more)",
+                    said["pushed"],
+                    f"{plain(half_speed, 1, 100)} %",
+                    above(half_speed, _NEAR_ALL),
+                ),
+                Claim("Half the angle costs reward on the arm", "supposed", plain(costs[3]), below(costs[3])),
+            ],
+        )
+
+
+def _percent(found: Any) -> Any:
+    return found._replace(mean=100 * found.mean, half=100 * found.half)
+
+
+EXPERIMENT = GoalArea()

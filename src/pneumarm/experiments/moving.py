@@ -1,0 +1,196 @@
+"""What experiments on the arm share: agents trained in its simulation, and their movements on it."""
+
+import functools
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import open_arm
+from pneumarm.arm.virtual import ArmParameters, VirtualArm
+from pneumarm.control.playing import Played, Player, part_of
+from pneumarm.control.transfer import BEGIN, draw_movement
+from pneumarm.errors import UnusableInput
+from pneumarm.experiments.experiment import LaboratorySettings, Report, run_seed
+from pneumarm.experiments.preparation import Simulated, simulated
+from pneumarm.learning import Agent, BeginStates, Exploration, TrainSettings
+from pneumarm.learning.environment import environment
+from pneumarm.learning.loop import Movements
+from pneumarm.learning.testing import GREEDY, TEST, run_test
+from pneumarm.learning.training import train
+from pneumarm.simulation.kernel import scaled_state
+from pneumarm.simulation.noise import NoiseSettings
+
+Array = NDArray[np.float64]
+
+ARMS = tuple(f"virtual:seed={n}" for n in range(1, 6))
+"""Five different arms."""
+THESIS = TrainSettings(learning_rate=0.10, agents=8, validation_episodes=1000)
+"""Trial 10 of table 5.3, whose agent was transferred (section 5.5); of eight agents the best.
+
+The thesis took the best of 128 agents, which it had anyway.
+"""
+_TEST_SEED = 0  # the same begin states and goals for every agent in the simulation
+TEST_MOVEMENTS, MOVEMENTS = 0, 1
+"""Streams of random numbers of goals and begin states on the arm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """An arm by name, and its simulation."""
+
+    arm: str
+    simulated: Simulated
+
+    @property
+    def parameters(self) -> ArmParameters:
+        """What the arm is made of."""
+        return _parameters(self.arm)
+
+
+def _parameters(name: str) -> ArmParameters:
+    with open_arm(name) as arm:
+        if not isinstance(arm, VirtualArm):
+            raise UnusableInput(
+                f"arm {name!r}: this experiment looks into what an arm is made of and moves it for days; "
+                "expected a virtual arm, such as virtual:seed=1"
+            )
+        return arm.parameters
+
+
+def material(arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
+    """Return ``arm`` and its simulation, collecting and fitting where that is missing.
+
+    Raises:
+        UnusableInput: the arm is not a virtual one.
+
+    """
+    _parameters(arm)
+    return Material(arm, simulated(arm, folder, settings, progress))
+
+
+def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Any:
+    """Return the virtual arm as it is in the morning, after a night of rest.
+
+    All trials of a run meet the same noise. ``parameters`` are those of the arm, or others.
+    """
+    return VirtualArm(parameters or of.parameters, seed=run_seed(laboratory, run), name=of.arm)
+
+
+_locks: dict[Any, threading.Lock] = {}
+_guard = threading.Lock()
+
+
+def agent_of(of: Material, settings: TrainSettings, run: int, laboratory: LaboratorySettings) -> Agent:
+    """Return the agent of ``run``, the best of ``settings.agents``; trained once in a process.
+
+    All trials of a run that train alike begin on the arm with the same agent.
+    """
+    chosen = replace(settings, max_episodes=laboratory.max_episodes or settings.max_episodes)
+    key = of, chosen, run_seed(laboratory, run)
+    with _guard:
+        lock = _locks.setdefault(key, threading.Lock())
+    with lock:
+        return _trained(*key)
+
+
+@functools.lru_cache(maxsize=64)
+def _trained(of: Material, settings: TrainSettings, seed: int) -> Agent:
+    return train(of.simulated.simulation, of.simulated.begin, settings, seed, threads=1).agent
+
+
+def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> tuple[Array, Array]:
+    """Return goals (count, joints) [counts] and times of inflation (count, joints, 2) [s] of movements.
+
+    Args:
+        agent: whose goals they are.
+        seed: of the run.
+        count: how many.
+        stream: ``TEST_MOVEMENTS`` or ``MOVEMENTS``.
+        first: number of the first of them.
+
+    """
+    shape = agent.spec.joints, 2
+    drawn = [draw_movement(agent.goal_range, seed, stream == TEST_MOVEMENTS, first + i) for i in range(count)]
+    goals = np.array([goal for _, goal in drawn]).reshape(count, shape[0])
+    return goals, np.array([random.uniform(0.0, BEGIN.inflate, shape) for random, _ in drawn]).reshape(count, *shape)
+
+
+def simulated_test(
+    of: Material,
+    agent: Agent,
+    episodes: int,
+    *,
+    exploration: Exploration = GREEDY,
+    noise: NoiseSettings | None = None,
+) -> dict[str, float]:
+    """Return the means of a test in the simulation, by default with the noise that the agent was trained with."""
+    settings = agent.settings if noise is None else replace(agent.settings, noise=noise)
+    env = environment(of.simulated.simulation, of.simulated.begin, settings)
+    tested = run_test(env, agent.weights(), agent.settings, episodes, (_TEST_SEED, TEST), exploration)
+    return means(Movements(**{name: getattr(tested, name) for name in Movements._fields}))
+
+
+def greedy_test(
+    of: Material,
+    agent: Agent,
+    episodes: int,
+    run: int,
+    laboratory: LaboratorySettings,
+    arm: VirtualArm | None = None,
+) -> Played:
+    """Let ``agent`` move greedily on the arm, by default as it is in the morning; the same goals in all trials."""
+    where = arm or new_arm(of, run, laboratory)
+    return Player(agent, where).play(*draws(agent, run_seed(laboratory, run), episodes, TEST_MOVEMENTS))
+
+
+def from_visits(agent: Agent, angle: Array, pressure: Array) -> BeginStates:
+    """Return begin states of what :meth:`Player.visit` saw: ``angle`` (n, joints), ``pressure`` (n, joints, 2)."""
+    window = agent.window
+    observed = np.concatenate([angle[..., None], np.zeros_like(angle)[..., None], pressure], axis=-1)
+    newest = observed.reshape(len(angle), window.observation_size)
+    closed = np.zeros((len(angle), (window.history - 1) * window.command_size))
+    sigma = np.concatenate([np.tile(newest, window.history), closed], axis=1)
+    order = np.argsort(angle[:, 0], kind="stable")
+    states = scaled_state(sigma[order], window, agent.scaling)
+    return BeginStates(window, states, np.ascontiguousarray(angle[order]))
+
+
+def means(made: Movements, prefix: str = "") -> dict[str, float]:
+    """Return the means of movements; actions and switches of successful ones, as in the thesis (5.5.1)."""
+    won, switches = made.success, made.switches.sum(axis=1)
+    figures = {"reward": float(made.reward.mean()), "success_rate": float(won.mean())}
+    if won.any():  # else there is nothing to take the mean of, and the row does not have it
+        figures |= {"actions": float(made.actions[won].mean()), "switches": float(switches[won].mean())}
+    return {prefix + name: value for name, value in figures.items()}
+
+
+def course(made: Movements, block: int) -> dict[str, float]:
+    """Return the means of every ``block`` of movements, as ``NAME @BLOCK``, blocks from 1."""
+    found: dict[str, float] = {}
+    for k in range(len(made.reward) // block):
+        part = means(part_of(made, k * block, (k + 1) * block))
+        found |= {f"{name} @{k + 1}": value for name, value in part.items()}
+    return found
+
+
+def series(name: str, values: Any) -> dict[str, float]:
+    """Return an array of one dimension as figures of a row."""
+    return {f"{name} #{i}": float(value) for i, value in enumerate(np.asarray(values, np.float64))}
+
+
+def from_series(figures: Mapping[str, float], name: str) -> Array:
+    """Return what :func:`series` put into the ``figures`` of a row."""
+    found: list[float] = []
+    while (key := f"{name} #{len(found)}") in figures:
+        found.append(figures[key])
+    return np.array(found)
+
+
+def joined(parts: list[Played]) -> Movements:
+    """Return the movements of several plays, one after the other."""
+    return Movements(*(np.concatenate(arrays) for arrays in zip(*(p.movements for p in parts), strict=True)))

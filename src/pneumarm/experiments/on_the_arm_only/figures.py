@@ -1,0 +1,39 @@
+"""How learning on the arm goes on."""
+
+from collections.abc import Mapping, Sequence
+
+from matplotlib.figure import Figure
+
+from pneumarm.experiments.moving import from_series
+from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
+
+_STYLES = ((DARK, "-"), (MIDDLE, "--"), (GREY, "-."), (LIGHT, "-"), (DARK, ":"))
+
+
+@styled
+def progress_figure(rows: Sequence[Mapping[str, float]]) -> Figure:
+    """Draw deviation and performance of the agents in ``rows``, their figures, over the time on the arm."""
+    figure, axes = panels(2, 1, 4.2, sharex=True)
+    above, below = axes[:, 0]
+    for i, row in enumerate(rows):
+        color, style = _STYLES[i % len(_STYLES)]
+        hours = from_series(row, "hours so far")
+        above.plot(hours, from_series(row, "deviation"), color=color, ls=style, lw=1)
+        below.plot(hours, 100 * from_series(row, "performance"), color=color, ls=style, lw=1)
+        above.plot(hours[-1], from_series(row, "deviation")[-1], color=color, marker="o" if row["met"] else "x")
+    above.set_ylabel("deviation [counts]")
+    above.set_yscale("log")
+    below.set_ylabel("performance [%]")
+    below.set_xlabel("time on the arm [h]")
+    below.set_xlim(0)
+    above.set_title("o: met the criterium; x: had not when training ended")
+    return figure
+
+
+def progress_alt(rows: Sequence[Mapping[str, float]]) -> str:
+    """Say in words what :func:`progress_figure` shows."""
+    said = [
+        f"{'met the criterium' if row['met'] else 'had not met the criterium'} after {row['hours']:.1f} h"
+        for row in rows
+    ]
+    return f"{len(rows)} agents; they {', '.join(said)}."

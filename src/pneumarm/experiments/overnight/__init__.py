@@ -1,0 +1,216 @@
+"""The hitch after 14 h of rest (section 5.5.1, figures 5.13, 5.14): does the agent adapt, or does the arm warm up?
+
+The thesis saw its learning agent drop after a night and recover in 2000 movements, and could not tell whether the
+agent or the arm had come back. Here an agent moves for a day, the arm rests, and it moves again: learning on both
+days, learning on the first alone, or never learning (so that what comes back is the arm); and one that learns on
+without a night, because what a learning agent earns goes up and down anyway.
+
+    pneumarm experiment overnight
+
+On arms 1 to 5, an agent each and 60,000 transitions, there is no hitch: the agent that never learns loses -4.8 ± 4.0
+after 14 h. What the night does to one that learns (-4 ± 20) is lost in what its reward goes up and down by anyway.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from pneumarm.control.playing import Player
+from pneumarm.experiments.differences import Interval, above
+from pneumarm.experiments.experiment import (
+    Analysis,
+    Claim,
+    Experiment,
+    Figures,
+    LaboratorySettings,
+    Report,
+    Rows,
+    run_seed,
+)
+from pneumarm.experiments.moving import (
+    ARMS,
+    MOVEMENTS,
+    THESIS,
+    Material,
+    agent_of,
+    course,
+    draws,
+    joined,
+    material,
+    new_arm,
+)
+from pneumarm.experiments.on_arms import Curve, blocks, courses_alt, courses_figure, number, over_arms, plain, thesis
+from pneumarm.learning import TrainSettings
+from pneumarm.report.page import Picture, Section, Table
+
+
+class Days(NamedTuple):
+    """What is done on the first day and on the second."""
+
+    words: str
+    first: bool
+    """Whether the agent learns on the first day."""
+    second: bool
+    night: bool = True
+    """Whether there is a night between them."""
+
+
+LEARNING, FIRST_DAY, FROZEN, NO_NIGHT = range(1, 5)
+DAYS = {
+    LEARNING: Days("learning on both days", True, True),
+    FIRST_DAY: Days("learning on the first day", True, False),
+    FROZEN: Days("never learning", False, False),
+    NO_NIGHT: Days("learning, no night between", True, True, night=False),
+}
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is moved in a row."""
+
+    first: int = 1000
+    """Movements before the night."""
+    second: int = 1000
+    """Movements after it."""
+    block: int = 100
+    """Movements in a point of the courses."""
+    hours: float = 14.0
+    """Of rest [h]."""
+    learning_rate: float = 0.05
+    """Of agents that learn (thesis: 0.05)."""
+
+
+@dataclass(frozen=True)
+class Overnight(Experiment):
+    """Two days with a night between."""
+
+    name: str = "overnight"
+    title: str = "After a night of rest"
+    question: str = "Is it the agent that adapts after a night, or the arm that warms up?"
+    source: str = "Thesis section 5.5.1, figures 5.13 and 5.14"
+    runs: int = 4
+    arms: tuple[str, ...] = ARMS
+    agent: TrainSettings = THESIS
+    sizes: Sizes = field(default_factory=Sizes)
+
+    @property
+    def trials(self) -> Mapping[int, str]:
+        """Who learns when."""
+        return {trial: days.words for trial, days in DAYS.items()}
+
+    def settings(self) -> Any:
+        """Return the settings of the agent and the sizes."""
+        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
+        """Return the arm and its simulation."""
+        return material(arm, folder, settings, progress)
+
+    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Move for two days, exploring as at the end of training on both."""
+        sizes, days, seed = self.sizes, DAYS[trial], run_seed(settings, run)
+        agent, arm = agent_of(material, self.agent, run, settings), new_arm(material, run, settings)
+        explores, rate = self.agent.exploration, sizes.learning_rate
+        first = Player(agent, arm, rate if days.first else 0.0, explores, seed)
+        day = first.play(*draws(agent, seed, sizes.first, MOVEMENTS))
+        if days.night:
+            arm.rest(3600 * sizes.hours)
+        second = Player(first.learned, arm, rate if days.second else 0.0, explores, seed + 1)
+        next_day = second.play(*draws(agent, seed, sizes.second, MOVEMENTS, sizes.first))
+        return course(joined([day, next_day]), sizes.block)
+
+    def analyse(self, rows: Rows) -> Analysis:
+        """Return the drop after the night and what brings the reward back."""
+        courses = {trial: blocks(rows, "reward", trial) for trial in DAYS}
+        place = self.sizes.first // self.sizes.block
+        found = {trial: _hitch(course_, place) for trial, course_ in courses.items()}
+        lost = over_arms((courses[NO_NIGHT] - courses[LEARNING])[:, :, place])
+        adapted = over_arms(_gain(courses[LEARNING], place) - _gain(courses[NO_NIGHT], place))
+        names = ["", "drop after the night", "gained on the second day"]
+        lines = [[days.words, *(plain(one) for one in found[trial])] for trial, days in DAYS.items()]
+        return Analysis(
+            summary=[
+                self.question,
+                f"The night costs the agent that learns {plain(lost)} of its reward, against the same agent without "
+                f"one, and the one that never learns {plain(found[FROZEN][0])}. On the second day the latter gains "
+                f"{plain(found[FROZEN][1])}, as the arm warms up; learning after a night gains {plain(adapted)} more "
+                "than learning without one.",
+                "Intervals are over arms, each the mean of its runs.",
+            ],
+            figures={
+                "drop": {DAYS[t].words: number(one[0]) for t, one in found.items()},
+                "gain": {DAYS[t].words: number(one[1]) for t, one in found.items()},
+                "lost": number(lost),
+                "adapted": number(adapted),
+            },
+            sections=[
+                Section(
+                    "Two days on the arm",
+                    [
+                        f"The drop is the reward of the last {_SPAN * self.sizes.block} movements of the first day "
+                        f"less that of the first {self.sizes.block} of the second; the gain is from there to the "
+                        f"last {_SPAN * self.sizes.block} of the second day. All explore alike. Without a night the "
+                        "first day is the same, movement by movement. An agent that is frozen in the evening also "
+                        "loses what learning on would have mended, night or not: its weights are those of a moment."
+                    ],
+                    tables=[Table(names, lines, "Reward, means over arms with 95 % intervals.")],
+                    figures=[self._picture(rows)],
+                )
+            ],
+            claims=_claims(found[FROZEN], lost, adapted),
+        )
+
+    def _picture(self, rows: Rows) -> Picture:
+        shown = {
+            label: [Curve(days.words, blocks(rows, figure, trial)) for trial, days in DAYS.items()]
+            for figure, label in (
+                ("reward", "reward [-]"),
+                ("actions", "actions of\nsuccesses [-]"),
+                ("switches", "switches of\nsuccesses [-]"),
+            )
+        }
+        marks = {float(self.sizes.first): f"{self.sizes.hours:g} h of rest"}
+        return Picture(
+            courses_figure(shown, self.sizes.block, marks),
+            "Reward, actions and switches before and after a night (thesis figures 5.13 and 5.14).",
+            courses_alt(shown),
+        )
+
+
+_SPAN = 3  # blocks before the night, and at the end, that are the level of a day
+
+
+def _span(place: int) -> int:
+    return min(_SPAN, place)
+
+
+def _gain(course_: Any, place: int) -> Any:
+    """Return what is gained from the first block of the second day to its end, shape (arms, runs)."""
+    span = _span(course_.shape[-1] - place)
+    return course_[:, :, -span:].mean(axis=-1) - course_[:, :, place]
+
+
+def _hitch(course_: Any, place: int) -> tuple[Interval, Interval]:
+    """Return the drop after the night and the gain of the second day."""
+    before = course_[:, :, place - _span(place) : place].mean(axis=-1)
+    return over_arms(before - course_[:, :, place]), over_arms(_gain(course_, place))
+
+
+def _claims(frozen: tuple[Interval, Interval], lost: Interval, adapted: Interval) -> list[Claim]:
+    said = thesis(__name__)
+    recovers = f"within {said['recovery']} movements"
+    drop, warmed = frozen
+    return [
+        Claim(
+            f"{said['hours']:g} h of rest cost the learning agent reward", "a sudden drop", plain(lost), above(lost)
+        ),
+        Claim("They cost an agent that does not learn reward", "expected", plain(drop), above(drop)),
+        Claim("The arm itself comes back as it warms up", recovers, plain(warmed), above(warmed)),
+        Claim("The agent adapts: learning brings back more", recovers, plain(adapted), above(adapted)),
+    ]
+
+
+EXPERIMENT = Overnight()

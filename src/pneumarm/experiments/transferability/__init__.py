@@ -1,0 +1,172 @@
+"""What is left of each agent on the arm (sections 3.4, 5.4.1, 5.4.2, 5.4.4)?
+
+The thesis expects that switches make an agent hard to transfer, asks what is left of agents that learned without
+shaping, and adds noise to the simulation for the sake of the transfer; it transferred one agent only. Here agents
+of every kind begin with the same weights, the best of eight by its own validation comes to the arm as it is in the
+morning, and all are judged by the same reward, in the simulation with the thesis' noise and on the arm: greedy and
+without learning.
+
+    pneumarm experiment transferability
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from pneumarm.experiments.differences import above, below
+from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.moving import ARMS, THESIS, Material, agent_of, greedy_test, material, means, simulated_test
+from pneumarm.experiments.on_arms import (
+    Column,
+    difference,
+    dots_alt,
+    dots_figure,
+    mean,
+    number,
+    over_arms,
+    plain,
+    table,
+    thesis,
+    values,
+)
+from pneumarm.learning import Exploration, Reward, TrainSettings
+from pneumarm.report.page import Picture, Section
+from pneumarm.simulation.noise import NoiseSettings
+
+BASE, NO_SHAPING, NO_PUNISHMENT, NO_NOISE, WHITE, TWICE = range(1, 7)
+KINDS: Mapping[int, tuple[str, TrainSettings]] = {
+    BASE: ("trial 10 of table 5.3", THESIS),
+    NO_SHAPING: ("without shaping", replace(THESIS, shaping=None, exploration=Exploration(0.09, 10.0))),
+    NO_PUNISHMENT: ("switches not punished", replace(THESIS, reward=Reward(switch=0.0))),
+    NO_NOISE: ("without noise", replace(THESIS, noise=NoiseSettings(kind="none"))),
+    WHITE: ("white noise", replace(THESIS, noise=NoiseSettings(kind="white"))),
+    TWICE: ("twice the noise", replace(THESIS, noise=NoiseSettings(factor=2.0))),
+}
+_SIMULATION = "simulation: "
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is moved in a row."""
+
+    test: int = 300
+    """Movements on the arm."""
+
+
+@dataclass(frozen=True)
+class Transferability(Experiment):
+    """Agents that learned in different ways, in the simulation and on the arm."""
+
+    name: str = "transferability"
+    title: str = "Transferability"
+    question: str = "How much of what an agent earns in the simulation is left on the arm, by how it learned?"
+    source: str = "Thesis sections 3.4, 5.4.1, 5.4.2 and 5.4.4"
+    runs: int = 4
+    arms: tuple[str, ...] = ARMS
+    agents: int = THESIS.agents
+    sizes: Sizes = field(default_factory=Sizes)
+
+    @property
+    def trials(self) -> Mapping[int, str]:
+        """How the agents learned."""
+        return {trial: words for trial, (words, _) in KINDS.items()}
+
+    def train_settings(self, trial: int) -> TrainSettings:
+        """Return how the agents of ``trial`` learn."""
+        return replace(KINDS[trial][1], agents=self.agents)
+
+    def settings(self) -> Any:
+        """Return the settings of all agents and the sizes."""
+        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
+        return {"agents": agents, "sizes": asdict(self.sizes)}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
+        """Return the arm and its simulation."""
+        return material(arm, folder, settings, progress)
+
+    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Train, and move in the simulation and on the arm."""
+        found = agent_of(material, self.train_settings(trial), run, settings)
+        judged = replace(found, settings=replace(found.settings, reward=Reward()))  # all by the same reward
+        before = simulated_test(material, judged, settings.test_episodes, noise=NoiseSettings())
+        played = greedy_test(material, judged, self.sizes.test, run, settings)
+        return {**{_SIMULATION + name: value for name, value in before.items()}, **means(played.movements)}
+
+    def analyse(self, rows: Rows) -> Analysis:
+        """Return what every kind of agent earns, and what it loses on the arm."""
+        names = list(self.trials.values())
+        lost = {trial: values(rows, _SIMULATION + "reward", trial) - values(rows, "reward", trial) for trial in KINDS}
+        shown = {
+            "reward on the arm [-]": [mean(rows, "reward", trial) for trial in KINDS],
+            "lost on the way [-]": [over_arms(lost[trial]) for trial in KINDS],
+            "switches of successes\non the arm [-]": [mean(rows, "switches", trial) for trial in KINDS],
+        }
+        columns = [
+            Column(_SIMULATION + "reward", "reward, simulation"),
+            Column("reward", "reward, arm"),
+            Column(_SIMULATION + "success_rate", "success, simulation [%]", 1, 100.0),
+            Column("success_rate", "success, arm [%]", 1, 100.0),
+            Column(_SIMULATION + "switches", "switches, simulation"),
+            Column("switches", "switches, arm"),
+        ]
+        said = thesis(__name__)
+        unpunished, unshaped = (over_arms(lost[t] - lost[BASE]) for t in (NO_PUNISHMENT, NO_SHAPING))
+        noiseless, louder = (difference(rows, "reward", BASE, NO_NOISE), difference(rows, "reward", TWICE, BASE))
+        base = over_arms(lost[BASE])
+        return Analysis(
+            summary=[
+                self.question,
+                f"Trial 10 loses {plain(base)} of its reward on the way to the arm. Intervals are over arms, each "
+                "the mean of its runs.",
+            ],
+            figures={
+                "lost": {words: number(over_arms(lost[trial])) for trial, words in self.trials.items()},
+                "reward": {words: number(mean(rows, "reward", trial)) for trial, words in self.trials.items()},
+            },
+            sections=[
+                Section(
+                    "Agents by how they learned",
+                    ["All are judged by the thesis' reward: 50 at the goal, -1 an action, -8 a switch."],
+                    tables=[table(rows, self.trials, columns, "Means over arms; switches of successful movements.")],
+                    figures=[
+                        Picture(
+                            dots_figure(names, shown),
+                            "What agents earn on the arm, what they lose on the way there, how often they switch.",
+                            dots_alt(names, shown),
+                        )
+                    ],
+                )
+            ],
+            claims=[
+                Claim(
+                    "Agents that are not punished for switches lose more on the way to the arm",
+                    said["punishment"],
+                    plain(unpunished),
+                    above(unpunished),
+                ),
+                Claim(
+                    "Agents that learned without shaping lose more on the way to the arm",
+                    said["shaping"],
+                    plain(unshaped),
+                    above(unshaped),
+                ),
+                Claim(
+                    "Noise in the simulation raises the reward on the arm",
+                    said["noise"],
+                    plain(noiseless),
+                    above(noiseless),
+                ),
+                Claim(
+                    "Twice the noise changes the reward on the arm by less than 3",
+                    said["more_noise"],
+                    plain(louder),
+                    below(louder._replace(mean=abs(louder.mean)), 3.0),
+                ),
+            ],
+        )
+
+
+EXPERIMENT = Transferability()

@@ -1,0 +1,228 @@
+"""Experiments on the arm, in small: over the simulation of the shared small run and the virtual arm that it is of."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.arm.virtual.parameters import without_noise
+from pneumarm.control.playing import Player
+from pneumarm.errors import UnusableInput
+from pneumarm.experiments import displacement, goal_area, on_the_arm_only, overnight, transfer, transferability
+from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, run_seed, sorted_rows
+from pneumarm.experiments.moving import (
+    MOVEMENTS,
+    THESIS,
+    Material,
+    agent_of,
+    draws,
+    from_series,
+    from_visits,
+    material,
+    series,
+)
+from pneumarm.experiments.on_arms import blocks, difference, mean, over_arms, plain, values
+from pneumarm.experiments.page import write_page
+from pneumarm.experiments.preparation import Simulated
+from pneumarm.learning import Reward, Shaping, begin_states
+from pneumarm.simulation import Simulation
+from pneumarm.simulation.kernel import raw_observation
+from pneumarm.transitions import Store
+from small import SMALL
+
+LABORATORY = LaboratorySettings(test_episodes=30, max_episodes=300)
+AGENT = replace(THESIS, agents=2, validation_episodes=20)
+SMALL_ONES: dict[str, Any] = {
+    "transfer": replace(
+        transfer.EXPERIMENT, agent=AGENT, sizes=transfer.Sizes(learning=40, block=10, test=10, warming=10)
+    ),
+    "transferability": replace(transferability.EXPERIMENT, agents=2, sizes=transferability.Sizes(test=10)),
+    "goal-area": replace(goal_area.EXPERIMENT, agent=AGENT, sizes=goal_area.Sizes(test=10)),
+    "overnight": replace(
+        overnight.EXPERIMENT, agent=AGENT, sizes=overnight.Sizes(first=20, second=20, block=10, hours=2.0)
+    ),
+    "on-the-arm-only": replace(on_the_arm_only.EXPERIMENT, sizes=on_the_arm_only.Sizes(looks=20, test=10)),
+    "displacement": replace(
+        displacement.EXPERIMENT, agent=AGENT, sizes=displacement.Sizes(adapting=10, shown=40, typical=2)
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def small_material(small_run: Path) -> Material:
+    simulation = Simulation.load(small_run / "simulation.safetensors")
+    with Store.open(small_run / "transitions.db") as store:
+        begin = begin_states(store, simulation.window, simulation.scaling)
+    return Material(SMALL.arm, Simulated(simulation, begin))
+
+
+def rows_of(experiment: Experiment, of: Material, runs: int = 2) -> Rows:
+    measured = [
+        (trial, run, experiment.measure(of, trial, run, LABORATORY))
+        for run in range(1, runs + 1)
+        for trial in experiment.trials
+    ]
+    return sorted_rows(Row(of.arm, trial, run, dict(found), 0.0) for trial, run, found in measured)
+
+
+@pytest.mark.parametrize("name", SMALL_ONES)
+def test_an_experiment_leaves_a_page(name: str, small_material: Material, tmp_path: Path) -> None:
+    experiment = SMALL_ONES[name]
+    rows = rows_of(experiment, small_material)
+    assert all(np.isfinite(list(row.figures.values())).all() for row in rows.rows)  # JSON knows no others
+    first = rows.rows[0]
+    assert experiment.measure(small_material, first.trial, first.run, LABORATORY) == first.figures
+    analysis = experiment.analyse(rows)
+    page = write_page(experiment, tmp_path, analysis, rows.runs, rows.arms).read_text()
+    assert page.count("data:image/svg") == sum(len(section.figures) for section in analysis.sections) > 0
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert len(results["claims"]) == len(analysis.claims) > 0
+    assert all(claim["thesis"] for claim in results["claims"])
+    assert json.dumps(experiment.settings()) != json.dumps(type(experiment)().settings())
+
+
+def test_the_agents_that_are_compared_come_from_the_same_training(small_material: Material) -> None:
+    """The test in the simulation is of the agent as it arrives, whatever it will learn with, and another a run."""
+    experiment = SMALL_ONES["transfer"]
+    rows = rows_of(experiment, small_material)
+    before = np.stack([values(rows, "simulation, exploring: reward", trial) for trial in transfer.RATES])
+    assert (before == before[0]).all()
+    assert before[0, 0, 0] != before[0, 0, 1]
+    courses = [blocks(rows, "reward", trial) for trial in transfer.RATES]
+    assert courses[0].shape == (1, 2, 4)
+    assert not np.array_equal(courses[0], courses[1])
+
+
+def test_conditions_change_what_they_say() -> None:
+    parameters = draw_parameters(3)
+    ideal = without_noise(parameters)
+    changed = {trial: transfer.changed(parameters, trial) for trial in transfer.CONDITIONS}
+    assert changed[transfer.AS_IT_IS] == changed[transfer.WARM] == parameters
+    assert changed[transfer.NO_NOISE] == replace(parameters, sensors=ideal.sensors) != parameters
+    assert changed[transfer.PUNCTUAL] == replace(parameters, jitter=0.0) != parameters
+    assert changed[transfer.ALL] == ideal
+
+
+def test_days_are_alike_until_they_differ(small_material: Material) -> None:
+    rows = rows_of(SMALL_ONES["overnight"], small_material, runs=1)
+    learning, first_day, frozen, no_night = (blocks(rows, "actions", trial)[0, 0] for trial in overnight.DAYS)
+    rewards = [blocks(rows, "reward", trial)[0, 0] for trial in overnight.DAYS]
+    for other in (1, 3):
+        np.testing.assert_array_equal(rewards[0][:2], rewards[other][:2])
+        assert not np.array_equal(rewards[0][2:], rewards[other][2:])
+    assert not np.array_equal(rewards[0][:2], rewards[2][:2])
+    assert len(learning) == len(first_day) == len(frozen) == len(no_night) == 4
+
+
+def test_looking_tells_goals_and_scales() -> None:
+    arm = VirtualArm(draw_parameters(2), seed=1)
+    agent = on_the_arm_only.look(arm, on_the_arm_only.ONE, 60, seed=3)
+    low, high = agent.goal_range[0]
+    assert high - low > 400
+    durations = np.random.default_rng(8).uniform(0, 1.5, (40, 1, 2))
+    angle, pressure = Player(agent, arm).visit(durations)
+    margin = (high - low) / 8  # goals are in the middle 80 % between the ends
+    assert ((angle > low - margin - 8) & (angle < high + margin + 8)).all()
+    begin = from_visits(agent, angle, pressure)
+    np.testing.assert_array_equal(begin.angle, np.sort(angle, axis=0))
+    assert np.abs(begin.states).max() < 3  # four standard deviations would be 2
+    raw = raw_observation(begin.states, agent.window, agent.scaling)
+    np.testing.assert_allclose(raw[..., 0], begin.angle, atol=1e-3)
+    assert (raw[..., 1] == 0).all()
+
+
+def test_learning_on_the_arm_ends_when_the_criterium_is_met() -> None:
+    """With a goal area as wide as the range every movement succeeds, so shaping grows the deviation every time."""
+    wide = Reward(angle_tolerance=1e4, velocity_tolerance=1e4)
+    shaping = Shaping(initial_deviation=30.0, episodes=10, performance_rate=0.2, grow=0.5)
+    settings = replace(on_the_arm_only.ONE, reward=wide, shaping=shaping)
+    arm = VirtualArm(draw_parameters(2), seed=1)
+    agent = on_the_arm_only.look(arm, settings, 10, seed=3)
+    found = on_the_arm_only.learn_on(arm, agent, 3)
+    hours, deviation, performance = np.array(found.course).T
+    assert found.met
+    assert deviation[-1] == 1023
+    np.testing.assert_allclose(deviation[1:-1], 1.5 * deviation[:-2])
+    assert performance[-1] >= 0.95
+    assert found.movements == 10 * len(hours) == found.steps
+    assert hours[-1] * 3600 == found.seconds == arm.time
+    assert (np.diff(hours) > 10 * 3.0 / 3600).all()  # venting and settling alone take 3 s
+    assert not np.array_equal(found.agent.weights(), agent.weights())
+    cut = on_the_arm_only.learn_on(VirtualArm(), replace(agent, settings=replace(settings, max_episodes=15)), 3)
+    assert (cut.movements, cut.met) == (15, False)
+
+
+def test_movements_of_a_given_displacement(small_material: Material) -> None:
+    agent = agent_of(small_material, AGENT, 1, LABORATORY)
+    arm = VirtualArm(small_material.parameters, seed=2)
+    made = displacement.typical_movement(agent, arm, 20.0, np.random.default_rng(1))
+    assert made is not None
+    step = 20.0 * arm.spec.counts_per_degree
+    assert abs(abs(made.goal[0] - made.angle[0, 0]) - step) <= 10  # the noise of two readings
+    assert len(made.time) == len(made.angle) == len(made.pressure) == len(made.valves)
+    assert made.time[-1] >= (made.end or made.time[-1] - 0.8) + 0.8 - 1e-9
+    assert displacement.typical_movement(agent, arm, 120.0, np.random.default_rng(1)) is None
+
+
+def test_out_of_the_way_and_ringing_by_hand() -> None:
+    angle = np.array([100.0, 80.0, 150.0, 210.0, 190.0, 260.0, 205.0])[:, None]
+    time = np.arange(7.0)
+    nothing = np.zeros((7, 1, 2))
+    made = displacement.Typical(time, angle, nothing, nothing, np.array([200.0]), 4.0)
+    assert made.beyond == 20.0
+    assert made.ringing == 60.0
+    missed = replace(made, end=None)
+    assert missed.beyond == 60.0
+    assert np.isnan(missed.ringing)
+
+
+def test_thirds_and_relations_by_hand() -> None:
+    distance = np.arange(9.0)
+    actions, switches = (10 * distance).astype(np.int64) + 2, np.full(9, 3)
+    won = np.arange(9) != 0
+    found = displacement.thirds(distance, actions, switches, won)
+    assert found["success, short"] == pytest.approx(2 / 3)
+    assert found["ratio, short"] == pytest.approx(6 / (12 + 22))
+    assert found["ratio, long"] == pytest.approx(9 / (62 + 72 + 82))
+    related = displacement.relations(distance, actions, switches)
+    assert related["correlation of actions"] == pytest.approx(1.0)
+    assert "correlation of switches" not in related  # they do not vary
+    assert related["few switches"] == 1.0
+
+
+def test_what_is_a_sample() -> None:
+    """Means of arms where there are several, else runs; what is missing in a row does not count."""
+
+    def row(arm: str, run: int, **figures: float) -> Row:
+        return Row(arm, 1, run, figures, 0.0)
+
+    two = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0), row("b", 1, x=8.0), row("b", 2)))
+    assert mean(two, "x", 1)[::2] == (5.0, 2)
+    one = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0)))
+    assert mean(one, "x", 1)[::2] == (2.0, 2)
+    assert mean(one, "y", 1).samples == 0
+    assert plain(mean(one, "y", 1)) == "none"
+    assert difference(one, "x", 1, 1).half == 0
+    assert over_arms([[1.0, np.nan], [3.0, 3.0]])[::2] == (2.0, 2)
+
+
+def test_series_of_figures() -> None:
+    assert from_series(series("a", [3, 1, 2]) | series("ab", [5]), "a").tolist() == [3, 1, 2]
+    assert from_series({}, "a").size == 0
+
+
+def test_draws_go_on(small_material: Material) -> None:
+    agent = agent_of(small_material, AGENT, 1, LABORATORY)
+    seed = run_seed(LABORATORY, 1)
+    whole, rest = draws(agent, seed, 6, MOVEMENTS), draws(agent, seed, 2, MOVEMENTS, 4)
+    for all_, part in zip(whole, rest, strict=True):
+        np.testing.assert_array_equal(all_[4:], part)
+
+
+def test_other_arms_than_virtual_ones_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnusableInput, match="expected a virtual arm, such as virtual:seed=1"):
+        material("emulated:virtual", tmp_path, LABORATORY, lambda done, total: None)

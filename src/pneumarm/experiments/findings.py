@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from pneumarm.experiments.design.anova import Source, anova
 from pneumarm.experiments.differences import Interval, Verdict, above, interval
+from pneumarm.experiments.evidence import within
 from pneumarm.experiments.experiment import Claim, Rows
 from pneumarm.experiments.factorial import Analyses, Factorial
 from pneumarm.experiments.trainings import LEARNING
@@ -97,13 +98,6 @@ def traces_are_marginal(made: Factorial, rows: Rows, ours: Analyses, theirs: Ana
         within(found, _MARGINAL),
         "traces",
     )
-
-
-def within(found: Interval, reach: float) -> Verdict:
-    """Return whether what is estimated lies between ``-reach`` and ``reach``; open while the interval goes across."""
-    if max(abs(found.low), abs(found.high)) <= reach:
-        return "holds"
-    return "does not hold" if found.low > reach or found.high < -reach else "open"
 
 
 def nearly_all_succeed(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:

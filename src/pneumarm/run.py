@@ -36,8 +36,8 @@ from pneumarm.learning import (
     LearnSettings,
     begin_states,
     load_agent,
+    results_with_lookahead,
     test_ahead,
-    tested_results,
     train,
 )
 from pneumarm.learning import test as test_agent
@@ -196,7 +196,7 @@ class Run:
         tested = test_agent(agent, simulation, begin, episodes, seed)
         ahead = test_ahead(agent, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
         test_record(tested).save(self.folder)
-        return {"test": tested_results(tested, ahead)}
+        return {"test": results_with_lookahead(tested, ahead)}
 
     def _transfer(self) -> dict[str, Any]:
         wanted = self.settings

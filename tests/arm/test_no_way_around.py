@@ -26,6 +26,8 @@ GUARDED = {
     "arm/serial/board.py": "a controller, which does what it is asked behind the guard",
     "arm/virtual/arm.py": "an arm that sets its own valves on closing and resting",
     "arm/cycle.py": "takes a GuardedArm",
+    "arm/serial/emulate.py": "warms up the arm of an emulated board, before anybody can reach it",
+    "experiments/valves_closed/__init__.py": "guards its arm",
     "gym/on_arm.py": "guards its arm",
     "control/leaks.py": "guards its arm",
     "checkup/measure.py": "takes a GuardedArm",

@@ -20,9 +20,9 @@ from pneumarm.learning import (
     Settings,
     TrainSettings,
     load_agent,
+    results_with_lookahead,
     test,
     test_ahead,
-    tested_results,
     train,
 )
 from pneumarm.learning.fleet.agent import KIND
@@ -239,13 +239,13 @@ def test_looking_ahead_is_tested_on_the_first_of_the_same_movements(
     np.testing.assert_array_equal(ahead.goal, plain.goal[:100])
     np.testing.assert_array_equal(ahead.angle_begin, plain.angle_begin[:100])
     assert ahead.reward.mean() > plain.reward[:100].mean()  # a short training leaves much to be seen ahead
-    found = tested_results(plain, ahead)
+    found = results_with_lookahead(plain, ahead)
     assert found["reward"] == plain.results()["reward"]
     assert found["lookahead"] == ahead.results()
     blind = replace(agent, settings=replace(agent.settings, lookahead=0))
     assert test_ahead(blind, simulation, begin, 10) is None
     assert test_ahead(trained["batched"].agent, simulation, begin, 10) is None
-    assert tested_results(plain, None)["lookahead"] is None
+    assert results_with_lookahead(plain, None)["lookahead"] is None
     scaling = replace(simulation.scaling, observation_scale=2 * simulation.scaling.observation_scale)
     with pytest.raises(UnusableInput, match="another simulation"):
         test_ahead(agent, replace(simulation, scaling=scaling), begin, 10)

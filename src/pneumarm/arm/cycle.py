@@ -1,6 +1,6 @@
 """The control cycle of thesis section 2.4.3 on any arm, and bringing the arm to rest at a random begin state."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from time import monotonic
@@ -41,7 +41,7 @@ class ControlCycle:
     def __post_init__(self) -> None:
         self.applied = np.zeros_like(self.arm.applied)
 
-    def run(self, decide: Decide) -> Iterator[Step]:
+    def run(self, decide: Decide) -> Generator[Step, None, None]:
         """Yield the turns until ``decide`` returns None; that last turn's valves are None, and all are closed.
 
         The valves are closed on every way out.

@@ -5,7 +5,7 @@ from pathlib import Path
 from pneumarm.commands.common import Json
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
-from pneumarm.learning import LOOKING_AHEAD, begin_states, test_ahead, tested_results
+from pneumarm.learning import LOOKING_AHEAD, begin_states, results_with_lookahead, test_ahead
 from pneumarm.learning import test as test_agent
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
@@ -39,7 +39,7 @@ def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: 
         begin = begin_states(store, simulation.window, simulation.scaling)
     tested = test_agent(trained, simulation, begin, episodes, seed)
     ahead = test_ahead(trained, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
-    result = tested_results(tested, ahead)
+    result = results_with_lookahead(tested, ahead)
 
     def rows() -> list[tuple[object, ...]]:
         shown = [("in the simulation", result)] + ([("looking ahead", result["lookahead"])] if ahead else [])

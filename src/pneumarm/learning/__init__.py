@@ -22,9 +22,9 @@ from pneumarm.learning.kinds import (
     adaptation,
     fingerprint,
     load_agent,
+    results_with_lookahead,
     test,
     test_ahead,
-    tested_results,
     train,
 )
 from pneumarm.learning.online import OnlineLearner
@@ -69,9 +69,9 @@ __all__ = [
     "begin_states",
     "fingerprint",
     "load_agent",
+    "results_with_lookahead",
     "test",
     "test_ahead",
-    "tested_results",
     "told",
     "train",
 ]

@@ -254,7 +254,7 @@ def test_ahead(
 test_ahead.__test__ = False  # type: ignore[attr-defined]
 
 
-def tested_results(tested: TestResult, ahead: TestResult | None) -> dict[str, Any]:
+def results_with_lookahead(tested: TestResult, ahead: TestResult | None) -> dict[str, Any]:
     """Return what ``results.json`` holds of :func:`test` and, under ``lookahead``, of :func:`test_ahead`."""
     return {**tested.results(), "lookahead": None if ahead is None else ahead.results()}
 

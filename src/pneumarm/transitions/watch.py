@@ -1,7 +1,8 @@
 """What watches an arm while it is recorded, and marks what nothing may be learned from."""
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
+from contextlib import closing
 from typing import Protocol
 
 import numpy as np
@@ -36,7 +37,7 @@ class Watch(Protocol):
 
 
 def watched(
-    steps: Iterator[Step],
+    steps: Generator[Step, None, None],
     watch: Watch | None,
     *,
     at_rest: bool,
@@ -50,10 +51,11 @@ def watched(
         watch.begin(at_rest=at_rest)
     seen: list[Step] = []
     try:
-        for step in steps:
-            if watch is not None:
-                watch.see(step.reading, step.valves)
-            seen.append(step)
+        with closing(steps):  # the valves are closed now, and not when the traceback is forgotten
+            for step in steps:
+                if watch is not None:
+                    watch.see(step.reading, step.valves)
+                seen.append(step)
     except BaseException as error:
         if broken is not None:
             broken(seen, error)

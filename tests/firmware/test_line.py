@@ -98,7 +98,7 @@ class Model:
 def fuzz(count: int, seed: int) -> dict[str, int]:
     """Send damaged frames, two good ones after each; compare all replies and the pins with the model's."""
     rng = random.Random(seed)
-    tally = {"damaged": 0, "accepted": 0, "one good frame lost": 0}
+    tally = {"damaged": 0, "accepted": 0, "answered": 0, "one good frame lost": 0}
     codes = [wire.valves(*names) for names in ([a, b, c, d] for a in CODE for b in CODE for c in CODE for d in CODE)]
     with armed() as host:
         model = Model(host)
@@ -115,7 +115,7 @@ def fuzz(count: int, seed: int) -> dict[str, int]:
             kinds = {content[0] for content in contents if content}
             if kinds - {wire.REQUEST["EXCHANGE"], wire.REQUEST["READ"]}:
                 continue  # another request as it was sent: no damage, and not the model's
-            expected = [model.take(content) for content in contents if content]
+            expected = [model.take(content) if content else None for content in contents]
             replies = host.send(stream, wait=0.0045)
             assert [reply.sequence for reply in replies] == [
                 sequence for sequence in expected if sequence is not None
@@ -128,8 +128,10 @@ def fuzz(count: int, seed: int) -> dict[str, int]:
             tally["damaged"] += 1
             tally["one good frame lost"] += contents[-2] is None
             sent.update(chunk[:-1] for chunk in (frame, *good))
-            for chunk, content in zip(chunks, contents, strict=True):
-                tally["accepted"] += content is not None and chunk not in sent
+            for chunk, content, answer in zip(chunks, contents, expected, strict=True):
+                foreign = content is not None and chunk not in sent
+                tally["accepted"] += foreign
+                tally["answered"] += foreign and answer is not None
             host.sequence = (model.last[0]) & 0xFFFF
         assert not [c for c in host.chip.changes if c.pins & 0x55 & ~(c.pins >> 1)]
     return tally
@@ -145,4 +147,5 @@ def test_two_thousand_damaged_frames() -> None:
 def test_hundred_thousand_damaged_frames() -> None:
     tally = fuzz(100_000, seed=4)
     print(f"frames damaged on the line to the board: {tally}")
-    assert tally["accepted"] == 0
+    # A checksum of 16 bits lets one of 65,536 through; it must still be of a kind and length that is known, and fresh.
+    assert tally["answered"] == 0

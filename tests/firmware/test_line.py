@@ -147,5 +147,5 @@ def test_two_thousand_damaged_frames() -> None:
 def test_hundred_thousand_damaged_frames() -> None:
     tally = fuzz(100_000, seed=4)
     print(f"frames damaged on the line to the board: {tally}")
-    # A checksum of 16 bits lets one of 65,536 through; it must still be of a kind and length that is known, and fresh.
+    # 16 bits let one in 65,536 through; it must still be of a kind and length that is known, and fresh.
     assert tally["answered"] == 0

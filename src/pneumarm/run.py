@@ -28,6 +28,7 @@ from pneumarm.control import (
     version_keeper,
     write_episodes,
 )
+from pneumarm.control.found import collected_results
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
 from pneumarm.learning import (
@@ -165,7 +166,7 @@ class Run:
                 arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
             )
             save_spec(self.folder, arm.spec)
-        return {"collect": asdict(collected)}
+        return {"collect": collected_results(collected, watch)}
 
     def _fit(self) -> dict[str, Any]:
         with self.progress("fitting the simulation") as report, Store.open(self.store) as store:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
+from pneumarm.control.transfer import running_time
 from pneumarm.control.versions import Adapted
 from pneumarm.learning import WatchSettings
 from pneumarm.report import figures
@@ -371,11 +372,13 @@ def adapted(data: Adapted) -> Section:
 
 
 def phases_of(data: TransferData) -> list[Phase]:
-    """Return the phases with their time counted from the begin of the first episode."""
-    starts = [p.time_start[0] for p in data.phases.values() if len(p)]
-    begin = starts[0] if starts else 0.0
+    """Return the phases with their time counted from the begin of the first episode, without interruptions."""
+    phases = data.phases
+    start, end = (np.concatenate([getattr(p, name) for p in phases.values()]) for name in ("time_start", "time_end"))
+    times = np.split(running_time(start, end), np.cumsum([len(p) for p in phases.values()])[:-1])
     return [
-        Phase(name, p.reward, p.success, p.actions, p.switches, p.time_end - begin) for name, p in data.phases.items()
+        Phase(name, p.reward, p.success, p.actions, p.switches, time)
+        for (name, p), time in zip(phases.items(), times, strict=True)
     ]
 
 

@@ -42,7 +42,7 @@ from pneumarm.learning import (
     train,
 )
 from pneumarm.learning import test as test_agent
-from pneumarm.records import demonstrate, test_record, training_record
+from pneumarm.records import demonstrate, marked_record, test_record, training_record
 from pneumarm.report import read_episodes, save_movement, save_spec, write_report
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import KINDS, CollectSettings, Store, collect, require_enough
@@ -166,6 +166,7 @@ class Run:
                 arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
             )
             save_spec(self.folder, arm.spec)
+            marked_record(store).save(self.folder)
         return {"collect": collected_results(collected, watch)}
 
     def _fit(self) -> dict[str, Any]:
@@ -216,6 +217,7 @@ class Run:
                 keep_version=version_keeper(self.folder),
             )
             movements = demonstrate(moved.agent, arm, wanted.seed)
+            marked_record(store).save(self.folder)
         moved.agent.save(self.adapted)
         save_history(self.folder, moved.adapted)
         write_episodes(self.episodes, moved.episodes)

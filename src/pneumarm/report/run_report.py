@@ -14,6 +14,7 @@ from pneumarm.report.data import (
     CoverageData,
     Episodes,
     LearningData,
+    MarkedData,
     Movement,
     QualityData,
     Record,
@@ -92,6 +93,7 @@ def read_run(folder: Path) -> RunData:
         test=_read(Episodes, folder),
         transfer=_read_transfer(folder / EPISODES, results),
         adaptation=read_history(folder) if (folder / HISTORY).exists() else None,
+        marked=_read(MarkedData, folder),
         movements=tuple(Movement.load(folder, path.name) for path in sorted(folder.glob(MOVEMENTS))),
     )
 

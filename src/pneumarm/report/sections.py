@@ -18,12 +18,14 @@ from pneumarm.report.data import (
     CoverageData,
     Episodes,
     LearningData,
+    MarkedData,
     Movement,
     QualityData,
     TrainingData,
     TransferData,
 )
 from pneumarm.report.figures import Classification, Mark, Phase
+from pneumarm.report.health import health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import of_joint, quantities
@@ -43,6 +45,7 @@ class RunData:
     transfer: TransferData | None = None
     adaptation: Adapted | None = None
     movements: tuple[Movement, ...] = ()
+    marked: MarkedData | None = None
 
 
 def all_sections(run: RunData) -> list[Section]:
@@ -68,6 +71,7 @@ def all_sections(run: RunData) -> list[Section]:
         sections.append(by_displacement(run.transfer, run.test, run.spec))
     if run.movements:
         sections.append(moved(run.movements, run.spec))
+    sections.append(health(run.results, run.marked, run.spec))
     return sections
 
 

@@ -15,6 +15,17 @@ _PHASES = {COLLECTING: COLLECTING, "before": "on arrival", "learning": "while le
 _STAGES = {"collect": COLLECTING, "transfer": "moving"}
 
 
+def tells_of_health(results: Mapping[str, Any]) -> bool:
+    """Return whether ``results`` say whether something was wrong."""
+    return any("findings" in results.get(stage, {}) for stage in _STAGES)
+
+
+def summary_of_health(results: Mapping[str, Any]) -> list[str]:
+    """Return what the summary of a report says of what was wrong: nothing where nothing was."""
+    found = len(_findings(results))
+    return [f"The monitor found {found} thing{'s' if found > 1 else ''} wrong with the arm."] if found else []
+
+
 def health(results: Mapping[str, Any], marked: MarkedData | None, spec: ArmSpec) -> Section:
     """Return what was found wrong, and what was done about it; one sentence where that is nothing.
 
@@ -38,8 +49,8 @@ def health(results: Mapping[str, Any], marked: MarkedData | None, spec: ArmSpec)
         text.append(
             "A finding tells since when something was wrong as far as the readings show it, when that was noticed, "
             "and until when it lasted, on the arm's clock. Rows read while a valve, a sensor or the supply was "
-            "broken are marked: they are kept, and nothing is learned from them. A leak or a change of the arm is told and "
-            "not marked, for what such an arm does is what there is to learn."
+            "broken are marked: they are kept, and nothing is learned from them. A leak or a change of the arm is "
+            "told and not marked, for what such an arm does is what there is to learn."
         )
     return Section("What was found wrong", text, [_picture(marked, spec)] if marked and spoiled else [], tables)
 
@@ -109,7 +120,7 @@ def _counts_table(counts: Mapping[str, Counts]) -> Table | None:
         counts,
         rows,
         "What the guard did and which deadlines were missed. It keeps inlets closed at the highest pressure on any "
-        "healthy arm; all else is for an eye.",
+        "healthy arm; anything else deserves a look.",
     )
 
 

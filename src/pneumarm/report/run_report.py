@@ -22,6 +22,7 @@ from pneumarm.report.data import (
     TransferData,
     read_episodes,
 )
+from pneumarm.report.health import summary_of_health
 from pneumarm.report.page import render
 from pneumarm.report.sections import RunData, all_sections, collected, predicted, propagated
 
@@ -156,6 +157,7 @@ def _summary(run: RunData) -> list[str]:
             f"The best that planning with the arm's true physics finds there is {bound['open_loop']['reward']:.2f}; "
             f"the controller is {abs(below):.2f} {'below' if below >= 0 else 'above'} it after adaptation."
         )
+    text += summary_of_health(run.results)
     if run.adaptation is not None:
         text += [f"{line[0].upper()}{line[1:]}." for line in run.adaptation.sentences]
     return text

@@ -25,7 +25,7 @@ from pneumarm.report.data import (
     TransferData,
 )
 from pneumarm.report.figures import Classification, Mark, Phase
-from pneumarm.report.health import health
+from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import of_joint, quantities
@@ -71,7 +71,8 @@ def all_sections(run: RunData) -> list[Section]:
         sections.append(by_displacement(run.transfer, run.test, run.spec))
     if run.movements:
         sections.append(moved(run.movements, run.spec))
-    sections.append(health(run.results, run.marked, run.spec))
+    if tells_of_health(run.results):
+        sections.append(health(run.results, run.marked, run.spec))
     return sections
 
 

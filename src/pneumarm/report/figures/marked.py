@@ -42,7 +42,8 @@ def marked_rows(
             (first + end) / 2 * minutes, 1.02, stage, transform=place.get_xaxis_transform(), ha="center", color=INK
         )
     place.set_yticks(range(len(reasons)), [_folded(one) for one in reasons])
-    place.set_ylim(len(reasons) - 0.5, -0.5)
+    place.set_ylim(max(len(reasons), 1) - 0.5, -0.5)
+    place.set_ylabel("marked for")
     place.set_xlim(0, total)
     place.grid(visible=False, axis="y")
     place.set_xlabel("recorded until then [min]")

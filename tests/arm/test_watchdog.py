@@ -1,5 +1,6 @@
 """A controller that does not come back: the arm is held, then vented, and the controller is stopped."""
 
+import signal
 from threading import Thread
 from threading import enumerate as threads
 from time import monotonic, sleep
@@ -39,6 +40,14 @@ def arm(smallest_arm):
             super().set_valves(valves)
 
     return RealTime()
+
+
+@pytest.fixture(autouse=True)
+def fresh_interrupts():
+    """The command line's handler takes interrupts within 2 s for the same one; other tests may have installed it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def endless(reading):

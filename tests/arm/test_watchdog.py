@@ -112,17 +112,15 @@ def test_one_that_comes_back_late_finds_the_arm_vented_and_goes_on(arm):
     assert guard.interventions == Interventions(late=1, vented=1)
 
 
-def test_limits_hold_while_a_decision_is_out(arm):
-    arm.pressure = [[171.0, 0]]  # 1.03 bar: over the limit within a period and a half
+def test_limits_hold_while_a_decision_is_out(smallest_arm):
+    arm = smallest_arm(period=PERIOD)
     guard = GuardedArm(arm)
-    decisions = iter([OPEN, None])
-
-    def decide(reading):
-        sleep(2.5 * PERIOD if reading.time > PERIOD else 0.0)
-        return next(decisions)
-
-    list(ControlCycle(guard).run(decide))
-    assert [valves for _, valves in arm.set[:2]] == [OPEN.tolist(), [[0, 0]]]
+    reading = guard.read()
+    guard.decide(OPEN)
+    arm.wait(1.5 * PERIOD)
+    arm.pressure = [[guard.spec.max_pressure_counts + 1, 0]]
+    assert guard.stand_in(reading)
+    assert arm.valves == [[0, 0]]
     assert guard.interventions == Interventions(pressure=1)
 
 

@@ -35,7 +35,7 @@ from pneumarm.arm.virtual import (
 )
 from pneumarm.arm.virtual.parameters import BAR
 from pneumarm.control import TransferSettings, transfer
-from pneumarm.control.leaks import LeakTest, leak_test, leaking
+from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control.monitor import Finding, Monitor
 from pneumarm.learning import train
 from pneumarm.learning.begin import begin_states

@@ -1,7 +1,8 @@
 """The check-up of an arm: what its sensors, valves and muscles do, what is wrong with them, and its calibration."""
 
 from pneumarm.checkup.calibrate import Calibration, Known, calibrate
-from pneumarm.checkup.diagnose import Finding, diagnose, joint_figures
+from pneumarm.checkup.diagnose import Finding, diagnose, ends, joint_figures, quickening
+from pneumarm.checkup.leaks import LeakRates, LeakTest, leak_test, leaking
 from pneumarm.checkup.measure import Checkup, CheckupSettings, Trace, measure
 
 __all__ = [
@@ -10,9 +11,15 @@ __all__ = [
     "CheckupSettings",
     "Finding",
     "Known",
+    "LeakRates",
+    "LeakTest",
     "Trace",
     "calibrate",
     "diagnose",
+    "ends",
     "joint_figures",
+    "leak_test",
+    "leaking",
     "measure",
+    "quickening",
 ]

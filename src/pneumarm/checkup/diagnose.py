@@ -5,13 +5,15 @@ Every rule looks at one thing that a healthy arm cannot do. The limits are far f
 monitor finds a minute later.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.spec_file import Baseline
+from pneumarm.checkup.leaks import LeakRates, falling, leaking
 from pneumarm.checkup.measure import Array, Checkup, JointTest, MuscleTest, Trace
 
 MOVED = 0.10
@@ -22,9 +24,17 @@ NOISY = 3.5
 """Readings are noisy whose standard deviation at rest exceeds so many counts (thesis A.1.3: 4 is relatively high)."""
 LAGS = 20
 LEAK = 12.0
-"""A muscle leaks if it loses more than so many percent of its pressure a minute."""
+"""A muscle leaks if it loses more than so many percent of its pressure a minute, where it has no baseline."""
 LOW_SUPPLY = 0.75
 """The supply is low if a full muscle reads less than this share of the pressure limit."""
+HIGH_SUPPLY = 1.05
+"""The supply is high if a muscle fills to more than this share of the limit before its inlet can be closed."""
+RISING = 0.85
+"""The supply rises if at the end of the check-up muscles fill in less than this share of the time as before."""
+ZERO = 0.05
+"""A pressure sensor is not as calibrated if it reads so much more or less in a vented muscle [bar]."""
+ENDS = 6.0
+"""A joint is not as calibrated if its ends have moved by so much [degrees]."""
 LEAP = 0.08
 """A sensor is at the valve's side if its reading leaps by so much [bar] when the valve opens and falls back."""
 LOGARITHMIC = 1.3
@@ -36,9 +46,9 @@ _EVEN = 0.35  # bar: what a filled muscle always exceeds, and one that is merely
 
 Kind = Literal[
     "muscles swapped", "pressure sensors swapped", "valves swapped", "inlet stuck closed", "inlet stuck open",
-    "exhaust stuck closed", "exhaust stuck open", "low supply", "leak", "angle reversed", "angle dead",
-    "angle frozen", "pressure frozen", "angle logarithmic", "angle worn", "pressure at the valve's side",
-    "noise", "noise not white", "jitter",
+    "exhaust stuck closed", "exhaust stuck open", "low supply", "high supply", "rising supply", "leak",
+    "angle reversed", "angle dead", "angle frozen", "pressure frozen", "angle logarithmic", "angle worn",
+    "pressure at the valve's side", "noise", "noise not white", "not as calibrated", "jitter",
 ]  # fmt: skip
 
 
@@ -66,8 +76,14 @@ class MuscleFigures:
     """Time from the command until 63 % of that [s]; not a number if it does not fill."""
     exhaust_time: float
     """Time from the command until 37 % of that [s]; not a number if it does not empty."""
+    fill_delay: float
+    """Time from the command until the pressure begins to rise [s]; not a number where that cannot be told."""
+    exhaust_delay: float
+    """Time from the command until it begins to fall [s]; not a number where that cannot be told."""
     leak: float
-    """Share of the pressure lost by closed valves [% a minute]."""
+    """Share of the pressure lost by closed valves [% a minute]; not a number if there is none to lose."""
+    leak_error: float
+    """Standard error of that [% a minute]."""
     turned: float
     """How far filling turned the joint [degrees]."""
     noise: float
@@ -109,14 +125,16 @@ def joint_figures(checkup: Checkup, joint: int) -> JointFigures:
 
 def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
     settings, bar = checkup.settings, checkup.spec.counts_per_bar
-    fill, hold, exhaust = cut(test.muscles[m], checkup)
+    muscle = test.muscles[m]
+    fill, hold, exhaust = muscle.fill, muscle.hold, muscle.exhaust
     rise = fill.pressure[:, m] - fill.pressure[0, m]
     full = float(np.median(hold.pressure[:, m]) - fill.pressure[0, m])
     fall = exhaust.pressure[:, m] - exhaust.pressure[-10:, m].mean()
     moved = full > MOVED * bar
     rest = test.rest
-    slope, level = np.polyfit(rest.time, rest.pressure[:, m], 1)
-    pulse = test.muscles[m].pulse
+    above = rest.pressure[:, m] - test.before.pressure[-10:, m].mean()  # its sensor may not be calibrated
+    leak, leak_error = falling(rest.time, above) if above.mean() > MOVED * bar else (np.nan, np.nan)
+    pulse = muscle.pulse
     end = int(np.searchsorted(pulse.time, settings.pulse))
     settled = np.median(pulse.pressure[_window(pulse.time, settings.pulse + 0.05, 0.05), m])
     peak = pulse.pressure[_window(pulse.time, settings.pulse - 0.01, 0.04), m].max() if end else settled
@@ -124,18 +142,69 @@ def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
         full=full / bar,
         fill_time=_first(fill.time, rise > 0.63 * full) if moved else float("nan"),
         exhaust_time=_first(exhaust.time - exhaust.time[0], fall < 0.37 * full) if moved else float("nan"),
-        leak=float(-6000 * slope / level) if level > MOVED * bar else float("nan"),
+        fill_delay=onset([(each.time, each.pressure[:, m]) for each in (fill, pulse, test.again[m])]) if moved else float("nan"),
+        exhaust_delay=onset([(exhaust.time - exhaust.time[0], -exhaust.pressure[:, m])]) if moved else float("nan"),
+        leak=float(100 * leak),
+        leak_error=float(100 * leak_error),
         turned=float(fill.angle[-1] - fill.angle[0]) / checkup.spec.counts_per_degree,
         noise=float(np.std(detrended(rest.time, rest.pressure[:, m]))),
         leap=float(peak - settled) / bar,
     )
 
 
-def cut(test: MuscleTest, checkup: Checkup) -> list[Trace]:
-    """Return fill, hold and exhaust of a muscle's test."""
-    settings = checkup.settings
-    half = settings.step / 2
-    return test.whole.pieces(settings.fill + half, settings.fill + settings.hold + half)
+def onset(rises: Sequence[tuple[Array, Array]]) -> float:
+    """Return after what time [s] values begin to rise, the same in all ``rises``; NaN where readings are too few.
+
+    A rise is times from 0 on [s] and values. Least squares of a level that goes over into a parabola: finer than the
+    readings are apart, and without the lateness of a threshold above the noise.
+    """
+    begins = np.arange(0.0, _ONSET / 2, _ONSET / 400)
+    left = np.zeros(len(begins))
+    for time, values in rises:
+        seen = time <= _ONSET
+        if seen.sum() < _FEWEST:
+            return float("nan")
+        since = np.maximum(time[seen] - begins[:, None], 0.0) / _ONSET
+        basis = np.stack([np.ones_like(since), since, since**2], axis=-1)
+        fitted = basis @ (np.linalg.pinv(basis) @ values[seen])[..., None]
+        left += ((values[seen] - fitted[..., 0]) ** 2).sum(axis=1)
+    return float(begins[np.argmin(left)])
+
+
+_ONSET = 0.1  # s: what is looked at for the beginning of a rise
+_FEWEST = 10  # readings that tell it
+
+
+def ends(test: JointTest) -> Array:
+    """Return the angles with muscle 2 full and with muscle 1 full, shape (2,) [counts]."""
+    return np.array([np.median(test.muscles[m].hold.angle) for m in (1, 0)])
+
+
+def quickening(test: JointTest, checkup: Checkup) -> float:
+    """Return in what share of the time muscles fill at the end of the check-up; NaN where they do not fill.
+
+    While air is scarce a muscle fills as fast as the supply's pressure says. Both muscles count, because supplies
+    fluctuate.
+    """
+    limit = checkup.spec.max_pressure_counts
+    before = [_passage(test.muscles[m].fill, m, limit) for m in range(2)]
+    after = [_passage(test.again[m], m, limit) for m in range(2)]
+    return float(np.mean(np.array(after) / np.array(before)))
+
+
+def _passage(fill: Trace, m: int, limit: float) -> float:
+    """Return the time [s] in which muscle ``m`` fills between two shares of the ``limit`` [counts]."""
+    pressure = np.convolve(fill.pressure[:, m] - fill.pressure[:3, m].mean(), np.full(_SMOOTH, 1 / _SMOOTH), "valid")
+    time = fill.time[_SMOOTH // 2 : len(fill.time) - _SMOOTH // 2]
+    rising = np.maximum.accumulate(pressure)
+    if not len(rising) or rising[-1] < _PASSAGE[1] * limit:
+        return float("nan")
+    begin, end = np.interp(np.array(_PASSAGE) * limit, rising, time)
+    return float(end - begin)
+
+
+_PASSAGE = (0.1, 0.7)  # shares of the limit: after the first unfolding, before the supply's pressure is near
+_SMOOTH = 5  # readings
 
 
 def _window(time: Array, begin: float, length: float) -> NDArray[np.bool_]:
@@ -235,9 +304,15 @@ def _parabola() -> Array:
 _PARABOLA = _parabola()
 
 
-def diagnose(checkup: Checkup) -> list[Finding]:
-    """Return what is wrong with the arm; an empty list for a healthy one."""
-    found = [finding for j in range(len(checkup.joints)) for finding in _of_joint(checkup, j)]
+def diagnose(checkup: Checkup, baseline: Baseline | None = None) -> list[Finding]:
+    """Return what is wrong with the arm; an empty list for a healthy one.
+
+    Args:
+        checkup: what was measured.
+        baseline: what the same arm did when it was calibrated, with its sensors corrected as they are now.
+
+    """
+    found = [finding for j in range(len(checkup.joints)) for finding in _of_joint(checkup, j, baseline)]
     periods = checkup.timing.periods
     if np.quantile(periods, 0.95) > 1.5 * checkup.spec.period:
         worst = f"95 % of the control periods are below {1e3 * np.quantile(periods, 0.95):.0f} ms"
@@ -246,10 +321,10 @@ def diagnose(checkup: Checkup) -> list[Finding]:
     return found
 
 
-def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
+def _of_joint(checkup: Checkup, j: int, baseline: Baseline | None) -> Iterator[Finding]:
     test, figures, bar = checkup.joints[j], joint_figures(checkup, j), checkup.spec.counts_per_bar
     name = f"joint {j + 1}" if len(checkup.joints) > 1 else "joint"
-    rose = np.array([_rise(test.muscles[m], checkup) for m in range(2)]) / bar  # [muscle filled, sensor]
+    rose = np.array([_rise(test.muscles[m]) for m in range(2)]) / bar  # [muscle filled, sensor]
     own, other = rose.diagonal(), rose[:, ::-1].diagonal()
     turned = np.array([m.turned for m in figures.muscles])
     crossed = bool((other > _EVEN).all() and (own < 0.5 * other).all())
@@ -284,8 +359,13 @@ def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
         yield from stuck  # while air flows that should not, nothing else can be judged
         return
     yield from valves
+    yield from _of_leaks(figures, name, baseline, j)
+    yield from _of_supply(checkup, test, figures, name)
     yield from _of_noise(checkup, j, name)
-    yield from _of_potentiometer(checkup, test, figures, name)
+    potentiometer = list(_of_potentiometer(checkup, test, figures, name))
+    yield from potentiometer
+    if baseline is not None and not potentiometer:
+        yield from _of_calibration(checkup, test, name, baseline.ends[j])
 
 
 def _of_valves(
@@ -300,7 +380,6 @@ def _of_valves(
     if (np.maximum(full, own) < LOW_SUPPLY * limit).all():
         told = f"full muscles reach {full[0]:.2f} and {full[1]:.2f} bar of {limit:.2f}"
         yield Finding("low supply", name, told, "See to the reducer, the buffer and the filters")
-    most = np.nanmax([LEAK, *(muscle.leak for muscle in figures.muscles)])  # where one sags, the other is stretched
     for m, muscle in enumerate(figures.muscles):
         where = f"{name}, muscle {m + 1}"
         if frozen[m]:
@@ -317,13 +396,66 @@ def _of_valves(
         elif other[m] > _EVEN or muscle.leak < -LEAK:
             told = "its pressure rises while its valves are closed"
             yield Finding("inlet stuck open", where, told, "See to the inlet valve: dirt in its seat, or it sticks")
-        elif muscle.leak > max(LEAK, 0.5 * most):
-            told = f"closed, it loses {muscle.leak:.0f} % a minute"
-            yield Finding("leak", where, told, "Look for the leak with soap water: clamps, hose, exhaust valve")
         elif muscle.leap > max(LEAP, _CLEAR * muscle.noise / checkup.spec.counts_per_bar):
             told = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
             remedy = "Move the pressure sensor to the far end of the muscle (thesis A.1.1)"
             yield Finding("pressure at the valve's side", where, told, remedy)
+
+
+def _of_leaks(figures: JointFigures, name: str, baseline: Baseline | None, j: int) -> Iterator[Finding]:
+    now = np.array([[muscle.leak, muscle.leak_error] for muscle in figures.muscles]).T / 100
+    if np.isnan(now).any():
+        return
+    leaks = (now[0] > LEAK / 100) & (now[0] >= now[0].max())  # where one sags, the other is stretched
+    then = np.zeros_like(now)
+    if baseline is not None:
+        then = np.array([baseline.leak[j], baseline.leak_error[j]])
+        healthy, found = (LeakRates(rate[None], error[None], np.nan) for rate, error in (then, now))
+        leaks |= leaking(healthy, found)[0]
+    for m in np.flatnonzero(leaks):
+        told = f"closed, it loses {100 * now[0, m]:.1f} % of its pressure a minute"
+        if then[0, m] > _CLEAR * then[1, m]:
+            told = (
+                f"it leaks {now[0, m] / then[0, m]:.1f} times as much as when calibrated: "
+                f"{told} instead of {100 * then[0, m]:.1f} %"
+            )
+        elif baseline is not None:
+            told += f", instead of {100 * then[0, m]:.1f} % when calibrated"
+        remedy = "Look for the leak with soap water: clamps, hose, exhaust valve"
+        yield Finding("leak", f"{name}, muscle {m + 1}", told, remedy)
+
+
+def _of_supply(checkup: Checkup, test: JointTest, figures: JointFigures, name: str) -> Iterator[Finding]:
+    limit = checkup.spec.max_pressure
+    full = max(muscle.full for muscle in figures.muscles)
+    if full > HIGH_SUPPLY * limit:
+        told = f"a muscle fills to {full:.2f} bar before its inlet can be closed at the limit of {limit:.2f} bar"
+        remedy = "Turn the reducer down; if that does not help it leaks: a safety valve on the buffer (thesis A.1.1)"
+        yield Finding("high supply", name, told, remedy)
+    elif (quicker := quickening(test, checkup)) < RISING:
+        told = f"at the end of the check-up muscles fill in {100 * quicker:.0f} % of the time of before"
+        remedy = "See whether the reducer leaks: its buffer fills up while no air is used (thesis A.1.1)"
+        yield Finding("rising supply", name, told, remedy)
+
+
+def _of_calibration(
+    checkup: Checkup, test: JointTest, name: str, calibrated: tuple[float, float]
+) -> Iterator[Finding]:
+    spec = checkup.spec
+    vented = spec.bar(test.before.pressure[-10:].mean(axis=0))
+    for m in np.flatnonzero(np.abs(vented) > ZERO):
+        told = f"vented, its sensor reads {vented[m]:.2f} bar; the zero has moved, or the spec is of another arm"
+        yield Finding("not as calibrated", f"{name}, muscle {m + 1}", told, _AGAIN)
+    moved = (ends(test) - calibrated) / spec.counts_per_degree
+    if np.abs(moved).max() > ENDS:
+        told = (
+            f"its ends are {moved[0]:+.1f} and {moved[1]:+.1f} degrees from where they were; the potentiometer has "
+            "slipped on its axis, the muscles or their mounting have changed, or the spec is of another arm"
+        )
+        yield Finding("not as calibrated", name, told, _AGAIN)
+
+
+_AGAIN = "See to it, then calibrate it anew with `pneumarm arm calibrate`"
 
 
 def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
@@ -397,22 +529,21 @@ def _is_frozen(test: JointTest, m: int) -> bool:
     return bool(np.ptp(pressures) == 0)
 
 
-def _rise(test: MuscleTest, checkup: Checkup) -> Array:
+def _rise(test: MuscleTest) -> Array:
     """Return how far each pressure rose while a muscle was filled, (2,) [counts]."""
-    fill = cut(test, checkup)[0]
+    fill = test.fill
     rise: Array = np.quantile(fill.pressure, 0.95, axis=0) - fill.pressure[:3].mean(axis=0)
     return rise
 
 
 def _stays(test: MuscleTest, m: int, checkup: Checkup) -> bool:
     """Return whether muscle ``m`` keeps most of its air while its exhaust is open."""
-    _, hold, exhaust = cut(test, checkup)
-    held = np.median(hold.pressure[:, m])
-    return bool(held > MOVED * checkup.spec.counts_per_bar and exhaust.pressure[-10:, m].mean() > 0.7 * held)
+    held = np.median(test.hold.pressure[:, m])
+    return bool(held > MOVED * checkup.spec.counts_per_bar and test.exhaust.pressure[-10:, m].mean() > 0.7 * held)
 
 
 def _vents_up(test: MuscleTest, m: int, checkup: Checkup) -> bool:
     """Return whether the pressure of muscle ``m`` rises while its exhaust is open."""
-    exhaust = cut(test, checkup)[2]
+    exhaust = test.exhaust
     gained = exhaust.pressure[-10:, m].mean() - exhaust.pressure[0, m]
     return bool(gained > MOVED * checkup.spec.counts_per_bar)

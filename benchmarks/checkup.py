@@ -58,9 +58,7 @@ CASES = {
     "inlet stuck closed": Case("inlet stuck closed", lambda m: StuckValve(muscle=m)),
     "inlet stuck open": Case("inlet stuck open", lambda m: StuckValve(muscle=m, position="open")),
     "exhaust stuck closed": Case("exhaust stuck closed", lambda m: StuckValve(muscle=m, valve="outlet")),
-    "exhaust stuck open": Case(
-        "exhaust stuck open", lambda m: StuckValve(muscle=m, valve="outlet", position="open")
-    ),
+    "exhaust stuck open": Case("exhaust stuck open", lambda m: StuckValve(muscle=m, valve="outlet", position="open")),
     "supply of 0.6 bar": Case("low supply", lambda m: SupplyLoss(to=0.6, over=0.0)),
     "no supply": Case("low supply", lambda m: SupplyLoss(to=0.0, over=0.0)),
     "reducer's creep, from now on": Case("rising supply", lambda m: ReducerLeak()),
@@ -77,6 +75,18 @@ CASES = {
 """Faults by what is said of them here."""
 
 
+OF_MUSCLES = (
+    "valves swapped",
+    "inlet stuck closed",
+    "inlet stuck open",
+    "exhaust stuck closed",
+    "exhaust stuck open",
+    "leak",
+    "pressure at the valve's side",
+)
+"""What is said of one muscle of a joint, not of all of it."""
+
+
 def played(case: Case, arm: int) -> tuple[Checkup, Baseline | None]:
     """Return the check-up of ``arm`` with a fault, on muscle 1 of even and 2 of odd arms, and its baseline."""
     opened = VirtualArm(draw_parameters(arm), seed=arm)
@@ -87,6 +97,12 @@ def played(case: Case, arm: int) -> tuple[Checkup, Baseline | None]:
     opened.faults = (case.fault(1 + arm % 2),)
     opened.wait(case.before)
     return check_up(seen), baseline
+
+
+def said(case: Case, arm: int) -> set[str]:
+    """Return what is said of ``arm``; a fault of a muscle counts only if it is said of the right one."""
+    place = f"muscle {1 + arm % 2}" if case.told in OF_MUSCLES else "joint"
+    return {f.kind if place in f.where else f"{f.kind} elsewhere" for f in diagnose(*played(case, arm))}
 
 
 def measure() -> Iterator[str]:
@@ -107,13 +123,13 @@ def measure() -> Iterator[str]:
             moved = (ends(again.joints[0]) - known.baseline.ends[0]) / known.spec.counts_per_degree
             figures[-1]["ends moved [degrees]"] = float(np.abs(moved).max())
     count = len(arms) * NOISES
-    yield f"arms {first} to {last}, healthy: {complaints} of {count} check-ups complain, calibrated {later} of {count}"
+    yield f"arms {first} to {last}, healthy: {complaints} of {count} complained of, calibrated {later} of {count}"
     limits = (LEAK, HIGH_SUPPLY, LEAP, LOGARITHMIC, WORN, -RISING, ENDS)
     for name, limit in zip(figures[0], limits, strict=True):
         worst = max(np.sign(limit) * each[name] for each in figures)
         yield f"  worst {name}: {abs(worst):.3g}, limit {abs(limit):g}"
     for name, case in CASES.items():
-        kinds = [{finding.kind for finding in diagnose(*played(case, arm))} for arm in arms]
+        kinds = [said(case, arm) for arm in arms]
         found, alone = sum(case.told in k for k in kinds), sum(k == {case.told} for k in kinds)
         others = sorted(set().union(*kinds) - {case.told})
         besides = f" (besides: {', '.join(others)})" if others else ""

@@ -105,7 +105,7 @@ def _require(valid: bool, name: str, expected: str) -> None:
 
 @dataclass(frozen=True)
 class Baseline:
-    """What the arm did when it was calibrated and sound; a later check-up is compared with it. In corrected counts."""
+    """What a sound arm did when it was calibrated; a later check-up is compared with it. In corrected counts."""
 
     leak: tuple[tuple[float, float], ...]
     """Part of its pressure that each closed muscle lost, (joints, 2) [1/minute]."""

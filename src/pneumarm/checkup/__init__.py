@@ -1,9 +1,10 @@
 """The check-up of an arm: what its sensors, valves and muscles do, what is wrong with them, and its calibration."""
 
 from pneumarm.checkup.calibrate import Calibration, Known, calibrate
-from pneumarm.checkup.diagnose import Finding, diagnose, ends, joint_figures, quickening
+from pneumarm.checkup.diagnose import Finding, diagnose
+from pneumarm.checkup.figures import ends, joint_figures, quickening
 from pneumarm.checkup.leaks import LeakRates, LeakTest, leak_test, leaking
-from pneumarm.checkup.measure import Checkup, CheckupSettings, Trace, measure
+from pneumarm.checkup.measure import Checkup, CheckupSettings, Trace, fill_alone, measure
 
 __all__ = [
     "Calibration",
@@ -17,6 +18,7 @@ __all__ = [
     "calibrate",
     "diagnose",
     "ends",
+    "fill_alone",
     "joint_figures",
     "leak_test",
     "leaking",

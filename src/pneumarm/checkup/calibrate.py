@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneumarm.arm.spec_file import ArmFile, Baseline, Correction
-from pneumarm.checkup.diagnose import LOGARITHMIC, ends, halves, joint_figures
+from pneumarm.checkup.diagnose import LOGARITHMIC
+from pneumarm.checkup.figures import ends, halves, joint_figures
 from pneumarm.checkup.measure import Array, Checkup, JointTest
 from pneumarm.errors import UnusableInput
 
@@ -33,7 +34,7 @@ class Known:
     """What only a person can say of an arm."""
 
     angles: tuple[tuple[float, float], ...] = ()
-    """Angles with muscle 2 full and with muscle 1 full, by a protractor, of each joint or one pair for all [degrees]."""
+    """Angles with muscle 2 full and with muscle 1 full, by a protractor [degrees]; for all joints, or for each."""
     counts_per_degree: float | None = None
     """... or what the angle's sensors count, by their data sheet; where both are missing the spec's scale stays."""
     supply: float | None = None
@@ -150,7 +151,7 @@ def _pressures(checkup: Checkup, known: Known) -> tuple[Array, Array]:
                 why = "is cut off at the pressure limit" if stopped else "still rises when its time is over"
                 raise UnusableInput(
                     f"{checkup.spec.name}: joint {j + 1}, muscle {m + 1} {why}, and does not show the supply's "
-                    "pressure; turn the reducer down, or fill longer (--fill), or leave --supply out"
+                    "pressure; turn the reducer down, or fill longer (--fill), or give --counts-per-bar instead"
                 )
     if known.supply is None:
         return zero, np.full_like(zero, known.counts_per_bar or checkup.spec.counts_per_bar)

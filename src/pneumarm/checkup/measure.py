@@ -163,6 +163,19 @@ def measure(
         guard.set_valves(np.zeros_like(guard.applied))
 
 
+def fill_alone(arm: Arm, joint: int, muscle: int, settings: CheckupSettings = CheckupSettings()) -> None:
+    """Vent all muscles of ``arm``, then fill one and close it: its joint stands at an end, and is left there.
+
+    Raises:
+        ArmFailure: the arm fails.
+
+    """
+    bench = _Bench(guarded(arm), settings)
+    bench.vent()
+    bench.watch(bench.alone(joint, muscle), settings.fill)
+    bench.watch(bench.valves(joint, 0, 0), settings.hold)
+
+
 def _timing(guard: GuardedArm, settings: CheckupSettings) -> Timing:
     closed = np.zeros_like(guard.applied)
 
@@ -197,6 +210,12 @@ class _Bench:
         valves[joint] = first, second
         return valves
 
+    def alone(self, joint: int, muscle: int, value: int = 1) -> NDArray[np.int8]:
+        """Return the valves of one muscle set to ``value``; those of all others closed."""
+        valves = np.zeros_like(self.guard.applied)
+        valves[joint, muscle] = value
+        return valves
+
     def vent(self) -> list[Reading]:
         """Vent all muscles."""
         self.guard.read()
@@ -220,17 +239,17 @@ class _Bench:
     def muscle(self, joint: int, muscle: int) -> MuscleTest:
         """Fill, hold and exhaust a muscle; then give it a pulse."""
         wanted = self.settings
-        alone = np.eye(2, dtype=int)[muscle]
         self.vent()
-        fill = self.watch(self.valves(joint, *alone), wanted.fill)
+        fill = self.watch(self.alone(joint, muscle), wanted.fill)
         hold = self.watch(self.valves(joint, 0, 0), wanted.hold)
-        exhaust = self.watch(self.valves(joint, *-alone), wanted.exhaust)
+        exhaust = self.watch(self.alone(joint, muscle, -1), wanted.exhaust)
         self.vent()
-        pulse = self.watch(self.valves(joint, *alone), wanted.pulse)
+        pulse = self.watch(self.alone(joint, muscle), wanted.pulse)
         after = self.watch(self.valves(joint, 0, 0), wanted.hold)
         self.vent()
         begin = fill[0].time
-        return MuscleTest(*[_trace(r, joint, begin) for r in (fill, hold, exhaust)], _trace(pulse + after, joint))
+        filled, held, vented = (_trace(readings, joint, begin) for readings in (fill, hold, exhaust))
+        return MuscleTest(filled, held, vented, _trace(pulse + after, joint))
 
     def rest(self) -> list[Reading]:
         """Fill all muscles, close them, let them settle, and read."""
@@ -241,7 +260,7 @@ class _Bench:
     def again(self, joint: int, muscle: int) -> Trace:
         """Fill a muscle from vented; then vent it."""
         self.vent()
-        fill = self.watch(self.valves(joint, *np.eye(2, dtype=int)[muscle]), self.settings.fill)
+        fill = self.watch(self.alone(joint, muscle), self.settings.fill)
         self.vent()
         return _trace(fill, joint)
 

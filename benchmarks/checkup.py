@@ -37,7 +37,9 @@ ARMS = "11-20"
 NOISES = 3
 """Check-ups of each healthy arm, with other noise, each raw and again as it was calibrated."""
 NIGHT = 12 * 3600.0
-"""Time that nobody uses air [s]."""
+"""Time that a healthy arm rests between check-ups [s]."""
+IDLE = 3600.0
+"""Time that nobody uses air [s]: a buffer behind a leaking reducer then is at 5.9 bar."""
 
 
 class Case(NamedTuple):
@@ -62,7 +64,7 @@ CASES = {
     "supply of 0.6 bar": Case("low supply", lambda m: SupplyLoss(to=0.6, over=0.0)),
     "no supply": Case("low supply", lambda m: SupplyLoss(to=0.0, over=0.0)),
     "reducer's creep, from now on": Case("rising supply", lambda m: ReducerLeak()),
-    "reducer's creep to 6 bar, after a night": Case("high supply", lambda m: ReducerLeak(), before=NIGHT),
+    "reducer's creep to 6 bar, an hour ago": Case("high supply", lambda m: ReducerLeak(), before=IDLE),
     "leak, 40 times": Case("leak", lambda m: Leak(muscle=m, factor=40.0)),
     "leak, 3 times, calibrated": Case("leak", lambda m: Leak(muscle=m, factor=3.0), calibrated=True),
     "potentiometer dead": Case("angle dead", lambda m: DeadPotentiometer(rail="low" if m == 1 else "high")),

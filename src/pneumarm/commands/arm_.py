@@ -188,7 +188,7 @@ def calibrate_(
     for j, residual in enumerate(calibration.residual):
         if residual is not None:
             say(f"joint {j + 1}: the potentiometer is not linear; linearised off by {residual:.2f} degrees (rms)")
-    show(result, json, lambda: [table((str(out), ""), list(result["spec"].items()))])  # type: ignore[attr-defined]
+    show(result, json, lambda: [table((str(out), ""), list(asdict(spec).items()))])
 
 
 def _missing(arm: str, known: Known) -> list[str]:

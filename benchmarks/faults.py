@@ -34,8 +34,8 @@ from pneumarm.arm.virtual import (
     draw_parameters,
 )
 from pneumarm.arm.virtual.parameters import BAR
+from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control import TransferSettings, transfer
-from pneumarm.control.leaks import LeakTest, leak_test, leaking
 from pneumarm.control.monitor import Finding, Monitor
 from pneumarm.learning import train
 from pneumarm.learning.begin import begin_states

@@ -64,6 +64,10 @@ COMMANDS = {
         "Measure an arm's sensors and write what everything else needs to know of it.",
         "pneumarm arm calibrate virtual:seed=7 --out arm.toml",
     ),
+    "arm sensors": (
+        "Show what the sensors say, with all valves closed.",
+        "pneumarm arm sensors virtual --seconds 2",
+    ),
     "arm errors": (
         "Show what the errors of the thesis' appendix A look like, on one page.",
         "pneumarm arm errors --out errors.html --transitions 4000",

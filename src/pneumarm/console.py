@@ -53,7 +53,7 @@ def show(result: Mapping[str, Any], as_json: bool, table: Callable[[], Sequence[
     if as_json:
         print(json.dumps(jsonable(result), allow_nan=False))
         return
-    out = Console(highlight=False)
+    out = Console(highlight=False, markup=False)  # "[bar]" is a unit, not a colour
     for part in table():
         out.print(part)
 

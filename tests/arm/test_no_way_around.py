@@ -29,7 +29,7 @@ GUARDED = {
     "arm/serial/emulate.py": "warms up the arm of an emulated board, before anybody can reach it",
     "experiments/valves_closed/__init__.py": "guards its arm",
     "gym/on_arm.py": "guards its arm",
-    "control/leaks.py": "guards its arm",
+    "checkup/leaks.py": "takes a GuardedArm",
     "checkup/measure.py": "takes a GuardedArm",
     "commands/arm_.py": "guards its arm",
 }

@@ -10,7 +10,8 @@ from benchmarks.faults import KINDS, played, watched_steps
 
 from pneumarm.arm import Reading
 from pneumarm.arm.virtual import DeadPotentiometer, Leak, StuckValve, SupplyLoss, VirtualArm, draw_parameters
-from pneumarm.control import Finding, LeakTest, Monitor, leak_test, leaking
+from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
+from pneumarm.control import Finding, Monitor
 from pneumarm.control.monitor import marks_of
 from pneumarm.control.monitor.hypotheses import hypotheses
 from pneumarm.errors import ArmFailure, UnusableInput

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.appendix_a.runs import Case
 from pneumarm.checkup import Checkup
-from pneumarm.checkup.diagnose import LAGS, detrended
+from pneumarm.checkup.figures import LAGS, detrended
 from pneumarm.report.checkup import spectrum
 from pneumarm.report.style import (
     DARK,

@@ -24,13 +24,12 @@ class CorrectedArm(Arm):
             raise UnusableInput(
                 f"the file is of an arm with {known.spec.joints} joint(s), this has {arm.spec.joints}"
             )
-        self.arm, self.spec = arm, known.spec
-        self._correction = known.correction
+        self.arm, self.spec, self.known = arm, known.spec, known
 
     def read(self) -> Reading:
         """Return what the sensors say, put right."""
         raw = checked(self.arm.read(), self.arm.spec)
-        correction = self._correction
+        correction = self.known.correction
         return replace(raw, angle=correction.angle(raw.angle), pressure=correction.pressure(raw.pressure))
 
     def set_valves(self, valves: NDArray[np.int8]) -> None:

@@ -1,7 +1,8 @@
 """What is known of an arm, in a file of its own: its spec, and what its sensors need to be put right.
 
 An ``arm.toml`` holds a table ``[spec]`` with the fields of :class:`~pneumarm.arm.ArmSpec`, and, where a calibration
-found that readings must be corrected, a table ``[correction]`` with those of :class:`Correction`::
+found that readings must be corrected, a table ``[correction]`` with those of :class:`Correction`, and a table
+``[baseline]`` with what the arm did then, those of :class:`Baseline`::
 
     [spec]
     joints = 1
@@ -12,6 +13,11 @@ found that readings must be corrected, a table ``[correction]`` with those of :c
 
     [correction]
     pressure_zero = [[41.0, 40.5]]
+
+    [baseline]
+    leak = [[0.025, 0.037]]
+    leak_error = [[0.0007, 0.0007]]
+    ends = [[160.5, 870.0]]
 """
 
 import math
@@ -74,7 +80,7 @@ class Correction:
         return np.array([_interpolated(r, *table) for r, table in zip(raw.tolist(), pairs, strict=True)])
 
     def pressure(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the corrected pressures (joints, 2) [counts]."""
+        """Return the corrected pressures (..., joints, 2) [counts]."""
         shifted = raw - np.asarray(self.pressure_zero) if self.pressure_zero else raw
         return shifted * np.asarray(self.pressure_gain) if self.pressure_gain else shifted
 
@@ -98,15 +104,37 @@ def _require(valid: bool, name: str, expected: str) -> None:
 
 
 @dataclass(frozen=True)
+class Baseline:
+    """What a sound arm did when it was calibrated; a later check-up is compared with it. In corrected counts."""
+
+    leak: tuple[tuple[float, float], ...]
+    """Part of its pressure that each closed muscle lost, (joints, 2) [1/minute]."""
+    leak_error: tuple[tuple[float, float], ...]
+    """Standard error of that, (joints, 2) [1/minute]."""
+    ends: tuple[tuple[float, float], ...]
+    """Angles with muscle 2 full and with muscle 1 full, (joints, 2) [counts]."""
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            if not all(map(_finite, values)):
+                raise UnusableInput(f"Baseline: {name} needs two finite numbers a joint")
+        if not all(error >= 0 for pair in self.leak_error for error in pair):
+            raise UnusableInput("Baseline: leak_error needs numbers that are not negative")
+
+
+@dataclass(frozen=True)
 class ArmFile:
     """The content of an ``arm.toml``."""
 
     spec: ArmSpec
     correction: Correction = Correction()
+    baseline: Baseline | None = None
 
     def __post_init__(self) -> None:
         if not self.correction.fits(self.spec.joints):
             raise UnusableInput(f"the correction must be for {self.spec.joints} joint(s), as the spec is")
+        if self.baseline is not None and any(len(v) != self.spec.joints for v in vars(self.baseline).values()):
+            raise UnusableInput(f"the baseline must be for {self.spec.joints} joint(s), as the spec is")
 
 
 def load_spec(path: Path | str) -> ArmSpec:
@@ -144,7 +172,7 @@ def load_arm_file(path: Path | str) -> ArmFile:
             raise UnusableInput(f"larger than {_LARGEST:,} bytes")
         found = tomllib.loads(text.decode())
         _refuse_unknown(found, ArmFile, "")
-        for part, kind in (("spec", ArmSpec), ("correction", Correction)):
+        for part, kind in (("spec", ArmSpec), ("correction", Correction), ("baseline", Baseline)):
             if isinstance(found.get(part), dict):
                 _refuse_unknown(found[part], kind, f"[{part}] ")
         return msgspec.convert(found, ArmFile)
@@ -166,6 +194,8 @@ def save_arm_file(known: ArmFile, path: Path | str) -> None:
     tables = {"spec": asdict(known.spec)}
     if not known.correction.is_none:
         tables["correction"] = asdict(known.correction)
+    if known.baseline is not None:
+        tables["baseline"] = asdict(known.baseline)
     lines = ["# An arm as pneumarm knows it: angles and pressures in sensor counts, times in seconds."]
     for name, table in tables.items():
         entries = [f"{key} = {_toml(value)}" for key, value in table.items() if value is not None and value != ()]

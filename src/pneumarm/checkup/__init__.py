@@ -1,8 +1,10 @@
 """The check-up of an arm: what its sensors, valves and muscles do, what is wrong with them, and its calibration."""
 
 from pneumarm.checkup.calibrate import Calibration, Known, calibrate
-from pneumarm.checkup.diagnose import Finding, diagnose, joint_figures
-from pneumarm.checkup.measure import Checkup, CheckupSettings, Trace, measure
+from pneumarm.checkup.diagnose import Finding, diagnose
+from pneumarm.checkup.figures import ends, joint_figures, quickening
+from pneumarm.checkup.leaks import LeakRates, LeakTest, leak_test, leaking
+from pneumarm.checkup.measure import Checkup, CheckupSettings, Trace, fill_alone, measure
 
 __all__ = [
     "Calibration",
@@ -10,9 +12,16 @@ __all__ = [
     "CheckupSettings",
     "Finding",
     "Known",
+    "LeakRates",
+    "LeakTest",
     "Trace",
     "calibrate",
     "diagnose",
+    "ends",
+    "fill_alone",
     "joint_figures",
+    "leak_test",
+    "leaking",
     "measure",
+    "quickening",
 ]

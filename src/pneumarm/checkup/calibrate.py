@@ -1,4 +1,4 @@
-"""What a check-up says of an arm's sensors, as the spec and the corrections that everything else works with.
+"""What a check-up says of an arm, as the spec, corrections and baseline that everything else works with.
 
 A logarithmic potentiometer is linearised by the symmetry of the joint. Its track turns the true share x of the way
 into the share (e^(k x) - 1) / (e^k - 1) of the counts; k is what makes the two halves of the sweep turn the joint
@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneumarm.arm.spec_file import ArmFile, Correction
-from pneumarm.checkup.diagnose import LOGARITHMIC, cut, halves
+from pneumarm.arm.spec_file import ArmFile, Baseline, Correction
+from pneumarm.checkup.diagnose import LOGARITHMIC
+from pneumarm.checkup.figures import ends, halves, joint_figures
 from pneumarm.checkup.measure import Array, Checkup, JointTest
 from pneumarm.errors import UnusableInput
 
@@ -32,16 +33,28 @@ _REACTION = 2.0  # a period must be so many times the 99th percentile of setting
 class Known:
     """What only a person can say of an arm."""
 
-    angles: tuple[float, float] | None = None
-    """Angles with muscle 2 full and with muscle 1 full, as read from a protractor [degrees]; else the scale stays."""
+    angles: tuple[tuple[float, float], ...] = ()
+    """Angles with muscle 2 full and with muscle 1 full, by a protractor [degrees]; for all joints, or for each."""
+    counts_per_degree: float | None = None
+    """... or what the angle's sensors count, by their data sheet; where both are missing the spec's scale stays."""
     supply: float | None = None
-    """Pressure of the supply by its manometer, which full muscles reach [bar gauge]; else the scale stays."""
+    """Pressure of the supply by its manometer, which full muscles reach [bar gauge]."""
+    counts_per_bar: float | None = None
+    """... or what the pressure sensors count, by their data sheet; where both are missing the spec's scale stays."""
 
     def __post_init__(self) -> None:
-        if self.angles is not None and not (all(map(math.isfinite, self.angles)) and self.angles[0] < self.angles[1]):
-            raise UnusableInput(f"the angles must be a lower and a higher one in degrees, got {self.angles}")
+        for pair in self.angles:
+            if not (all(map(math.isfinite, pair)) and pair[0] < pair[1]):
+                raise UnusableInput(f"the angles must be a lower and a higher one in degrees, got {pair}")
         if self.supply is not None and not 0.1 <= self.supply <= 10:
             raise UnusableInput(f"the supply must be 0.1 to 10 bar gauge, got {self.supply}")
+        for name in ("counts_per_degree", "counts_per_bar"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < math.inf:
+                raise UnusableInput(f"{name} must be above 0, got {value}")
+        for measured, sheet in (("angles", "counts_per_degree"), ("supply", "counts_per_bar")):
+            if getattr(self, measured) and getattr(self, sheet) is not None:
+                raise UnusableInput(f"give {measured} or {sheet}, not both: which of them were to hold?")
 
 
 @dataclass(frozen=True)
@@ -54,7 +67,7 @@ class Calibration:
 
 
 def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
-    """Return spec and corrections of the arm that was checked with its sensors raw.
+    """Return spec, corrections and baseline of the arm that was checked with its sensors raw.
 
     Raises:
         UnusableInput: the arm cannot be calibrated like this; what it needs first is said.
@@ -62,16 +75,21 @@ def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
     """
     spec = checkup.spec
     lines = [_linearised(checkup, j) for j in range(len(checkup.joints))]
-    ends = np.array([line.ends for line in lines])
-    if (np.diff(ends) < _LEAST_SWEEP * np.diff(spec.angle_range)).any():
+    at_ends = np.array([line.ends for line in lines])
+    if (np.diff(at_ends) < _LEAST_SWEEP * np.diff(spec.angle_range)).any():
         raise UnusableInput(f"{spec.name}: its angle hardly moves; run `pneumarm arm check` and mend what it finds")
     per_degree, angle_range = spec.counts_per_degree, spec.angle_range
     scales = [(0.0, 0.0, 1.0)] * len(
         lines
     )  # where a joint's 0 degrees are, where they go, and how they are stretched
-    if known.angles is not None:
-        each = np.diff(ends)[:, 0] / np.diff(known.angles)
-        zeros = ends[:, 0] - known.angles[0] * each
+    if known.counts_per_degree is not None:
+        per_degree = known.counts_per_degree
+    if known.angles:
+        if len(known.angles) not in (1, len(lines)):
+            raise UnusableInput(f"{spec.name}: give the angles once, or once for each of its {len(lines)} joints")
+        degrees = np.broadcast_to(known.angles, at_ends.shape)
+        each = np.diff(at_ends)[:, 0] / np.diff(degrees)[:, 0]
+        zeros = at_ends[:, 0] - degrees[:, 0] * each
         per_degree, middle = float(each.mean()), float(zeros.mean())
         reach = max(middle - spec.angle_range[0], spec.angle_range[1] - middle)
         angle_range = (middle - reach, middle + reach)
@@ -95,11 +113,26 @@ def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
     calibrated = replace(
         spec, counts_per_degree=per_degree, counts_per_bar=mean_per_bar, angle_range=angle_range, period=period
     )
-    return Calibration(ArmFile(calibrated, correction), tuple(line.residual for line in lines))
+    file = ArmFile(calibrated, correction, _baseline(checkup, correction))
+    return Calibration(file, tuple(line.residual for line in lines))
 
 
-def _pairs(values: Array) -> tuple[tuple[float, float], ...]:
-    return tuple((round(float(a), 4), round(float(b), 4)) for a, b in values)
+def _baseline(checkup: Checkup, correction: Correction) -> Baseline | None:
+    """Return what the arm did, with its sensors corrected; None where its muscles hold no air to lose."""
+    muscles = [joint_figures(checkup, j).muscles for j in range(len(checkup.joints))]
+    leak, error = (np.array([[getattr(m, name) / 100 for m in pair] for pair in muscles]) for name in _LEAKS)
+    if np.isnan(leak).any():
+        return None
+    raw = np.array([ends(test) for test in checkup.joints])
+    true = np.stack([correction.angle(at) for at in raw.T], axis=1)
+    return Baseline(_pairs(leak, 6), _pairs(error, 6), _pairs(true))
+
+
+_LEAKS = ("leak", "leak_error")
+
+
+def _pairs(values: Array, digits: int = 4) -> tuple[tuple[float, float], ...]:
+    return tuple((round(float(a), digits), round(float(b), digits)) for a, b in values)
 
 
 def _pressures(checkup: Checkup, known: Known) -> tuple[Array, Array]:
@@ -107,7 +140,7 @@ def _pressures(checkup: Checkup, known: Known) -> tuple[Array, Array]:
     zero, full = (np.zeros((len(checkup.joints), 2)) for _ in range(2))
     for j, test in enumerate(checkup.joints):
         for m in range(2):
-            fill = cut(test.muscles[m], checkup)[0]
+            fill = test.muscles[m].fill
             zero[j, m] = test.before.pressure[-10:, m].mean()
             late = fill.time > fill.time[-1] - 0.2
             end = fill.pressure[late, m]
@@ -118,10 +151,10 @@ def _pressures(checkup: Checkup, known: Known) -> tuple[Array, Array]:
                 why = "is cut off at the pressure limit" if stopped else "still rises when its time is over"
                 raise UnusableInput(
                     f"{checkup.spec.name}: joint {j + 1}, muscle {m + 1} {why}, and does not show the supply's "
-                    "pressure; turn the reducer down, or fill longer (--fill), or leave --supply out"
+                    "pressure; turn the reducer down, or fill longer (--fill), or give --counts-per-bar instead"
                 )
     if known.supply is None:
-        return zero, np.full_like(zero, checkup.spec.counts_per_bar)
+        return zero, np.full_like(zero, known.counts_per_bar or checkup.spec.counts_per_bar)
     if (full - zero <= 0).any():
         raise UnusableInput(f"{checkup.spec.name}: a muscle does not fill; run `pneumarm arm check`")
     return zero, (full - zero) / known.supply
@@ -140,13 +173,13 @@ class _Line:
 def _linearised(checkup: Checkup, j: int) -> _Line:
     test, spec = checkup.joints[j], checkup.spec
     ratio = halves(test)
-    ends = np.array([np.median(cut(test.muscles[m], checkup)[1].angle) for m in (1, 0)])
+    at_ends = ends(test)
     if math.isnan(ratio):
         raise UnusableInput(
             f"{spec.name}: joint {j + 1} does not turn as its pressures say; run `pneumarm arm check` and mend it"
         )
     if 1 / LOGARITHMIC < ratio < LOGARITHMIC:
-        return _Line(ends, 0.0, None)
+        return _Line(at_ends, 0.0, None)
     low, high = spec.angle_range
     curvature = _curvature(test, low, high)
     angle = straightened(test.sweep.angle, curvature, low, high)
@@ -156,7 +189,7 @@ def _linearised(checkup: Checkup, j: int) -> _Line:
             f"{spec.name}: the potentiometer of joint {j + 1} is not linear, and linearised as a logarithmic one "
             f"it is still off by {residual:.1f} degrees; put in a linear one"
         )
-    return _Line(straightened(ends, curvature, low, high), curvature, residual)
+    return _Line(straightened(at_ends, curvature, low, high), curvature, residual)
 
 
 def straightened(raw: Array, curvature: float, low: float, high: float) -> Array:

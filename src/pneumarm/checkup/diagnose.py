@@ -6,39 +6,55 @@ monitor finds a minute later.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.checkup.measure import Array, Checkup, JointTest, MuscleTest, Trace
+from pneumarm.arm.spec_file import Baseline
+from pneumarm.checkup.figures import (
+    MOVED,
+    JointFigures,
+    autocorrelation,
+    detrended,
+    ends,
+    irregularity,
+    joint_figures,
+    ljung_box,
+    quickening,
+)
+from pneumarm.checkup.leaks import LeakRates, leaking
+from pneumarm.checkup.measure import Array, Checkup, JointTest, MuscleTest
 
-MOVED = 0.10
-"""A pressure moved if it changed by so much [bar]; the other muscle, stretched or slackened, moves by less."""
 WHITE = 0.25
 """Noise whose autocorrelation at any of the first lags exceeds this is not white."""
 NOISY = 3.5
 """Readings are noisy whose standard deviation at rest exceeds so many counts (thesis A.1.3: 4 is relatively high)."""
-LAGS = 20
 LEAK = 12.0
-"""A muscle leaks if it loses more than so many percent of its pressure a minute."""
+"""A muscle leaks if it loses more than so many percent of its pressure a minute, where it has no baseline."""
 LOW_SUPPLY = 0.75
 """The supply is low if a full muscle reads less than this share of the pressure limit."""
+HIGH_SUPPLY = 1.05
+"""The supply is high if muscles fill to more than this share of the limit before their inlets can be closed."""
+RISING = 0.85
+"""The supply rises if at the end of the check-up muscles fill in less than this share of the time as before."""
+ZERO = 0.05
+"""A pressure sensor is not as calibrated if it reads so much more or less in a vented muscle [bar]."""
+ENDS = 6.0
+"""A joint is not as calibrated if its ends have moved by so much [degrees]."""
 LEAP = 0.08
 """A sensor is at the valve's side if its reading leaps by so much [bar] when the valve opens and falls back."""
 LOGARITHMIC = 1.3
 """A potentiometer is logarithmic if one half of the sweep turns it so many times further than the other half."""
 WORN = 6.0
 """A place of the potentiometer is worn if its readings are off by so many counts there (root mean square)."""
-_BIN = 10.0  # counts: about a degree
 _EVEN = 0.35  # bar: what a filled muscle always exceeds, and one that is merely stretched never reaches
 
 Kind = Literal[
     "muscles swapped", "pressure sensors swapped", "valves swapped", "inlet stuck closed", "inlet stuck open",
-    "exhaust stuck closed", "exhaust stuck open", "low supply", "leak", "angle reversed", "angle dead",
-    "angle frozen", "pressure frozen", "angle logarithmic", "angle worn", "pressure at the valve's side",
-    "noise", "noise not white", "jitter",
+    "exhaust stuck closed", "exhaust stuck open", "low supply", "high supply", "rising supply", "leak",
+    "angle reversed", "angle dead", "angle frozen", "pressure frozen", "angle logarithmic", "angle worn",
+    "pressure at the valve's side", "noise", "noise not white", "not as calibrated", "jitter",
 ]  # fmt: skip
 
 
@@ -56,188 +72,15 @@ class Finding(NamedTuple):
         return f"{self.where}: {self.kind}: {self.told_by}. {self.remedy}."
 
 
-@dataclass(frozen=True)
-class MuscleFigures:
-    """What one muscle and its valves do."""
+def diagnose(checkup: Checkup, baseline: Baseline | None = None) -> list[Finding]:
+    """Return what is wrong with the arm; an empty list for a healthy one.
 
-    full: float
-    """Pressure when full [bar]."""
-    fill_time: float
-    """Time from the command until 63 % of that [s]; not a number if it does not fill."""
-    exhaust_time: float
-    """Time from the command until 37 % of that [s]; not a number if it does not empty."""
-    leak: float
-    """Share of the pressure lost by closed valves [% a minute]."""
-    turned: float
-    """How far filling turned the joint [degrees]."""
-    noise: float
-    """Standard deviation of the pressure's reading at rest [counts]."""
-    leap: float
-    """By how much the reading falls within 0.06 s after a pulse of air has ended [bar]."""
+    Args:
+        checkup: what was measured.
+        baseline: what the same arm did when it was calibrated, with its sensors corrected as they are now.
 
-
-@dataclass(frozen=True)
-class JointFigures:
-    """What one joint does."""
-
-    muscles: tuple[MuscleFigures, MuscleFigures]
-    angle_noise: float
-    """Standard deviation of the angle's reading at rest [counts]."""
-    lowest: float
-    """Lowest angle of the sweep [counts]."""
-    highest: float
-    """Highest angle of the sweep [counts]."""
-    halves: float
-    """How many times further the upper half of the pressure difference turns the joint than the lower half."""
-    worst: float
-    """Largest irregularity of the angle at any place (root mean square) [counts]."""
-
-
-def joint_figures(checkup: Checkup, joint: int) -> JointFigures:
-    """Return the figures of ``joint``."""
-    test = checkup.joints[joint]
-    one, two = (_muscle_figures(checkup, test, m) for m in range(2))
-    return JointFigures(
-        muscles=(one, two),
-        angle_noise=float(np.std(detrended(test.rest.time, test.rest.angle))),
-        lowest=float(test.sweep.angle.min()),
-        highest=float(test.sweep.angle.max()),
-        halves=halves(test),
-        worst=float(max(irregularity(test)[1], default=0.0)),
-    )
-
-
-def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
-    settings, bar = checkup.settings, checkup.spec.counts_per_bar
-    fill, hold, exhaust = cut(test.muscles[m], checkup)
-    rise = fill.pressure[:, m] - fill.pressure[0, m]
-    full = float(np.median(hold.pressure[:, m]) - fill.pressure[0, m])
-    fall = exhaust.pressure[:, m] - exhaust.pressure[-10:, m].mean()
-    moved = full > MOVED * bar
-    rest = test.rest
-    slope, level = np.polyfit(rest.time, rest.pressure[:, m], 1)
-    pulse = test.muscles[m].pulse
-    end = int(np.searchsorted(pulse.time, settings.pulse))
-    settled = np.median(pulse.pressure[_window(pulse.time, settings.pulse + 0.05, 0.05), m])
-    peak = pulse.pressure[_window(pulse.time, settings.pulse - 0.01, 0.04), m].max() if end else settled
-    return MuscleFigures(
-        full=full / bar,
-        fill_time=_first(fill.time, rise > 0.63 * full) if moved else float("nan"),
-        exhaust_time=_first(exhaust.time - exhaust.time[0], fall < 0.37 * full) if moved else float("nan"),
-        leak=float(-6000 * slope / level) if level > MOVED * bar else float("nan"),
-        turned=float(fill.angle[-1] - fill.angle[0]) / checkup.spec.counts_per_degree,
-        noise=float(np.std(detrended(rest.time, rest.pressure[:, m]))),
-        leap=float(peak - settled) / bar,
-    )
-
-
-def cut(test: MuscleTest, checkup: Checkup) -> list[Trace]:
-    """Return fill, hold and exhaust of a muscle's test."""
-    settings = checkup.settings
-    half = settings.step / 2
-    return test.whole.pieces(settings.fill + half, settings.fill + settings.hold + half)
-
-
-def _window(time: Array, begin: float, length: float) -> NDArray[np.bool_]:
-    return (time >= begin) & (time <= begin + length)
-
-
-def _first(time: Array, reached: NDArray[np.bool_]) -> float:
-    return float(time[np.argmax(reached)]) if reached.any() else float("nan")
-
-
-def detrended(time: Array, values: Array) -> Array:
-    """Return ``values`` without what changes slowly: creep, heat and leak (thesis A.1.3: "we detrend this data")."""
-    scaled = time / time[-1]
-    return values - np.polyval(np.polyfit(scaled, values, 4), scaled)
-
-
-_NOTHING = 1e-6
-"""A variance below this [counts^2] is that of rounding."""
-
-
-def autocorrelation(values: Array) -> Array:
-    """Return the autocorrelation at lags 0..LAGS; zeros where nothing varies.
-
-    The covariance is the inverse Fourier transform of the power spectrum (thesis A.1.3), zero-padded, so that the end
-    of the record does not meet its beginning.
     """
-    spectrum = np.abs(np.fft.rfft(values - values.mean(), 2 * len(values))) ** 2
-    covariance = np.fft.irfft(spectrum)[: LAGS + 1]
-    return covariance / covariance[0] if covariance[0] > _NOTHING * len(values) else np.zeros(LAGS + 1)
-
-
-def ljung_box(correlation: Array, count: int) -> float:
-    """Return the statistic of Ljung and Box of ``count`` values, which is chi-squared with LAGS degrees if white.
-
-    G. M. Ljung and G. E. P. Box, "On a measure of lack of fit in time series models", Biometrika 65, 1978.
-    """
-    lags = np.arange(1, len(correlation))
-    return float(count * (count + 2) * np.sum(correlation[1:] ** 2 / (count - lags)))
-
-
-def halves(test: JointTest) -> float:
-    """Return how many times further the upper half of the pressure difference turns the joint than the lower half.
-
-    Two muscles that are alike turn a joint by the same angle for the same difference either way; weight and unlike
-    muscles bend that by a tenth, the track of a logarithmic potentiometer by a factor of three to eight.
-    """
-    difference = test.sweep.pressure[:, 0] - test.sweep.pressure[:, 1]
-    low, high = difference.min(), difference.max()
-    reach = 0.8 * min(-low, high)
-    if reach <= 0:
-        return float("nan")
-    turns = []
-    n = len(difference) // 2 + 1
-    for half in (slice(0, n), slice(n - 1, None)):
-        order = np.argsort(difference[half])
-        at = np.interp((-reach, 0.0, reach), difference[half][order], test.sweep.angle[half][order])
-        turns.append(np.diff(at))
-    lower, upper = np.mean(turns, axis=0)
-    return float(upper / lower) if lower > 0 and upper > 0 else float("nan")
-
-
-def irregularity(test: JointTest) -> tuple[Array, Array]:
-    """Return places of the angle [counts] and how far readings there are off those before and after (rms) [counts].
-
-    A joint has inertia: within a few readings it moves on a parabola. What departs from the parabola at the same
-    angle again and again, whatever the movement, is the potentiometer.
-    """
-    places, offs = [], []
-    for trace in [piece for muscle in test.muscles for piece in (muscle.whole, muscle.pulse)]:
-        angle = trace.angle
-        if len(angle) < 2 * _AROUND + 1:
-            continue
-        around = np.lib.stride_tricks.sliding_window_view(angle, 2 * _AROUND + 1)
-        places.append(np.median(around, axis=1))
-        offs.append(angle[_AROUND:-_AROUND] - around @ _PARABOLA)
-    place, off = np.concatenate(places), np.concatenate(offs)
-    bins = np.floor(place / _BIN).astype(int)
-    found = [(b, off[bins == b]) for b in np.unique(bins)]
-    kept = [(b, values) for b, values in found if len(values) >= 3]
-    centres = np.array([(b + 0.5) * _BIN for b, _ in kept])
-    return centres, np.array([float(np.sqrt(np.mean(values**2))) for _, values in kept])
-
-
-_AROUND = 7
-"""Readings either side that a parabola is fitted to, without those in the middle."""
-
-
-def _parabola() -> Array:
-    """Return the weights that give a parabola's value in the middle of 2 * _AROUND + 1 readings."""
-    x = np.arange(-_AROUND, _AROUND + 1.0)
-    outer = np.abs(x) > 1
-    weights = np.zeros(len(x))
-    weights[outer] = np.linalg.pinv(np.vander(x[outer], 3, increasing=True))[0]
-    return weights
-
-
-_PARABOLA = _parabola()
-
-
-def diagnose(checkup: Checkup) -> list[Finding]:
-    """Return what is wrong with the arm; an empty list for a healthy one."""
-    found = [finding for j in range(len(checkup.joints)) for finding in _of_joint(checkup, j)]
+    found = [finding for j in range(len(checkup.joints)) for finding in _of_joint(checkup, j, baseline)]
     periods = checkup.timing.periods
     if np.quantile(periods, 0.95) > 1.5 * checkup.spec.period:
         worst = f"95 % of the control periods are below {1e3 * np.quantile(periods, 0.95):.0f} ms"
@@ -246,10 +89,10 @@ def diagnose(checkup: Checkup) -> list[Finding]:
     return found
 
 
-def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
+def _of_joint(checkup: Checkup, j: int, baseline: Baseline | None) -> Iterator[Finding]:
     test, figures, bar = checkup.joints[j], joint_figures(checkup, j), checkup.spec.counts_per_bar
     name = f"joint {j + 1}" if len(checkup.joints) > 1 else "joint"
-    rose = np.array([_rise(test.muscles[m], checkup) for m in range(2)]) / bar  # [muscle filled, sensor]
+    rose = np.array([_rise(test.muscles[m]) for m in range(2)]) / bar  # [muscle filled, sensor]
     own, other = rose.diagonal(), rose[:, ::-1].diagonal()
     turned = np.array([m.turned for m in figures.muscles])
     crossed = bool((other > _EVEN).all() and (own < 0.5 * other).all())
@@ -258,14 +101,15 @@ def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
     before = test.before.pressure
     filled_by_venting = (before[-10:].mean(axis=0) - before[0]) / bar > MOVED
     stays = np.array([_stays(test.muscles[m], m, checkup) for m in range(2)])
+    swapped_pair = False
     for m in range(2):
         where = f"{name}, muscle {m + 1}"
         swapped = _vents_up(test.muscles[m], m, checkup)
-        if filled_by_venting[m] or swapped:
+        if (filled_by_venting[m] or swapped) and _filled_by_venting(test.muscles[m], m, checkup):
+            swapped_pair = True
             yield Finding(
                 "valves swapped", where, "its pressure rises on letting air out", "Swap its inlet and exhaust wires"
             )
-    swapped_pair = filled_by_venting.any()
     if crossed and reversed_:
         told = "filling one raises the pressure of the other and turns the joint the other way"
         yield Finding("muscles swapped", name, told, "Swap the valves of muscle 1 with those of muscle 2")
@@ -277,6 +121,13 @@ def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
         yield Finding("angle reversed", name, told, "Swap the outer wires of the potentiometer")
     if crossed or swapped_pair:
         return
+    limit = checkup.spec.max_pressure
+    full = min(muscle.full for muscle in figures.muscles)
+    if full > HIGH_SUPPLY * limit:
+        told = f"muscles fill to {full:.2f} bar before their inlets can be closed at the limit of {limit:.2f} bar"
+        remedy = "Turn the reducer down; if it creeps up again it leaks: a safety valve on the buffer (thesis A.1.1)"
+        yield Finding("high supply", name, told, remedy)
+        return  # so fast nothing else can be judged
     frozen = [_is_frozen(test, m) for m in range(2)]
     valves = list(_of_valves(figures, rose, stays, frozen, checkup, name))
     stuck = [finding for finding in valves if "stuck" in finding.kind]
@@ -284,15 +135,23 @@ def _of_joint(checkup: Checkup, j: int) -> Iterator[Finding]:
         yield from stuck  # while air flows that should not, nothing else can be judged
         return
     yield from valves
+    yield from _of_leaks(figures, name, baseline, j)
+    if (quicker := quickening(test, checkup)) < RISING:
+        told = f"at the end of the check-up muscles fill in {100 * quicker:.0f} % of the time of before"
+        remedy = "See whether the reducer leaks: its buffer fills up while no air is used (thesis A.1.1)"
+        yield Finding("rising supply", name, told, remedy)
     yield from _of_noise(checkup, j, name)
-    yield from _of_potentiometer(checkup, test, figures, name)
+    potentiometer = list(_of_potentiometer(checkup, test, figures, name))
+    yield from potentiometer
+    if baseline is not None and not potentiometer:
+        yield from _of_calibration(checkup, test, name, baseline.ends[j])
 
 
 def _of_valves(
     figures: JointFigures, rose: Array, stays: NDArray[np.bool_], frozen: list[bool], checkup: Checkup, name: str
 ) -> Iterator[Finding]:
     limit = checkup.spec.max_pressure
-    own, other = rose.diagonal(), rose[::-1].diagonal()[::-1]  # by its own inlet, by the other muscle's
+    own, other = rose.diagonal(), rose[::-1].diagonal()  # by its own inlet, by the other muscle's
     full = np.array([m.full for m in figures.muscles])
     if (own < MOVED).all():
         yield Finding("low supply", name, "no muscle fills", "Turn the air on; see to the valves' power")
@@ -300,7 +159,6 @@ def _of_valves(
     if (np.maximum(full, own) < LOW_SUPPLY * limit).all():
         told = f"full muscles reach {full[0]:.2f} and {full[1]:.2f} bar of {limit:.2f}"
         yield Finding("low supply", name, told, "See to the reducer, the buffer and the filters")
-    most = np.nanmax([LEAK, *(muscle.leak for muscle in figures.muscles)])  # where one sags, the other is stretched
     for m, muscle in enumerate(figures.muscles):
         where = f"{name}, muscle {m + 1}"
         if frozen[m]:
@@ -308,22 +166,62 @@ def _of_valves(
         if own[m] < MOVED:
             told = f"it gains {own[m]:.2f} bar when its inlet opens"
             yield Finding("inlet stuck closed", where, told, "See to the inlet valve, its wire and its hose")
-        elif stays[m]:
-            told = "its pressure does not fall when its exhaust opens"
-            yield Finding("exhaust stuck closed", where, told, "See to the exhaust valve, its wire and its silencer")
         elif muscle.full < 0.6 * own[m]:
             told = f"of {own[m]:.2f} bar it keeps {muscle.full:.2f} when its valves close"
             yield Finding("exhaust stuck open", where, told, "See to the exhaust valve; or the muscle has burst")
         elif other[m] > _EVEN or muscle.leak < -LEAK:
             told = "its pressure rises while its valves are closed"
             yield Finding("inlet stuck open", where, told, "See to the inlet valve: dirt in its seat, or it sticks")
-        elif muscle.leak > max(LEAK, 0.5 * most):
-            told = f"closed, it loses {muscle.leak:.0f} % a minute"
-            yield Finding("leak", where, told, "Look for the leak with soap water: clamps, hose, exhaust valve")
+        elif stays[m]:
+            told = "its pressure does not fall when its exhaust opens"
+            yield Finding("exhaust stuck closed", where, told, "See to the exhaust valve, its wire and its silencer")
         elif muscle.leap > max(LEAP, _CLEAR * muscle.noise / checkup.spec.counts_per_bar):
             told = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
             remedy = "Move the pressure sensor to the far end of the muscle (thesis A.1.1)"
             yield Finding("pressure at the valve's side", where, told, remedy)
+
+
+def _of_leaks(figures: JointFigures, name: str, baseline: Baseline | None, j: int) -> Iterator[Finding]:
+    now = np.array([[muscle.leak, muscle.leak_error] for muscle in figures.muscles]).T / 100
+    if np.isnan(now).any():
+        return
+    leaks = (now[0] > LEAK / 100) & (now[0] >= now[0].max())  # where one sags, the other is stretched
+    then = np.zeros_like(now)
+    if baseline is not None:
+        then = np.array([baseline.leak[j], baseline.leak_error[j]])
+        healthy, found = (LeakRates(rate[None], error[None], np.nan) for rate, error in (then, now))
+        leaks |= leaking(healthy, found)[0]
+    for m in np.flatnonzero(leaks):
+        told = f"closed, it loses {100 * now[0, m]:.1f} % of its pressure a minute"
+        if then[0, m] > _CLEAR * then[1, m]:
+            told = (
+                f"it leaks {now[0, m] / then[0, m]:.1f} times as much as when calibrated: "
+                f"{told} instead of {100 * then[0, m]:.1f} %"
+            )
+        elif baseline is not None:
+            told += f", instead of {100 * then[0, m]:.1f} % when calibrated"
+        remedy = "Look for the leak with soap water: clamps, hose, exhaust valve"
+        yield Finding("leak", f"{name}, muscle {m + 1}", told, remedy)
+
+
+def _of_calibration(
+    checkup: Checkup, test: JointTest, name: str, calibrated: tuple[float, float]
+) -> Iterator[Finding]:
+    spec = checkup.spec
+    vented = spec.bar(test.before.pressure[-10:].mean(axis=0))
+    for m in np.flatnonzero(np.abs(vented) > ZERO):
+        told = f"vented, its sensor reads {vented[m]:.2f} bar; the zero has moved, or the spec is of another arm"
+        yield Finding("not as calibrated", f"{name}, muscle {m + 1}", told, _AGAIN)
+    moved = (ends(test) - calibrated) / spec.counts_per_degree
+    if np.abs(moved).max() > ENDS:
+        told = (
+            f"its ends are {moved[0]:+.1f} and {moved[1]:+.1f} degrees from where they were; the potentiometer has "
+            "slipped on its axis, the muscles or their mounting have changed, or the spec is of another arm"
+        )
+        yield Finding("not as calibrated", name, told, _AGAIN)
+
+
+_AGAIN = "See to it, then calibrate it anew with `pneumarm arm calibrate`"
 
 
 def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
@@ -375,10 +273,15 @@ def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, 
         yield Finding("angle logarithmic", name, told, remedy)
     worn, off = _worn(test)
     if len(worn):
-        degrees = ", ".join(f"{d:.0f}" for d in checkup.spec.degrees(worn))
-        told = f"readings are off by up to {off.max():.0f} counts at {degrees} degrees"
+        degrees = checkup.spec.degrees(worn)
+        zones = np.split(degrees, np.flatnonzero(np.diff(degrees) > _APART) + 1)
+        places = " and ".join(f"{z[0]:.0f}" if len(z) == 1 else f"{z[0]:.0f} to {z[-1]:.0f}" for z in zones)
+        told = f"readings are off by up to {off.max():.0f} counts at {places} degrees"
         remedy = "Put in a new potentiometer, and mount it so that nothing presses on its axis (thesis A.1.2)"
         yield Finding("angle worn", name, told, remedy)
+
+
+_APART = 6.0  # degrees between two worn zones
 
 
 def _worn(test: JointTest) -> tuple[Array, Array]:
@@ -397,22 +300,31 @@ def _is_frozen(test: JointTest, m: int) -> bool:
     return bool(np.ptp(pressures) == 0)
 
 
-def _rise(test: MuscleTest, checkup: Checkup) -> Array:
+def _rise(test: MuscleTest) -> Array:
     """Return how far each pressure rose while a muscle was filled, (2,) [counts]."""
-    fill = cut(test, checkup)[0]
+    fill = test.fill
     rise: Array = np.quantile(fill.pressure, 0.95, axis=0) - fill.pressure[:3].mean(axis=0)
     return rise
 
 
 def _stays(test: MuscleTest, m: int, checkup: Checkup) -> bool:
     """Return whether muscle ``m`` keeps most of its air while its exhaust is open."""
-    _, hold, exhaust = cut(test, checkup)
-    held = np.median(hold.pressure[:, m])
-    return bool(held > MOVED * checkup.spec.counts_per_bar and exhaust.pressure[-10:, m].mean() > 0.7 * held)
+    held = np.median(test.hold.pressure[:, m])
+    return bool(held > MOVED * checkup.spec.counts_per_bar and test.exhaust.pressure[-10:, m].mean() > 0.7 * held)
 
 
 def _vents_up(test: MuscleTest, m: int, checkup: Checkup) -> bool:
     """Return whether the pressure of muscle ``m`` rises while its exhaust is open."""
-    exhaust = cut(test, checkup)[2]
+    exhaust = test.exhaust
     gained = exhaust.pressure[-10:, m].mean() - exhaust.pressure[0, m]
     return bool(gained > MOVED * checkup.spec.counts_per_bar)
+
+
+def _filled_by_venting(test: MuscleTest, m: int, checkup: Checkup) -> bool:
+    """Return whether muscle ``m`` holds as much air after its exhaust was opened as after its inlet was.
+
+    Not more: where it is then over the limit the guard keeps its inlet closed, whose wire would vent it. A muscle
+    whose inlet is stuck open holds less.
+    """
+    more = test.exhaust.pressure[-10:, m].mean() - test.fill.pressure[-10:, m].mean()
+    return bool(more > -MOVED / 2 * checkup.spec.counts_per_bar)

@@ -3,9 +3,10 @@
 1. *Timing*: readings and settings of closed valves, timed by the host's clock; the control cycle with closed valves.
 2. *Muscles*, one at a time from vented: fill, hold, exhaust. Then a short pulse, which is over while air still flows
    fast: a sensor at the valve's side shows it by a leap (thesis A.1.1).
-3. *Rest*: both muscles half full and closed. After they have settled, the readings are noise (thesis A.1.3), and what
-   the pressures lose is the leak.
-4. *Sweep*: from one end to the other and back in small steps, standing still after each: angle against pressures.
+3. *Sweep*: from one end to the other and back in small steps, standing still after each: angle against pressures.
+4. *Rest*: all muscles of all joints full and closed. After they have settled, the readings are noise (thesis A.1.3),
+   and what the pressures lose is the leak (:mod:`pneumarm.checkup.leaks`).
+5. *Again*: each muscle is filled once more. A supply that creeps up has done so by now (thesis A.1.1).
 """
 
 from collections.abc import Callable
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
+from pneumarm.checkup.leaks import LeakTest, watch_closed
 from pneumarm.errors import UnusableInput
 
 Array = NDArray[np.float64]
@@ -35,10 +37,10 @@ class CheckupSettings:
     """Time that it is vented [s]."""
     pulse: float = 0.25
     """Length of the short pulse [s]."""
-    settle: float = 3.0
+    settle: float = 8.0
     """Time that closed muscles rest before noise and leak are measured [s]."""
-    rest: float = 20.0
-    """Time over which noise and leak are measured [s]."""
+    rest: float = 45.0
+    """Time over which noise and leak are measured [s]; a longer one finds smaller leaks."""
     rest_step: float = 0.02
     """Time between two readings then [s]."""
     sweep_steps: int = 16
@@ -61,29 +63,34 @@ class Trace:
     """What one joint's sensors read while its valves were set to something."""
 
     time: Array
-    """Since the valves were first set [s], shape (n,)."""
+    """Since the reading before the valves were first set [s], shape (n,)."""
     angle: Array
     """Shape (n,) [counts]."""
     pressure: Array
     """Shape (n, 2) [counts]."""
 
-    def pieces(self, *ends: float) -> list["Trace"]:
-        """Return the trace cut at the times ``ends`` [s]."""
-        places = np.searchsorted(self.time, ends)
-        cut = zip(
-            np.split(self.time, places), np.split(self.angle, places), np.split(self.pressure, places), strict=True
-        )
-        return [Trace(*piece) for piece in cut]
+    def __add__(self, later: "Trace") -> "Trace":
+        """Return this trace with a ``later`` one, on the same clock, after it."""
+        return Trace(*[np.concatenate(both) for both in zip(vars(self).values(), vars(later).values(), strict=True)])
 
 
 @dataclass(frozen=True)
 class MuscleTest:
     """One muscle of a joint, filled, held and exhausted, and then given a pulse, the other one vented."""
 
-    whole: Trace
-    """Fill, hold, exhaust; it begins at the moment that the inlet is opened."""
+    fill: Trace
+    """The inlet is open from 0 s on."""
+    hold: Trace
+    """Closed; its clock and that of ``exhaust`` go on from ``fill``."""
+    exhaust: Trace
+    """The exhaust is open from its first reading on."""
     pulse: Trace
-    """The pulse and some 0.1 s after it."""
+    """The pulse, on a clock of its own, and what comes after it."""
+
+    @property
+    def whole(self) -> Trace:
+        """Fill, hold and exhaust."""
+        return self.fill + self.hold + self.exhaust
 
 
 @dataclass(frozen=True)
@@ -93,10 +100,12 @@ class JointTest:
     before: Trace
     """While all muscles were first vented: nothing should rise."""
     muscles: tuple[MuscleTest, MuscleTest]
-    rest: Trace
-    """Both muscles half full and closed."""
     sweep: Trace
     """A reading at rest for each step, up and then down; many readings are averaged for each."""
+    rest: Trace
+    """Both muscles full and closed."""
+    again: tuple[Trace, Trace]
+    """Each muscle filled once more at the end, as it was in its own test."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +134,7 @@ def measure(
     *,
     progress: Callable[[float, float], None] | None = None,
 ) -> Checkup:
-    """Check ``arm``, whose joints must be free to move; it is left vented and closed.
+    """Check ``arm``, whose joints must be free to move, for some two minutes; it is left vented and closed.
 
     Raises:
         ArmFailure: the arm fails.
@@ -138,14 +147,33 @@ def measure(
     try:
         first = bench.vent()
         timing = _timing(guard, settings)
-        tests = []
+        moved = []
         for joint in range(joints):
-            tests.append(bench.joint(joint, first))
-            told(joint + 1, joints)
-        bench.vent()
+            moved.append((bench.muscle(joint, 0), bench.muscle(joint, 1), bench.sweep(joint)))
+            told(joint + 1, joints + 1)
+        rest = bench.rest()
+        again = [(bench.again(joint, 0), bench.again(joint, 1)) for joint in range(joints)]
+        told(joints + 1, joints + 1)
+        tests = [
+            JointTest(_trace(first, j), (one, two), sweep, _trace(rest, j), again[j])
+            for j, (one, two, sweep) in enumerate(moved)
+        ]
         return Checkup(guard.spec, settings, timing, tuple(tests))
     finally:
         guard.set_valves(np.zeros_like(guard.applied))
+
+
+def fill_alone(arm: Arm, joint: int, muscle: int, settings: CheckupSettings = CheckupSettings()) -> None:
+    """Vent all muscles of ``arm``, then fill one and close it: its joint stands at an end, and is left there.
+
+    Raises:
+        ArmFailure: the arm fails.
+
+    """
+    bench = _Bench(guarded(arm), settings)
+    bench.vent()
+    bench.watch(bench.alone(joint, muscle), settings.fill)
+    bench.watch(bench.valves(joint, 0, 0), settings.hold)
 
 
 def _timing(guard: GuardedArm, settings: CheckupSettings) -> Timing:
@@ -157,6 +185,7 @@ def _timing(guard: GuardedArm, settings: CheckupSettings) -> Timing:
             began = perf_counter()
             what()
             seconds[i] = perf_counter() - began
+            guard.wait(0.0)  # a controller that is only asked, and never told, would take us for dead
         return seconds
 
     def set_and_read() -> None:
@@ -182,6 +211,12 @@ class _Bench:
         valves[joint] = first, second
         return valves
 
+    def alone(self, joint: int, muscle: int, value: int = 1) -> NDArray[np.int8]:
+        """Return the valves of one muscle set to ``value``; those of all others closed."""
+        valves = np.zeros_like(self.guard.applied)
+        valves[joint, muscle] = value
+        return valves
+
     def vent(self) -> list[Reading]:
         """Vent all muscles."""
         self.guard.read()
@@ -202,32 +237,33 @@ class _Bench:
             readings.append(self.guard.watch())
         return readings
 
-    def joint(self, joint: int, first: list[Reading]) -> JointTest:
-        """Carry out all tests of ``joint``."""
-        one, two = self.muscle(joint, 0), self.muscle(joint, 1)
-        return JointTest(_trace(first, joint), (one, two), self.rest(joint), self.sweep(joint))
-
     def muscle(self, joint: int, muscle: int) -> MuscleTest:
         """Fill, hold and exhaust a muscle; then give it a pulse."""
         wanted = self.settings
-        alone = np.eye(2, dtype=int)[muscle]
         self.vent()
-        fill = self.watch(self.valves(joint, *alone), wanted.fill)
+        fill = self.watch(self.alone(joint, muscle), wanted.fill)
         hold = self.watch(self.valves(joint, 0, 0), wanted.hold)
-        exhaust = self.watch(self.valves(joint, *-alone), wanted.exhaust)
+        exhaust = self.watch(self.alone(joint, muscle, -1), wanted.exhaust)
         self.vent()
-        pulse = self.watch(self.valves(joint, *alone), wanted.pulse)
+        pulse = self.watch(self.alone(joint, muscle), wanted.pulse)
         after = self.watch(self.valves(joint, 0, 0), wanted.hold)
         self.vent()
-        return MuscleTest(_trace(fill + hold + exhaust, joint), _trace(pulse + after, joint))
+        begin = fill[0].time
+        filled, held, vented = (_trace(readings, joint, begin) for readings in (fill, hold, exhaust))
+        return MuscleTest(filled, held, vented, _trace(pulse + after, joint))
 
-    def rest(self, joint: int) -> Trace:
-        """Fill both muscles half, close them, let them settle, and read."""
+    def rest(self) -> list[Reading]:
+        """Fill all muscles, close them, let them settle, and read."""
         wanted = self.settings
         self.vent()
-        self.watch(self.valves(joint, 1, 1), wanted.fill / 3)
-        self.watch(self.valves(joint, 0, 0), wanted.settle)
-        return _trace(self.watch(self.valves(joint, 0, 0), wanted.rest, wanted.rest_step), joint)
+        return watch_closed(self.guard, LeakTest(wanted.fill, wanted.settle, wanted.rest, wanted.rest_step))
+
+    def again(self, joint: int, muscle: int) -> Trace:
+        """Fill a muscle from vented; then vent it."""
+        self.vent()
+        fill = self.watch(self.alone(joint, muscle), self.settings.fill)
+        self.vent()
+        return _trace(fill, joint)
 
     def sweep(self, joint: int) -> Trace:
         """Go from one end to the other and back, standing still after each step."""
@@ -256,7 +292,7 @@ class _Bench:
         return Reading(last[-1].time, angle, np.mean([r.pressure for r in last], axis=0))
 
 
-def _trace(readings: list[Reading], joint: int) -> Trace:
+def _trace(readings: list[Reading], joint: int, begin: float | None = None) -> Trace:
     time = np.array([r.time for r in readings])
     angle = np.array([r.angle[joint] for r in readings])
-    return Trace(time - time[0], angle, np.array([r.pressure[joint] for r in readings]))
+    return Trace(time - (time[0] if begin is None else begin), angle, np.array([r.pressure[joint] for r in readings]))

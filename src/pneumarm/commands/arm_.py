@@ -1,16 +1,19 @@
-"""``pneumarm arm check``, ``calibrate``, ``valves`` and ``emulate``."""
+"""``pneumarm arm check``, ``calibrate``, ``sensors``, ``valves``, ``errors`` and ``emulate``."""
 
+import math
+import select
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from pneumarm.appendix_a.runs import RunsSettings
-from pneumarm.arm import Arm, guarded, open_arm
+from pneumarm.arm import Arm, ArmSpec, GuardedArm, Reading, guarded, open_arm
+from pneumarm.arm.corrected import CorrectedArm
 from pneumarm.arm.spec_file import save_arm_file
 from pneumarm.checkup import (
     Checkup,
@@ -18,9 +21,12 @@ from pneumarm.checkup import (
     Known,
     calibrate,
     diagnose,
+    ends,
+    fill_alone,
     joint_figures,
     measure,
 )
+from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, muscle_row
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.errors import UnusableInput
@@ -47,7 +53,8 @@ def check_(
     Parameters
     ----------
     arm
-        virtual, virtual:seed=N, serial:PORT or python:module:callable; ``,spec=arm.toml`` names a calibration.
+        virtual, virtual:seed=N, serial:PORT or python:module:callable; ``,spec=arm.toml`` names a calibration, and
+        the arm is then compared with what it was.
     out
         Folder for a page with curves; made where there is none.
     seed
@@ -59,48 +66,47 @@ def check_(
         require_folder(out)
     with open_arm(arm, seed) as opened:
         checkup = _measured(opened, settings)
-    findings = diagnose(checkup)
+    baseline = None
+    if isinstance(opened, CorrectedArm):
+        baseline = opened.known.baseline
+        if opened.arm.spec.name not in (opened.spec.name, "arm"):
+            say(f"The spec was made as {opened.spec.name}; this is {opened.arm.spec.name}.")
+    findings = diagnose(checkup, baseline)
     figures = [joint_figures(checkup, j) for j in range(len(checkup.joints))]
     timing = _timing(checkup)
     if out is not None:
         from pneumarm.report.checkup import checkup_page
 
         out.mkdir(exist_ok=True)
-        write_text(out / "checkup.html", checkup_page(checkup, findings))
+        write_text(out / "checkup.html", checkup_page(checkup, findings, baseline))
         say(f"page: {out / 'checkup.html'}")
+    places = [(j, m) for j in range(len(figures)) for m in range(2)]
     result = {
         "healthy": not findings,
         "findings": [finding._asdict() for finding in findings],
         "timing_ms": timing,
         "joints": [asdict(joint) for joint in figures],
+        "baseline": None if baseline is None else asdict(baseline),
     }
 
     def rows() -> list[Any]:
-        muscles = [
-            (f"joint {j + 1}, muscle {m + 1}", *asdict(muscle).values())
-            for j, joint in enumerate(figures)
-            for m, muscle in enumerate(joint.muscles)
-        ]
-        header = (
-            "",
-            "full [bar]",
-            "fills [s]",
-            "empties [s]",
-            "leak [%/min]",
-            "turns [°]",
-            "noise [counts]",
-            "leap [bar]",
-        )
+        of_muscles = zip(MUSCLE_HEADER, *(muscle_row(figures[j], j, m, baseline) for j, m in places), strict=True)
+        of_joints = zip(JOINT_HEADER, *(joint_row(figure, checkup.spec) for figure in figures), strict=True)
         verdict: Sequence[str] = [str(finding) for finding in findings] or ["Nothing is wrong with it."]
-        return [table(header, muscles, arm), table(("time [ms]", ""), list(timing.items())), *verdict]
+        return [
+            table(("", *(f"joint {j + 1}, muscle {m + 1}" for j, m in places)), list(of_muscles), arm),
+            table(("", *(f"joint {j + 1}" for j in range(len(figures)))), list(of_joints)),
+            table(("time [ms]", ""), list(timing.items())),
+            *verdict,
+        ]
 
     show(result, json, rows)
 
 
 def _timing(checkup: Checkup) -> dict[str, float]:
-    """Return quantiles of the arm's answers and of its control periods [ms]."""
+    """Return quantiles of the arm's answers and of its control periods [ms]; a reading is one round trip."""
     timing = checkup.timing
-    named = {"read": timing.read, "set and read": timing.set_and_read, "control period": timing.periods}
+    named = {"round trip": timing.read, "set and read": timing.set_and_read, "control period": timing.periods}
     return {
         f"{name}, {word}": round(1e3 * float(np.quantile(values, share)), 4)
         for name, values in named.items()
@@ -113,15 +119,18 @@ def calibrate_(
     /,
     *,
     out: Path,
-    angles: tuple[float, float] | None = None,
+    angles: tuple[tuple[float, float], ...] = (),
+    counts_per_degree: float | None = None,
     supply: float | None = None,
+    counts_per_bar: float | None = None,
     seed: int = 0,
     settings: Annotated[CheckupSettings, Settings] = CheckupSettings(),
     json: Json = False,
 ) -> None:
     """Measure an arm's sensors and write what everything else needs to know of it.
 
-    Afterwards ``,spec=FILE`` behind the arm's name uses it with any command.
+    Afterwards ``,spec=FILE`` behind the arm's name uses it with any command. What the counts of an arm on a serial
+    port mean is asked for, unless the options or a ``,spec=FILE`` say it; other arms know it themselves.
 
     Parameters
     ----------
@@ -130,35 +139,112 @@ def calibrate_(
     out
         File to write, arm.toml.
     angles
-        Angles of the joint with muscle 2 full and with muscle 1 full, by a protractor [degrees].
+        Angles of the joint with muscle 2 full and with muscle 1 full, by a protractor [degrees]; for all joints, or
+        once for each.
+    counts_per_degree
+        ... or counts of the angle's sensors per degree: for a potentiometer on the joint's axis 1023 divided by its
+        electrical angle in degrees.
     supply
-        Pressure of the supply by its manometer [bar gauge].
+        Pressure of the supply by its manometer, which full muscles reach [bar gauge].
+    counts_per_bar
+        ... or counts of the pressure sensors per bar, by their data sheet.
     seed
         Of a virtual arm's noise.
     json
         Print one JSON object on stdout and nothing else there.
     """
     require_folder(out)
-    known = Known(angles, supply)
+    known = Known(angles, counts_per_degree, supply, counts_per_bar)
+    missing = _missing(arm, known)
+    asking = sys.stdin.isatty() and not json
+    if missing and not asking:
+        raise UnusableInput(f"{arm}: what its counts mean must be said: give {' and '.join(missing)}")
     with open_arm(arm, seed) as opened:
+        if isinstance(opened, CorrectedArm) and not opened.known.correction.is_none:
+            raise UnusableInput(f"{arm} is calibrated already; leave spec= out, or give a spec without corrections")
         checkup = _measured(opened, settings)
-    blocking = [finding for finding in diagnose(checkup) if finding.kind not in _NO_HINDRANCE]
-    if blocking:
-        raise UnusableInput(f"{arm} is to be mended before it is calibrated: {' '.join(map(str, blocking))}")
+        findings = diagnose(checkup)
+        blocking = [finding for finding in findings if finding.kind not in _NO_HINDRANCE]
+        if blocking:
+            raise UnusableInput(f"{arm} is to be mended before it is calibrated: {' '.join(map(str, blocking))}")
+        for finding in findings:
+            say(str(finding))
+        if missing:
+            known = _asked(guarded(opened), checkup, known)
     calibration = calibrate(checkup, known)
     save_arm_file(calibration.file, out)
     result = {
         "spec": asdict(calibration.file.spec),
         "correction": asdict(calibration.file.correction),
         "linearised_residual_degrees": list(calibration.residual),
+        "baseline": None if calibration.file.baseline is None else asdict(calibration.file.baseline),
     }
+    spec = calibration.file.spec
+    sources = ("by data sheet", "by protractor", "by manometer", "as it was")
+    angle = sources[0 if known.counts_per_degree else 1 if known.angles else 3]
+    pressure = sources[0 if known.counts_per_bar else 2 if known.supply else 3]
+    say(f"angle: {spec.counts_per_degree:.3f} counts per degree, {angle}")
+    say(f"pressure: {spec.counts_per_bar:.1f} counts per bar, {pressure}")
     for j, residual in enumerate(calibration.residual):
         if residual is not None:
             say(f"joint {j + 1}: the potentiometer is not linear; linearised off by {residual:.2f} degrees (rms)")
-    show(result, json, lambda: [table((str(out), ""), list(result["spec"].items()))])  # type: ignore[attr-defined]
+    show(result, json, lambda: [table((str(out), ""), list(asdict(spec).items()))])
 
 
-_NO_HINDRANCE = ("angle logarithmic", "low supply", "leak", "noise", "noise not white", "jitter")
+def _missing(arm: str, known: Known) -> list[str]:
+    """Return the options that must say what the counts of ``arm`` mean: a serial port cannot tell."""
+    if not arm.startswith("serial:") or ",spec=" in arm:
+        return []
+    angle = [] if known.angles or known.counts_per_degree else ["--angles or --counts-per-degree"]
+    pressure = [] if known.supply or known.counts_per_bar else ["--supply or --counts-per-bar"]
+    return angle + pressure
+
+
+def _asked(guard: GuardedArm, checkup: Checkup, known: Known) -> Known:
+    """Return what is known with what a person says who has protractor and manometer before them."""
+    if not (known.angles or known.counts_per_degree):
+        known = replace(known, angles=tuple(_protractor(guard, checkup, j) for j in range(guard.spec.joints)))
+    if not (known.supply or known.counts_per_bar):
+        known = replace(known, supply=_answer(guard, "What does the manometer of the supply show [bar]?"))
+    return known
+
+
+def _protractor(guard: GuardedArm, checkup: Checkup, joint: int) -> tuple[float, float]:
+    """Return the angles [degrees] of ``joint`` at the ends of the check-up, from those that it is held at now."""
+    said, counts = [], []
+    for muscle in (1, 0):
+        fill_alone(guard, joint, muscle, checkup.settings)
+        question = f"Joint {joint + 1} stands with muscle {muscle + 1} full. Its angle by the protractor [degrees]?"
+        said.append(_answer(guard, question))
+        counts.append(float(guard.read().angle[joint]))
+    if not (said[0] < said[1] and counts[0] < counts[1]):
+        raise UnusableInput(f"{guard.spec.name}: with muscle 1 full the angle must be the higher one, got {said}")
+    per_degree = (counts[1] - counts[0]) / (said[1] - said[0])
+    then = ends(checkup.joints[joint])  # it has crept a little since
+    low, high = (s + (float(t) - c) / per_degree for s, t, c in zip(said, then, counts, strict=True))
+    return low, high
+
+
+def _answer(guard: GuardedArm, question: str) -> float:
+    """Return the number that a person answers; meanwhile the arm stays as it is."""
+    while True:
+        say(question)
+        while not select.select([sys.stdin], [], [], 0.0)[0]:
+            guard.wait(_TURN)
+        line = sys.stdin.readline()
+        if not line:
+            raise UnusableInput("no answer came; give --angles and --supply as options")
+        try:
+            value = float(line.replace(",", "."))
+        except ValueError:
+            value = float("nan")
+        if math.isfinite(value):
+            return value
+        say(f"{line.strip()!r} is no number.")
+
+
+_TURN = 0.05  # s between two looks at the keyboard
+_NO_HINDRANCE = ("angle logarithmic", "low supply", "rising supply", "leak", "noise", "noise not white", "jitter")
 """Findings with which the sensors can be calibrated all the same."""
 
 
@@ -205,6 +291,52 @@ def errors_(
         for name, said in cases.items()
     ]
     show(result, json, lambda: [table(("error", "run", "check-up", "monitor"), rows)])
+
+
+def sensors_(arm: str, /, *, seconds: float = 60.0, every: float = 0.2, json: Json = False) -> None:
+    """Show what the sensors say, with all valves closed: turn the joint by hand, and its angle must follow.
+
+    Parameters
+    ----------
+    arm
+        virtual, virtual:seed=N, serial:PORT or python:module:callable.
+    seconds
+        For how long [s]; Ctrl-C ends it sooner.
+    every
+        Time between two lines [s].
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    if not (0 < seconds <= 86400 and 0.01 <= every <= 60):
+        raise UnusableInput(f"sensors are shown for up to 86400 s, every 0.01 to 60 s, got {seconds}, {every}")
+    seen: list[Reading] = []
+    with open_arm(arm) as opened, suppress(KeyboardInterrupt):
+        guard, spec = guarded(opened), opened.spec
+        guard.set_valves(np.zeros_like(guard.applied))
+        begin = guard.read().time
+        while (reading := guard.read()).time < begin + seconds:
+            seen.append(reading)
+            if not json:
+                print(f"{reading.time - begin:7.1f} s   {_sensed(reading, spec)}", flush=True)
+            guard.wait(every)
+    counts = np.array([np.column_stack([reading.angle, reading.pressure]) for reading in seen])
+    rows = [
+        {"joint": j + 1, "sensor": name, "lowest": counts[:, j, k].min(), "highest": counts[:, j, k].max()}
+        for j in range(spec.joints if seen else 0)
+        for k, name in enumerate(("angle", "pressure 1", "pressure 2"))
+    ]
+    header = ("joint", "sensor", "lowest [counts]", "highest [counts]")
+    show({"sensors": rows}, json, lambda: [table(header, [list(row.values()) for row in rows])])
+
+
+def _sensed(reading: Reading, spec: ArmSpec) -> str:
+    """Return what the sensors say in degrees and bar, and in counts behind it."""
+    degrees, bar = spec.degrees(reading.angle), spec.bar(reading.pressure)
+    return "   ".join(
+        f"joint {j + 1}: {degrees[j]:6.1f}° ({reading.angle[j]:4.0f})"
+        + "".join(f"  {bar[j, m]:5.2f} bar ({reading.pressure[j, m]:4.0f})" for m in range(2))
+        for j in range(spec.joints)
+    )
 
 
 def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Json = False) -> None:

@@ -2,7 +2,6 @@
 
 from pneumarm.control.agent import AgentController
 from pneumarm.control.bound import BoundSettings, Planned, known_bound, measure_bound
-from pneumarm.control.leaks import LeakRates, LeakTest, leak_test, leaking
 from pneumarm.control.monitor import Finding, Monitor, MonitorSettings
 from pneumarm.control.movement import LearningController, Movement, move
 from pneumarm.control.open_agent import open_agent
@@ -29,8 +28,6 @@ __all__ = [
     "Episode",
     "Finding",
     "History",
-    "LeakRates",
-    "LeakTest",
     "LearningController",
     "Monitor",
     "MonitorSettings",
@@ -44,8 +41,6 @@ __all__ = [
     "TransferSettings",
     "Transferred",
     "known_bound",
-    "leak_test",
-    "leaking",
     "measure_bound",
     "move",
     "open_agent",

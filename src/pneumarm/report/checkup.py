@@ -5,7 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from pneumarm.checkup.diagnose import Finding, autocorrelation, detrended, irregularity, joint_figures
+from pneumarm.arm.spec_file import Baseline
+from pneumarm.checkup.diagnose import WHITE, WORN, Finding
+from pneumarm.checkup.figures import (
+    JOINT_HEADER,
+    MUSCLE_HEADER,
+    autocorrelation,
+    detrended,
+    irregularity,
+    joint_figures,
+    joint_row,
+    muscle_row,
+)
 from pneumarm.checkup.measure import Checkup
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
@@ -13,17 +24,30 @@ from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
 _LINES = ((DARK, "-"), (MIDDLE, "--"))
 
 
-def checkup_page(checkup: Checkup, findings: Sequence[Finding]) -> str:
-    """Return the page as HTML text."""
+def checkup_page(checkup: Checkup, findings: Sequence[Finding], baseline: Baseline | None = None) -> str:
+    """Return the page as HTML text; ``baseline`` is what the arm did when it was calibrated."""
     name = checkup.spec.name
     verdict = [f"{len(findings)} thing(s) to see to." if findings else "Nothing is wrong with it."]
     rows = [(f.where, f.kind, f.told_by, f.remedy) for f in findings]
     said = [Table(("where", "what", "told by", "what to do"), rows, "What is wrong.", words=True)] if rows else []
+    muscles = [
+        (f"joint {j + 1}, muscle {m + 1}", *muscle_row(joint_figures(checkup, j), j, m, baseline))
+        for j in range(len(checkup.joints))
+        for m in range(2)
+    ]
+    joints = [
+        (f"joint {j + 1}", *joint_row(joint_figures(checkup, j), checkup.spec)) for j in range(len(checkup.joints))
+    ]
+    figures = [
+        Table(("", *MUSCLE_HEADER), muscles, "Muscles and valves; times from the command on, to 63 % of the way."),
+        Table(("", *JOINT_HEADER), joints, "Joints and their potentiometers."),
+    ]
     return render(
         f"Check-up of {name}",
         verdict,
         [
             Section("Findings", [] if rows else ["None."], tables=said),
+            Section("Figures", tables=figures),
             *[_of_joint(checkup, j) for j in range(len(checkup.joints))],
         ],
     )
@@ -42,13 +66,14 @@ def _of_joint(checkup: Checkup, j: int) -> Section:
             Picture(
                 noise(checkup, j),
                 "Noise at rest, detrended: power spectrum and autocorrelation (thesis A.1.3). White noise has a flat "
-                "spectrum and no correlation; the grey band holds 99 % of what white noise shows.",
+                "spectrum and no correlation; the grey band holds 99 % of what white noise shows; beyond the dotted "
+                "lines it is said not to be white.",
                 f"noise of {figures.angle_noise:.2f} counts in the angle",
             ),
             Picture(
                 potentiometer(checkup, j),
                 "The angle at rest against the difference of the pressures, up and down; and how irregular the angle "
-                "is by place.",
+                "is by place; over the dotted line it is worn there.",
                 f"the upper half turns {figures.halves:.2f} times as far; irregular by {figures.worst:.1f} counts",
             ),
         ],
@@ -91,6 +116,8 @@ def noise(checkup: Checkup, j: int) -> Figure:
         axes[0, 1].plot(autocorrelation(clean), line, color=color, marker="o", markersize=2.5)
     band = 2.58 / np.sqrt(len(rest.time))
     axes[0, 1].axhspan(-band, band, color=GREY, alpha=0.3, linewidth=0)
+    for side in (-WHITE, WHITE):
+        axes[0, 1].axhline(side, color=GREY, linewidth=0.8, linestyle=":")
     axes[0, 0].set_xlabel("frequency [Hz]")
     axes[0, 0].set_ylabel("power density [counts²/Hz]")
     axes[0, 0].legend()
@@ -99,7 +126,7 @@ def noise(checkup: Checkup, j: int) -> Figure:
     return figure
 
 
-def spectrum(values: np.ndarray, step: float, pieces: int = 8) -> tuple[np.ndarray, np.ndarray]:
+def spectrum(values: np.ndarray, step: float, pieces: int = 16) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies [Hz] and the power density, the mean over pieces (Bartlett)."""
     length = len(values) // pieces
     cuts = values[: pieces * length].reshape(pieces, length)
@@ -119,6 +146,7 @@ def potentiometer(checkup: Checkup, j: int) -> Figure:
         axes[0, 0].plot(difference[piece], angle, line, color=color, marker="o", label=name)
     places, off = irregularity(test)
     axes[0, 1].bar(spec.degrees(places), off, width=0.8, color=DARK)
+    axes[0, 1].axhline(WORN, color=GREY, linewidth=0.8, linestyle=":")
     axes[0, 0].set_xlabel("pressure 1 - pressure 2 [bar]")
     axes[0, 0].set_ylabel("angle at rest [°]")
     axes[0, 0].legend()

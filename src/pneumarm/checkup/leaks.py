@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.guard import guarded
-from pneumarm.arm.seam import Arm
+from pneumarm.arm.guard import GuardedArm, guarded
+from pneumarm.arm.seam import Arm, Reading
 from pneumarm.errors import UnusableInput
 
 
@@ -28,6 +28,8 @@ class LeakTest:
     """Time that is waited before the pressures are watched [s]."""
     watch: float = 45.0
     """Time that they are watched [s]."""
+    step: float = 1 / 30
+    """Time between two readings then [s]."""
     surely: float = 4.0
     """Standard errors by which a rate must exceed the healthy one."""
     drift: float = 0.002
@@ -60,34 +62,41 @@ def leak_test(arm: Arm, test: LeakTest | None = None) -> LeakRates:
 
     """
     test, guard = test or LeakTest(), guarded(arm)
-    closed = np.zeros((arm.spec.joints, 2), np.int8)
     begin = guard.read().time
+    readings = watch_closed(guard, test)
+    time, pressure = np.array([r.time for r in readings]), np.array([r.pressure for r in readings])
+    if (pressure.mean(axis=0) < 0.2 * arm.spec.max_pressure_counts).any():
+        low = arm.spec.bar(pressure.mean(axis=0)).round(2).tolist()
+        raise UnusableInput(f"{arm.spec.name}: filled muscles hold only {low} bar; see to supply and valves first")
+    return LeakRates(*falling(time, pressure), float(time[-1] - begin))
+
+
+def watch_closed(guard: GuardedArm, test: LeakTest) -> list[Reading]:
+    """Fill all muscles, close them, and return what is read after they have settled; the arm is left closed."""
+    closed = np.zeros_like(guard.applied)
+    guard.read()
     guard.set_valves(closed + 1)
     guard.wait(test.fill)
     guard.set_valves(closed)
     guard.wait(test.settle)
-    times, pressures = [], []
-    for _ in range(max(3, round(test.watch / arm.spec.period))):
-        reading = guard.read()
-        times.append(reading.time)
-        pressures.append(reading.pressure)
-        guard.wait(arm.spec.period)
-    time, pressure = np.array(times), np.array(pressures)
-    if (pressure.mean(axis=0) < 0.2 * arm.spec.max_pressure_counts).any():
-        low = arm.spec.bar(pressure.mean(axis=0)).round(2).tolist()
-        raise UnusableInput(f"{arm.spec.name}: filled muscles hold only {low} bar; see to supply and valves first")
-    rate, error = _falling(time, pressure)
-    return LeakRates(rate, error, float(time[-1] - begin))
+    readings = []
+    for _ in range(max(3, round(test.watch / test.step))):
+        readings.append(guard.read())
+        guard.wait(test.step)
+    return readings
 
 
-def _falling(
+def falling(
     time: NDArray[np.float64], pressure: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the rates (joints, 2) [1/minute] at which pressures (n, joints, 2) fall, and their standard errors."""
+    """Return the rates (...) [1/minute] at which pressures (n, ...) fall at ``time`` (n,) [s], and their errors.
+
+    ``pressure`` is above that of the surroundings, in any unit; the errors are standard errors.
+    """
     minutes = (time - time.mean()) / 60
     mean = pressure.mean(axis=0)
     slope = np.tensordot(minutes, pressure, axes=1) / (minutes @ minutes)
-    left = pressure - mean - minutes[:, None, None] * slope
+    left = pressure - mean - np.multiply.outer(minutes, slope)
     error = np.sqrt((left**2).sum(axis=0) / (len(time) - 2) / (minutes @ minutes))
     return -slope / mean, error / mean
 

@@ -1,0 +1,302 @@
+"""The figures that a check-up tells: of muscles and valves, of noise, of potentiometers, of the supply."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import ArmSpec
+from pneumarm.arm.spec_file import Baseline
+from pneumarm.checkup.leaks import falling
+from pneumarm.checkup.measure import Array, Checkup, JointTest, Trace
+
+MOVED = 0.10
+"""A pressure moved if it changed by so much [bar]; the other muscle, stretched or slackened, moves by less."""
+LAGS = 20
+"""Readings apart up to which noise is correlated."""
+_BIN = 10.0  # counts: about a degree
+
+
+@dataclass(frozen=True)
+class MuscleFigures:
+    """What one muscle and its valves do."""
+
+    full: float
+    """Pressure when full [bar]."""
+    fill_time: float
+    """Time from the command until 63 % of that [s]; not a number if it does not fill."""
+    exhaust_time: float
+    """Time from the command until 37 % of that [s]; not a number if it does not empty."""
+    fill_delay: float
+    """Time from the command until the pressure begins to rise [s]; not a number where that cannot be told."""
+    exhaust_delay: float
+    """Time from the command until it begins to fall [s]; not a number where that cannot be told."""
+    leak: float
+    """Share of the pressure lost by closed valves [% a minute]; not a number if there is none to lose."""
+    leak_error: float
+    """Standard error of that [% a minute]."""
+    turned: float
+    """How far filling turned the joint [degrees]."""
+    noise: float
+    """Standard deviation of the pressure's reading at rest [counts]."""
+    leap: float
+    """By how much the reading falls within 0.06 s after a pulse of air has ended [bar]."""
+
+
+@dataclass(frozen=True)
+class JointFigures:
+    """What one joint does."""
+
+    muscles: tuple[MuscleFigures, MuscleFigures]
+    angle_noise: float
+    """Standard deviation of the angle's reading at rest [counts]."""
+    lowest: float
+    """Lowest angle of the sweep [counts]."""
+    highest: float
+    """Highest angle of the sweep [counts]."""
+    halves: float
+    """How many times further the upper half of the pressure difference turns the joint than the lower half."""
+    worst: float
+    """Largest irregularity of the angle at any place (root mean square) [counts]."""
+
+
+def joint_figures(checkup: Checkup, joint: int) -> JointFigures:
+    """Return the figures of ``joint``."""
+    test = checkup.joints[joint]
+    one, two = (_muscle_figures(checkup, test, m) for m in range(2))
+    return JointFigures(
+        muscles=(one, two),
+        angle_noise=float(np.std(detrended(test.rest.time, test.rest.angle))),
+        lowest=float(test.sweep.angle.min()),
+        highest=float(test.sweep.angle.max()),
+        halves=halves(test),
+        worst=float(max(irregularity(test)[1], default=0.0)),
+    )
+
+
+def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
+    settings, bar = checkup.settings, checkup.spec.counts_per_bar
+    muscle = test.muscles[m]
+    fill, hold, exhaust = muscle.fill, muscle.hold, muscle.exhaust
+    rise = fill.pressure[:, m] - fill.pressure[0, m]
+    full = float(np.median(hold.pressure[:, m]) - fill.pressure[0, m])
+    fall = exhaust.pressure[:, m] - exhaust.pressure[-10:, m].mean()
+    moved = full > MOVED * bar
+    rest = test.rest
+    above = rest.pressure[:, m] - test.before.pressure[-10:, m].mean()  # its sensor may not be calibrated
+    leak, leak_error = falling(rest.time, above) if above.mean() > MOVED * bar else (np.nan, np.nan)
+    pulse = muscle.pulse
+    fills = [(each.time, each.pressure[:, m]) for each in (fill, pulse, test.again[m])]
+    end = int(np.searchsorted(pulse.time, settings.pulse))
+    settled = np.median(pulse.pressure[_window(pulse.time, settings.pulse + 0.05, 0.05), m])
+    peak = pulse.pressure[_window(pulse.time, settings.pulse - 0.01, 0.04), m].max() if end else settled
+    return MuscleFigures(
+        full=full / bar,
+        fill_time=_first(fill.time, rise > 0.63 * full) if moved else float("nan"),
+        exhaust_time=_first(exhaust.time - exhaust.time[0], fall < 0.37 * full) if moved else float("nan"),
+        fill_delay=onset(fills) if moved else float("nan"),
+        exhaust_delay=onset([(exhaust.time - exhaust.time[0], -exhaust.pressure[:, m])]) if moved else float("nan"),
+        leak=float(100 * leak),
+        leak_error=float(100 * leak_error),
+        turned=float(fill.angle[-1] - fill.angle[0]) / checkup.spec.counts_per_degree,
+        noise=float(np.std(detrended(rest.time, rest.pressure[:, m]))),
+        leap=float(peak - settled) / bar,
+    )
+
+
+def onset(rises: Sequence[tuple[Array, Array]]) -> float:
+    """Return after what time [s] values begin to rise, the same in all ``rises``; NaN where readings are too few.
+
+    A rise is times from 0 on [s] and values. Least squares of a level that goes over into a parabola: finer than the
+    readings are apart, and without the lateness of a threshold above the noise.
+    """
+    begins = np.arange(0.0, _ONSET / 2, _ONSET / 400)
+    left = np.zeros(len(begins))
+    for time, values in rises:
+        seen = time <= _ONSET
+        if seen.sum() < _FEWEST:
+            return float("nan")
+        since = np.maximum(time[seen] - begins[:, None], 0.0) / _ONSET
+        basis = np.stack([np.ones_like(since), since, since**2], axis=-1)
+        fitted = basis @ (np.linalg.pinv(basis) @ values[seen])[..., None]
+        left += ((values[seen] - fitted[..., 0]) ** 2).sum(axis=1)
+    return float(begins[np.argmin(left)])
+
+
+_ONSET = 0.1  # s: what is looked at for the beginning of a rise
+_FEWEST = 10  # readings that tell it
+
+
+def ends(test: JointTest) -> Array:
+    """Return the angles with muscle 2 full and with muscle 1 full, shape (2,) [counts]."""
+    return np.array([np.median(test.muscles[m].hold.angle) for m in (1, 0)])
+
+
+def quickening(test: JointTest, checkup: Checkup) -> float:
+    """Return in what share of the time muscles fill at the end of the check-up; NaN where they do not fill.
+
+    While air is scarce a muscle fills as fast as the supply's pressure says. Both muscles count, because supplies
+    fluctuate.
+    """
+    limit = checkup.spec.max_pressure_counts
+    before = [_passage(test.muscles[m].fill, m, limit) for m in range(2)]
+    after = [_passage(test.again[m], m, limit) for m in range(2)]
+    return float(np.mean(np.array(after) / np.array(before)))
+
+
+def _passage(fill: Trace, m: int, limit: float) -> float:
+    """Return the time [s] in which muscle ``m`` fills between two shares of the ``limit`` [counts]."""
+    pressure = np.convolve(fill.pressure[:, m] - fill.pressure[:3, m].mean(), np.full(_SMOOTH, 1 / _SMOOTH), "valid")
+    time = fill.time[_SMOOTH // 2 : len(fill.time) - _SMOOTH // 2]
+    rising = np.maximum.accumulate(pressure)
+    if not len(rising) or rising[-1] < _PASSAGE[1] * limit:
+        return float("nan")
+    begin, end = np.interp(np.array(_PASSAGE) * limit, rising, time)
+    return float(end - begin)
+
+
+_PASSAGE = (0.1, 0.7)  # shares of the limit: after the first unfolding, before the supply's pressure is near
+_SMOOTH = 5  # readings
+
+
+def _window(time: Array, begin: float, length: float) -> NDArray[np.bool_]:
+    return (time >= begin) & (time <= begin + length)
+
+
+def _first(time: Array, reached: NDArray[np.bool_]) -> float:
+    return float(time[np.argmax(reached)]) if reached.any() else float("nan")
+
+
+def detrended(time: Array, values: Array) -> Array:
+    """Return ``values`` without what changes slowly: creep, heat and leak (thesis A.1.3: "we detrend this data")."""
+    scaled = time / time[-1]
+    return values - np.polyval(np.polyfit(scaled, values, 4), scaled)
+
+
+_NOTHING = 1e-6
+"""A variance below this [counts^2] is that of rounding."""
+
+
+def autocorrelation(values: Array) -> Array:
+    """Return the autocorrelation at lags 0..LAGS; zeros where nothing varies.
+
+    The covariance is the inverse Fourier transform of the power spectrum (thesis A.1.3), zero-padded, so that the end
+    of the record does not meet its beginning.
+    """
+    spectrum = np.abs(np.fft.rfft(values - values.mean(), 2 * len(values))) ** 2
+    covariance = np.fft.irfft(spectrum)[: LAGS + 1]
+    return covariance / covariance[0] if covariance[0] > _NOTHING * len(values) else np.zeros(LAGS + 1)
+
+
+def ljung_box(correlation: Array, count: int) -> float:
+    """Return the statistic of Ljung and Box of ``count`` values, which is chi-squared with LAGS degrees if white.
+
+    G. M. Ljung and G. E. P. Box, "On a measure of lack of fit in time series models", Biometrika 65, 1978.
+    """
+    lags = np.arange(1, len(correlation))
+    return float(count * (count + 2) * np.sum(correlation[1:] ** 2 / (count - lags)))
+
+
+def halves(test: JointTest) -> float:
+    """Return how many times further the upper half of the pressure difference turns the joint than the lower half.
+
+    Two muscles that are alike turn a joint by the same angle for the same difference either way; weight and unlike
+    muscles bend that by a tenth, the track of a logarithmic potentiometer by a factor of three to eight.
+    """
+    difference = test.sweep.pressure[:, 0] - test.sweep.pressure[:, 1]
+    low, high = difference.min(), difference.max()
+    reach = 0.8 * min(-low, high)
+    if reach <= 0:
+        return float("nan")
+    turns = []
+    n = len(difference) // 2 + 1
+    for half in (slice(0, n), slice(n - 1, None)):
+        order = np.argsort(difference[half])
+        at = np.interp((-reach, 0.0, reach), difference[half][order], test.sweep.angle[half][order])
+        turns.append(np.diff(at))
+    lower, upper = np.mean(turns, axis=0)
+    return float(upper / lower) if lower > 0 and upper > 0 else float("nan")
+
+
+def irregularity(test: JointTest) -> tuple[Array, Array]:
+    """Return places of the angle [counts] and how far readings there are off those before and after (rms) [counts].
+
+    A joint has inertia: within a few readings it moves on a parabola. What departs from the parabola at the same
+    angle again and again, whatever the movement, is the potentiometer.
+    """
+    places, offs = [], []
+    for trace in [piece for muscle in test.muscles for piece in (muscle.whole, muscle.pulse)]:
+        angle = trace.angle
+        if len(angle) < 2 * _AROUND + 1:
+            continue
+        around = np.lib.stride_tricks.sliding_window_view(angle, 2 * _AROUND + 1)
+        places.append(np.median(around, axis=1))
+        offs.append(angle[_AROUND:-_AROUND] - around @ _PARABOLA)
+    place, off = np.concatenate(places), np.concatenate(offs)
+    bins = np.floor(place / _BIN).astype(int)
+    found = [(b, off[bins == b]) for b in np.unique(bins)]
+    kept = [(b, values) for b, values in found if len(values) >= 3]
+    centres = np.array([(b + 0.5) * _BIN for b, _ in kept])
+    return centres, np.array([float(np.sqrt(np.mean(values**2))) for _, values in kept])
+
+
+_AROUND = 7
+"""Readings either side that a parabola is fitted to, without those in the middle."""
+
+
+def _parabola() -> Array:
+    """Return the weights that give a parabola's value in the middle of 2 * _AROUND + 1 readings."""
+    x = np.arange(-_AROUND, _AROUND + 1.0)
+    outer = np.abs(x) > 1
+    weights = np.zeros(len(x))
+    weights[outer] = np.linalg.pinv(np.vander(x[outer], 3, increasing=True))[0]
+    return weights
+
+
+_PARABOLA = _parabola()
+
+
+MUSCLE_HEADER = (
+    "full [bar]",
+    "fills after, in [ms]",
+    "empties after, in [ms]",
+    "leak [%/min]",
+    "leak when calibrated",
+    "turns [°]",
+    "noise [counts]",
+    "leap [bar]",
+)
+"""What :func:`muscle_row` gives; times are from the command to the first air, and to 63 % of the way."""
+
+
+def muscle_row(figures: JointFigures, joint: int, muscle: int, baseline: Baseline | None) -> tuple[str, ...]:
+    """Return the figures of a muscle as words for a table."""
+    one = figures.muscles[muscle]
+    then = "-" if baseline is None else f"{100 * baseline.leak[joint][muscle]:.2f}"
+    return (
+        f"{one.full:.2f}",
+        f"{1e3 * one.fill_delay:.0f}, {1e3 * one.fill_time:.0f}",
+        f"{1e3 * one.exhaust_delay:.0f}, {1e3 * one.exhaust_time:.0f}",
+        f"{one.leak:.2f} ± {one.leak_error:.2f}",
+        then,
+        f"{one.turned:.0f}",
+        f"{one.noise:.2f}",
+        f"{one.leap:.2f}",
+    )
+
+
+JOINT_HEADER = ("from [°]", "to [°]", "halves turn", "irregular by [counts]", "noise [counts]")
+"""What :func:`joint_row` gives."""
+
+
+def joint_row(figures: JointFigures, spec: ArmSpec) -> tuple[str, ...]:
+    """Return the figures of a joint as words for a table."""
+    lowest, highest = spec.degrees([figures.lowest, figures.highest])
+    return (
+        f"{lowest:.0f}",
+        f"{highest:.0f}",
+        f"1 : {figures.halves:.2f}",
+        f"{figures.worst:.1f}",
+        f"{figures.angle_noise:.2f}",
+    )

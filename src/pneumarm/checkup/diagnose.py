@@ -34,8 +34,9 @@ LEAK = 12.0
 """A muscle leaks if it loses more than so many percent of its pressure a minute, where it has no baseline."""
 LOW_SUPPLY = 0.75
 """The supply is low if a full muscle reads less than this share of the pressure limit."""
-HIGH_SUPPLY = 1.05
-"""The supply is high if muscles fill to more than this share of the limit before their inlets can be closed."""
+HIGH_SUPPLY = 1.04
+"""The supply is high if a joint's muscles, on average, fill to more than this share of the limit before their inlets
+can be closed."""
 RISING = 0.85
 """The supply rises if at the end of the check-up muscles fill in less than this share of the time as before."""
 ZERO = 0.05
@@ -122,7 +123,7 @@ def _of_joint(checkup: Checkup, j: int, baseline: Baseline | None) -> Iterator[F
     if crossed or swapped_pair:
         return
     limit = checkup.spec.max_pressure
-    full = min(muscle.full for muscle in figures.muscles)
+    full = np.mean([muscle.full for muscle in figures.muscles])
     if full > HIGH_SUPPLY * limit:
         told = f"muscles fill to {full:.2f} bar before their inlets can be closed at the limit of {limit:.2f} bar"
         remedy = "Turn the reducer down; if it creeps up again it leaks: a safety valve on the buffer (thesis A.1.1)"

@@ -11,7 +11,7 @@ from tests.arm.serial.wired import Wired, all_valves, wired
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.serial import LineFaults
 from pneumarm.arm.serial.arm import BOOT
-from pneumarm.arm.serial.protocol import Cause, Request
+from pneumarm.arm.serial.protocol import VERSION, Cause, Request
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.transitions import Recorded
 
@@ -232,7 +232,7 @@ def test_controller_that_still_boots_is_waited_for(w: Wired) -> None:
 
 
 def test_a_controller_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pneumarm.arm.serial.board.VERSION", 2)
+    monkeypatch.setattr("pneumarm.arm.serial.board.VERSION", VERSION - 1)
     with pytest.raises(UnusableInput, match="flash the firmware"):
         wired()
 

@@ -4,8 +4,8 @@ The limits: no stale request ever acts, the ticks of the loop stay on the grid o
 misses no more of them than 1 % with a fifth of all frames lost, doubled or late in both directions.
 
 ticks: points of the grid that passed, a second; missed: share of those without a turn within half a period; drift: how
-much farther off the grid the promptest tenth of the turns lies in the second half than in the first; late: how long after its point of the grid a turn
-that is not missed is read.
+much farther off the grid the promptest tenth of the turns lies in the second half than in the first; late: how
+long after its point of the grid a turn that is not missed is read.
 """
 
 from collections.abc import Iterator
@@ -27,8 +27,8 @@ RATES = (30, 100)
 def measure() -> Iterator[str]:
     """Run the control cycle with random valves on the virtual arm behind the board."""
     yield f"{TURNS:,} control periods, 0.5 ms each way, late ones 50 ms; shares of the frames in each direction"
-    head = f"{'rate':>6} {'fault':>8} {'share':>6} {'ticks':>10} {'missed':>7} {'drift':>8} {'retries':>8} {'late p99':>9}"
-    yield f"{head} {'stale':>6} applied"
+    head = f"{'rate':>6} {'fault':>8} {'share':>6} {'ticks':>9} {'missed':>7} {'drift':>8} {'retries':>8}"
+    yield f"{head} {'late p99':>9} {'stale':>6} applied"
     for rate in RATES:
         yield row(rate, "none", LineFaults())
         for share in SHARES:

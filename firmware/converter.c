@@ -50,13 +50,13 @@ static volatile bool no_past = true;
 
 void converter_start(void)
 {
-	ADCSRA = 0; /* gives up a conversion that never ends */
+	/* Gives up a conversion that never ends, and the flag of one that ended and was not fetched: its interrupt
+	 * would take the conversion that begins here for that of the next channel. */
+	ADCSRA = _BV(ADIF);
 	ADMUX = REFERENCE | channel;
 	DIDR0 = 0x3f; /* no digital inputs on the analog pins: less noise */
 	ADCSRB = 0;
-	/* The flag of a conversion that ended and was not fetched is cleared: its interrupt would take the one that
-	 * begins here for that of the next channel. */
-	ADCSRA = RUN | _BV(ADSC) | _BV(ADIF);
+	ADCSRA = RUN | _BV(ADSC);
 }
 
 static void fill(struct window *window, uint16_t value)

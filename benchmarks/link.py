@@ -3,9 +3,9 @@
 The limits: no stale request ever acts, the ticks of the loop stay on the grid of its first one, and a loop at 30 Hz
 misses no more of them than 1 % with a fifth of all frames lost, doubled or late in both directions.
 
-ticks: points of the grid that passed, a second; missed: share of those without a turn within half a period; drift: how
-much farther off the grid the promptest tenth of the turns lies in the second half than in the first; late: how
-long after its point of the grid a turn that is not missed is read.
+ticks: points of the grid that passed, a second; missed: share of those without a turn within half a period; drift:
+how much later the promptest tenth of the turns in time are in the second half than in the first; late: how long
+after its point of the grid a turn in time is read.
 """
 
 from collections.abc import Iterator
@@ -52,6 +52,7 @@ def row(rate: float, name: str, faults: LineFaults) -> str:
         end = f"  given up after {len(times)} turns: {error}"
     at = np.array(times) - times[0]
     off = at - np.rint(at * rate) / rate
+    off = off[off > -1e-6]  # who is before a point of the grid missed the one before
     ticks = cycle.missed_deadlines + len(times)
     share = max(getattr(faults, kind) for kind in KINDS)
     missed, retries = cycle.missed_deadlines / ticks, w.arm.link.counts.retries / w.arm.link.counts.requests

@@ -135,6 +135,8 @@ def looped(path: str, rate: int, seconds: float) -> str:
         except ArmFailure as error:  # the dead-man, where this computer has other things to do
             ended = f"; ended after {len(began)} turns: {error}"
         counts = arm.link.counts  # type: ignore[attr-defined]
+    if len(read_at) < rate:
+        return f"{rate} Hz: given up in its first second; load {os.getloadavg()[0]:.1f}{ended}"
     late = np.abs(1e3 * (np.diff(began) - 1 / rate))
     middle, last = np.quantile(late, [0.5, 0.99])
     median, p99 = np.quantile(round_trips, [0.5, 0.99])

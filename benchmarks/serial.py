@@ -114,7 +114,7 @@ def emulated_port() -> Iterator[str]:
 def looped(path: str, rate: int, seconds: float) -> str:
     """Return what a loop of so many turns a second measures, with other valves in every turn."""
     random = np.random.default_rng(0)
-    round_trips, began = [], []
+    round_trips, began, read_at, missed = [], [], [], 0
     with open_arm(f"serial:{path}") as arm:
         arm.spec = replace(arm.spec, period=1 / rate)
         cycle, turns = ControlCycle(guarded(arm)), iter(range(round(rate * seconds)))
@@ -129,16 +129,23 @@ def looped(path: str, rate: int, seconds: float) -> str:
 
         ended = ""
         try:
-            for _ in cycle.run(decide):
-                pass
+            for step in cycle.run(decide):
+                read_at.append(step.reading.time)
+                missed = cycle.missed_deadlines
         except ArmFailure as error:  # the dead-man, where this computer has other things to do
             ended = f"; ended after {len(began)} turns: {error}"
         counts = arm.link.counts  # type: ignore[attr-defined]
+    if len(read_at) < rate:
+        return f"{rate} Hz: given up in its first second; load {os.getloadavg()[0]:.1f}{ended}"
     late = np.abs(1e3 * (np.diff(began) - 1 / rate))
     middle, last = np.quantile(late, [0.5, 0.99])
     median, p99 = np.quantile(round_trips, [0.5, 0.99])
+    at = np.array(read_at) - read_at[0]
+    early, later = (1e3 * np.median(half) for half in np.array_split(at - np.rint(at * rate) / rate, 2))
+    ticks = missed + len(at)
     return (
-        f"{rate} Hz for {seconds:g} s: missed deadlines {cycle.missed_deadlines}, period off by {middle:.2f} ms at "
+        f"{rate} Hz for {seconds:g} s: {(ticks - 1) / at[-1]:.2f} ticks/s, drift {later - early:+.2f} ms, "
+        f"missed deadlines {missed}, period off by {middle:.2f} ms at "
         f"p50, {last:.2f} at p99; round trip {median:.2f} ms at p50, {p99:.2f} at p99; "
         f"{counts.retries} of {counts.requests} requests sent again; load {os.getloadavg()[0]:.1f}{ended}"
     )

@@ -44,11 +44,15 @@ static volatile uint16_t limit[MUSCLES] = {0x3ff, 0x3ff, 0x3ff, 0x3ff}; /* nothi
 static volatile uint16_t past[JOINTS][PAST];
 static volatile uint8_t newest;
 static volatile uint8_t velocity_ms = 1;
+/* So many milliseconds of them are known; before that the arm is taken to have been at rest. */
+static volatile uint8_t known_ms;
 static volatile bool no_past = true;
 
 void converter_start(void)
 {
-	ADCSRA = 0; /* gives up a conversion that never ends */
+	/* Gives up a conversion that never ends, and the flag of one that ended and was not fetched: its interrupt
+	 * would take the conversion that begins here for that of the next channel. */
+	ADCSRA = _BV(ADIF);
 	ADMUX = REFERENCE | channel;
 	DIDR0 = 0x3f; /* no digital inputs on the analog pins: less noise */
 	ADCSRB = 0;
@@ -133,27 +137,27 @@ static uint16_t median(uint8_t of)
 void converter_tick(void)
 {
 	uint8_t next = newest + 1 == PAST ? 0 : newest + 1;
-	for (uint8_t joint = 0; joint < JOINTS; joint++) {
-		uint16_t value = median(ANGLE_OF[joint]);
-		past[joint][next] = value;
-		/* Without a past the arm is taken to have been at rest. */
-		if (no_past)
-			for (uint8_t i = 0; i < PAST; i++)
-				past[joint][i] = value;
-	}
+	for (uint8_t joint = 0; joint < JOINTS; joint++)
+		past[joint][next] = median(ANGLE_OF[joint]);
 	newest = next;
+	/* Counted, not filled: filling takes longer than two bytes take on the line, and the third would be lost. */
+	if (no_past)
+		known_ms = 0;
+	else if (known_ms < MOST_VELOCITY_MS)
+		known_ms++;
 	no_past = unfilled;
 }
 
 static int16_t velocity(uint8_t joint)
 {
-	uint8_t now, then, over_ms;
+	uint8_t now, then, over_ms, reach;
 	int16_t change;
 	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 	{
 		over_ms = velocity_ms;
 		now = newest;
-		then = now >= over_ms ? now - over_ms : now + PAST - over_ms;
+		reach = over_ms < known_ms ? over_ms : known_ms;
+		then = now >= reach ? now - reach : now + PAST - reach;
 		change = past[joint][now] - past[joint][then];
 	}
 	/* Unsigned in 16 bits, which the highest count times the scale just fits: the signed division of 32 bits takes
@@ -187,6 +191,7 @@ void converter_configure(uint8_t of, uint8_t over_ms, const uint16_t limits[MUSC
 		oldest = 0;
 		unfilled = CHANNELS;
 		velocity_ms = over_ms;
+		known_ms = 0;
 		no_past = true;
 		memcpy((void *)limit, limits, sizeof limit);
 		memset((void *)over, 0, sizeof over);

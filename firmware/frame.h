@@ -1,4 +1,5 @@
-/* Frames: COBS( content | CRC-16/X-25 ) 0x00, where content is type u8, sequence u16, payload.
+/* Frames: COBS( content | CRC-16/X-25 ) 0x00, where content is type u8, sequence u16, payload. That the two bytes of an
+ * EXCHANGE are each other's complement belongs to the frame too: a damaged one is none.
  *
  * Nothing here knows the microcontroller, so that tests compile it for their own machine too. */
 #pragma once

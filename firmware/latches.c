@@ -14,6 +14,7 @@
 /* The bits of OVER_PRESSURE_n are those of a mask of muscles in the flags' upper byte. */
 #define FIRST_OVER_PRESSURE 8
 
+_Static_assert(DEAD_MAN_MS <= UINT8_MAX, "silence is counted in a byte");
 static volatile uint16_t flags;
 static volatile uint8_t silence_ms; /* since the dead-man was fed */
 static volatile uint8_t still_ms;   /* since the converter made a sweep */

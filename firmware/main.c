@@ -21,12 +21,22 @@ ISR(TIMER1_COMPA_vect)
 	converter_tick();
 }
 
+/* An interrupt that nobody wants: something disturbed a register. By default the program would then jump to its
+ * beginning, the registers as disturbed as they are and no cause to tell; the watchdog resets them all, and is told. */
+ISR(BADISR_vect)
+{
+	latches_disarm();
+	for (;;)
+		;
+}
+
 int main(void)
 {
 	valves_start();
 	clock_start();
 	converter_start();
 	uart_start();
+	session_start();
 	sei();
 	reset_count();
 	for (;;) {

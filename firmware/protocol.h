@@ -2,7 +2,7 @@
 #pragma once
 
 /* Constants */
-#define VERSION 1
+#define VERSION 2
 #define BAUD 500000UL
 #define JOINTS 2
 #define MUSCLES 4
@@ -26,7 +26,7 @@
 #define CONFIGURE_LENGTH 10
 #define ARM_LENGTH 4
 #define DISARM_LENGTH 0
-#define EXCHANGE_LENGTH 1
+#define EXCHANGE_LENGTH 2
 #define READ_LENGTH 0
 
 /* Replies and the lengths of their payloads */

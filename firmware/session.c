@@ -1,6 +1,7 @@
 #include "session.h"
 
 #include <stdbool.h>
+#include <util/atomic.h>
 
 #include "clock.h"
 #include "converter.h"
@@ -64,10 +65,18 @@ static void begin(uint8_t type, uint16_t sequence)
 
 static void put_state(uint16_t more)
 {
+	uint16_t flags;
+	uint8_t valves;
+	/* Of one moment: a latch that came in between would vent valves that no flag explains. */
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		flags = latches_flags();
+		valves = valves_applied();
+	}
 	if (uart_overrun())
 		more |= OVERRUN_SEEN;
-	put16(latches_flags() | (configured ? CONFIGURED : 0) | seen | more);
-	put8(valves_applied());
+	put16(flags | (configured ? CONFIGURED : 0) | seen | more);
+	put8(valves);
 	seen = 0;
 }
 
@@ -213,6 +222,12 @@ static void take(const uint8_t *request)
 		reading(sequence, repeated);
 	else
 		status(sequence, repeated);
+}
+
+void session_start(void)
+{
+	static const uint8_t END = 0;
+	uart_send(&END, sizeof END);
 }
 
 void session_byte(uint8_t byte)

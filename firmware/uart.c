@@ -10,6 +10,7 @@
 #define IN_SIZE 128
 #define OUT_SIZE 128
 
+_Static_assert(LONGEST_FRAME <= OUT_SIZE / 2, "a frame must leave while the next one is made");
 static volatile uint8_t in_ring[IN_SIZE], in_head, in_tail;
 static volatile uint8_t out_ring[OUT_SIZE], out_head, out_tail;
 static volatile bool overrun;

@@ -55,16 +55,37 @@ def test_what_is_reported_is_what_was_applied(smallest_arm):
     assert steps[0].valves.tolist() == cycle.applied.tolist() == [[0, -1]]
 
 
-def test_a_lost_period_is_counted_and_not_caught_up(smallest_arm):
+@pytest.mark.parametrize(("late", "missed", "turn"), [(0.3, 0, 3), (0.6, 1, 4), (1.4, 1, 4), (3.2, 3, 6)])
+def test_a_late_turn_does_not_move_the_grid(smallest_arm, late, missed, turn):
     arm = smallest_arm()
+    period = arm.spec.period
     cycle = ControlCycle(GuardedArm(arm))
     times = []
     for step in cycle.run(deciding(*[OPEN * 0] * 6)):
         times.append(step.reading.time)
         if len(times) == 3:
-            arm.time += 0.1  # whoever looks at the steps took their time
-    assert cycle.missed_deadlines == 1
-    assert np.diff(times)[3:] == pytest.approx(1 / 30)
+            arm.time += (1 + late) * period  # whoever looks at the steps took their time
+    assert cycle.missed_deadlines == missed
+    expected = [0, 1, 2, 3 + late, *(turn + 1 + k for k in range(3))]
+    assert np.array(times) - times[0] == pytest.approx(period * np.array(expected))
+
+
+def test_lateness_does_not_add_up(smallest_arm):
+    arm, random = smallest_arm(), np.random.default_rng(0)
+    period = arm.spec.period
+    cycle = ControlCycle(GuardedArm(arm))
+    times = []
+    for step in cycle.run(deciding(*[OPEN * 0] * 300)):
+        times.append(step.reading.time / period)
+        if random.random() < 0.3:
+            arm.time += random.exponential(period)
+    ticks = np.array(times) - times[0]
+    assert np.abs(ticks - np.rint(ticks)).max() <= 0.5
+    on_time = np.abs(ticks - np.rint(ticks)) < 1e-6
+    assert on_time.mean() > 0.5
+    assert on_time[-50:].any()  # no drift: also in the end turns lie on the first one's grid
+    assert cycle.missed_deadlines > 10
+    assert cycle.missed_deadlines + len(times) == pytest.approx(np.rint(ticks[-1]) + 1)
 
 
 def test_an_error_in_deciding_is_held_then_vented_then_told(smallest_arm):

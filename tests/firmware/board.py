@@ -109,9 +109,9 @@ class SimulatedBoard:
         """Forget what came and was not read."""
         self._waiting.clear()
 
-    def reset(self) -> None:
-        """Pull the reset pin."""
-        self.chip.reset()
+    def reset(self, cause: str = "EXTERNAL") -> None:
+        """Reset the chip for a cause of the page."""
+        self.chip.reset(cause)
 
     def _run_until(self, cycle: int) -> None:
         while self._next_step <= cycle and self.arm is not None:

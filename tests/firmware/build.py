@@ -12,6 +12,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[1] / "firmware"
 BUILD = FIRMWARE / "build"
+_DATA, _EEPROM = 0x800000, 0x810000
+"""Where the linker puts the data memory and the EEPROM."""
 PACKAGES = "gcc-avr avr-libc libsimavr-dev libelf-dev make gcc"
 
 
@@ -52,6 +54,21 @@ def hex_file() -> Path:
     with _alone():
         _run("make", "-C", str(FIRMWARE))
     return BUILD / "pneumarm.hex"
+
+
+@functools.cache
+def symbols() -> dict[str, tuple[int, int]]:
+    """Return the address in the data memory and the size of each variable of the firmware; ends have no size."""
+    hex_file()
+    listing = subprocess.run(
+        ["avr-nm", "--print-size", str(BUILD / "pneumarm.elf")], capture_output=True, text=True, check=True
+    ).stdout
+    found = {}
+    for line in listing.splitlines():
+        address, *size, kind, name = line.split()
+        if kind in "bBdD" and int(address, 16) < _EEPROM:
+            found[name] = (int(address, 16) - _DATA, int(size[0], 16) if size else 0)
+    return found
 
 
 def _library(source: Path, others: tuple[Path, ...], flags: tuple[str, ...]) -> Path:

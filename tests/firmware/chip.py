@@ -5,7 +5,8 @@ from collections import deque
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from tests.firmware.build import hex_file, shim
+from tests.firmware.build import hex_file, shim, symbols
+from tests.firmware.wire import CAUSE
 
 FREQUENCY = 16_000_000
 """Cycles a second."""
@@ -44,7 +45,9 @@ def _load(library: Path) -> ctypes.CDLL:
         "board_events": (u32, [board, ctypes.POINTER(_Event), u32]),
         "board_millivolts": (None, [board, u32, u32]),
         "board_log_samples": (None, [board, ctypes.c_int]),
-        "board_reset": (None, [board]),
+        "board_reset": (None, [board, u32]),
+        "board_watch": (None, [board]),
+        "board_longest_masked": (u64, [board]),
         "board_peek": (u8, [board, u16]),
         "board_poke": (None, [board, u16, u8]),
         "board_jump": (None, [board, u32]),
@@ -153,10 +156,19 @@ class Chip:
         """Keep the times of conversions."""
         self._shim.board_log_samples(self._board, on)
 
-    def reset(self) -> None:
-        """Pull the reset pin, as opening the port of an Uno does."""
-        self._shim.board_reset(self._board)
+    def reset(self, cause: str = "EXTERNAL") -> None:
+        """Reset for a cause of the page; EXTERNAL is the reset pin, which opening the port of an Uno pulls."""
+        self._shim.board_reset(self._board, CAUSE[cause])
         self._collect()
+
+    def watch_interrupts(self) -> None:
+        """Measure from now on for how long interrupts are off; the simulation is slower from then on."""
+        self._shim.board_watch(self._board)
+
+    @property
+    def longest_masked(self) -> float:
+        """Longest time that interrupts were off since :meth:`watch_interrupts` [s]."""
+        return int(self._shim.board_longest_masked(self._board)) / FREQUENCY
 
     def peek(self, address: int) -> int:
         """Return a byte of the data memory."""
@@ -166,17 +178,26 @@ class Chip:
         """Write a byte of the data memory behind the program's back."""
         self._shim.board_poke(self._board, address, value)
 
+    def variable(self, name: str) -> int:
+        """Return the value of a variable of the program."""
+        address, size = symbols()[name]
+        return int.from_bytes(bytes(self.peek(address + i) for i in range(size)), "little")
+
+    def set_variable(self, name: str, value: int) -> None:
+        """Write a variable of the program behind its back."""
+        address, size = symbols()[name]
+        for i, byte in enumerate(value.to_bytes(size, "little")):
+            self.poke(address + i, byte)
+
     def hang(self, *, interrupts: bool = True) -> None:
         """Let the main loop hang, as after a disturbance: with or without interrupts.
 
         Every program has its endless loop after ``main`` in it; this jumps there.
         """
         endless, cli = 0xCFFF, 0x94F8
-        for address in range(0, 0x7FFE, 2):
-            if self._shim.board_word(self._board, address) == endless:
-                before = self._shim.board_word(self._board, address - 2)
-                if before != cli:
-                    raise RuntimeError("the endless loop is not where exit() ends")
+        for address in range(2, 0x8000, 2):
+            words = [self._shim.board_word(self._board, at) for at in (address - 2, address)]
+            if words == [cli, endless]:
                 self._shim.board_jump(self._board, address if interrupts else address - 2)
                 return
         raise RuntimeError("the program has no endless loop")

@@ -179,7 +179,7 @@ class Port:
         while not frame.endswith(b"\0"):
             if not select.select([self._line], [], [], timeout)[0]:
                 raise TimeoutError(f"no reply to {name}")
-            frame += os.read(self._line, 64)
+            frame = (frame + os.read(self._line, 64)).lstrip(b"\0")  # zeros between frames mean nothing
         return wire.reply(frame[:-1])
 
     def close(self) -> None:

@@ -50,6 +50,8 @@ def is_request(chunk: bytes) -> bytes | None:
     if decoded is None or len(chunk) >= wire.CONSTANT["LONGEST_FRAME"]:
         return None
     content, crc = decoded[:-2], int.from_bytes(decoded[-2:], "little")
+    if content[0] == wire.REQUEST["EXCHANGE"] and tuple(content[3:]) != wire.twice(content[3]):
+        return None
     return content if wire.crc(content) == crc else None
 
 
@@ -57,4 +59,6 @@ def random_request(rng: random.Random, sequence: int) -> bytes:
     """Return the frame of any request, its values at random."""
     name = rng.choice(list(wire.REQUEST))
     payload = rng.randbytes(wire.layout(name).size)
+    if name == "EXCHANGE":
+        payload = bytes(wire.twice(payload[0]))
     return wire.enclosed(bytes([wire.REQUEST[name]]) + (sequence & 0xFFFF).to_bytes(2, "little") + payload)

@@ -34,6 +34,8 @@ struct board {
 	uint32_t millivolts[CHANNELS];
 	uint32_t pins;
 	int samples; /* whether conversions are events */
+	int watched; /* whether the processor is looked at after each instruction */
+	uint64_t masked_since, longest_masked;
 	uint64_t in_next, out_free;
 	uint32_t in_head, in_tail, event_head, event_tail;
 	uint8_t in[QUEUE];
@@ -144,6 +146,17 @@ static avr_cycle_count_t stop(struct avr_t *avr, avr_cycle_count_t when, void *b
 	return 0;
 }
 
+/* Note for how long interrupts are off: after each instruction, of which simavr else makes several at once. */
+static void look_at_interrupts(struct board *b)
+{
+	avr_t *avr = b->avr;
+	avr->run_cycle_limit = avr->run_cycle_count = 1;
+	if (avr->sreg[S_I])
+		b->masked_since = avr->cycle;
+	else if (avr->cycle - b->masked_since > b->longest_masked)
+		b->longest_masked = avr->cycle - b->masked_since;
+}
+
 /* Run until `cycle`; return whether the processor still runs. */
 int board_run(struct board *b, uint64_t cycle)
 {
@@ -160,6 +173,8 @@ int board_run(struct board *b, uint64_t cycle)
 		uint64_t next = waiting && b->in_next < cycle ? b->in_next : cycle;
 		if (!avr_cycle_timer_status(avr, stop, b))
 			avr_cycle_timer_register(avr, next - avr->cycle, stop, b);
+		if (b->watched)
+			look_at_interrupts(b);
 		int state = avr_run(avr);
 		if (state == cpu_Done || state == cpu_Crashed)
 			return 0;
@@ -201,11 +216,27 @@ void board_log_samples(struct board *b, int on)
 	b->samples = on;
 }
 
-/* Pull the reset pin for a moment. */
-void board_reset(struct board *b)
+/* Reset for the cause whose bit of MCUSR is set in `cause`, as by the reset pin or by a supply that breaks down. */
+void board_reset(struct board *b, uint32_t cause)
 {
 	avr_reset(b->avr);
-	avr_regbit_set(b->avr, b->avr->reset_flags.extrf);
+	avr_regbit_setto_raw(b->avr, b->avr->reset_flags.porf, cause & 1);
+	avr_regbit_setto_raw(b->avr, b->avr->reset_flags.extrf, cause & 2);
+	avr_regbit_setto_raw(b->avr, b->avr->reset_flags.borf, cause & 4);
+}
+
+/* Watch the interrupts from now on; it makes the simulation slower. */
+void board_watch(struct board *b)
+{
+	b->watched = 1;
+	b->masked_since = b->avr->cycle;
+	b->longest_masked = 0;
+}
+
+/* Return the longest time that interrupts were off [cycles]. */
+uint64_t board_longest_masked(struct board *b)
+{
+	return b->longest_masked;
 }
 
 uint8_t board_peek(struct board *b, uint16_t address)

@@ -25,7 +25,7 @@ def ask(board: SimulatedBoard, name: str, sequence: int, *values: int) -> Reply:
     while not frame.endswith(b"\0"):
         byte = board.read(1, timeout=0.005)
         assert byte, "no reply"
-        frame += byte
+        frame = (frame + byte).lstrip(b"\0")  # zeros between frames mean nothing
     return wire.reply(frame[:-1])
 
 

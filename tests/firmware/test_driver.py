@@ -1,8 +1,10 @@
 """pneumarm's own driver on the unmodified firmware, in lock-step: what holds of any arm holds of this one."""
 
 import sys
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.seam import checked
-from pneumarm.arm.serial import SerialArm
+from pneumarm.arm.serial import FaultyLine, SerialArm
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.errors import ArmFailure
@@ -105,3 +107,105 @@ def test_collecting_and_moving(
     assert watch.findings == []
     assert len(moved.episodes) == 2
     assert all(episode.success or episode.actions == agent.settings.cutoff for episode in moved.episodes)
+
+
+def in_motion(arm: SerialArm, turns: int = 10) -> SimulatedBoard:
+    """Have the arm move for some control periods; give the board."""
+    for turn in range(turns):
+        begun = arm.read().time
+        arm.set_valves(every(1 if turn % 2 else -1))
+        arm.wait_until(begun + arm.spec.period)
+    arm.set_valves(every(1))
+    return arm._line.board  # type: ignore[attr-defined,no-any-return]
+
+
+def until_failure(arm: SerialArm) -> tuple[float, str]:
+    """Go on in the control cycle; return how long [s] until it failed, and why."""
+    begun = arm._line.now()
+    turns = ControlCycle(guarded(arm)).run(lambda reading: every(1))
+    with pytest.raises(ArmFailure) as failed:
+        deque(islice(turns, 100), maxlen=0)
+    return arm._line.now() - begun, str(failed.value)
+
+
+@pytest.mark.parametrize(
+    ("cause", "words"),
+    [
+        ("EXTERNAL", "reset pin"),
+        ("BROWN_OUT", "supply too low"),
+        ("POWER_ON", "power on"),
+        ("WATCHDOG", "its program hung"),
+    ],
+)
+def test_controller_that_begins_anew_in_an_episode(arm: SerialArm, cause: str, words: str) -> None:
+    """It is vented and told of; the host shakes hands again within 2 s, and its readings' times stay true."""
+    board = in_motion(arm)
+    before, happened = arm.read().time, board.time
+    if cause == "WATCHDOG":
+        board.chip.hang()
+    else:
+        board.reset(cause)
+    took, why = until_failure(arm)
+    board.wait_until(max(board.time, happened + 0.15))
+    assert board.chip.valve_pins == 0
+    if cause == "WATCHDOG":  # it is silent first
+        assert "not answered" in why
+    else:
+        assert f"began anew while in use ({words})" in why
+    assert took <= 2 * arm.spec.period + LONGEST_EXCHANGE
+    with pytest.raises(ArmFailure):
+        arm.make_ready()
+    assert board.chip.valve_pins == 0
+    begun = board.time
+    arm.rearm()
+    assert board.time - begun < 2
+    assert arm.reset_causes() == [words]
+    # The controller's clock began anew; readings go on in the host's time.
+    for _ in range(30):
+        sent = board.time
+        reading = arm.read()
+        assert before < sent <= reading.time <= board.time
+        arm.set_valves(every(1))
+        arm.wait(0.1)
+    assert board.chip.valve_pins != 0
+
+
+def test_controller_s_clock_wraps_in_an_episode(arm: SerialArm) -> None:
+    """As after an hour and eleven minutes: readings go on in the host's time, period by period."""
+    board = in_motion(arm)
+    board.chip.set_variable("ticks_us", (1 << 32) - 500_000)
+    arm.rearm()  # a new session, with a new map of the clock
+    readings, raw = [], []
+    for _ in range(40):
+        sent = board.time
+        readings.append(arm.read().time)
+        raw.append(board.chip.variable("ticks_us"))
+        assert sent <= readings[-1] <= board.time
+        arm.set_valves(every(0))
+        arm.wait_until(readings[-1] + arm.spec.period)
+    assert min(raw) < 1_000_000 < 4_000_000_000 < max(raw)
+    assert np.diff(readings) == pytest.approx(arm.spec.period, abs=LONGEST_EXCHANGE)
+
+
+def test_board_that_is_unplugged_and_plugged_in_again(arm: SerialArm) -> None:
+    """Row 1 on the real firmware: vented by the dead-man; nothing moves until it is armed again."""
+    board = in_motion(arm)
+    fed = board.time
+    line = arm._line
+    arm.link.line = gone = FaultyLine(line)
+    gone.unplugged = True
+    with pytest.raises(ArmFailure, match="gone"):
+        arm.read()
+    board.wait_until(fed + 0.251)
+    assert board.chip.valve_pins == 0
+    gone.unplugged = False
+    for use in (arm.read, arm.make_ready, lambda: arm.set_valves(every(1))):
+        with pytest.raises(ArmFailure, match="gone"):
+            use()
+    board.wait(0.5)
+    assert board.chip.valve_pins == 0
+    begun = board.time
+    arm.rearm()
+    assert board.time - begun < 2
+    arm.set_valves(every(1))
+    assert board.chip.valve_pins != 0

@@ -110,7 +110,7 @@ def fuzz(count: int, seed: int) -> Tally:
 
 def _moves(content: bytes, sequence: int) -> bool:
     ahead = (int.from_bytes(content[1:3], "little") - sequence) & 0xFFFF
-    known = all(content[3] >> 2 * m & 3 in wire.CODE.values() for m in range(4)) if len(content) == 4 else False
+    known = all(content[3] >> 2 * m & 3 in wire.CODE.values() for m in range(4)) if len(content) == 5 else False
     return content[0] == wire.REQUEST["EXCHANGE"] and known and ahead <= 0x7FFF
 
 

@@ -73,6 +73,21 @@ def test_too_many_requests_at_once_are_lost_and_said_to_be() -> None:
         assert not host.ask("READ").has("OVERRUN_SEEN")
 
 
+def test_reset_in_the_middle_of_a_reply_costs_that_reply_only() -> None:
+    with armed() as host:
+        host.chip.write(wire.request("READ", host.sequence + 1))
+        host.chip.run(0.0008)
+        begun = bytes(byte for _, byte in host.chip.received())
+        assert begun
+        assert not begun.endswith(b"\0")
+        host.chip.reset()
+        host.chip.run(0.01)
+        ended, *others = (begun + bytes(byte for _, byte in host.chip.received())).split(b"\0")
+        assert ended.startswith(begun)
+        assert others == [b""]
+        assert host.connect().reset_cause == wire.CAUSE["EXTERNAL"]
+
+
 class Model:
     """What the board must do with what comes: the protocol, for EXCHANGE and READ of an armed board."""
 

@@ -32,7 +32,8 @@ def ready() -> Iterator[Host]:
 def test_only_connect_is_served_after_a_reset(host: Host) -> None:
     for name in REQUEST:
         if name != "CONNECT":
-            reply = host.ask(name, *wire.layout(name).unpack(bytes(wire.layout(name).size)))
+            zeros = bytes(wire.layout(name).size)
+            reply = host.ask(name, *(wire.twice(0) if name == "EXCHANGE" else wire.layout(name).unpack(zeros)))
             assert (reply.name, reply.why, reply.valves) == ("REFUSED", "NOT_CONNECTED", VENTED)
     assert host.chip.valve_pins == 0
 
@@ -255,6 +256,17 @@ def test_request_of_a_wrong_length_is_corrupt(ready: Host) -> None:
             assert ready.send(wire.enclosed(content)) == []
             assert ready.ask("READ").has("CORRUPT_SEEN")
     assert not ready.ask("READ").has("CORRUPT_SEEN")
+
+
+def test_valves_that_are_not_said_twice_are_corrupt(ready: Host) -> None:
+    """With a right CRC: neither done, nor answered, nor counted as a sequence, whichever bit differs."""
+    ready.exchange("IN", "OUT")
+    codes = wire.valves("OUT", "IN")
+    for second in [codes, 0, 0xFF, *(codes ^ 0xFF ^ 1 << bit for bit in range(8))]:
+        assert ready.ask("EXCHANGE", codes, second, sequence=ready.sequence + 1) is None
+        assert ready.chip.valve_pins == wire.pins_of(wire.valves("IN", "OUT"))
+        assert ready.ask("READ").has("CORRUPT_SEEN")
+    assert ready.ask("EXCHANGE", codes).valves == codes
 
 
 def test_unknown_types_are_corrupt(ready: Host) -> None:

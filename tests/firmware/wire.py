@@ -92,8 +92,15 @@ def enclosed(content: bytes) -> bytes:
     return bytes(cobs.encode(content + crc(content).to_bytes(2, "little"))) + b"\0"
 
 
+def twice(codes: int) -> tuple[int, int]:
+    """Return the payload of an EXCHANGE: the valves and all their bits turned."""
+    return codes, codes ^ 0xFF
+
+
 def request(name: str, sequence: int, *values: int) -> bytes:
-    """Return the frame of a request."""
+    """Return the frame of a request; of an EXCHANGE the valves suffice, which it says twice."""
+    if name == "EXCHANGE" and len(values) == 1:
+        values = twice(*values)
     payload = layout(name).pack(*values)
     return enclosed(struct.pack("<BH", REQUEST[name], sequence & 0xFFFF) + payload)
 

@@ -28,6 +28,10 @@ class Step(NamedTuple):
 class ControlCycle:
     """Read, decide, let the latency pass, set the valves, wait for the period to end; over and over.
 
+    Turns are due on a grid of control periods from the first reading on. One that comes late does not move it: the
+    next is due when it would have been, or, after a turn more than half a period late, at the first point of the grid
+    more than half a period away. So no two turns are nearer to each other than that, and the rate is kept.
+
     The valves stay as they are between reading and acting, or are closed then (thesis figure 2.8). A decision that
     cannot be used, that raises, or that took longer than a period on the arm's clock is replaced by the guard; while
     one does not come at all, the guard stands in for it.
@@ -38,7 +42,7 @@ class ControlCycle:
     patience: float = PATIENCE
     """Time [s] after which a controller that does not decide is stopped."""
     missed_deadlines: int = field(default=0, init=False)
-    """Number of turns that began more than half a period late."""
+    """Points of the grid that passed without a turn within half a period."""
     applied: NDArray[np.int8] = field(init=False)
     """The valves of the last turn as applied, shape (joints, 2); what they led to is read in the next turn."""
 
@@ -61,11 +65,10 @@ class ControlCycle:
         try:
             while True:
                 reading = arm.read()
-                if due is not None and reading.time - due > period / 2:
-                    # Start counting afresh rather than hurry after a lost period.
-                    self.missed_deadlines += 1
-                    due = reading.time
-                due = (reading.time if due is None else due) + period
+                due = reading.time if due is None else due
+                missed = max(round((reading.time - due) / period), 0)
+                self.missed_deadlines += missed
+                due += (missed + 1) * period
                 if self.close_while_computing:
                     arm.set_valves(closed)
                 began, raised = monotonic(), None

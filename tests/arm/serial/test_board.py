@@ -113,7 +113,7 @@ def test_a_muscle_that_fills_is_cut_off_soon_after_its_limit(monkeypatch: pytest
     emulated = EmulatedBoard(arm)
     limit = 100
     limits = [limit, *[HIGHEST_COUNT] * (wire.CONSTANT["MUSCLES"] - 1)]
-    requests = [("CONNECT", 1, SESSION), ("CONFIGURE", 5, 16, *limits), ("ARM", SESSION)]
+    requests = [("CONNECT", wire.CONSTANT["VERSION"], SESSION), ("CONFIGURE", 5, 16, *limits), ("ARM", SESSION)]
     requests += [("EXCHANGE", wire.valves("IN"))] * 20
     for sequence, (name, *values) in enumerate(requests):
         emulated.receive(wire.request(name, sequence, *values))

@@ -78,3 +78,11 @@ def test_a_clock_on_the_wall_that_jumps_changes_nothing(monkeypatch: pytest.Monk
     steady = run(jumps=False)
     assert run(jumps=True) == steady
     assert (np.diff(steady) > 0).all()
+
+
+def test_times_rise_though_the_controller_s_clock_stands_still() -> None:
+    """As that of an emulated board does on a computer that is too busy for it."""
+    clock = ControllerClock()
+    times = [clock.map(5_000, sent, sent + 1e-3) for sent in np.arange(0.0, 1.0, 1 / 60)]
+    assert (np.diff(times) > 0).all()
+    assert times == pytest.approx(np.arange(0.0, 1.0, 1 / 60), abs=1.1e-3)

@@ -25,6 +25,7 @@ from pneumarm.arm.serial.protocol import (
     decode,
     encode,
     pack_valves,
+    said_twice,
     stuff,
     unpack_valves,
     unstuff,
@@ -32,6 +33,13 @@ from pneumarm.arm.serial.protocol import (
 
 X25 = Calculator(Crc16.X25)
 KINDS = {**wire.REQUEST, **wire.REPLY}
+
+
+def random_values(name: str, rng: random.Random) -> tuple[int, ...]:
+    """Return any payload of a frame, as its values."""
+    if name == "EXCHANGE":
+        return wire.twice(rng.randrange(256))
+    return wire.layout(name).unpack(rng.randbytes(wire.layout(name).size))
 
 
 def test_constants_are_those_of_the_page() -> None:
@@ -62,7 +70,7 @@ def test_each_request_has_the_answer_of_the_page() -> None:
 def test_frames_are_those_of_the_page(name: str) -> None:
     rng = random.Random(name)
     for sequence in (0, 1, 255, 256, 65535):
-        values = wire.layout(name).unpack(rng.randbytes(wire.layout(name).size))
+        values = random_values(name, rng)
         content = bytes([KINDS[name]]) + sequence.to_bytes(2, "little") + wire.layout(name).pack(*values)
         frame = encode(KINDS[name], sequence, *values)
         assert frame == wire.enclosed(content)
@@ -104,7 +112,7 @@ def test_unstuffing_agrees_also_on_what_is_none(data: bytes) -> None:
 @given(st.binary(max_size=300), st.lists(st.integers(0, 400), max_size=10), st.integers(0, 2**32))
 def test_a_stream_gives_the_same_frames_however_it_is_cut(garbage: bytes, cuts: list[int], seed: int) -> None:
     rng = random.Random(seed)
-    frames = [encode(Request.EXCHANGE, rng.randrange(65536), rng.randrange(256)) for _ in range(5)]
+    frames = [encode(Request.EXCHANGE, rng.randrange(65536), *said_twice(rng.randrange(256))) for _ in range(5)]
     stream = b"".join(frames[:2]) + garbage + b"\0" + b"".join(frames[2:])
     whole, pieces = Splitter(), Splitter()
     expected = list(whole.feed(stream))
@@ -124,6 +132,8 @@ def oracle(chunk: bytes) -> bytes | None:
     except ValueError:
         return None
     name = next((name for name, number in KINDS.items() if number == content[0]), None)
+    if name == "EXCHANGE" and tuple(content[3:]) != wire.twice(content[3]):
+        return None
     return content if name is not None and len(content) == 3 + wire.layout(name).size else None
 
 
@@ -135,7 +145,7 @@ def damage(count: int, seed: int) -> tuple[int, int]:
     names = list(KINDS)
     for i in range(count):
         name = rng.choice(names)
-        values = wire.layout(name).unpack(rng.randbytes(wire.layout(name).size))
+        values = random_values(name, rng)
         frame = encode(KINDS[name], i & 0xFFFF, *values)
         others[i % len(others)] = frame
         stream = mutated(frame, rng, others) + b"\0"
@@ -162,6 +172,16 @@ def test_million_damaged_frames_to_the_host_and_the_board() -> None:
     damaged, foreign = damage(1_000_000, seed=2)
     print(f"a million damaged frames to the Python decoder: {damaged} damaged, {foreign} of them taken")
     assert foreign <= 3 + 3 * damaged / 65_536  # what a CRC of 16 bits lets through by chance
+
+
+def test_an_exchange_says_its_valves_twice() -> None:
+    """Of all 65,536 payloads, each with its right CRC, the 256 whose bytes are each other's complement are taken."""
+    taken = []
+    for payload in range(1 << 16):
+        content = bytes([Request.EXCHANGE, 1, 2]) + payload.to_bytes(2, "little")
+        if (frame := decode(stuff(content + protocol.crc(content).to_bytes(2, "little")))) is not None:
+            taken.append(frame.values)
+    assert taken == sorted(map(said_twice, range(256)), key=lambda values: values[1])
 
 
 def test_every_byte_of_valves() -> None:

@@ -32,6 +32,7 @@ from pneumarm.arm.serial.protocol import (
     Sensors,
     Status,
     pack_valves,
+    said_twice,
     unpack_valves,
 )
 from pneumarm.errors import ArmFailure, UnusableInput
@@ -219,7 +220,7 @@ class SerialArm(Arm):
 
     def _exchange(self, valves: NDArray[np.int8]) -> None:
         packed = pack_valves(valves)
-        answer = self.link.ask(Request.EXCHANGE, packed)
+        answer = self.link.ask(Request.EXCHANGE, *said_twice(packed))
         flags = self._status(answer)
         sensors = Sensors.of(answer.frame.values)
         if flags & LATCHES:

@@ -34,7 +34,7 @@ class ControllerClock:
 
     def __init__(self) -> None:
         self._kept: deque[_Exchange] = deque(maxlen=STRETCHES)
-        self._last: tuple[float, float] | None = None
+        self._last: float | None = None
         self.rate = 1.0
         """Seconds of the host per second of the controller."""
         self._origin = (0.0, 0.0)
@@ -42,14 +42,12 @@ class ControllerClock:
     def map(self, raw: int, sent: float, received: float) -> float:
         """Return the host's time [s] of a reading made at ``raw`` [us] in an exchange between two host times [s]."""
         controller = self._unwrapped(raw, received)
-        if self._last is not None and controller == self._last[0]:
-            return self._last[1]
         self._keep(_Exchange(controller, (sent + received) / 2, received - sent))
         mapped = self._origin[1] + self.rate * (controller - self._origin[0])
         mapped = min(max(mapped, sent), received)  # it was made then, whatever the line says
         if self._last is not None:
-            mapped = max(mapped, self._last[1])
-        self._last = (controller, mapped)
+            mapped = max(mapped, self._last)
+        self._last = mapped
         return mapped
 
     def _unwrapped(self, raw: int, received: float) -> float:

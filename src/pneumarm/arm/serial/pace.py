@@ -2,8 +2,10 @@
 
 import math
 
-SHORTEST = 0.002
-"""No attempt is waited for less long [s]: a reply takes 1 to 1.5 ms."""
+SHORTEST = 1e-3
+"""No attempt is waited for less long [s]: so long a request and its reply are on the line."""
+MARGIN = 1.25
+"""An attempt is waited for at least so many times the smoothed round trip."""
 SOONEST = 0.03
 """No link is given up sooner [s], however short the period is: a computer is busy elsewhere for 10 ms at times."""
 SURE = 1e-6
@@ -21,8 +23,9 @@ _FORGETS = 0.999
 class Pace:
     """How long to wait for an answer before asking again, and when to stop asking.
 
-    *Asking again*: after the smoothed round trip and four mean deviations, between :data:`SHORTEST` and a third of
-    the control period, so that at least two more attempts fit into a period.
+    *Asking again*: after the smoothed round trip and four mean deviations, or :data:`MARGIN` times the round trip,
+    between :data:`SHORTEST` and a third of the control period, so that at least two more attempts fit into a period
+    and, on a line that answers within a millisecond or two, as many as there is time for.
 
     *Giving up*: as soon as k attempts without an answer are less likely than :data:`SURE` on this link,
     ``(1 - p)^k`` with p the share of attempts that it answered lately; but not before most of a period has passed,
@@ -47,7 +50,8 @@ class Pace:
         """Time after which to ask again [s]."""
         if self._round_trip is None:
             return self._longest
-        return min(max(self._round_trip + 4 * self._deviation, SHORTEST), self._longest)
+        timeout = max(self._round_trip + 4 * self._deviation, MARGIN * self._round_trip, SHORTEST)
+        return min(timeout, self._longest)
 
     @property
     def share(self) -> float:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-VERSION = 1
+VERSION = 2
 BAUD = 500_000
 JOINTS = 2
 MUSCLES = 4
@@ -110,7 +110,7 @@ PAYLOAD: dict[int, struct.Struct] = {
     Request.CONFIGURE: struct.Struct(f"<BB{MUSCLES}H"),
     Request.ARM: struct.Struct("<I"),
     Request.DISARM: struct.Struct("<"),
-    Request.EXCHANGE: struct.Struct("<B"),
+    Request.EXCHANGE: struct.Struct("<BB"),
     Request.READ: struct.Struct("<"),
     Reply.HELLO: struct.Struct("<BIIBH"),
     Reply.STATUS: struct.Struct("<IHB"),
@@ -195,6 +195,11 @@ class Refused(NamedTuple):
     valves: int
 
 
+def said_twice(valves: int) -> tuple[int, int]:
+    """Return the values of an EXCHANGE that sets the byte ``valves``: itself and its complement."""
+    return valves, valves ^ 0xFF
+
+
 def encode(kind: int, sequence: int, *values: int) -> bytes:
     """Return the frame of a request or reply, its 0x00 included."""
     content = _HEAD.pack(kind, sequence) + PAYLOAD[kind].pack(*values)
@@ -212,7 +217,10 @@ def decode(frame: bytes) -> Frame | None:
     if _CRC.unpack(content[-_CRC.size :])[0] != crc(content[: -_CRC.size]):
         return None
     kind, sequence = _HEAD.unpack_from(content)
-    return Frame(kind, sequence, layout.unpack(content[_HEAD.size : -_CRC.size]))
+    values = layout.unpack(content[_HEAD.size : -_CRC.size])
+    if kind == Request.EXCHANGE and values != said_twice(values[0]):
+        return None
+    return Frame(kind, sequence, values)
 
 
 _MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))

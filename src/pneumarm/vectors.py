@@ -32,41 +32,49 @@ _ALIGNED = 4  # bytes
 _CONTRACT = ("contract",)  # a product and a sum may become one instruction, which rounds once
 
 
-def weighted_sums(x: _Floats, weights: _Floats, sums: _Floats, first: int) -> None:
-    """Set ``sums[first + u]`` to the sum over i of ``x[i] weights[i, u]``, added up in the order of i.
+def weighted_sums(x: _Floats, weights: _Floats, first: int, sums: _Floats) -> None:
+    """Set ``sums[u]`` to the sum over i of ``x[i] weights[i, first + u]``, added up in the order of i.
 
     Args:
         x: shape (inputs,), a multiple of ``ROWS``.
-        weights: shape (at least inputs, units), units a multiple of ``LANES``.
-        sums: shape (at least first + units,); not overlapping the others.
-        first: where to begin in ``sums``.
+        weights: shape (at least inputs, at least first + units).
+        first: where to begin in the rows of ``weights``.
+        sums: shape (units,), a multiple of ``LANES``; not overlapping the others.
 
     """
-    sums[first : first + weights.shape[1]] = 0
+    sums[:] = 0
     for i in range(x.shape[0]):
-        sums[first : first + weights.shape[1]] += x[i] * weights[i]
+        sums += x[i] * weights[i, first : first + sums.shape[0]]
 
 
-def add_products(table: _Floats, x: _Floats, factors: _Floats) -> None:
-    """Add ``x[i] factors[u]`` to ``table[i, u]``.
+def add_products(table: _Floats, first: int, x: _Floats, factors: _Floats) -> None:
+    """Add ``x[i] factors[u]`` to ``table[i, first + u]``.
 
     Args:
-        table: shape (at least inputs, units), units a multiple of ``LANES``; not overlapping the others.
+        table: shape (at least inputs, at least first + units); not overlapping the others.
+        first: where to begin in its rows.
         x: shape (inputs,), a multiple of ``ROWS``.
-        factors: shape (at least units,).
+        factors: shape (units,), a multiple of ``LANES``.
 
     """
     for i in range(x.shape[0]):
-        table[i] += x[i] * factors[: table.shape[1]]
+        table[i, first : first + factors.shape[0]] += x[i] * factors
 
 
-def follow(table: _Floats, traces: _Floats, factor: float32, decay: float32) -> None:
-    """Add ``factor`` times ``traces`` to ``table``, both (rows, units), and multiply ``traces`` by ``decay``.
+def follow(table: _Floats, traces: _Floats, first: int, units: int, factor: float32, decay: float32) -> None:
+    """Add ``factor`` times ``traces`` to ``table`` and multiply ``traces`` by ``decay``, in some columns of both.
 
-    Units are a multiple of ``LANES``; the two do not overlap.
+    Args:
+        table: shape (rows, at least first + units).
+        traces: same shape; not overlapping ``table``.
+        first: where to begin in the rows.
+        units: how many columns, a multiple of ``LANES``.
+        factor: of the traces.
+        decay: of the traces, afterwards.
+
     """
-    table += factor * traces
-    traces *= decay
+    table[:, first : first + units] += factor * traces[:, first : first + units]
+    traces[:, first : first + units] *= decay
 
 
 class _Table:
@@ -104,15 +112,24 @@ def _multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
     return builder.fadd(builder.fmul(a, b, flags=_CONTRACT), c, flags=_CONTRACT)
 
 
-def _blocks(builder: Any, count: Any, body: Callable[[Any, int], None]) -> None:
-    """Call ``body(first, lanes)`` for vectors of ``count`` units; wide ones where the count allows it."""
-    zero = ir.Constant(count.type, 0)
-    wide = ir.Constant(count.type, 2 * LANES)
-    is_wide = builder.icmp_unsigned("==", builder.urem(count, wide), zero)
+def _blocks(builder: Any, count: Any, body: Callable[[list[Any], int], None], at_once: Sequence[int] = (1,)) -> None:
+    """Call ``body(places, lanes)`` for all vectors of ``count`` units, so many ``at_once`` while there are so many.
+
+    Vectors are wide ones where the count allows it.
+    """
+    kind = count.type
+    is_wide = builder.icmp_unsigned("==", builder.urem(count, kind(2 * LANES)), kind(0))
     with builder.if_else(is_wide) as cases:
         for case, lanes in zip(cases, (2 * LANES, LANES), strict=True):
-            with case, cgutils.for_range_slice(builder, zero, count, ir.Constant(count.type, lanes)) as (first, _):
-                body(first, lanes)
+            with case:
+                begin = kind(0)
+                for vectors in at_once:
+                    step = kind(vectors * lanes)
+                    left = builder.sub(count, begin)
+                    end = builder.add(begin, builder.sub(left, builder.urem(left, step)))
+                    with cgutils.for_range_slice(builder, begin, end, step) as (first, _):
+                        body([builder.add(first, kind(k * lanes)) for k in range(vectors)], lanes)
+                    begin = end
 
 
 def _rows(builder: Any, count: Any, body: Callable[[Any], None]) -> None:
@@ -132,81 +149,88 @@ def _tables(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> 
 
 
 @intrinsic
-def _weighted_sums(typing: Any, x: Any, weights: Any, sums: Any, first: Any) -> Any:
+def _weighted_sums(typing: Any, x: Any, weights: Any, first: Any, sums: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> Any:
         x, weights, sums = _tables(context, builder, signature, args)
-        units = weights.shape[1]
 
-        def block(u: Any, lanes: int) -> None:
-            total = cgutils.alloca_once_value(builder, ir.Constant(ir.VectorType(ir.FloatType(), lanes), None))
-            builder.store(ir.Constant(ir.VectorType(ir.FloatType(), lanes), None), total)
+        def block(places: list[Any], lanes: int) -> None:
+            zero = ir.Constant(ir.VectorType(ir.FloatType(), lanes), None)
+            totals = [cgutils.alloca_once(builder, zero.type) for _ in places]
+            for total in totals:
+                builder.store(zero, total)
 
             def row(i: Any) -> None:
-                weight = weights.load(builder.add(builder.mul(i, units), u), lanes)
-                builder.store(_multiply_add(builder, x.spread(i, lanes), weight, builder.load(total)), total)
+                begin, number = builder.add(builder.mul(i, weights.shape[1]), args[2]), x.spread(i, lanes)
+                for total, place in zip(totals, places, strict=True):
+                    weight = weights.load(builder.add(begin, place), lanes)
+                    builder.store(_multiply_add(builder, number, weight, builder.load(total)), total)
 
             _rows(builder, x.shape[0], row)
-            sums.store(builder.load(total), builder.add(args[3], u), lanes)
+            for total, place in zip(totals, places, strict=True):
+                sums.store(builder.load(total), place, lanes)
 
-        _blocks(builder, units, block)
+        _blocks(builder, sums.shape[0], block, at_once=(4, 2, 1))
         return context.get_dummy_value()
 
-    return types.void(x, weights, sums, types.intp), generate
+    return types.void(x, weights, types.intp, sums), generate
 
 
 @intrinsic
-def _add_products(typing: Any, table: Any, x: Any, factors: Any) -> Any:
+def _add_products(typing: Any, table: Any, first: Any, x: Any, factors: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> Any:
         table, x, factors = _tables(context, builder, signature, args)
-        units = table.shape[1]
 
-        def block(u: Any, lanes: int) -> None:
+        def block(places: list[Any], lanes: int) -> None:
+            (u,) = places
             factor = factors.load(u, lanes)
 
             def row(i: Any) -> None:
-                place = builder.add(builder.mul(i, units), u)
+                place = builder.add(builder.add(builder.mul(i, table.shape[1]), args[1]), u)
                 moved = _multiply_add(builder, x.spread(i, lanes), factor, table.load(place, lanes))
                 table.store(moved, place, lanes)
 
             _rows(builder, x.shape[0], row)
 
-        _blocks(builder, units, block)
+        _blocks(builder, factors.shape[0], block)
         return context.get_dummy_value()
 
-    return types.void(table, x, factors), generate
+    return types.void(table, types.intp, x, factors), generate
 
 
 @intrinsic
-def _follow(typing: Any, table: Any, traces: Any, factor: Any, decay: Any) -> Any:
+def _follow(typing: Any, table: Any, traces: Any, first: Any, units: Any, factor: Any, decay: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> Any:
         table, traces = _tables(context, builder, signature, args)
-        _, _, factor, decay = args
+        first, units, factor, decay = args[2:]
 
-        def block(u: Any, lanes: int) -> None:
-            trace = traces.load(u, lanes)
-            moved = _multiply_add(builder, _spread(builder, factor, lanes), trace, table.load(u, lanes))
-            table.store(moved, u, lanes)
-            traces.store(builder.fmul(trace, _spread(builder, decay, lanes)), u, lanes)
+        def block(places: list[Any], lanes: int) -> None:
+            factors, decays = (_spread(builder, number, lanes) for number in (factor, decay))
+            with cgutils.for_range(builder, table.shape[0]) as loop:
+                begin = builder.add(builder.mul(loop.index, table.shape[1]), first)
+                place = builder.add(begin, places[0])
+                trace = traces.load(place, lanes)
+                table.store(_multiply_add(builder, factors, trace, table.load(place, lanes)), place, lanes)
+                traces.store(builder.fmul(trace, decays), place, lanes)
 
-        _blocks(builder, builder.mul(*table.shape), block)
+        _blocks(builder, units, block)
         return context.get_dummy_value()
 
-    return types.void(table, traces, types.float32, types.float32), generate
+    return types.void(table, traces, types.intp, types.intp, types.float32, types.float32), generate
 
 
 # Translations for kernels.
-overload(weighted_sums, jit_options=_INLINE)(lambda x, weights, sums, first: _call_weighted_sums)
-overload(add_products, jit_options=_INLINE)(lambda table, x, factors: _call_add_products)
-overload(follow, jit_options=_INLINE)(lambda table, traces, factor, decay: _call_follow)
+overload(weighted_sums, jit_options=_INLINE)(lambda x, weights, first, sums: _call_weighted_sums)
+overload(add_products, jit_options=_INLINE)(lambda table, first, x, factors: _call_add_products)
+overload(follow, jit_options=_INLINE)(lambda table, traces, first, units, factor, decay: _call_follow)
 
 
-def _call_weighted_sums(x, weights, sums, first):  # type: ignore[no-untyped-def]
-    _weighted_sums(x, weights, sums, first)
+def _call_weighted_sums(x, weights, first, sums):  # type: ignore[no-untyped-def]
+    _weighted_sums(x, weights, first, sums)
 
 
-def _call_add_products(table, x, factors):  # type: ignore[no-untyped-def]
-    _add_products(table, x, factors)
+def _call_add_products(table, first, x, factors):  # type: ignore[no-untyped-def]
+    _add_products(table, first, x, factors)
 
 
-def _call_follow(table, traces, factor, decay):  # type: ignore[no-untyped-def]
-    _follow(table, traces, factor, decay)
+def _call_follow(table, traces, first, units, factor, decay):  # type: ignore[no-untyped-def]
+    _follow(table, traces, first, units, factor, decay)

@@ -36,16 +36,16 @@ class Learner(NamedTuple):
     """The networks of an agent as a kernel changes them. Made by :func:`learner`."""
 
     weights: NDArray[np.float32]
-    """Shape (joints, 9, inputs + 2, units), a network an action of each joint, its hidden units padded: by input, then
-    the output weights, then in the first place the output bias."""
+    """Shape (joints, inputs + 2, units): by input, then the output weights, then the output biases. The networks of the
+    actions lie side by side: hidden unit ``h`` of action ``a`` is at ``a width + h``, its output bias at ``a width``."""
     traces: NDArray[np.float32]
     """Eligibility of each weight, same shape; not used if ``decay`` is 0."""
     traced: NDArray[np.bool_]
     """Which networks have traces that are not 0, shape (joints, 9)."""
     hidden: NDArray[np.float32]
-    """Room for the hidden units of all networks of a joint, one network after the other, padded."""
+    """Room for all networks of a joint, shape (units,)."""
     activation: NDArray[np.float32]
-    """Room for the hidden units of one network, shape (units,) or longer."""
+    """Room for the hidden units of one network, shape (width,); 0 beyond them."""
     slope: NDArray[np.float32]
     """Room, same shape."""
     size: int
@@ -64,14 +64,14 @@ class Learner(NamedTuple):
 
 def learner(weights: NDArray[np.float32], settings: TrainSettings, learning_rate: float | None = None) -> Learner:
     """Return a learner that changes ``weights`` in place."""
-    units = weights.shape[3]
+    width = padded(settings.hidden, LANES)
     return Learner(
         weights=weights,
         traces=np.zeros_like(weights),
-        traced=np.zeros(weights.shape[:2], np.bool_),
-        hidden=np.zeros(padded(ACTIONS * units, UNIT_BLOCK), np.float32),
-        activation=np.zeros(padded(units, UNIT_BLOCK), np.float32),
-        slope=np.zeros(padded(units, UNIT_BLOCK), np.float32),
+        traced=np.zeros((len(weights), ACTIONS), np.bool_),
+        hidden=np.zeros(weights.shape[2], np.float32),
+        activation=np.zeros(width, np.float32),
+        slope=np.zeros(width, np.float32),
         size=settings.hidden,
         rate=float(settings.learning_rate if learning_rate is None else learning_rate),
         discount=float(settings.discount),
@@ -113,39 +113,46 @@ def pack(networks: Networks, window: Window) -> NDArray[np.float32]:
     """Return ``networks`` as the weights of a :class:`Learner`."""
     place, state = places(window), window.state_size
     joints, _, _, size = networks.hidden_weights.shape
-    weights = np.zeros((joints, ACTIONS, place.size + 2, padded(size, LANES)), np.float32)
-    weights[:, :, :state, :size] = networks.hidden_weights[:, :, :state]
-    weights[:, :, place.goal : place.one, :size] = networks.hidden_weights[:, :, state:]
-    weights[:, :, place.one, :size] = networks.hidden_bias
-    weights[:, :, -2, :size] = networks.output_weights
-    weights[:, :, -1, 0] = networks.output_bias
+    width = padded(size, LANES)
+    weights = np.zeros((joints, place.size + 2, padded(ACTIONS * width, UNIT_BLOCK)), np.float32)
+    rows = _by_action(weights, width)
+    rows[:, :, :state, :size] = networks.hidden_weights[:, :, :state]
+    rows[:, :, place.goal : place.one, :size] = networks.hidden_weights[:, :, state:]
+    rows[:, :, place.one, :size] = networks.hidden_bias
+    rows[:, :, -2, :size] = networks.output_weights
+    rows[:, :, -1, 0] = networks.output_bias
     return weights
 
 
 def unpack(weights: NDArray[np.float32], window: Window, hidden: int) -> Networks:
     """Return what :func:`pack` packed."""
     place, state = places(window), window.state_size
-    inputs = np.concatenate([weights[:, :, :state, :hidden], weights[:, :, place.goal : place.one, :hidden]], axis=2)
+    rows = _by_action(weights, padded(hidden, LANES))
     return Networks(
-        inputs,
-        weights[:, :, place.one, :hidden].copy(),
-        weights[:, :, -2, :hidden].copy(),
-        weights[:, :, -1, 0].copy(),
+        np.concatenate([rows[:, :, :state, :hidden], rows[:, :, place.goal : place.one, :hidden]], axis=2),
+        rows[:, :, place.one, :hidden].copy(),
+        rows[:, :, -2, :hidden].copy(),
+        rows[:, :, -1, 0].copy(),
     )
+
+
+def _by_action(weights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
+    """Return ``weights`` of a :class:`Learner` seen network by network, shape (joints, 9, inputs + 2, width)."""
+    used = weights[:, :, : ACTIONS * width]
+    return used.reshape(*used.shape[:2], ACTIONS, width).transpose(0, 2, 1, 3)
 
 
 @part
 def action_values(learner, joint, x, values):  # type: ignore[no-untyped-def]
     """Set ``values`` (9,) to the action values of ``joint`` in the state and goal ``x``, in units of reward."""
-    weights, hidden = learner.weights, learner.hidden
-    row, units = x.shape[0], weights.shape[3]
-    for action in range(ACTIONS):
-        weighted_sums(x, weights[joint, action], hidden, action * units)
+    weights, hidden = learner.weights[joint], learner.hidden
+    row, width = x.shape[0], learner.activation.shape[0]
+    weighted_sums(x, weights, 0, hidden)
     tansig(hidden)
     for action in range(ACTIONS):
-        value = weights[joint, action, row + 1, 0]
-        for h in range(learner.size):
-            value += hidden[action * units + h] * weights[joint, action, row, h]
+        value = weights[row + 1, action * width]
+        for u in range(action * width, action * width + learner.size):
+            value += hidden[u] * weights[row, u]
         values[action] = value * np.float32(learner.scale)
 
 
@@ -161,27 +168,31 @@ def backpropagate(learner, joint, x, action):  # type: ignore[no-untyped-def]
 
     ``slope`` is the derivative of the network's output by what enters each hidden unit.
     """
-    weights, activation, slope = learner.weights[joint, action], learner.activation, learner.slope
-    row = x.shape[0]
-    weighted_sums(x, weights, activation, 0)
+    weights, activation, slope = learner.weights[joint], learner.activation, learner.slope
+    row, first = x.shape[0], action * activation.shape[0]
+    weighted_sums(x, weights, first, activation)
     tansig(activation)
-    output = weights[row + 1, 0]
+    output = weights[row + 1, first]
     for h in range(learner.size):
-        weight = weights[row, h]
+        weight = weights[row, first + h]
         output += activation[h] * weight
         slope[h] = weight * (np.float32(1.0) - activation[h] * activation[h])
     return output * np.float32(learner.scale)
 
 
 @part(fastmath=_IN_ORDER)
-def add_gradient(learner, table, x, factor):  # type: ignore[no-untyped-def]
-    """Add ``factor`` times the gradient that :func:`backpropagate` left to ``table`` (inputs + 2, units)."""
-    row = x.shape[0]
+def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-def]
+    """Add ``factor`` times the gradient that :func:`backpropagate` left to ``table`` (inputs + 2, units).
+
+    Leaves ``factor`` times the slopes in the learner.
+    """
+    activation, slope = learner.activation, learner.slope
+    row, first = x.shape[0], action * activation.shape[0]
     for h in range(learner.size):
-        table[row, h] += factor * learner.activation[h]
-        learner.slope[h] *= factor
-    table[row + 1, 0] += factor
-    add_products(table, x, learner.slope)
+        slope[h] *= factor
+        table[row, first + h] += factor * activation[h]
+    table[row + 1, first] += factor
+    add_products(table, first, x, slope)
 
 
 @part
@@ -190,9 +201,9 @@ def update(learner, joint, x, action, target):  # type: ignore[no-untyped-def]
     delta = target - backpropagate(learner, joint, x, action)
     factor = np.float32(learner.rate * delta / learner.scale)
     if learner.decay == 0.0:
-        add_gradient(learner, learner.weights[joint, action], x, factor)
+        add_gradient(learner, learner.weights[joint], x, action, factor)
     else:
-        add_gradient(learner, learner.traces[joint, action], x, np.float32(1.0))
+        add_gradient(learner, learner.traces[joint], x, action, np.float32(1.0))
         learner.traced[joint, action] = True
         follow_traces(learner, joint, factor)
     return delta
@@ -201,19 +212,20 @@ def update(learner, joint, x, action, target):  # type: ignore[no-untyped-def]
 @part
 def follow_traces(learner, joint, factor):  # type: ignore[no-untyped-def]
     """Move all weights of ``joint`` by ``factor`` along their traces, and let these decay."""
-    decay = np.float32(learner.discount * learner.decay)
+    weights, traces = learner.weights[joint], learner.traces[joint]
+    decay, width = np.float32(learner.discount * learner.decay), learner.activation.shape[0]
     for action in range(ACTIONS):
         if learner.traced[joint, action]:
-            follow(learner.weights[joint, action], learner.traces[joint, action], factor, decay)
+            follow(weights, traces, action * width, width, factor, decay)
 
 
 @part
 def forget_traces(learner, joint):  # type: ignore[no-untyped-def]
     """Set the traces of ``joint`` to 0, as at the start of every episode."""
+    traces, width = learner.traces[joint], learner.activation.shape[0]
     for action in range(ACTIONS):
         if learner.traced[joint, action]:
             learner.traced[joint, action] = False
-            traces = learner.traces[joint, action]
             for i in range(traces.shape[0]):
-                for u in range(traces.shape[1]):
+                for u in range(action * width, (action + 1) * width):
                     traces[i, u] = np.float32(0.0)

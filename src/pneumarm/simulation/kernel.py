@@ -185,7 +185,7 @@ def tansig(hidden):  # type: ignore[no-untyped-def]
 @part
 def hidden_layer(weights, x, hidden):  # type: ignore[no-untyped-def]
     """Set ``hidden`` (units,) to tansig(x W), ``weights`` (at least inputs, units), ``x`` (inputs,)."""
-    weighted_sums(x, weights, hidden, 0)
+    weighted_sums(x, weights, 0, hidden)
     tansig(hidden)
 
 

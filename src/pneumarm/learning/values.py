@@ -151,7 +151,8 @@ def action_values(learner, joint, x, values):  # type: ignore[no-untyped-def]
     tansig(hidden)
     for action in range(ACTIONS):
         value = weights[row + 1, action * width]
-        for u in range(action * width, action * width + learner.size):
+        for h in range(learner.size):
+            u = np.uint64(action * width + h)  # an unsigned index needs no test for wrapping around
             value += hidden[u] * weights[row, u]
         values[action] = value * np.float32(learner.scale)
 
@@ -174,7 +175,7 @@ def backpropagate(learner, joint, x, action):  # type: ignore[no-untyped-def]
     tansig(activation)
     output = weights[row + 1, first]
     for h in range(learner.size):
-        weight = weights[row, first + h]
+        weight = weights[row, np.uint64(first + h)]
         output += activation[h] * weight
         slope[h] = weight * (np.float32(1.0) - activation[h] * activation[h])
     return output * np.float32(learner.scale)
@@ -190,7 +191,7 @@ def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-
     row, first = x.shape[0], action * activation.shape[0]
     for h in range(learner.size):
         slope[h] *= factor
-        table[row, first + h] += factor * activation[h]
+        table[row, np.uint64(first + h)] += factor * activation[h]
     table[row + 1, first] += factor
     add_products(table, first, x, slope)
 
@@ -228,4 +229,4 @@ def forget_traces(learner, joint):  # type: ignore[no-untyped-def]
             learner.traced[joint, action] = False
             for i in range(traces.shape[0]):
                 for u in range(action * width, (action + 1) * width):
-                    traces[i, u] = np.float32(0.0)
+                    traces[i, np.uint64(u)] = np.float32(0.0)

@@ -29,7 +29,7 @@ def compiled(x: Any, table: Any, traces: Any, first: int, sums: Any) -> None:
 
 
 def numbers(*shape: int) -> np.ndarray:
-    """Return multiples of 1/8 between -1 and 1: what is made of them here is exact in float32, however it is rounded."""
+    """Return multiples of 1/8 between -1 and 1: all that is made of them here is exact in float32."""
     return (np.random.default_rng(sum(shape)).integers(-8, 9, shape) / 8).astype(np.float32)
 
 

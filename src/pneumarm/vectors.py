@@ -1,10 +1,10 @@
-"""What networks spend their time on, in vector instructions: the loops that a compiler leaves slow where sizes are small.
+"""The loops that networks spend their time in, as vector instructions.
 
-A compiler turns a loop over a few hundred units into good vector instructions. Networks here have 5 to 50, of which the
-compiler does not know how many; it adds up in memory, in pieces of different widths, and spends more instructions on
-finding the way than on numbers. These functions are that loop written for the machine: ``LANES`` (or twice as many)
-units at once, their sums in registers over all inputs. Every sum is made in the order of its inputs, so what comes out
-does not depend on how wide the machine's vectors are.
+A compiler turns a loop over a few hundred units into good vector instructions. Networks here have 5 to 50, and it
+does not know how many: it adds up in memory, in pieces of different widths, and spends more instructions on finding
+the way than on numbers. These functions are such loops written for the machine: ``LANES`` units at once (or twice as
+many), their sums in registers over all inputs. Every sum is made in the order of its inputs, so what comes out does
+not depend on how wide the machine's vectors are.
 
 Each is an ordinary function, which says what it does and runs as plain Python, with a translation for kernels
 (:mod:`pneumarm.kernels`). Arrays are float32 and C-contiguous.
@@ -27,7 +27,7 @@ ROWS = 4
 """Inputs are padded to a multiple of this."""
 
 _Floats = NDArray[float32]
-_INLINE = {"forceinline": True, "_nrt": False, "nogil": True, "error_model": "numpy"}
+_INLINE: Any = {"forceinline": True, "_nrt": False, "nogil": True, "error_model": "numpy"}
 _ALIGNED = 4  # bytes
 _CONTRACT = ("contract",)  # a product and a sum may become one instruction, which rounds once
 
@@ -225,12 +225,12 @@ overload(follow, jit_options=_INLINE)(lambda table, traces, first, units, factor
 
 
 def _call_weighted_sums(x, weights, first, sums):  # type: ignore[no-untyped-def]
-    _weighted_sums(x, weights, first, sums)
+    _weighted_sums(x, weights, first, sums)  # type: ignore[call-arg]
 
 
 def _call_add_products(table, first, x, factors):  # type: ignore[no-untyped-def]
-    _add_products(table, first, x, factors)
+    _add_products(table, first, x, factors)  # type: ignore[call-arg]
 
 
 def _call_follow(table, traces, first, units, factor, decay):  # type: ignore[no-untyped-def]
-    _follow(table, traces, first, units, factor, decay)
+    _follow(table, traces, first, units, factor, decay)  # type: ignore[call-arg]

@@ -36,8 +36,9 @@ class Learner(NamedTuple):
     """The networks of an agent as a kernel changes them. Made by :func:`learner`."""
 
     weights: NDArray[np.float32]
-    """Shape (joints, inputs + 2, units): by input, then the output weights, then the output biases. The networks of the
-    actions lie side by side: hidden unit ``h`` of action ``a`` is at ``a width + h``, its output bias at ``a width``."""
+    """Shape (joints, inputs + 2, units): by input, then the output weights, then the output biases. The networks of
+    the actions lie side by side: hidden unit ``h`` of action ``a`` is at ``a width + h``, its output bias at
+    ``a width``."""
     traces: NDArray[np.float32]
     """Eligibility of each weight, same shape; not used if ``decay`` is 0."""
     traced: NDArray[np.bool_]

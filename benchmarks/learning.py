@@ -21,7 +21,7 @@ from pneumarm.kernels import kernel
 from pneumarm.learning import TrainSettings, test, train
 from pneumarm.learning.environment import Environment, environment, episode
 from pneumarm.learning.loop import Schedule, room, train_episode
-from pneumarm.learning.values import draw_networks, learner, pack, unpack
+from pneumarm.learning.values import Networks, draw_networks, learner, pack, unpack
 from pneumarm.random import normal, random_state, uniform
 
 STEPS = 200_000
@@ -191,6 +191,16 @@ def _numpy_steps(simulation: Any, env: Environment, weights: Any, steps: int) ->
         x, q, hidden, last, action = x_next, q_next, hidden_next, action, chosen
 
 
+def _by_unit(networks: Networks) -> np.ndarray:
+    """Return nine networks of five units for :func:`_fused`: unit h of action a in column 9 h + a, shape (22, 48)."""
+    w1, b1, w2, b2 = (array[0] for array in networks)
+    weights = np.zeros((22, 48), np.float32)
+    weights[:16, :45] = w1[:, :16].transpose(1, 2, 0).reshape(16, 45)
+    weights[18, :45], weights[19, :45] = w1[:, 16].T.ravel(), b1.T.ravel()
+    weights[20, :45], weights[21, :9] = w2.T.ravel(), b2
+    return weights
+
+
 def _best(run: Any, repeats: int = 5) -> float:
     """Return the shortest processor time of ``run`` [s]."""
     times = []
@@ -222,7 +232,7 @@ def measure() -> Iterator[str]:
     noise = np.array([*env.noise.std, env.noise.ramp[0], env.noise.ramp[2], env.noise.speed[0, 0], env.noise.ramp[1]])
 
     def fused(steps: int = STEPS) -> Any:
-        weights, random = start[0].copy(), random_state(1)
+        weights, random = _by_unit(unpack(start, simulation.window, 5)), random_state(1)
         x = one.state.x.copy()
         uniform(random)  # the goal
         x[:16] = sigma[int(uniform(random) * len(sigma))]
@@ -236,7 +246,8 @@ def measure() -> Iterator[str]:
 
     (composed_weights, composed_total), (fused_weights, fused_total) = composed(200), fused(200)
     assert composed_total == fused_total
-    np.testing.assert_allclose(fused_weights, composed_weights[0], atol=1e-3)
+    expected = _by_unit(unpack(composed_weights, simulation.window, 5))
+    np.testing.assert_allclose(fused_weights, expected, atol=1e-3)
 
     # In turns, so that what else the machine does bears on both.
     seconds = np.array([[_best(composed, 1), _best(fused, 1)] for _ in range(15)]).min(axis=0)

@@ -14,7 +14,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.learning import BeginStates, TrainSettings
 from pneumarm.learning.environment import environment, episode
 from pneumarm.learning.loop import Schedule, room, train_episode, train_episodes
-from pneumarm.learning.values import draw_networks, learner, network_shapes, pack
+from pneumarm.learning.values import draw_networks, learner, network_shapes, pack, unpack
 from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
@@ -37,7 +37,7 @@ def one_episode(
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     outcome = train_episode(env, learner(weights, settings), GREEDY, one, room(one))
-    return outcome, 50 * weights[0, -1, :9]
+    return outcome, 50 * unpack(weights, simulation.window, settings.hidden).output_bias[0]
 
 
 def test_goal_is_terminal(simulation: Simulation, begin: BeginStates) -> None:

@@ -109,7 +109,7 @@ def bias_only(biases: list[float], **settings: float | str) -> tuple[np.ndarray,
 
 
 def table(weights: np.ndarray) -> np.ndarray:
-    return 50 * weights[0, -1, :9]
+    return 50 * unpack(weights, Window(), 5).output_bias[0]
 
 
 def test_two_steps_of_sarsa_by_hand() -> None:

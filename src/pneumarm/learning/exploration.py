@@ -11,10 +11,10 @@ from pneumarm.random import uniform
 @part
 def greedy(values):  # type: ignore[no-untyped-def]
     """Return the action with the highest of ``values`` (9,), the first of equals."""
-    best = 0
+    best, highest = 0, values[0]
     for action in range(1, values.shape[0]):
-        if values[action] > values[best]:
-            best = action
+        if values[action] > highest:
+            best, highest = action, values[action]
     return best
 
 

@@ -18,7 +18,7 @@ from pneumarm.learning.values import action_values, forget_traces, learner, td_t
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import places
 
-_SAVED = ("weights", "traces", "random", "x", "actions", "next_actions", "next_values", "cut")
+_SAVED = ("weights", "traces", "traced", "random", "x", "actions", "next_actions", "next_values", "cut")
 
 
 class OnlineLearner:

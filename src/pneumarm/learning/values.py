@@ -24,22 +24,29 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import part
 from pneumarm.learning.settings import TrainSettings
-from pneumarm.simulation.kernel import FASTMATH, UNIT_BLOCK, hidden_layer, padded, places, tansig
+from pneumarm.simulation.kernel import UNIT_BLOCK, padded, places, tansig
 from pneumarm.transitions.window import Window
+from pneumarm.vectors import LANES, add_products, follow, weighted_sums
+
+_IN_ORDER = {"contract"}
+"""A product and a sum may become one instruction, but sums keep their order."""
 
 
 class Learner(NamedTuple):
     """The networks of an agent as a kernel changes them. Made by :func:`learner`."""
 
     weights: NDArray[np.float32]
-    """Shape (joints, inputs + 2, units): by input, then the output weights, then in the first nine places the output
-    biases. Unit ``h`` of the network of action ``a`` is at ``9 h + a``."""
+    """Shape (joints, inputs + 2, units): by input, then the output weights, then the output biases. The networks of
+    the actions lie side by side: hidden unit ``h`` of action ``a`` is at ``a width + h``, its output bias at
+    ``a width``."""
     traces: NDArray[np.float32]
     """Eligibility of each weight, same shape; not used if ``decay`` is 0."""
+    traced: NDArray[np.bool_]
+    """Which networks have traces that are not 0, shape (joints, 9)."""
     hidden: NDArray[np.float32]
     """Room for all networks of a joint, shape (units,)."""
     activation: NDArray[np.float32]
-    """Room for the hidden units of one network, shape (size,)."""
+    """Room for the hidden units of one network, shape (width,); 0 beyond them."""
     slope: NDArray[np.float32]
     """Room, same shape."""
     size: int
@@ -58,12 +65,14 @@ class Learner(NamedTuple):
 
 def learner(weights: NDArray[np.float32], settings: TrainSettings, learning_rate: float | None = None) -> Learner:
     """Return a learner that changes ``weights`` in place."""
+    width = padded(settings.hidden, LANES)
     return Learner(
         weights=weights,
         traces=np.zeros_like(weights),
+        traced=np.zeros((len(weights), ACTIONS), np.bool_),
         hidden=np.zeros(weights.shape[2], np.float32),
-        activation=np.zeros(settings.hidden, np.float32),
-        slope=np.zeros(settings.hidden, np.float32),
+        activation=np.zeros(width, np.float32),
+        slope=np.zeros(width, np.float32),
         size=settings.hidden,
         rate=float(settings.learning_rate if learning_rate is None else learning_rate),
         discount=float(settings.discount),
@@ -105,44 +114,48 @@ def pack(networks: Networks, window: Window) -> NDArray[np.float32]:
     """Return ``networks`` as the weights of a :class:`Learner`."""
     place, state = places(window), window.state_size
     joints, _, _, size = networks.hidden_weights.shape
-    used = ACTIONS * size
-    weights = np.zeros((joints, place.size + 2, padded(used, UNIT_BLOCK)), np.float32)
-    columns = networks.hidden_weights.transpose(0, 2, 3, 1).reshape(joints, state + joints, used)
-    weights[:, :state, :used] = columns[:, :state]
-    weights[:, place.goal : place.one, :used] = columns[:, state:]
-    weights[:, place.one, :used] = networks.hidden_bias.transpose(0, 2, 1).reshape(joints, used)
-    weights[:, -2, :used] = networks.output_weights.transpose(0, 2, 1).reshape(joints, used)
-    weights[:, -1, :ACTIONS] = networks.output_bias
+    width = padded(size, LANES)
+    weights = np.zeros((joints, place.size + 2, padded(ACTIONS * width, UNIT_BLOCK)), np.float32)
+    rows = _by_action(weights, width)
+    rows[:, :, :state, :size] = networks.hidden_weights[:, :, :state]
+    rows[:, :, place.goal : place.one, :size] = networks.hidden_weights[:, :, state:]
+    rows[:, :, place.one, :size] = networks.hidden_bias
+    rows[:, :, -2, :size] = networks.output_weights
+    rows[:, :, -1, 0] = networks.output_bias
     return weights
 
 
 def unpack(weights: NDArray[np.float32], window: Window, hidden: int) -> Networks:
     """Return what :func:`pack` packed."""
-    place, state, used = places(window), window.state_size, ACTIONS * hidden
-    joints = weights.shape[0]
-    rows = np.concatenate([weights[:, :state, :used], weights[:, place.goal : place.one, :used]], axis=1)
+    place, state = places(window), window.state_size
+    rows = _by_action(weights, padded(hidden, LANES))
     return Networks(
-        rows.reshape(joints, state + joints, hidden, ACTIONS).transpose(0, 3, 1, 2).copy(),
-        weights[:, place.one, :used].reshape(joints, hidden, ACTIONS).transpose(0, 2, 1).copy(),
-        weights[:, -2, :used].reshape(joints, hidden, ACTIONS).transpose(0, 2, 1).copy(),
-        weights[:, -1, :ACTIONS].copy(),
+        np.concatenate([rows[:, :, :state, :hidden], rows[:, :, place.goal : place.one, :hidden]], axis=2),
+        rows[:, :, place.one, :hidden].copy(),
+        rows[:, :, -2, :hidden].copy(),
+        rows[:, :, -1, 0].copy(),
     )
 
 
-@part(fastmath=FASTMATH)
+def _by_action(weights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
+    """Return ``weights`` of a :class:`Learner` seen network by network, shape (joints, 9, inputs + 2, width)."""
+    used = weights[:, :, : ACTIONS * width]
+    return used.reshape(*used.shape[:2], ACTIONS, width).transpose(0, 2, 1, 3)
+
+
+@part
 def action_values(learner, joint, x, values):  # type: ignore[no-untyped-def]
     """Set ``values`` (9,) to the action values of ``joint`` in the state and goal ``x``, in units of reward."""
-    weights, hidden, row = learner.weights[joint], learner.hidden, x.shape[0]
-    hidden_layer(weights, x, hidden)
-    for u in range(hidden.shape[0]):
-        hidden[u] *= weights[row, u]
+    weights, hidden = learner.weights[joint], learner.hidden
+    row, width = x.shape[0], learner.activation.shape[0]
+    weighted_sums(x, weights, 0, hidden)
+    tansig(hidden)
     for action in range(ACTIONS):
-        values[action] = weights[row + 1, action]
-    for h in range(learner.size):
-        for action in range(ACTIONS):
-            values[action] += hidden[ACTIONS * h + action]
-    for action in range(ACTIONS):
-        values[action] *= np.float32(learner.scale)
+        value = weights[row + 1, action * width]
+        for h in range(learner.size):
+            u = np.uint64(action * width + h)  # an unsigned index needs no test for wrapping around
+            value += hidden[u] * weights[row, u]
+        values[action] = value * np.float32(learner.scale)
 
 
 @part
@@ -151,38 +164,37 @@ def td_target(reward, discount, next_value, terminal):  # type: ignore[no-untype
     return reward if terminal else reward + discount * next_value
 
 
-@part(fastmath=FASTMATH)
+@part(fastmath=_IN_ORDER)
 def backpropagate(learner, joint, x, action):  # type: ignore[no-untyped-def]
     """Return the value of ``action`` in ``x`` and leave its network's activations and slopes in the learner.
 
     ``slope`` is the derivative of the network's output by what enters each hidden unit.
     """
     weights, activation, slope = learner.weights[joint], learner.activation, learner.slope
-    row = x.shape[0]
-    for h in range(learner.size):
-        total = np.float32(0.0)
-        for i in range(row):
-            total += x[i] * weights[i, ACTIONS * h + action]
-        activation[h] = total
+    row, first = x.shape[0], action * activation.shape[0]
+    weighted_sums(x, weights, first, activation)
     tansig(activation)
-    output = weights[row + 1, action]
+    output = weights[row + 1, first]
     for h in range(learner.size):
-        weight = weights[row, ACTIONS * h + action]
+        weight = weights[row, np.uint64(first + h)]
         output += activation[h] * weight
         slope[h] = weight * (np.float32(1.0) - activation[h] * activation[h])
     return output * np.float32(learner.scale)
 
 
-@part(fastmath=FASTMATH)
+@part(fastmath=_IN_ORDER)
 def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-def]
-    """Add ``factor`` times the gradient that :func:`backpropagate` left to ``table`` (inputs + 2, units)."""
-    row = x.shape[0]
+    """Add ``factor`` times the gradient that :func:`backpropagate` left to ``table`` (inputs + 2, units).
+
+    Leaves ``factor`` times the slopes in the learner.
+    """
+    activation, slope = learner.activation, learner.slope
+    row, first = x.shape[0], action * activation.shape[0]
     for h in range(learner.size):
-        by = factor * learner.slope[h]
-        for i in range(row):
-            table[i, ACTIONS * h + action] += by * x[i]
-        table[row, ACTIONS * h + action] += factor * learner.activation[h]
-    table[row + 1, action] += factor
+        slope[h] *= factor
+        table[row, np.uint64(first + h)] += factor * activation[h]
+    table[row + 1, first] += factor
+    add_products(table, first, x, slope)
 
 
 @part
@@ -194,26 +206,28 @@ def update(learner, joint, x, action, target):  # type: ignore[no-untyped-def]
         add_gradient(learner, learner.weights[joint], x, action, factor)
     else:
         add_gradient(learner, learner.traces[joint], x, action, np.float32(1.0))
+        learner.traced[joint, action] = True
         follow_traces(learner, joint, factor)
     return delta
 
 
-@part(fastmath=FASTMATH)
+@part
 def follow_traces(learner, joint, factor):  # type: ignore[no-untyped-def]
     """Move all weights of ``joint`` by ``factor`` along their traces, and let these decay."""
     weights, traces = learner.weights[joint], learner.traces[joint]
-    decay = np.float32(learner.discount * learner.decay)
-    for i in range(weights.shape[0]):
-        for u in range(weights.shape[1]):
-            weights[i, u] += factor * traces[i, u]
-            traces[i, u] *= decay
+    decay, width = np.float32(learner.discount * learner.decay), learner.activation.shape[0]
+    for action in range(ACTIONS):
+        if learner.traced[joint, action]:
+            follow(weights, traces, action * width, width, factor, decay)
 
 
 @part
 def forget_traces(learner, joint):  # type: ignore[no-untyped-def]
     """Set the traces of ``joint`` to 0, as at the start of every episode."""
-    if learner.decay != 0.0:
-        traces = learner.traces[joint]
-        for i in range(traces.shape[0]):
-            for u in range(traces.shape[1]):
-                traces[i, u] = np.float32(0.0)
+    traces, width = learner.traces[joint], learner.activation.shape[0]
+    for action in range(ACTIONS):
+        if learner.traced[joint, action]:
+            learner.traced[joint, action] = False
+            for i in range(traces.shape[0]):
+                for u in range(action * width, (action + 1) * width):
+                    traces[i, np.uint64(u)] = np.float32(0.0)

@@ -20,6 +20,7 @@ from pneumarm.random import RandomState
 from pneumarm.simulation.noise import add_noise, begin_noise
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.transitions.window import Window
+from pneumarm.vectors import weighted_sums
 
 UNIT_BLOCK = 16
 INPUT_BLOCK = 4
@@ -181,19 +182,10 @@ def tansig(hidden):  # type: ignore[no-untyped-def]
         hidden[u] = z * above / below
 
 
-@part(fastmath=FASTMATH)
+@part
 def hidden_layer(weights, x, hidden):  # type: ignore[no-untyped-def]
     """Set ``hidden`` (units,) to tansig(x W), ``weights`` (at least inputs, units), ``x`` (inputs,)."""
-    units = hidden.shape[0]
-    for u in range(units):
-        hidden[u] = np.float32(0.0)
-    for first in range(0, x.shape[0], INPUT_BLOCK):
-        i = np.uint64(first)  # an unsigned index needs no test for wrapping around
-        j, k, m = np.uint64(first + 1), np.uint64(first + 2), np.uint64(first + 3)
-        x0, x1, x2, x3 = x[i], x[j], x[k], x[m]
-        for u in range(units):
-            near = x0 * weights[i, u] + x1 * weights[j, u]
-            hidden[u] += near + (x2 * weights[k, u] + x3 * weights[m, u])
+    weighted_sums(x, weights, 0, hidden)
     tansig(hidden)
 
 

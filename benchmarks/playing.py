@@ -1,0 +1,69 @@
+"""Movements of a learning agent on a virtual arm: one compiled loop beside the guard, the control cycle and ``move``.
+
+python -m benchmarks playing
+
+Both make the same movements, which is checked: an agent of the thesis' kind with random weights learns on
+``virtual:seed=1``. Times are of the processor, the shortest of three, made in turns.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from benchmarks.learning import _synthetic
+from pneumarm.arm import BeginState, ControlCycle, guarded
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.control.agent import AgentController
+from pneumarm.control.movement import move
+from pneumarm.control.playing import Player
+from pneumarm.control.transfer import draw_movement
+from pneumarm.learning import Agent, Exploration, TrainSettings
+from pneumarm.learning.online import OnlineLearner
+from pneumarm.learning.values import draw_networks
+
+MOVEMENTS, REPEATS, SEED = 100, 3, 7
+RANGE = np.array([[150.0, 850.0]])
+BEGIN, EXPLORATION, SETTINGS = BeginState(), Exploration(), TrainSettings()
+
+
+def measure() -> Iterator[str]:
+    """Yield a line with the time of a movement either way, and how many times as fast the loop is."""
+    simulation = _synthetic().synthetic_simulation()
+    networks = draw_networks(simulation.window, SETTINGS, np.random.default_rng(2))
+    agent = Agent(VirtualArm().spec, simulation.window, simulation.scaling, RANGE, networks, SETTINGS)
+    _played(agent, 2), _moved(agent, 2)  # compiles, or loads what was compiled
+    ways: tuple[Callable[[Agent], tuple[float, float, float]], ...] = (_moved, _played)
+    found = np.array([[way(agent) for way in ways] for _ in range(REPEATS)])
+    assert (found[:, :, 1:] == found[0, 0, 1:]).all(), "the loop and move differ"
+    (slow, fast), (_, arm_time) = found[:, :, 0].min(axis=0), found[0, 0, 1:]
+    yield (
+        f"a movement, one compiled loop: {1e3 * fast / MOVEMENTS:.2f} ms, {arm_time / fast:,.0f} times real time; "
+        f"through move and the guard: {1e3 * slow / MOVEMENTS:.2f} ms; the loop is {slow / fast:.1f} times as fast"
+    )
+
+
+def _played(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:
+    """Return the processor time [s], the sum of rewards and the arm's time at the end [s]."""
+    drawn = [draw_movement(RANGE, SEED, False, i) for i in range(count)]
+    goals = np.array([goal for _, goal in drawn])
+    durations = np.array([random.uniform(0.0, BEGIN.inflate, (1, 2)) for random, _ in drawn])
+    arm = VirtualArm(draw_parameters(1), seed=SEED)
+    player = Player(agent, arm, SETTINGS.learning_rate, EXPLORATION, seed=SEED, begin=BEGIN)
+    began = time.process_time()
+    made = player.play(goals, durations)
+    return time.process_time() - began, float(made.movements.reward.sum()), float(made.time_end[-1])
+
+
+def _moved(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:
+    """Return the same of movements through the guard and the control cycle."""
+    learning = OnlineLearner(agent, SETTINGS.learning_rate, EXPLORATION, seed=SEED)
+    cycle = ControlCycle(guarded(VirtualArm(draw_parameters(1), seed=SEED)))
+    controller, reward, end = AgentController(agent, learning), 0.0, 0.0
+    began = time.process_time()
+    for i in range(count):
+        random, goal = draw_movement(RANGE, SEED, False, i)
+        BEGIN.reach(cycle.arm, random)
+        made = move(cycle, controller, goal, SETTINGS.reward, SETTINGS.cutoff)
+        reward, end = reward + made.reward, made.time_end
+    return time.process_time() - began, reward, end

@@ -139,7 +139,7 @@ class SimulatedBoard:
             for channel, count in enumerate(sensors, start=len(sensors) * joint):
                 self.chip.set_count(channel, int(count))
         further = arm.spec.sensors
-        for one, value in zip(further, measured(reading, arm.spec)[-len(further) :] if further else (), strict=True):
+        for one, value in zip(further, measured(reading, (one.name for one in further)), strict=True):
             self.chip.set_count(_FIRST_EXTRA + (one.channel or 1) - 1, round(one.counts(value)))
 
     def _pass(self, cycle: int) -> None:

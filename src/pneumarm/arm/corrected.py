@@ -27,7 +27,7 @@ class CorrectedArm(Arm):
         missing = [name for name in known.spec.further if name not in arm.spec.further]
         if missing:
             raise UnusableInput(
-                f"the file names sensors that {arm.spec.name} does not have ({', '.join(missing)}); remove them from it"
+                f"the file names sensors that {arm.spec.name} lacks ({', '.join(missing)}); remove them from it"
             )
         self.arm, self.spec = arm, known.spec
         self._correction = known.correction

@@ -6,9 +6,9 @@ takes an :class:`Arm`; nothing else in pneumarm knows whether it is virtual, sim
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from types import TracebackType
 from typing import Literal, Self
 
@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import ArmFailure, UnusableInput
-
 
 SensorKind = Literal["velocity", "acceleration", "temperature"]
 """Kinds of further sensors, besides those of angle and pressure that every arm has."""
@@ -130,7 +129,7 @@ class ArmSpec:
 
     @cached_property
     def further(self) -> tuple[str, ...]:
-        """Names of all that readings carry besides angles and pressures, in the order of :func:`measured`."""
+        """Names of all that readings carry besides angles and pressures, velocities first."""
         velocities = [velocity_name(j) for j in range(1, self.joints + 1)] if self.velocity_sensor else []
         return (*velocities, *(one.name for one in self.sensors))
 
@@ -171,25 +170,32 @@ def velocity_name(joint: int) -> str:
     return f"joint_{joint}_velocity"
 
 
-def measured(reading: Reading, spec: ArmSpec) -> list[float]:
-    """Return what ``reading`` carries besides angles and pressures, in the order of :attr:`ArmSpec.further`.
+def measured(reading: Reading, names: Iterable[str], whose: str = "the arm") -> list[float]:
+    """Return what the further sensors called ``names`` say in ``reading``; see :attr:`ArmSpec.further`.
 
     Raises:
-        ArmFailure: it lacks some of it, or a value is no finite number.
+        ArmFailure: one says nothing, or no finite number; ``whose`` it is stands in the message.
 
     """
-    try:
-        found = [] if not spec.velocity_sensor else _array(reading.velocity, (spec.joints,)).tolist()
-        for one in spec.sensors:
-            if one.kind == "temperature":
-                found.append(float(_array(reading.temperature, (spec.joints, 2))[one.joint - 1, (one.muscle or 1) - 1]))
-            else:
-                found.append(float(_array(reading.acceleration, (spec.joints,))[one.joint - 1]))
-    except (TypeError, ValueError) as error:
-        raise ArmFailure(f"{spec.name}: a reading needs {', '.join(spec.further)}, got {reading!r}") from error
-    if not all(map(math.isfinite, found)):
-        raise ArmFailure(f"{spec.name}: {', '.join(spec.further)} must be finite numbers, got {found}")
+    found = []
+    for name in names:
+        kind, place = _place(name)
+        values = getattr(reading, kind)
+        try:
+            value = math.nan if values is None else float(np.asarray(values)[place])
+        except (TypeError, ValueError, IndexError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise ArmFailure(f"{whose}: a reading must hold a finite {name}, got {values!r} as {kind}")
+        found.append(value)
     return found
+
+
+@cache
+def _place(name: str) -> tuple[str, tuple[int, ...]]:
+    """Return the field of a reading and the place in it that the sensor ``name`` fills."""
+    _, joint, kind, *muscle = name.split("_")
+    return kind, (int(joint) - 1, *(int(m) - 1 for m in muscle))
 
 
 def with_measured(reading: Reading, spec: ArmSpec, values: Sequence[float]) -> Reading:
@@ -281,15 +287,13 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
     if not all(map(math.isfinite, [time, *angle.tolist(), *pressure.ravel().tolist()])):
         raise ArmFailure(f"{spec.name}: a reading must hold finite numbers, got {reading!r}")
     if spec.further:
-        measured(reading, spec)
+        measured(reading, spec.further, spec.name)
     if angle is reading.angle and pressure is reading.pressure and type(reading.time) is float:
         return reading
     return Reading(time, angle, pressure, reading.velocity, reading.temperature, reading.acceleration)
 
 
-def _array(values: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _array(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Return ``values`` as a float64 array of ``shape``; the same object where it is one."""
-    if values is None:
-        raise TypeError("there is none")
     array = np.asarray(values, np.float64)
     return array if array.shape == shape else array.reshape(shape)

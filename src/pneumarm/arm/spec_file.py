@@ -189,7 +189,7 @@ def _refuse_unknown(found: Mapping[str, Any], kind: type, place: str) -> None:
 
 
 def _tables(table: Any, name: str) -> list[dict[str, Any]]:
-    """Return the tables in the list ``name`` of ``table``; what is none of these is left to be refused by its type."""
+    """Return the tables in the list ``name`` of ``table``; what is no table is refused by its type elsewhere."""
     listed = table.get(name) if isinstance(table, dict) else None
     return [one for one in listed if isinstance(one, dict)] if isinstance(listed, list) else []
 

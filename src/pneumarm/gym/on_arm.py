@@ -45,14 +45,13 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._goals, self._reward, self._cutoff, self._begin = goals, reward, cutoff, begin
         self._tracker, self._scaling = StateTracker(window, scaling), scaling
         self.action_space = action_space(window.joints)
-        space = observation_space(window, scaling, sensor_ranges(arm.spec), goals)
+        space = observation_space(window, scaling, sensor_ranges(arm.spec, window), goals)
         self.observation_space = cast("Space[Observation]", space)
         self._low, self._high = space.low, space.high
         self._closed = np.zeros((arm.spec.joints, 2), np.int8)
         self._over = True
         self._goal = goals.mean(axis=1)
         self._applied: NDArray[np.int8] | None = None
-        self._reading: Reading
         self._due = 0.0
         self._count = 0
 
@@ -75,10 +74,10 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
                 raise UnusableInput(f"a goal needs {low.size} angle(s) in counts within {low} to {high}, got {goal}")
         self._goal = goal
         self._begin.reach(self.arm, self.np_random)
-        self._reading = self.arm.read()
-        self._due, self._count, self._applied, self._over = self._reading.time, 0, None, False
+        reading = self.arm.read()
+        self._due, self._count, self._applied, self._over = reading.time, 0, None, False
         self._tracker.reset()
-        return self._observation(self._reading), {"goal": goal.copy()}
+        return self._observation(reading), {"goal": goal.copy()}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Take ``action`` for a control period."""
@@ -87,17 +86,16 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         actions = np.asarray(action)
         if not self.action_space.contains(actions if actions.ndim else int(actions)):
             raise UnusableInput(f"actions must be in {self.action_space}, got {action!r}")
-        applied, before = self._turn(to_valves(actions.reshape(-1))), self._reading
-        self._reading = reading = self.arm.read()
+        applied = self._turn(to_valves(actions.reshape(-1)))
+        reading = self.arm.read()
         if reading.time - self._due > self.arm.spec.period / 2:
             self._due = reading.time  # as the control cycle does after a lost period
         switched = 0 if self._applied is None else int((applied != self._applied).any(axis=1).sum())
         self._applied = applied
         self._tracker.commanded(applied)
         observation = self._observation(reading)
-        velocity = (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
         self._count += 1
-        reached = self._reward.reached(reading.angle, velocity, self._goal)
+        reached = self._reward.reached(reading.angle, self._tracker.velocity, self._goal)
         truncated = not reached and self._count >= self._cutoff
         self._over = reached or truncated
         if self._over:

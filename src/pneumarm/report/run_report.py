@@ -6,6 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
+import msgspec
+
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.versions import HISTORY, read_history
 from pneumarm.errors import UnusableInput
@@ -114,8 +116,8 @@ def _read_transfer(path: Path, results: dict[str, Any]) -> TransferData | None:
 def _read_spec(path: Path) -> ArmSpec:
     stored = _read_json(path)
     try:
-        return ArmSpec(**{**stored, "angle_range": tuple(stored["angle_range"])})
-    except (TypeError, KeyError, ValueError) as error:
+        return msgspec.convert(stored, ArmSpec)
+    except (msgspec.ValidationError, UnusableInput) as error:
         raise UnusableInput(f"{path}: expected the spec of an arm, {error}") from error
 
 

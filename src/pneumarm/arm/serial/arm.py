@@ -245,7 +245,7 @@ class SerialArm(Arm):
             np.array(sensors.angle[:joints], np.float64),
             np.array(sensors.pressure[: 2 * joints], np.float64).reshape(joints, 2),
         )
-        velocity = [value / VELOCITY_SCALE for value in sensors.velocity[:joints]] if self.spec.velocity_sensor else []
+        velocity = [value / VELOCITY_SCALE for value in sensors.velocity[:joints] if self.spec.velocity_sensor]
         further = [one.value(sensors.extra[(one.channel or 1) - 1]) for one in self.spec.sensors]
         return with_measured(reading, self.spec, [*velocity, *further])
 

@@ -270,7 +270,7 @@ class EmulatedBoard:
                 velocity[joint] = min(max(round(VELOCITY_SCALE * change / since), -32767), 32767)
         extra, sensors = [0] * EXTRAS, self.arm.spec.sensors
         if sensors:
-            for one, value in zip(sensors, measured(now, self.arm.spec)[-len(sensors) :], strict=True):
+            for one, value in zip(sensors, measured(now, (one.name for one in sensors)), strict=True):
                 if one.channel is not None and one.channel <= EXTRAS:
                     extra[one.channel - 1] = _count(one.counts(value))
         return Sensors(time, flags, valves, tuple(angle), tuple(pressure), tuple(velocity), tuple(extra))

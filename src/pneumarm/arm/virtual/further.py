@@ -74,9 +74,9 @@ def usual_sensors(kinds: Iterable[str], joints: int = 1) -> tuple[bool, tuple[Se
         for joint in range(1, joints + 1):
             if kind == "acceleration":
                 channel = len(sensors) + 1
-                sensors.append(Sensor(kind, joint, None, channel, ACCELEROMETER, -MIDDLE * ACCELEROMETER))
+                sensors.append(Sensor("acceleration", joint, None, channel, ACCELEROMETER, -MIDDLE * ACCELEROMETER))
             elif kind == "temperature":
-                sensors += [Sensor(kind, joint, m, len(sensors) + m, THERMOMETER) for m in (1, 2)]
+                sensors += [Sensor("temperature", joint, m, len(sensors) + m, THERMOMETER) for m in (1, 2)]
     return "velocity" in wanted, tuple(sensors)
 
 
@@ -84,7 +84,7 @@ class Further(NamedTuple):
     """Further sensors for kernels. Made by :func:`further_sensors`."""
 
     past: NDArray[np.float64]
-    """Angles of the last milliseconds, a ring, shape (joints, VELOCITY_MS + 1) [counts]; (0, ...) without velocity."""
+    """Angles of the last milliseconds, a ring, shape (joints, VELOCITY_MS + 1) [counts]; (0, ...) if not needed."""
     tick: NDArray[np.int64]
     """Number of the newest of them: milliseconds of the arm's clock, shape (1,)."""
     random: RandomState

@@ -138,7 +138,7 @@ def test_the_name_or_the_spec_says_which_a_virtual_arm_has(tmp_path):
         with open_arm(f"virtual:seed=2,spec={tmp_path / 'arm.toml'}") as same:
             assert same.spec.sensors == arm.spec.sensors
             assert same.read().temperature == pytest.approx(arm.read().temperature, abs=3 * THERMOMETER)
-        with pytest.raises(UnusableInput, match="lacks .*joint_1_velocity"):
+        with pytest.raises(UnusableInput, match=r"lacks .*joint_1_velocity"):
             CorrectedArm(plain, ArmFile(arm.spec))
     for wrong in ("humidity", "velocity+velocity", "velocity+"):
         with pytest.raises(UnusableInput, match="further sensors of velocity, acceleration, temperature"):

@@ -194,8 +194,9 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
             raise UnusableInput("[arm] needs the period [s] between two rows")
         if not mapping.joint:
             raise UnusableInput("needs a [[joint]] for each joint of the arm")
-        measured = {"velocity_sensor": _measures_velocity(mapping.joint), "sensors": _sensors(mapping.joint)}
-        return mapping, replace(msgspec.convert({**mapping.arm, "joints": len(mapping.joint)}, ArmSpec), **measured)
+        spec = msgspec.convert({**mapping.arm, "joints": len(mapping.joint)}, ArmSpec)
+        velocity, sensors = _measures_velocity(mapping.joint), _sensors(mapping.joint)
+        return mapping, replace(spec, velocity_sensor=velocity, sensors=sensors)
     except OSError as error:
         raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
     except (ValueError, RecursionError, UnusableInput) as error:  # TOML, UTF-8 and msgspec's errors are ValueErrors

@@ -9,7 +9,8 @@ from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.control import Movement as Moved
 from pneumarm.learning import AnyAgent, FleetTraining, TestResult, Trained
-from pneumarm.report.data import Episodes, LearningData, Movement, TrainingData
+from pneumarm.report.data import Episodes, LearningData, MarkedData, Movement, TrainingData
+from pneumarm.transitions import Store
 
 DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large displacement": 70.0}
 """Movements that are shown [degrees] (thesis figures 5.17 to 5.19)."""
@@ -60,6 +61,40 @@ def test_record(tested: TestResult) -> Episodes:
         time_start=nothing,
         time_end=nothing,
     )
+
+
+def marked_record(store: Store) -> MarkedData:
+    """Return which of the stored rows are marked and why, in the order of recording."""
+    stages = {number: run["purpose"] for number, run in store.runs().items()}
+    rows: dict[str, int] = {}  # by stage
+    spans: list[tuple[int, int]] = []
+    reason: list[int] = []
+    reasons: dict[str, int] = {}
+    begin, marks = 0, store.marks()
+    for entry in store.catalogue():
+        for mark in marks.get(entry.number, []):
+            # A lost period leaves a gap in the steps and none in the rows: the difference cannot be seen.
+            first, end = (begin + min(step, entry.rows) for step in (mark.first, mark.last + 1))
+            why = reasons.setdefault(_in_short(mark.reason), len(reasons))
+            if spans and reason[-1] == why and spans[-1][1] == first:
+                spans[-1] = (spans[-1][0], end)
+            else:
+                spans.append((first, end))
+                reason.append(why)
+        begin += entry.rows
+        rows[stages.get(entry.run or 0, entry.kind)] = begin
+    return MarkedData(
+        spans=np.array(spans, np.int64).reshape(-1, 2),
+        reason=np.array(reason, np.int64),
+        ends=np.array(list(rows.values()), np.int64),
+        reasons=tuple(reasons),
+        stages=tuple(rows),
+    )
+
+
+def _in_short(reason: str) -> str:
+    """Return the ``reason`` of a mark without what differs each time: when, and what failed."""
+    return reason.split(" since ")[0].split(" here: ")[0].replace("-", " ")
 
 
 def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Movement]:

@@ -28,6 +28,7 @@ from pneumarm.control import (
     version_keeper,
     write_episodes,
 )
+from pneumarm.control.found import collected_results
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
 from pneumarm.learning import (
@@ -41,7 +42,7 @@ from pneumarm.learning import (
     train,
 )
 from pneumarm.learning import test as test_agent
-from pneumarm.records import demonstrate, test_record, training_record
+from pneumarm.records import demonstrate, marked_record, test_record, training_record
 from pneumarm.report import read_episodes, save_movement, save_spec, write_report
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import KINDS, CollectSettings, Store, collect, require_enough
@@ -165,7 +166,8 @@ class Run:
                 arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
             )
             save_spec(self.folder, arm.spec)
-        return {"collect": asdict(collected)}
+            marked_record(store).save(self.folder)
+        return {"collect": collected_results(collected, watch)}
 
     def _fit(self) -> dict[str, Any]:
         with self.progress("fitting the simulation") as report, Store.open(self.store) as store:
@@ -215,6 +217,7 @@ class Run:
                 keep_version=version_keeper(self.folder),
             )
             movements = demonstrate(moved.agent, arm, wanted.seed)
+            marked_record(store).save(self.folder)
         moved.agent.save(self.adapted)
         save_history(self.folder, moved.adapted)
         write_episodes(self.episodes, moved.episodes)

@@ -1,12 +1,15 @@
 """Transfer: resumable, comparable, and the adapted agent is what was averaged."""
 
+import itertools
 import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import pneumarm
 from pneumarm.arm import Reading, open_arm
@@ -58,6 +61,42 @@ def test_a_transfer_that_failed_goes_on_as_if_nothing_had_happened(agent: Agent,
     assert transfer_into(folder, agent, Interrupted(seed=3), SHORT, seed=1) == whole
     for name in ("episodes.csv", "adapted.safetensors"):
         assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+class Clumsy(Agent):
+    """An agent that fails to decide now and then, and keeps account of that."""
+
+    failures: ClassVar[list[int]] = []
+
+    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> Any:
+        actor = super().actor(learning_rate, explores, seed)
+        turns, act = itertools.count(), actor.act
+
+        def acting() -> NDArray[np.int64]:
+            if next(turns) % 20 == 19:
+                self.failures.append(1)
+                raise RuntimeError("no idea")
+            return act()
+
+        actor.act = acting  # type: ignore[method-assign]
+        return actor
+
+
+def test_what_the_guard_did_is_told_by_phase_and_known_after_an_interruption(agent: Agent, tmp_path: Path) -> None:
+    clumsy = Clumsy(**vars(agent))
+    (tmp_path / "whole").mkdir()
+    whole = transfer_into(tmp_path / "whole", clumsy, VirtualArm(seed=3), SHORT, seed=1)
+    replaced = {phase: counts["interventions"]["raised"] for phase, counts in whole["counts"].items()}
+    assert list(replaced) == ["before", "learning", "after"]
+    assert min(replaced.values()) > 0
+    assert sum(replaced.values()) == len(Clumsy.failures)
+    arm = Interrupted(seed=3)
+    arm.left = 300
+    with pytest.raises(ArmFailure, match="OSError: cable"):
+        transfer_into(tmp_path / "broken", clumsy, arm, SHORT, seed=1)
+    again = transfer_into(tmp_path / "broken", clumsy, VirtualArm(seed=3), SHORT, seed=1)
+    assert all(counts["interventions"]["raised"] > 0 for counts in again["counts"].values())
+    assert transfer_into(tmp_path / "broken", clumsy, VirtualArm(seed=3), SHORT, seed=1) == again
 
 
 @pytest.fixture(scope="module")

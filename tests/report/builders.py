@@ -1,11 +1,25 @@
 """Arrays as a run leaves them, made up but of realistic size and shape; every builder takes a seed."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from pneumarm.arm.counts import Counts
+from pneumarm.arm.guard import Interventions
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.control import Adapted
+from pneumarm.control import Adapted, Finding
+from pneumarm.control.found import Found
 from pneumarm.learning import Event
-from pneumarm.report import CoverageData, Episodes, Movement, QualityData, RunData, TrainingData, TransferData
+from pneumarm.report import (
+    CoverageData,
+    Episodes,
+    MarkedData,
+    Movement,
+    QualityData,
+    RunData,
+    TrainingData,
+    TransferData,
+)
 from pneumarm.report.figures import Rival
 from pneumarm.statistics import Estimate
 from pneumarm.transitions.window import QUANTITIES, Window
@@ -162,9 +176,34 @@ def movement(name="large displacement", goal=70.0, joints=1, n=45, reached=True)
     )
 
 
+def marked(stretches=40, reasons=("stuck valve: joint 1, muscle 2 (the inlet is stuck closed)", "low supply")):
+    """Stretches of 100 rows here and there among 200,000 rows of collecting and 50,000 of moving."""
+    random = np.random.default_rng(1)
+    first = np.sort(random.choice(2_400, stretches, replace=False)) * 100
+    return MarkedData(
+        spans=np.stack([first, first + 100], axis=1),
+        reason=np.arange(stretches) % max(len(reasons), 1),
+        ends=np.array([200_000, 250_000]),
+        reasons=reasons,
+        stages=("collect", "transfer"),
+    )
+
+
+FOUND = Finding("stuck-valve", "the inlet is stuck closed", 1, 2, since=59.5, noticed=60.4, until=82.6)
+LEFT = Finding("low-supply", "the supply is gone", None, None, since=602.7, noticed=602.9)
+
+
+def found(*findings, late=0, missed=0, link=None, phases=("collecting",)):
+    """What was wrong, as a stage's results hold it."""
+    counts = Counts(Interventions(pressure=30, late=late, vented=late // 2), missed, link or {})
+    marked = {str(replace(one, until=None)): 474 for one in findings}
+    return Found(findings, marked, dict.fromkeys(phases, counts)).results()
+
+
 def results():
+    moving = found(LEFT, late=3, missed=7, link={"requests": 9_000, "retries": 4}, phases=("before", "after"))
     return {
-        "collect": {"transitions": 200_000, "seconds": 7350.0},
+        "collect": {"transitions": 200_000, "seconds": 7350.0, **found(FOUND)},
         "filter": {"kept": 21_900, "cells_occupied": 5200},
         "simulation": {
             "std": {"angle": 3.31, "velocity": 0.12, "pressure_1": 1.44, "pressure_2": 1.38},
@@ -172,7 +211,7 @@ def results():
         },
         "training": {"episodes": 280_000, "steps": 9_000_000, "seconds": 4.2, "steps_per_second": 2.1e6},
         "test": {"lookahead": tested(37.4)},
-        "transfer": {"learning_rate": 0.05},
+        "transfer": {"learning_rate": 0.05, **moving},
         "bound": {
             "open_loop": tested(40.2),
             "closed_loop": tested(39.9),
@@ -223,4 +262,5 @@ def run(joints=1, small=False):
             movement("typical displacement", 30.0, joints),
             movement("small displacement", -5.0, joints, reached=False),
         ),
+        marked=marked(),
     )

@@ -30,6 +30,7 @@ def figures_of(n, joints):
     adapted = builders.adaptation(n, joints)
     marks = [figures.Mark(event.movement, event.what) for event in adapted.events]
     m = builders.movement(joints=joints, n=max(n // 8, 1))
+    k = builders.marked(n, builders.marked().reasons if n else ())
     made = {
         "projections": figures.projections(seen.observation, spec),
         "cells": figures.cells(seen.cells_holding, 5, seen.growth),
@@ -44,6 +45,7 @@ def figures_of(n, joints):
         "displacement": figures.against_displacement(*far, spec),
         "rivals": figures.rivals(*(builders.rivals(min(n, 10)) if n else ([], {}))),
         "adaptation": figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14),
+        "marked": figures.marked_rows(k.spans, k.reason, k.reasons, k.ends.tolist(), k.stages, spec.period),
         "movement": figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
     }
     if t is not None:
@@ -64,7 +66,14 @@ def test_every_axis_is_labelled_with_its_unit(joints):
                 if shown:
                     labels.append(axis.get_label_text())
             for label in labels:
-                named = {"valves", "input", "observations", "transitions", "action (valves of muscle 1, 2)"}
+                named = {
+                    "valves",
+                    "input",
+                    "observations",
+                    "transitions",
+                    "action (valves of muscle 1, 2)",
+                    "marked for",
+                }
                 assert re.search(r"\[.+\]", label) or label in named, f"{name}: {label!r}"
 
 

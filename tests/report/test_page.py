@@ -81,7 +81,7 @@ def test_page_asks_nothing_of_any_network(html, page):
 
 def test_every_picture_has_a_caption_and_a_text_alternative(page):
     pictures = [attrs for tag, attrs in page.elements if tag == "img"]
-    assert len(pictures) == 18
+    assert len(pictures) == 19
     assert all(len(attrs["alt"]) > 60 for attrs in pictures)
     tags = [tag for tag, _ in page.elements]
     assert tags.count("figcaption") == tags.count("figure") == 18 + tags.count("table")
@@ -149,7 +149,7 @@ def test_sections_of_the_same_title_are_refused():
 def save(folder, run):
     (folder / "results.json").write_text(json.dumps(run.results))
     save_spec(folder, run.spec)
-    for record in (run.coverage, run.quality, run.training, run.test):
+    for record in (run.coverage, run.quality, run.training, run.test, run.marked):
         record.save(folder)
     save_history(folder, run.adaptation)
     for number, movement in enumerate(run.movements):
@@ -173,7 +173,7 @@ def test_what_a_run_leaves_in_its_folder_comes_back(tmp_path, joints):
     found = read_run(tmp_path)
     assert found.spec == run.spec
     records = [(found.coverage, run.coverage), (found.quality, run.quality), (found.training, run.training)]
-    records += [(found.test, run.test), *zip(found.movements, run.movements, strict=True)]
+    records += [(found.test, run.test), (found.marked, run.marked), *zip(found.movements, run.movements, strict=True)]
     records += list(zip(found.transfer.phases.values(), run.transfer.phases.values(), strict=True))
     for back, sent in records:
         for name in sent.shapes:
@@ -247,6 +247,8 @@ def test_a_file_of_another_record_is_refused(tmp_path):
         (builders.training, {"chosen": 16}),
         (builders.training, {"evaluated": np.full(16, 99)}),
         (builders.movement, {"time": np.full(45, np.nan)}),
+        (builders.marked, {"stages": ("collect",)}),
+        (builders.marked, {"reasons": ("one",)}),
         (lambda: builders.episodes(5), {"reward": np.zeros(4)}),
     ],
 )

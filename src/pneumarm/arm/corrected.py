@@ -57,6 +57,10 @@ class CorrectedArm(Arm):
         """Prepare to move after a pause."""
         self.arm.make_ready()
 
+    def link_counts(self) -> dict[str, int]:
+        """Return what has happened on the link to the arm."""
+        return self.arm.link_counts()
+
     def get_state(self) -> bytes | None:
         """Return the state of the arm."""
         return self.arm.get_state()

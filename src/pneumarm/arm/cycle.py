@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.guard import GuardedArm
 from pneumarm.arm.seam import Reading
+from pneumarm.arm.watchdog import PATIENCE
 from pneumarm.errors import PneumarmError
 
 Decide = Callable[[Reading], NDArray[np.int8] | None]
@@ -28,11 +29,14 @@ class ControlCycle:
     """Read, decide, let the latency pass, set the valves, wait for the period to end; over and over.
 
     The valves stay as they are between reading and acting, or are closed then (thesis figure 2.8). A decision that
-    cannot be used, that raises, or that took longer than a period on the arm's clock is replaced by the guard.
+    cannot be used, that raises, or that took longer than a period on the arm's clock is replaced by the guard; while
+    one does not come at all, the guard stands in for it.
     """
 
     arm: GuardedArm
     close_while_computing: bool = False
+    patience: float = PATIENCE
+    """Time [s] after which a controller that does not decide is stopped."""
     missed_deadlines: int = field(default=0, init=False)
     """Number of turns that began more than half a period late."""
     applied: NDArray[np.int8] = field(init=False)
@@ -48,7 +52,7 @@ class ControlCycle:
 
         Raises:
             PneumarmError: whatever ``decide`` raises on purpose.
-            ControllerFailure: too many decisions in a row had to be replaced.
+            ControllerFailure: too many decisions in a row had to be replaced, or one did not come at all.
 
         """
         arm, period, latency = self.arm, self.arm.spec.period, self.arm.spec.latency
@@ -65,16 +69,19 @@ class ControlCycle:
                 if self.close_while_computing:
                     arm.set_valves(closed)
                 began, raised = monotonic(), None
+                arm.watchdog.begin(reading, self.patience)
                 try:
                     valves = decide(reading)
                 except PneumarmError:
                     raise
                 except Exception as error:
                     valves, raised = arm.applied, error
+                finally:
+                    arm.watchdog.end()
                 if valves is None:
                     yield Step(reading, None)
                     break
-                late = self._lateness(reading) if monotonic() - began > period else 0.0
+                late = arm.lateness(reading) if monotonic() - began > period else 0.0
                 if latency:
                     arm.wait(latency)
                 if raised is not None:
@@ -95,16 +102,6 @@ class ControlCycle:
             raise
         else:
             arm.set_valves(closed)
-
-    def _lateness(self, reading: Reading) -> float:
-        """Return how many periods ago ``reading`` was on the arm's clock.
-
-        The clock of an arm that has a state stands still while we compute, however long that takes, and is not asked:
-        another reading would draw other noise, and nothing would repeat.
-        """
-        if self.arm.get_state() is not None:
-            return 0.0
-        return (self.arm.read().time - reading.time) / self.arm.spec.period
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ What is asked for passes four rules, in this order:
 4. *Angle*: at an end of ``spec.angle_limits``, valves that push further out (air into the muscle that pulls there,
    air out of the other) stay closed. A joint may always be vented whole.
 
-A decision that never returns cannot be replaced from here: that is what the dead-man of a microcontroller is for.
+While a controller does not come back with a decision, the guard stands in for it (:meth:`GuardedArm.stand_in`, called
+by the :class:`~pneumarm.arm.watchdog.Watchdog`): it holds, then vents, and in the end the controller is interrupted.
 """
 
 import atexit
@@ -26,7 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Arm, Reading, checked
-from pneumarm.errors import ControllerFailure, PneumarmError
+from pneumarm.arm.watchdog import Watchdog
+from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
 
 _SETTINGS = frozenset((-1, 0, 1))
 HELD = 3
@@ -107,6 +109,8 @@ class GuardedArm(Arm):
         self._replaced = 0  # decisions in a row
         self._undecided = 0.0  # control periods in a row without a decision of the controller
         self._time = -math.inf  # of the last reading
+        self.watchdog = Watchdog(self)
+        """Looks after a decision while it is out."""
         _open_arms[id(arm)] = arm
 
     @property
@@ -115,8 +119,20 @@ class GuardedArm(Arm):
         return replace(self._interventions)
 
     def read(self) -> Reading:
-        """Return a checked reading and remember which muscles and joints are at their limits."""
+        """Return a checked reading and remember which muscles and joints are at their limits.
+
+        Raises:
+            ArmFailure: a reading that is none, or one from before the last: the arm's clock began anew.
+
+        """
         reading = checked(self.arm.read(), self.spec)
+        if reading.time < self._time:
+            before, self._time = self._time, -math.inf  # the next reading is the first on the new clock
+            self._inflation = _Inflation(self.spec.max_inflation, self.applied.size)
+            raise ArmFailure(
+                f"{self.spec.name}: its clock went back from {before:.2f} to {reading.time:.2f} s while in use, as "
+                "when a controller begins anew; see to its power and run the same command again"
+            )
         over = max(reading.pressure.ravel().tolist()) > self._limit
         self._over = reading.pressure > self._limit if over else None
         np.maximum(self.peak_pressure, reading.pressure, out=self.peak_pressure)
@@ -180,6 +196,44 @@ class GuardedArm(Arm):
                 f"used ({reason}: {what}); mend the controller and run the same command again"
             ) from cause
 
+    def lateness(self, reading: Reading) -> float:
+        """Return how many periods ago ``reading`` was on the arm's clock, for a decision that took long to make.
+
+        The clock of an arm that has a state stands still while we compute, however long that takes, and is not asked:
+        another reading would draw other noise, and nothing would repeat.
+        """
+        if self.get_state() is not None:
+            return 0.0
+        return (self.read().time - reading.time) / self.spec.period
+
+    def stand_in(self, reading: Reading) -> bool:
+        """Do what is safe while there is no decision on ``reading`` yet: keep the limits, hold, then vent.
+
+        Called once a period for as long as that lasts; what it replaces is counted when the decision comes, or by
+        :meth:`give_up`.
+
+        Returns:
+            Whether that is needed: the clock of an arm may stand still while we compute.
+
+        """
+        late = (self.watch().time - reading.time) / self.spec.period
+        if late < 1 / 2:
+            return False
+        if self._undecided + late > HELD:
+            self._set(np.full_like(self.applied, -1))  # over and over: so hardware knows that we are there
+        return True
+
+    def give_up(self, patience: float) -> ControllerFailure:
+        """Vent everything and return the error for a controller that had not decided for ``patience`` [s]."""
+        self._interventions.late += 1
+        self._interventions.vented += 1
+        with suppress(PneumarmError, OSError):  # the first failure is the one to tell of
+            self._set(np.full_like(self.applied, -1))
+        return ControllerFailure(
+            f"{self.spec.name}: stopped and vented, because the controller had not decided for {patience:g} s; mend "
+            "the controller and run the same command again"
+        )
+
     def _sensible(self, valves: object) -> NDArray[np.int8] | None:
         """Return a copy of ``valves`` if they are valves, else None."""
         try:
@@ -239,6 +293,10 @@ class GuardedArm(Arm):
     def make_ready(self) -> None:
         """Prepare to move after a pause."""
         self.arm.make_ready()
+
+    def link_counts(self) -> dict[str, int]:
+        """Return what has happened on the link to the arm behind."""
+        return self.arm.link_counts()
 
     def get_state(self) -> bytes | None:
         """Return the state of the arm behind."""

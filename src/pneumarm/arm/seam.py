@@ -215,7 +215,11 @@ def with_measured(reading: Reading, spec: ArmSpec, values: Sequence[float]) -> R
 
 
 class Arm(ABC):
-    """An arm: a context manager whose ``close`` leaves every valve closed or vented on every way out."""
+    """An arm: a context manager whose ``close`` leaves every valve closed or vented on every way out.
+
+    Calls come one at a time, but not always from the same thread: while a controller does not come back, the watchdog
+    of decisions reads and vents from one of its own.
+    """
 
     spec: ArmSpec
 
@@ -246,6 +250,10 @@ class Arm(ABC):
 
         Called before each movement; an arm that was vented for any other reason raises.
         """
+
+    def link_counts(self) -> dict[str, int]:
+        """Return what has happened on the link to the arm so far, by name; nothing where there is no link."""
+        return {}
 
     def get_state(self) -> bytes | None:
         """Return everything that the arm's future depends on, or None where that cannot be had (hardware).

@@ -8,6 +8,7 @@ from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import Monitor, open_controller
+from pneumarm.control.found import collected_results, said
 from pneumarm.transitions import CollectSettings, Store, collect, require_enough
 
 
@@ -50,6 +51,7 @@ def collect_(
         result = collect(
             opened, store, transitions, seed, progress=report, settings=settings, controller=player, watch=watch
         )
-    for found in watch.findings:
-        say(f"found: {found}; what was read meanwhile is marked and not learned from")
-    show(asdict(result), json, lambda: [table(("collected", ""), list(asdict(result).items()))])
+    results = collected_results(result, watch)
+    for line in said(results, "collecting"):
+        say(line)
+    show(results, json, lambda: [table(("collected", ""), list(asdict(result).items()))])

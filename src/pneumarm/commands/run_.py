@@ -6,6 +6,7 @@ from typing import Annotated
 from pneumarm.commands.common import Json, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
+from pneumarm.control.found import said
 from pneumarm.run import Run, RunSettings
 
 COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
@@ -37,7 +38,8 @@ def run_(
     rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
     show(results, json, lambda: [table(("", *COLUMNS), rows, title="Ledger")])
     say_history(out)
-    for found in results["transfer"].get("findings", []):
-        say(f"found: {found}")
+    for stage, doing in (("collect", "collecting"), ("transfer", "moving")):
+        for line in said(results[stage], doing):
+            say(line)
     seconds = sum(results["wall_seconds"].values())
     say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory")

@@ -8,6 +8,7 @@ from pneumarm.commands.common import Json, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
+from pneumarm.control.found import said
 
 
 def transfer_(
@@ -39,8 +40,8 @@ def transfer_(
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
         result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
     say_history(out)
-    for found in result["findings"]:
-        say(f"found: {found}")
+    for line in said(result, "moving"):
+        say(line)
     say(f"adapted agent: {out / 'adapted.safetensors'}")
     show(
         result,

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -9,11 +10,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
+from pneumarm.arm.counts import Counts
 from pneumarm.control.agent import AgentController, warm_up
-from pneumarm.control.monitor import Finding, Monitor
+from pneumarm.control.found import Found
+from pneumarm.control.monitor import Monitor
 from pneumarm.control.movement import MOVEMENT, Movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -30,6 +33,8 @@ Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
 BEGIN = BeginState()
 """How the arm gets to a begin state between movements (thesis section 5.5)."""
+LONGEST_PAUSE = 120.0
+"""Movements that are farther apart on the arm's clock [s] were interrupted: none takes so long to begin."""
 _TOGETHER = 10
 """Movements that are stored in one transaction: at most these are made again after an interruption."""
 
@@ -135,8 +140,8 @@ class Transferred:
     learning_rate: float
     adapted: Adapted | None = None
     """How a policy adapted; None for an agent that does not, or learns while it moves."""
-    findings: tuple[Finding, ...] = ()
-    """What the monitor found wrong with the arm."""
+    found: Found = field(default_factory=Found)
+    """What the monitor found wrong with the arm, and what guard, control cycle and link counted in each phase."""
 
     @property
     def adaptations(self) -> int:
@@ -155,7 +160,7 @@ class Transferred:
             "episodes": len(self.phase("learning")),
             "learning_rate": self.learning_rate,
             "adaptations": self.adaptations,
-            "findings": [str(found) for found in self.findings],
+            **self.found.results(),
             **({} if self.adapted is None else self._adapted(self.adapted)),
         }
 
@@ -229,10 +234,19 @@ def transfer(
         warm_up(agent, rate, explores=True)
     if done and (seen := store.state("watch")) is not None:
         watch.set_state(seen)
+    counted = {phase: Counts.of(saved) for phase, saved in json.loads(store.state(_COUNTS) or b"{}").items()}
+    until = Counts.now(cycle)
+
+    def count(phase: Phase) -> None:
+        """Count what happened in ``phase`` since it was last counted."""
+        nonlocal until
+        before, until = until, Counts.now(cycle)
+        counted[phase] = counted.get(phase, Counts()) + (until - before)
 
     def keep() -> None:
         state = {"learner": learner.get_state(), "mean": mean.get_state(), "arm": arm.get_state()}
         state["watch"] = watch.get_state()
+        state[_COUNTS] = json.dumps({phase: counts.as_dict() for phase, counts in counted.items()}).encode()
         keep_watch(store, watch, number)
         if adapting is not None:
             state["adaptation"] = adapting.get_state()
@@ -276,9 +290,10 @@ def transfer(
             return adapting.agent
         return mean.agent if mean.count else agent.with_weights(learner.weights())
 
+    phase: Phase = PHASES[0]
     try:
         for phase in PHASES:
-            count = settings.movements(phase)
+            movements = settings.movements(phase)
             greedy = phase != "learning"
             made = sum(e.phase == phase for e in done)
             if phase == "after" and settings.episodes > 0 and made == 0:
@@ -286,7 +301,7 @@ def transfer(
             learns = adapting is None and not greedy
             moving = agent if learns else shown()
             controller = AgentController(moving, learner if learns else None)
-            for i in range(made, count):
+            for i in range(made, movements):
                 if phase == "learning":
                     adapt()
                 if adapting is not None and moving is not adapting.agent:
@@ -297,16 +312,18 @@ def transfer(
                 movement = move(
                     cycle, controller, goal, task.reward, task.cutoff, watch, broken.append, agent.window.velocity
                 )
-                if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * count:
+                if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * movements:
                     mean.add(learner.weights())
                 note(phase, movement)
-                if len(waiting) == _TOGETHER or i == count - 1:
+                count(phase)
+                if len(waiting) == _TOGETHER or i == movements - 1:
                     keep()
                 if progress is not None:
                     progress(len(done), total)
     except BaseException as error:
         if arm.get_state() is None:  # no arm can make these movements again
             with suppress(Exception):  # the first failure is the one to tell of
+                count(phase)
                 keep_rest()
         if isinstance(error, PneumarmError) or not isinstance(error, Exception):
             raise
@@ -317,7 +334,8 @@ def transfer(
     adapted = None
     if adapting is not None:
         adapted = Adapted(adapting.version, adapting.quantities, np.array(squares), adapting.events)
-    return Transferred(done, shown(), rate, adapted, tuple(watch.findings))
+    found = Found(tuple(watch.findings), store.marked_rows(number), counted)
+    return Transferred(done, shown(), rate, adapted, found)
 
 
 def _movements(store: Store, run: int) -> list[SequenceEntry]:
@@ -326,6 +344,7 @@ def _movements(store: Store, run: int) -> list[SequenceEntry]:
 
 
 _SQUARES = "squares"  # place of a movement's errors beside its figures in the store
+_COUNTS = "counts"  # place of what was counted, among the states in the store
 
 
 class _Mean:
@@ -403,8 +422,27 @@ def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
         actions=np.array([e.actions for e in episodes]),
         switches=np.array([e.switches for e in episodes]),
     )
-    seconds = episodes[-1].time_end - episodes[0].time_start if episodes else 0.0
-    return {**figures, "seconds": seconds}
+    running = running_time([e.time_start for e in episodes], [e.time_end for e in episodes])
+    return {**figures, "seconds": float(running[-1]) if len(running) else 0.0}
+
+
+def running_time(time_start: ArrayLike, time_end: ArrayLike) -> NDArray[np.float64]:
+    """Return the arm time [s] from the begin of the first movement to the end of each, shape (n,).
+
+    Between two movements the arm is brought to a begin state, and an agent may adapt. What lies between them where
+    the arm's clock went back (a controller began anew), or where they are more than :data:`LONGEST_PAUSE` apart, was
+    an interruption, and is left out.
+
+    Args:
+        time_start: when each movement began on the arm's clock, shape (n,) [s].
+        time_end: when it ended [s].
+
+    """
+    start, end = np.asarray(time_start, np.float64), np.asarray(time_end, np.float64)
+    passed = end - start
+    pause = start[1:] - end[:-1]
+    passed[1:] += np.where((pause >= 0) & (pause <= LONGEST_PAUSE), pause, 0.0)
+    return np.cumsum(passed)
 
 
 def write_episodes(path: Path, episodes: Sequence[Episode]) -> None:

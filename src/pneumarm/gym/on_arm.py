@@ -1,5 +1,7 @@
 """A single movement on an arm, turn by turn as the control cycle makes them."""
 
+import math
+from time import monotonic
 from typing import Any, cast
 
 import gymnasium
@@ -24,7 +26,9 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
     """The task of :func:`pneumarm.gym.point_to_point` on an arm.
 
     Between movements the arm is brought to a random begin state at rest, which takes some five seconds of its time.
-    The pressure limit holds: switches are counted between valves as they are applied.
+    The guard's limits hold: switches are counted between valves as they are applied. Where the arm's clock goes on
+    while an agent thinks, and longer than a control period, its action is replaced as the control cycle does it, by
+    holding and then venting; an agent that does not come back at all is waited for with the arm vented.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium wants it
@@ -52,6 +56,8 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._over = True
         self._goal = goals.mean(axis=1)
         self._applied: NDArray[np.int8] | None = None
+        self._reading: Reading
+        self._asked = 0.0  # when the agent was last asked for an action [s]
         self._due = 0.0
         self._count = 0
 
@@ -64,6 +70,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         was when the environment was made, so that its movements repeat; no seed decides a real arm's noise.
         """
         super().reset(seed=seed)
+        self.arm.watchdog.end()
         if seed is not None and self._fresh is not None:
             self.arm.set_state(self._fresh)
         low, high = self._goals.T
@@ -74,10 +81,12 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
                 raise UnusableInput(f"a goal needs {low.size} angle(s) in counts within {low} to {high}, got {goal}")
         self._goal = goal
         self._begin.reach(self.arm, self.np_random)
-        reading = self.arm.read()
-        self._due, self._count, self._applied, self._over = reading.time, 0, None, False
+        self._reading = self.arm.read()
+        self._due, self._count, self._applied, self._over = self._reading.time, 0, None, False
         self._tracker.reset()
-        return self._observation(reading), {"goal": goal.copy()}
+        observation = self._observation(self._reading)
+        self._ask()
+        return observation, {"goal": goal.copy()}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Take ``action`` for a control period."""
@@ -86,8 +95,9 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         actions = np.asarray(action)
         if not self.action_space.contains(actions if actions.ndim else int(actions)):
             raise UnusableInput(f"actions must be in {self.action_space}, got {action!r}")
+        self.arm.watchdog.end()
         applied = self._turn(to_valves(actions.reshape(-1)))
-        reading = self.arm.read()
+        self._reading = reading = self.arm.read()
         if reading.time - self._due > self.arm.spec.period / 2:
             self._due = reading.time  # as the control cycle does after a lost period
         switched = 0 if self._applied is None else int((applied != self._applied).any(axis=1).sum())
@@ -100,18 +110,29 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._over = reached or truncated
         if self._over:
             self.arm.set_valves(self._closed)
+        else:
+            self._ask()
         paid = (self._reward.goal if reached else self._reward.action) + self._reward.switch * switched
         return observation, paid, reached, truncated, {"is_success": reached}
 
     def _turn(self, valves: NDArray[np.int8]) -> NDArray[np.int8]:
         """Let a turn pass with ``valves`` (joints, 2); return them as applied."""
         spec = self.arm.spec
+        late = self.arm.lateness(self._reading) if monotonic() - self._asked > spec.period else 0.0
         self._due += spec.period
         if spec.latency:
             self.arm.wait(spec.latency)
-        self.arm.set_valves(valves)
+        if late > 1:
+            self.arm.replace("late", f"{late:.1f} periods after its reading", late)
+        else:
+            self.arm.decide(valves)
         self.arm.wait_until(self._due)
         return self.arm.applied
+
+    def _ask(self) -> None:
+        """Have the arm looked after until the agent comes with an action: for as long as it takes."""
+        self._asked = monotonic()
+        self.arm.watchdog.begin(self._reading, math.inf)
 
     def _observation(self, reading: Reading) -> Observation:
         state = self._tracker.reading(reading)
@@ -120,4 +141,5 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
 
     def close(self) -> None:
         """Close the arm."""
+        self.arm.watchdog.end()
         self.arm.close()

@@ -142,6 +142,30 @@ class QualityData(Record):
 
 
 @dataclass(frozen=True)
+class MarkedData(Record):
+    """Which of the stored rows are marked, so that nothing is learned from them."""
+
+    file = "marked.safetensors"
+    shapes = {"spans": "n 2", "reason": "n", "ends": "stages"}  # noqa: RUF012
+
+    spans: NDArray[np.int64]
+    """First row of each marked stretch and the one after its last, in the order of recording, shape (n, 2)."""
+    reason: NDArray[np.int64]
+    """Index of its reason, shape (n,)."""
+    ends: NDArray[np.int64]
+    """Rows recorded by the end of each stage, shape (stages,)."""
+    reasons: Sequence[str] = ()
+    """Why rows are marked, in words."""
+    stages: Sequence[str] = ()
+    """What the arm was moved for."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.stages) != len(self.ends) or not np.isin(self.reason, range(len(self.reasons))).all():
+            raise UnusableInput("MarkedData: every stage needs its end, and every stretch one of the reasons")
+
+
+@dataclass(frozen=True)
 class LearningData(Record):
     """Learning curves of all agents that learned in many simulated arms at once, and their validation."""
 

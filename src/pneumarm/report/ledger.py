@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.control.transfer import running_time
 from pneumarm.report import thesis
 from pneumarm.report.data import Episodes, QualityData, TransferData
 from pneumarm.report.figures import expectation
@@ -122,8 +123,8 @@ def bound_table(bound: Mapping[str, Any]) -> Table:
 
 
 def arm_time(episodes: Episodes) -> float:
-    """Return the time [s] from the begin of the first episode to the end of the last."""
-    return float(episodes.time_end[-1] - episodes.time_start[0]) if len(episodes) else 0.0
+    """Return the time [s] from the begin of the first episode to the end of the last, without interruptions."""
+    return float(running_time(episodes.time_start, episodes.time_end)[-1]) if len(episodes) else 0.0
 
 
 def with_interval(estimate: Estimate, form: str) -> str:

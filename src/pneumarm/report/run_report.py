@@ -16,6 +16,7 @@ from pneumarm.report.data import (
     CoverageData,
     Episodes,
     LearningData,
+    MarkedData,
     Movement,
     QualityData,
     Record,
@@ -23,6 +24,7 @@ from pneumarm.report.data import (
     TransferData,
     read_episodes,
 )
+from pneumarm.report.health import summary_of_health
 from pneumarm.report.page import render
 from pneumarm.report.sections import RunData, all_sections, collected, predicted, propagated
 
@@ -94,6 +96,7 @@ def read_run(folder: Path) -> RunData:
         test=_read(Episodes, folder),
         transfer=_read_transfer(folder / EPISODES, results),
         adaptation=read_history(folder) if (folder / HISTORY).exists() else None,
+        marked=_read(MarkedData, folder),
         movements=tuple(Movement.load(folder, path.name) for path in sorted(folder.glob(MOVEMENTS))),
     )
 
@@ -156,6 +159,7 @@ def _summary(run: RunData) -> list[str]:
             f"The best that planning with the arm's true physics finds there is {bound['open_loop']['reward']:.2f}; "
             f"the controller is {abs(below):.2f} {'below' if below >= 0 else 'above'} it after adaptation."
         )
+    text += summary_of_health(run.results)
     if run.adaptation is not None:
         text += [f"{line[0].upper()}{line[1:]}." for line in run.adaptation.sentences]
     return text

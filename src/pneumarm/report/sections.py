@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
+from pneumarm.control.transfer import running_time
 from pneumarm.control.versions import Adapted
 from pneumarm.learning import WatchSettings
 from pneumarm.report import figures
@@ -17,12 +18,14 @@ from pneumarm.report.data import (
     CoverageData,
     Episodes,
     LearningData,
+    MarkedData,
     Movement,
     QualityData,
     TrainingData,
     TransferData,
 )
 from pneumarm.report.figures import Classification, Mark, Phase
+from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import of_joint, quantities
@@ -42,6 +45,7 @@ class RunData:
     transfer: TransferData | None = None
     adaptation: Adapted | None = None
     movements: tuple[Movement, ...] = ()
+    marked: MarkedData | None = None
 
 
 def all_sections(run: RunData) -> list[Section]:
@@ -67,6 +71,8 @@ def all_sections(run: RunData) -> list[Section]:
         sections.append(by_displacement(run.transfer, run.test, run.spec))
     if run.movements:
         sections.append(moved(run.movements, run.spec))
+    if tells_of_health(run.results):
+        sections.append(health(run.results, run.marked, run.spec))
     return sections
 
 
@@ -371,11 +377,13 @@ def adapted(data: Adapted) -> Section:
 
 
 def phases_of(data: TransferData) -> list[Phase]:
-    """Return the phases with their time counted from the begin of the first episode."""
-    starts = [p.time_start[0] for p in data.phases.values() if len(p)]
-    begin = starts[0] if starts else 0.0
+    """Return the phases with their time counted from the begin of the first episode, without interruptions."""
+    phases = data.phases
+    start, end = (np.concatenate([getattr(p, name) for p in phases.values()]) for name in ("time_start", "time_end"))
+    times = np.split(running_time(start, end), np.cumsum([len(p) for p in phases.values()])[:-1])
     return [
-        Phase(name, p.reward, p.success, p.actions, p.switches, p.time_end - begin) for name, p in data.phases.items()
+        Phase(name, p.reward, p.success, p.actions, p.switches, time)
+        for (name, p), time in zip(phases.items(), times, strict=True)
     ]
 
 

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.controller import Controller
+from pneumarm.arm.counts import Counts
 from pneumarm.arm.cycle import BeginState, ControlCycle, Step
 from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, Reading
@@ -101,6 +102,15 @@ class CollectResult:
     """How often the guard did what."""
     missed_deadlines: int
     """Number of control periods that began more than half a period late."""
+    link: dict[str, int] = field(default_factory=dict)
+    """What happened on the link to the arm, by name; empty for an arm without one."""
+    marked: dict[str, int] = field(default_factory=dict)
+    """How many stored rows are marked, so that nothing is learned from them, by reason."""
+
+    @property
+    def counts(self) -> Counts:
+        """What guard, control cycle and link counted."""
+        return Counts(self.interventions, self.missed_deadlines, self.link)
 
 
 @dataclass
@@ -111,11 +121,17 @@ class _Tally:
     interventions: dict[str, int] = field(default_factory=dict)
     missed_deadlines: int = 0
     peak_pressure: list[list[float]] = field(default_factory=list)
+    link: dict[str, int] = field(default_factory=dict)
 
-    def add(self, arm: GuardedArm, interventions: Interventions, missed: int, seconds: float) -> None:
+    @property
+    def counts(self) -> Counts:
+        return Counts(Interventions(**self.interventions), self.missed_deadlines, self.link)
+
+    def add(self, arm: GuardedArm, counts: Counts, seconds: float) -> None:
         self.seconds += seconds
-        self.interventions = asdict(Interventions(**self.interventions) + interventions)
-        self.missed_deadlines += missed
+        total = (self.counts + counts).as_dict()
+        self.interventions, self.link = total["interventions"], total["link"]
+        self.missed_deadlines = total["missed_deadlines"]
         peak = arm.peak_pressure
         self.peak_pressure = (np.maximum(peak, self.peak_pressure) if self.peak_pressure else peak).tolist()
 
@@ -215,6 +231,8 @@ def collect(
         peak_pressure=np.array(tally.peak_pressure),
         interventions=Interventions(**tally.interventions),
         missed_deadlines=tally.missed_deadlines,
+        link=tally.link,
+        marked=store.marked_rows(run),
     )
 
 
@@ -278,7 +296,8 @@ def _sequence(
     keep_broken: Callable[[Recorded], None],
 ) -> Recorded:
     """Bring the arm to a begin state, carry out one sequence, and return what was read."""
-    interventions = arm.interventions
+    cycle = ControlCycle(arm, settings.close_while_computing)
+    before = Counts.now(cycle)
     start = arm.read().time
     settings.begin.reach(arm, random)
     info: Mapping[str, object] = {}
@@ -291,7 +310,6 @@ def _sequence(
         goal = _goal(arm, goals, random)
         info = {"goal": goal.tolist()}
         _told(actor, goal)
-    cycle = ControlCycle(arm, settings.close_while_computing)
     remaining = iter(range(settings.actions))
 
     def decide(reading: Reading) -> NDArray[np.int8] | None:
@@ -299,12 +317,13 @@ def _sequence(
 
     def broken(steps: list[Step], why: BaseException) -> None:
         recorded = broken_off(steps, arm.spec, why, kind=kind, at_rest=True, info=info)
+        tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start if steps else 0.0)
         if recorded is not None and arm.get_state() is None:
             with suppress(Exception):  # the first failure is the one to tell of
                 keep_broken(recorded)
 
     steps = watched(cycle.run(decide), watch, at_rest=True, broken=broken)
-    tally.add(arm, arm.interventions - interventions, cycle.missed_deadlines, steps[-1].reading.time - start)
+    tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start)
     return Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info)
 
 

@@ -51,6 +51,9 @@ BLOCK = 200_000
 """Rows of a block, about; with one joint a block takes 20 MB."""
 
 
+_STEPS = 1 << 32  # more than any step of a sequence
+
+
 class SequenceEntry(NamedTuple):
     """What the store knows of a sequence besides its rows."""
 
@@ -220,6 +223,20 @@ class Store:
             found.setdefault(sequence, []).append(mark)
         return found
 
+    def marked_rows(self, run: int) -> dict[str, int]:
+        """Return how many rows of ``run`` are marked, by reason; a row with several marks counts for each reason."""
+        with translated(self.path):
+            if version_of(self._connection) == 1:
+                return {}
+            found = self._connection.execute(
+                "SELECT marks.reason, count(DISTINCT rows.sequence * ? + rows.step) FROM marks "
+                "JOIN sequences ON sequences.number = marks.sequence AND sequences.run = ? "
+                "JOIN rows ON rows.sequence = marks.sequence AND rows.step BETWEEN marks.first AND marks.last "
+                "GROUP BY marks.reason ORDER BY min(marks.rowid)",
+                (_STEPS, run),
+            ).fetchall()
+        return {str(reason): int(rows) for reason, rows in found}
+
     def _marks(self, condition: str, values: tuple[Any, ...]) -> list[tuple[int, Mark]]:
         with translated(self.path):
             if version_of(self._connection) == 1:
@@ -329,21 +346,27 @@ class Store:
             connection.execute("UPDATE sequences SET transitions = ? WHERE number = ?", (left, number))
 
     def mark_since(self, time: float, reason: str, run: int) -> None:
-        """Mark all rows of ``run`` read at ``time`` [s] or later, the newest sequences, that are not marked yet."""
+        """Mark all rows of ``run`` read at ``time`` [s] or later, the newest sequences, that are not marked yet.
+
+        Sequences before the arm's clock last began anew have times of another clock, and are left as they are.
+        """
         with translated(self.path):
             numbers = self._connection.execute(
                 "SELECT number FROM sequences WHERE run = ? ORDER BY number DESC", (run,)
             ).fetchall()
+        after = math.inf  # when the next sequence began
         for (number,) in numbers:
             with translated(self.path):
-                steps = self._connection.execute(
-                    "SELECT step FROM rows WHERE sequence = ? AND time >= ? ORDER BY step", (number, time)
+                rows = self._connection.execute(
+                    "SELECT step, time FROM rows WHERE sequence = ? ORDER BY step", (number,)
                 ).fetchall()
-            if not steps:
+            steps = [step for step, read in rows if read >= time]
+            if not steps or rows[-1][1] > after:
                 return
-            first, last = steps[0][0], steps[-1][0]
+            after = rows[0][1]
+            first, last = steps[0], steps[-1]
             marks = self.marks(number).get(number, [])
-            if unmarked(np.array(steps, np.int64).ravel(), marks).any():
+            if unmarked(np.array(steps, np.int64), marks).any():
                 self.mark(number, [Mark(first, last, reason)])
 
     @staticmethod

@@ -2,6 +2,7 @@
 
 import secrets
 from contextlib import suppress
+from dataclasses import asdict
 from typing import NoReturn
 
 import numpy as np
@@ -301,6 +302,10 @@ class SerialArm(Arm):
             f"{self.spec.name}: the controller heard nothing for a quarter of a second and vented all muscles; "
             "this computer was too busy, or asleep"
         )
+
+    def link_counts(self) -> dict[str, int]:
+        """Return what has happened on the link so far."""
+        return asdict(self.link.counts)
 
     def reset_causes(self) -> list[str]:
         """Return why the controller last began anew, in words; several may be true."""

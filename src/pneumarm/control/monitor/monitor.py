@@ -169,6 +169,7 @@ class Monitor:
             )
         self.findings: list[Finding] = []
         """All that was found, in the order of being found."""
+        self._earlier = 0  # so many findings are told on a clock of the arm that has ended
         self._open: dict[_Key, int] = {}  # places in findings of what is not over
         self._hypotheses, self._readings = hypotheses(spec.joints)
         history = 2 if simulation is None else max(2, simulation.window.history)
@@ -237,6 +238,8 @@ class Monitor:
     def see(self, reading: Reading, valves: NDArray[np.int8] | None) -> None:
         """Weigh a reading and remember the ``valves`` (joints, 2) as applied after it."""
         memory = self._memory
+        if reading.time < memory.clock[0]:
+            self._go_on_from(reading.time)
         if memory.clock[1] and not 0.5 < (reading.time - memory.clock[0]) / self.spec.period < 1.5:
             self.begin(at_rest=False)  # a lost period: nothing is known of what was in it
         self._see(
@@ -260,6 +263,23 @@ class Monitor:
             values = measured(reading, self._simulation.window.needs, self.spec.name)
             kept[1:] = values if self._memory.clock[1] <= 1 else kept[:-1].copy()
             kept[0] = values
+
+    def _go_on_from(self, now: float) -> None:
+        """Go on where the arm's clock began anew and shows ``now`` [s], as after a reset of its controller.
+
+        What is wrong stays so: such findings end with the old clock and begin anew on this one. Evidence stays too,
+        as if no time had passed in between.
+        """
+        memory, before = self._memory, float(self._memory.clock[0])
+        memory.since[...] += now - before
+        memory.disagreement_since[...] += now - before
+        memory.clock[0] = now
+        self._earlier = len(self.findings)
+        for key, place in list(self._open.items()):
+            lasting = self.findings[place]
+            self._close(key, before)
+            self._open[key] = len(self.findings)
+            self.findings.append(replace(lasting, since=now, noticed=now))
 
     def _suspicious(self) -> bool:
         """Whether there is something to decide; most of the time there is not."""
@@ -350,7 +370,7 @@ class Monitor:
 
     def marks(self, recorded: Recorded) -> tuple[Mark, ...]:
         """Return the marks of a sequence that it has seen."""
-        return marks_of(self.findings, recorded.time, recorded.step)
+        return marks_of(self.findings[self._earlier :], recorded.time, recorded.step)
 
     # ---- saved states
 
@@ -359,6 +379,7 @@ class Monitor:
         state = {
             "memory": {name: values.tolist() for name, values in self._memory._asdict().items()},
             "findings": [asdict(one) for one in self.findings],
+            "earlier": self._earlier,
             "simulation": self._simulation is not None,
         }
         if self._measured.size:
@@ -376,6 +397,7 @@ class Monitor:
             saved = json.loads(state)
             arrays = {name: np.array(values, np.float64) for name, values in saved["memory"].items()}
             findings = [Finding(**one) for one in saved["findings"]]
+            earlier = int(saved.get("earlier", 0))
             memory = Memory(**arrays)
             same = [a.shape == b.shape for a, b in zip(memory, self._memory, strict=True)]
             further = np.array(saved.get("measured", []), np.float64).reshape(self._measured.shape)
@@ -386,7 +408,7 @@ class Monitor:
         for mine, values in zip(self._memory, memory, strict=True):
             mine[...] = values
         self._measured[...] = further
-        self.findings = findings
+        self.findings, self._earlier = findings, earlier
         self._open = {
             (one.kind, one.detail, one.joint, one.muscle): place
             for place, one in enumerate(findings)

@@ -11,6 +11,7 @@ from pneumarm.report.figures.episodes import distributions, distributions_alt
 from pneumarm.report.figures.importance import input_importance, input_importance_alt
 from pneumarm.report.figures.isoplots import isoplot, isoplot_alt
 from pneumarm.report.figures.learning import learning_curves, learning_curves_alt
+from pneumarm.report.figures.marked import marked_rows, marked_rows_alt
 from pneumarm.report.figures.movements import movement, movement_alt
 from pneumarm.report.figures.propagation import error_propagation, error_propagation_alt, expectation
 from pneumarm.report.figures.residues import (
@@ -51,6 +52,8 @@ __all__ = [
     "isoplot_alt",
     "learning_curves",
     "learning_curves_alt",
+    "marked_rows",
+    "marked_rows_alt",
     "movement",
     "movement_alt",
     "new_share",

@@ -1,0 +1,127 @@
+"""The watchdog of decisions: it sees to the arm while a controller does not come back with one."""
+
+import ctypes
+import math
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from threading import Lock, Thread, get_ident, main_thread
+from time import monotonic, sleep
+from typing import TYPE_CHECKING
+
+from pneumarm.arm.seam import Reading
+
+if TYPE_CHECKING:
+    from pneumarm.arm.guard import GuardedArm
+
+PATIENCE = 60.0
+"""After so long [s] without a decision a controller is stopped, even where an arm's clock stands still meanwhile."""
+_AGAIN = 3.0
+"""A controller that goes on when it is interrupted is interrupted again after this [s]."""
+_ARRIVING = 1.0
+"""An interruption that was sent arrives within this [s]."""
+_SELDOM = 1.0
+"""An arm that has not to be seen to is looked at this often [s]."""
+
+
+class Watchdog:
+    """Looks after one decision at a time, from a thread of its own.
+
+    A decision is out from :meth:`begin` to :meth:`end`. Once it is out for longer than a control period, the arm is
+    seen to every period by :meth:`GuardedArm.stand_in`; one that is out for too long is interrupted where it is. A
+    decision in time costs what two assignments under a lock cost: nothing is told to the thread, which looks once a
+    period by itself and ends when there is nothing to look at.
+
+    Python is needed for that: a controller inside compiled code that does not let other threads run stops the
+    watchdog too, and is left to the dead-man of the arm's own controller.
+    """
+
+    def __init__(self, arm: "GuardedArm") -> None:
+        self._arm = arm
+        self._lock = Lock()  # held while the arm is seen to, so that the decider has to wait with moving it
+        self._thread: Thread | None = None
+        self._reading: Reading | None = None  # after which a decision is out; None while none is
+        self._since = 0.0  # when it was asked for [s]
+        self._patience = PATIENCE
+        self._decider = 0
+        self._stands_still: bool | None = None  # the arm's clock while we compute; None while that is not known
+        self._needed = True  # whether the arm has to be seen to
+        self._interrupted: float | None = None  # when the decider was [s]
+
+    def begin(self, reading: Reading, patience: float = PATIENCE) -> None:
+        """Look after the decision on ``reading``; the calling thread is interrupted after ``patience`` [s]."""
+        with self._lock:
+            self._since, self._patience, self._decider = monotonic(), patience, get_ident()
+            self._needed, self._interrupted = not self._stands_still, None
+            self._reading = reading
+            if self._thread is None:
+                self._thread = Thread(target=self._look, name="pneumarm watchdog", daemon=True)
+                self._thread.start()
+
+    def end(self) -> None:
+        """Stop looking after the decision: it has come, or will never.
+
+        Raises:
+            ControllerFailure: the controller was stopped because it had not decided for too long; all is vented.
+
+        """
+        arrived = isinstance(sys.exc_info()[1], KeyboardInterrupt)
+        try:
+            self._end()
+        except KeyboardInterrupt:
+            self._end()
+            if self._interrupted is None:
+                raise
+            arrived = True
+        if self._interrupted is not None:
+            with suppress(KeyboardInterrupt):
+                sleep(0.0 if arrived else _ARRIVING)  # here it harms nothing
+            raise self._arm.give_up(self._patience)
+
+    def _end(self) -> None:
+        with self._lock:
+            self._reading = None
+
+    def _look(self) -> None:
+        period = self._arm.spec.period
+        seen = -1.0
+        while True:
+            with self._lock:
+                if self._reading is not None:
+                    nap = self._attend(self._reading)
+                elif self._since == seen:  # no decision was asked for since the last look
+                    self._thread = None
+                    return
+                else:
+                    nap = period
+                seen = self._since
+            sleep(nap)
+
+    def _attend(self, reading: Reading) -> float:
+        """Do what the decision on ``reading`` needs by now; return for how long [s] it needs nothing more."""
+        period, now = self._arm.spec.period, monotonic()
+        out = now - self._since
+        if out < min(period, self._patience):
+            return min(period, self._patience) - out
+        if out >= self._patience and now - (self._interrupted or -math.inf) >= _AGAIN:
+            self._interrupted = now
+            _interrupt(self._decider)
+        if self._needed:
+            try:
+                if self._stands_still is None:
+                    self._stands_still = self._arm.get_state() is not None
+                self._needed = not self._stands_still and self._arm.stand_in(reading)
+            except Exception:  # the arm failed, and whoever moves it next will be told
+                self._needed = False
+        nap = period if self._needed else _SELDOM
+        return min(nap, self._patience - out) if out < self._patience else nap
+
+
+def _interrupt(thread: int) -> None:
+    """Raise KeyboardInterrupt in ``thread``."""
+    handler: Callable[..., object] | int | None = signal.getsignal(signal.SIGINT)
+    if thread == main_thread().ident and callable(handler):
+        signal.pthread_kill(thread, signal.SIGINT)  # ends waits and sleeps too
+    else:
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(KeyboardInterrupt))

@@ -1,0 +1,72 @@
+"""Which of the stored rows are marked, so that nothing is learned from them, and why."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pneumarm.report.style import DARK, GREY, INK, panels, styled
+
+_THINNEST = 0.003  # of the width: a shorter stretch is drawn as long as this, so that it can be seen
+_LINE = 34  # characters of a label in a line
+
+
+@styled
+def marked_rows(
+    spans: NDArray[np.int64], reason: NDArray[np.int64], reasons: Sequence[str], ends: Sequence[int],
+    stages: Sequence[str], period: float,
+) -> Figure:  # fmt: skip
+    """Draw a lane a reason, with the stretches of the rows that are marked for it.
+
+    Args:
+        spans: first row and the one after the last of each stretch, in the order of recording, shape (n, 2).
+        reason: index of its reason, shape (n,).
+        reasons: in words.
+        ends: rows recorded by the end of each stage, rising.
+        stages: what was done then.
+        period: of control [s].
+
+    """
+    minutes = period / 60
+    total = max(ends[-1] if ends else 0, 1) * minutes
+    figure, axes = panels(1, 1, 0.9 + 0.42 * max(len(reasons), 1))
+    place = axes[0, 0]
+    for lane in range(len(reasons)):
+        begin, end = (spans[reason == lane] * minutes).T
+        width = np.maximum(end - begin, _THINNEST * total)
+        place.broken_barh(list(zip(begin, width, strict=True)), (lane - 0.3, 0.6), color=DARK)
+    for stage, first, end in zip(stages, [0, *ends], ends, strict=False):
+        place.axvline(end * minutes, color=GREY, ls=":", lw=1.2)
+        place.text(
+            (first + end) / 2 * minutes, 1.02, stage, transform=place.get_xaxis_transform(), ha="center", color=INK
+        )
+    place.set_yticks(range(len(reasons)), [_folded(one) for one in reasons])
+    place.set_ylim(max(len(reasons), 1) - 0.5, -0.5)
+    place.set_ylabel("marked for")
+    place.set_xlim(0, total)
+    place.grid(visible=False, axis="y")
+    place.set_xlabel("recorded until then [min]")
+    return figure
+
+
+def marked_rows_alt(
+    spans: NDArray[np.int64], reason: NDArray[np.int64], reasons: Sequence[str], period: float
+) -> str:
+    """Say in words what :func:`marked_rows` shows."""
+    told = []
+    for lane, words in enumerate(reasons):
+        of_it = spans[reason == lane]
+        rows, first, last = (of_it[:, 1] - of_it[:, 0]).sum(), of_it.min(), of_it.max()
+        told.append(f"{words}: {rows:,} rows between {first * period / 60:.1f} and {last * period / 60:.1f} min")
+    return f"Marked rows. {'; '.join(told)}." if told else "No rows are marked."
+
+
+def _folded(words: str) -> str:
+    """Return ``words`` in lines that fit beside the lanes."""
+    lines = [""]
+    for word in words.split():
+        if lines[-1] and len(lines[-1]) + len(word) >= _LINE:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    return "\n".join(lines)

@@ -1,5 +1,6 @@
 """What a store covers and how good a simulation of it is, gathered for the report (thesis sections 3.2.3 and 3.3)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,21 +70,21 @@ def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = No
     states = filtered.transitions.inputs[:, : simulation.window.state_size]
     remedy = Resynchronisation(states[:: max(1, len(states) // 10_000)], RESYNCHRONISE)
     remedied = propagation(simulation, apart, steps, resynchronisation=remedy)
-    joints = store.joints
+    window = simulation.window
     figures = {
-        "held_out": _errors(errors),
+        "held_out": _errors(errors, window.further),
         "propagation": {
             "steps": steps,
-            "measured": by_quantity(spread.measured[-1]),
-            "expected": by_quantity(spread.expected[-1]),
-            "resynchronised": by_quantity(remedied.measured[-1]),
+            "measured": by_quantity(spread.measured[-1], window.further),
+            "expected": by_quantity(spread.expected[-1], window.further),
+            "resynchronised": by_quantity(remedied.measured[-1], window.further),
         },
         "invalid": {"simulated": float(valid.simulated[-1]), "recorded": float(valid.recorded[-1])},
         "filter": filtered.coverage.summary(),
     }
     return Analysis(
         coverage=_coverage(store, filtered),
-        quality=_quality(simulation, filtered, apart, spread.measured.reshape(steps, joints, 4)),
+        quality=_quality(simulation, filtered, apart, window.of_joints(spread.measured)),
         figures=figures,
     )
 
@@ -113,13 +114,13 @@ def _longest(apart: Transitions, steps: int) -> int:
     return int(min(steps, max(1, lengths.max())))
 
 
-def _errors(errors: Statistics) -> dict[str, Any]:
+def _errors(errors: Statistics, further: Sequence[str]) -> dict[str, Any]:
     return {
-        "std": by_quantity(errors.std),
-        "relative_error": by_quantity(errors.relative),
-        "mean": by_quantity(errors.mean),
-        "slope": by_quantity(errors.slope),
-        "calibration": by_quantity(errors.calibration),
+        "std": by_quantity(errors.std, further),
+        "relative_error": by_quantity(errors.relative, further),
+        "mean": by_quantity(errors.mean, further),
+        "slope": by_quantity(errors.slope, further),
+        "calibration": by_quantity(errors.calibration, further),
     }
 
 
@@ -132,7 +133,7 @@ def _coverage(store: Store, filtered: Filtered) -> CoverageData:
         growth.append((int(held.sum()), len(held)))
     sample = filtered.sample("generalisation", _POINTS) or filtered.transitions
     return CoverageData(
-        observation=sample.observation.reshape(-1, store.joints, 4).astype(np.float64),
+        observation=grid.window.of_joints(sample.observation).astype(np.float64),
         cells_holding=np.bincount(np.minimum(filtered.filter.counts.arrays()[1], _MOST_IN_CELL)),
         cells=grid.size,
         per_cell=filtered.filter.settings.per_cell,
@@ -146,7 +147,6 @@ def _quality(simulation: Simulation, filtered: Filtered, apart: Transitions, mea
     head = np.arange(min(_IN_A_ROW, count))
     rest = np.random.default_rng(0).permutation(np.arange(len(head), count))[: _POINTS - len(head)]
     shown = picked(apart, np.concatenate([head, np.sort(rest)]))
-    shape = (len(shown.sequence), simulation.window.joints, 4)
     window, places = simulation.window, simulation.outputs
     kept = filtered.transitions
     x = simulation.scaling.inputs(kept.inputs, window)
@@ -155,9 +155,9 @@ def _quality(simulation: Simulation, filtered: Filtered, apart: Transitions, mea
     outputs = [names[place].removesuffix("[k]") for place in places]
     weights = importance(least_squares(x, y), x, y, names, outputs)
     return QualityData(
-        observation=shown.observation.reshape(shape).astype(np.float64),
-        target=shown.target.reshape(shape).astype(np.float64),
-        predicted=simulation.predict(shown.inputs).reshape(shape),
+        observation=window.of_joints(shown.observation).astype(np.float64),
+        target=window.of_joints(shown.target).astype(np.float64),
+        predicted=window.of_joints(simulation.predict(shown.inputs)),
         command=shown.inputs[:, window.state_size :].reshape(-1, window.joints, 2).astype(np.float64),
         time=shown.time - apart.time.min(),
         propagation=measured,

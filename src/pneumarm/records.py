@@ -118,7 +118,8 @@ def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Movement]:
 
 
 def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Moved:
-    return move(cycle, AgentController(agent), goal, agent.settings.reward, agent.settings.cutoff)
+    task = agent.settings
+    return move(cycle, AgentController(agent), goal, task.reward, task.cutoff, velocity=agent.window.velocity)
 
 
 def _recorded(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Movement:

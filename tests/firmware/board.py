@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm
+from pneumarm.arm.seam import measured
 from pneumarm.arm.virtual import VirtualArm
 from tests.firmware.chip import FREQUENCY, VALVE_PINS, Chip
 
 STEP = 0.25e-3
 """Time for which a voltage is held [s]: about one sweep of the converter, so that each conversion has its noise."""
+_FIRST_EXTRA = 6  # channels of the converter before it are of angles and pressures
 _STEP_CYCLES = round(STEP * FREQUENCY)
 _SLICE = 800
 """Cycles between two looks at the line while something waits for it."""
@@ -26,7 +28,8 @@ _SLICE = 800
 def single_conversions(arm: VirtualArm, seed: int = 0) -> VirtualArm:
     """Return the same arm with single conversions: the medians are the board's business."""
     sensors = replace(arm.parameters.sensors, conversions=1)
-    return VirtualArm(replace(arm.parameters, sensors=sensors), seed=seed, name=arm.spec.name)
+    further = {"velocity_sensor": arm.spec.velocity_sensor, "sensors": arm.spec.sensors}
+    return VirtualArm(replace(arm.parameters, sensors=sensors), seed=seed, name=arm.spec.name, **further)
 
 
 def valves_of(pins: int, joints: int) -> NDArray[np.int8]:
@@ -135,6 +138,9 @@ class SimulatedBoard:
             sensors = (reading.angle[joint], *reading.pressure[joint])
             for channel, count in enumerate(sensors, start=len(sensors) * joint):
                 self.chip.set_count(channel, int(count))
+        further = arm.spec.sensors
+        for one, value in zip(further, measured(reading, (one.name for one in further)), strict=True):
+            self.chip.set_count(_FIRST_EXTRA + (one.channel or 1) - 1, round(one.counts(value)))
 
     def _pass(self, cycle: int) -> None:
         assert self.arm is not None

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.seam import checked
 from pneumarm.arm.serial import FaultyLine, SerialArm
-from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.arm.virtual import VirtualArm, draw_parameters, usual_sensors
+from pneumarm.arm.virtual.further import THERMOMETER
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.errors import ArmFailure
 from pneumarm.learning import Agent
@@ -45,6 +46,29 @@ def test_time_passes_by_waiting_and_a_little_by_asking(arm: SerialArm) -> None:
     assert begin < arm.read().time < begin + 2 * LONGEST_EXCHANGE
     arm.wait_until(begin + 0.4)
     assert begin + 0.4 <= arm.read().time < begin + 0.4 + 2 * LONGEST_EXCHANGE
+
+
+def test_further_sensors_come_through_their_channels() -> None:
+    """A velocity of the firmware's own samples, and thermometers on the two extra channels, each on its own."""
+    sensors = usual_sensors(["temperature"])[1]
+    bare = VirtualArm(draw_parameters(3), velocity_sensor=True, sensors=sensors)
+    inner = single_conversions(bare, seed=1)
+    inner.records.muscles["temperature"] = [[15.0, 35.0]]
+    with SerialArm(SimulatedLine(SimulatedBoard(inner)), replace(inner.spec, name="firmware")) as arm:
+        arm.wait(0.05)
+        arm.set_valves(np.array([[1, -1]], np.int8))
+        arm.wait(0.15)
+        before, speed = arm.read(), []
+        for _ in range(8):
+            arm.wait(0.01)
+            reading = checked(arm.read(), arm.spec)
+            assert reading.velocity is not None
+            assert reading.temperature is not None
+            speed.append(reading.velocity[0])
+        expected = (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
+        assert abs(expected[0]) > 0.3
+        assert np.mean(speed) == pytest.approx(expected[0], rel=0.3)
+        assert reading.temperature == pytest.approx(inner.temperature, abs=2 * THERMOMETER)
 
 
 def test_each_muscle_obeys_its_own_valve_and_holds(arm: SerialArm) -> None:

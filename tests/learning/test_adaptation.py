@@ -106,7 +106,7 @@ def test_what_is_rehearsed_is_what_the_simulation_says_of_movements(joints: int,
 
 def movement(rows: Rows, number: int) -> Rows:
     chosen = rows.sequence == number
-    return Rows(**{name: values[chosen] for name, values in vars(rows).items()})
+    return rows.where(chosen)
 
 
 def first_of(rows: Rows, movements: int) -> Rows:

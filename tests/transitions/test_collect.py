@@ -10,6 +10,7 @@ from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import to_actions
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
+from pneumarm.transitions.rows import joined
 
 SHORT = CollectSettings(actions=100, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
 
@@ -23,10 +24,8 @@ def collected(folder, name="s.db", joints=1, count=2000, settings=SHORT, arm=Non
 
 def content(path):
     with Store.open(path) as store:
-        blocks = list(store)
-        names = blocks[0].__dataclass_fields__
-        rows = {name: np.concatenate([getattr(b, name) for b in blocks]) for name in names}
-        return rows, list(store.catalogue()), store.state()
+        rows = vars(joined(store))
+        return rows | rows.pop("measured"), list(store.catalogue()), store.state()
 
 
 def assert_same(one, other):

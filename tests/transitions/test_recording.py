@@ -8,6 +8,7 @@ import pytest
 from pneumarm.errors import UnusableInput
 from pneumarm.transitions import Store, import_recording
 from pneumarm.transitions.recording import read_mapping
+from pneumarm.transitions.rows import joined
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "recordings" / "mpi_pam.toml"
 
@@ -41,9 +42,8 @@ def imported(tmp_path):
         result = import_recording(tmp_path / "r.csv", tmp_path / "m.toml", tmp_path / "s.db")
         with Store.open(tmp_path / "s.db") as store:
             store.check()
-            blocks = list(store)
-            names = blocks[0].__dataclass_fields__
-            return result, store.spec, {n: np.concatenate([getattr(b, n) for b in blocks]) for n in names}
+            rows = vars(joined(store))
+            return result, store.spec, rows | rows.pop("measured")
 
     return run
 

@@ -17,6 +17,7 @@ from pneumarm.arm import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.transitions import Recorded, Store
 from pneumarm.transitions.quantiles import Quantiles
+from pneumarm.transitions.rows import joined
 
 
 @pytest.fixture
@@ -25,9 +26,8 @@ def path(tmp_path):
 
 
 def all_rows(store, **options):
-    blocks = list(store.blocks(**options))
-    names = blocks[0].__dataclass_fields__
-    return {name: np.concatenate([getattr(block, name) for block in blocks]) for name in names}
+    rows = vars(joined(store.blocks(**options)))
+    return rows | rows.pop("measured")
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3])

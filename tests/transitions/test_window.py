@@ -76,7 +76,7 @@ def test_nothing_spans_two_sequences():
 def test_velocity_uses_the_times_as_they_were():
     given_rows = rows([0, 10, 20])
     given_rows.time[:] = [0.0, 0.1, 0.15]
-    np.testing.assert_allclose(observations(given_rows)[:, 1], [0, 0.1, 0.2])
+    np.testing.assert_allclose(observations(given_rows, Window())[:, 1], [0, 0.1, 0.2])
 
 
 @given(st.integers(1, 3), st.integers(1, 5), st.integers(0, 2**32 - 1))
@@ -89,7 +89,7 @@ def test_every_window_equals_one_built_row_by_row(joints, history, seed):
     given_rows = rows(random.integers(0, 1000, n), joints, steps=steps, at_rest=bool(random.integers(2)))
     window = Window(joints, history)
     found = transitions(given_rows, window)
-    observed = observations(given_rows)
+    observed = observations(given_rows, Window())
     command = given_rows.command.reshape(n, -1)
     built = []
     begin = 0

@@ -4,7 +4,7 @@ from pneumarm.arm.controller import Controller
 from pneumarm.arm.cycle import BeginState, ControlCycle, Step
 from pneumarm.arm.guard import GuardedArm, guarded
 from pneumarm.arm.open import open_arm
-from pneumarm.arm.seam import Arm, ArmSpec, Reading
+from pneumarm.arm.seam import Arm, ArmSpec, Reading, Sensor
 
 __all__ = [
     "Arm",
@@ -14,6 +14,7 @@ __all__ = [
     "Controller",
     "GuardedArm",
     "Reading",
+    "Sensor",
     "Step",
     "guarded",
     "open_arm",

@@ -17,12 +17,17 @@ class CorrectedArm(Arm):
         """Take what is ``known`` of ``arm``.
 
         Raises:
-            UnusableInput: it is for another number of joints.
+            UnusableInput: it is for another number of joints, or names sensors that the arm does not have.
 
         """
         if known.spec.joints != arm.spec.joints:
             raise UnusableInput(
                 f"the file is of an arm with {known.spec.joints} joint(s), this has {arm.spec.joints}"
+            )
+        missing = [name for name in known.spec.further if name not in arm.spec.further]
+        if missing:
+            raise UnusableInput(
+                f"the file names sensors that {arm.spec.name} lacks ({', '.join(missing)}); remove them from it"
             )
         self.arm, self.spec, self.known = arm, known.spec, known
 
@@ -30,7 +35,10 @@ class CorrectedArm(Arm):
         """Return what the sensors say, put right."""
         raw = checked(self.arm.read(), self.arm.spec)
         correction = self.known.correction
-        return replace(raw, angle=correction.angle(raw.angle), pressure=correction.pressure(raw.pressure))
+        angle, velocity = correction.angle(raw.angle), raw.velocity
+        if velocity is not None and correction.angle_raw:
+            velocity = correction.angle(raw.angle + velocity / 2) - correction.angle(raw.angle - velocity / 2)
+        return replace(raw, angle=angle, pressure=correction.pressure(raw.pressure), velocity=velocity)
 
     def set_valves(self, valves: NDArray[np.int8]) -> None:
         """Set the valves."""

@@ -9,10 +9,11 @@ from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.errors import UnusableInput
 
 _FORMS = (
-    "virtual, virtual:seed=7, virtual:preset=A, virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
-    "emulated:ARM or python:module:callable"
+    "virtual, virtual:seed=7, virtual:preset=A, virtual:seed=7,sensors=velocity+temperature, "
+    "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, emulated:ARM or python:module:callable"
 )
 _FAULTS = ",faults="
+_SENSORS = ",sensors="
 _SPEC = ",spec="
 
 
@@ -20,7 +21,9 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     """Return the arm called ``name``; ``seed`` seeds the noise of its sensors and of its surroundings.
 
     ``virtual`` is the nominal virtual arm, ``virtual:seed=N`` another one from the distribution of arms,
-    ``virtual:seed=N,faults=PLAN.toml`` one with faults (:mod:`pneumarm.arm.virtual.faults`);
+    ``virtual:seed=N,sensors=velocity+acceleration+temperature`` one with further sensors, any of these
+    (:mod:`pneumarm.arm.virtual.further`), ``virtual:seed=N,faults=PLAN.toml`` one with faults
+    (:mod:`pneumarm.arm.virtual.faults`);
     ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
     ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
     ``python:module:callable`` calls ``callable()`` for the arm.
@@ -49,11 +52,11 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
 def _open(name: str, seed: int, spec: ArmSpec | None = None) -> Arm:
     kind, _, rest = name.partition(":")
     if kind == "virtual":
-        return _virtual(name, rest, seed)
+        return _virtual(name, rest, seed, spec)
     if kind == "emulated" and rest:
         from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
 
-        inner = _open(rest, seed)
+        inner = _open(rest, seed, spec)
         return SerialArm(BoardLine(EmulatedBoard(inner)), replace(spec or inner.spec, name=name))
     if _FAULTS in rest:
         raise UnusableInput(f"arm {name!r}: only a virtual arm plays faults; remove {_FAULTS!r} and what follows")
@@ -71,11 +74,15 @@ def _open(name: str, seed: int, spec: ArmSpec | None = None) -> Arm:
     raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
 
 
-def _virtual(name: str, rest: str, seed: int) -> Arm:
-    """Return the virtual arm with the options ``rest``: seed=N or preset=P, then faults=FILE."""
-    from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, read_plan
+def _virtual(name: str, rest: str, seed: int, spec: ArmSpec | None) -> Arm:
+    """Return the virtual arm with the options ``rest``: seed=N or preset=P, then sensors=KINDS, then faults=FILE.
 
-    first, separator, file = (rest if not rest.startswith("faults=") else f",{rest}").partition(_FAULTS)
+    Without ``sensors`` it has the further sensors that its ``spec`` names, if it has one.
+    """
+    from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, read_plan, usual_sensors
+
+    options, separator, file = (f",{rest}" if rest.startswith(("faults=", "sensors=")) else rest).partition(_FAULTS)
+    first, _, kinds = options.partition(_SENSORS)
     key, _, value = first.partition("=")
     if not first and name != "virtual:":
         parameters = None
@@ -85,7 +92,12 @@ def _virtual(name: str, rest: str, seed: int) -> Arm:
         parameters = preset_parameters(value)
     else:
         raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
-    return VirtualArm(parameters, seed=seed, name=name, faults=read_plan(file) if separator else ())
+    if kinds:
+        velocity, sensors = usual_sensors(kinds.split("+"), 1 if parameters is None else len(parameters.joints))
+    else:
+        velocity, sensors = (spec.velocity_sensor, spec.sensors) if spec is not None else (False, ())
+    faults = read_plan(file) if separator else ()
+    return VirtualArm(parameters, seed=seed, name=name, faults=faults, velocity_sensor=velocity, sensors=sensors)
 
 
 def _from_python(place: str) -> Arm:

@@ -6,14 +6,67 @@ takes an :class:`Arm`; nothing else in pneumarm knows whether it is virtual, sim
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 from types import TracebackType
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import ArmFailure, UnusableInput
+
+SensorKind = Literal["velocity", "acceleration", "temperature"]
+"""Kinds of further sensors, besides those of angle and pressure that every arm has."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A further sensor of an arm: an accelerometer of a joint, or a thermometer of a muscle.
+
+    The velocity of the joints is none of these: a controller makes it of the angle's faster samples, without a
+    sensor of its own; see :attr:`ArmSpec.velocity_sensor`.
+    """
+
+    kind: Literal["acceleration", "temperature"]
+    """What it measures: tangential acceleration of a joint's link [m/s2], or temperature of a muscle [Celsius]."""
+    joint: int = 1
+    """Joint that it is at, from 1."""
+    muscle: int | None = None
+    """Muscle that a thermometer is at, 1 or 2; None for an accelerometer."""
+    channel: int | None = None
+    """The controller's extra channel that it is wired to, from 1; None where there is no controller between."""
+    scale: float = 1.0
+    """What a count of that channel is worth [m/s2 or Celsius]."""
+    offset: float = 0.0
+    """What the count 0 says [m/s2 or Celsius]."""
+
+    def __post_init__(self) -> None:
+        checks = {
+            "kind": self.kind in ("acceleration", "temperature"),
+            "joint": self.joint >= 1,
+            "muscle": self.muscle in (1, 2) if self.kind == "temperature" else self.muscle is None,
+            "channel": self.channel is None or self.channel >= 1,
+            "scale": math.isfinite(self.scale) and self.scale != 0,
+            "offset": math.isfinite(self.offset),
+        }
+        for name, valid in checks.items():
+            if not valid:
+                raise UnusableInput(f"Sensor: {name} cannot be {getattr(self, name)!r}; see its docstring")
+
+    @property
+    def name(self) -> str:
+        """What its readings are called, such as ``joint_1_temperature_2``."""
+        return f"joint_{self.joint}_{self.kind}" + ("" if self.muscle is None else f"_{self.muscle}")
+
+    def value(self, counts: float) -> float:
+        """Return what ``counts`` of its channel say [m/s2 or Celsius]."""
+        return self.offset + self.scale * counts
+
+    def counts(self, value: float) -> float:
+        """Return the counts, not rounded, that say ``value`` [m/s2 or Celsius]."""
+        return (value - self.offset) / self.scale
 
 
 @dataclass(frozen=True)
@@ -37,9 +90,10 @@ class ArmSpec:
     angle_limits: tuple[float, float] | None = None
     """At these angles [counts] valves that push further out stay closed; None where the end stops bear that."""
     velocity_sensor: bool = False
-    """Whether readings carry the velocity that the arm measures itself, as a controller does that samples faster.
-
-    Nobody learns from it yet: states are made of angles."""
+    """Whether readings carry the velocity that the arm measures itself, as a controller does that samples faster
+    (thesis sections 5.1 and 7.3)."""
+    sensors: tuple[Sensor, ...] = ()
+    """Further sensors whose readings it carries (thesis appendix A)."""
     latency: float = 0.0
     """Time [s] between reading and acting that the control cycle has to let pass on this arm.
 
@@ -61,6 +115,8 @@ class ArmSpec:
             "max_inflation": _positive(self.max_inflation),
             "angle_limits": math.isfinite(lowest) and math.isfinite(highest) and lowest < highest,
             "latency": math.isfinite(self.latency) and 0 <= self.latency < self.period,
+            "sensors": all(one.joint <= self.joints for one in self.sensors)
+            and len({one.name for one in self.sensors}) == len(self.sensors),
         }
         for name, valid in checks.items():
             if not valid:
@@ -70,6 +126,12 @@ class ArmSpec:
     def max_pressure_counts(self) -> float:
         """The pressure limit [counts]."""
         return self.max_pressure * self.counts_per_bar
+
+    @cached_property
+    def further(self) -> tuple[str, ...]:
+        """Names of all that readings carry besides angles and pressures, velocities first."""
+        velocities = [velocity_name(j) for j in range(1, self.joints + 1)] if self.velocity_sensor else []
+        return (*velocities, *(one.name for one in self.sensors))
 
     def degrees(self, counts: ArrayLike) -> NDArray[np.float64]:
         """Convert angles [counts] to degrees, 0 in the middle of the range."""
@@ -98,7 +160,58 @@ class Reading:
     velocity: NDArray[np.float64] | None = None
     """Angular velocities from a sensor of their own, shape (joints,) [counts/ms]."""
     temperature: NDArray[np.float64] | None = None
-    """Temperatures of the muscles, shape (joints, 2) [degrees Celsius]."""
+    """Temperatures of the muscles, shape (joints, 2) [degrees Celsius]; NaN for a muscle without a thermometer."""
+    acceleration: NDArray[np.float64] | None = None
+    """Tangential accelerations of the links, shape (joints,) [m/s2]; NaN for a joint without an accelerometer."""
+
+
+def velocity_name(joint: int) -> str:
+    """Return what the measured velocity of ``joint``, from 1, is called."""
+    return f"joint_{joint}_velocity"
+
+
+def measured(reading: Reading, names: Iterable[str], whose: str = "the arm") -> list[float]:
+    """Return what the further sensors called ``names`` say in ``reading``; see :attr:`ArmSpec.further`.
+
+    Raises:
+        ArmFailure: one says nothing, or no finite number; ``whose`` it is stands in the message.
+
+    """
+    found = []
+    for name in names:
+        kind, place = _place(name)
+        values = getattr(reading, kind)
+        try:
+            value = math.nan if values is None else float(np.asarray(values)[place])
+        except (TypeError, ValueError, IndexError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise ArmFailure(f"{whose}: a reading must hold a finite {name}, got {values!r} as {kind}")
+        found.append(value)
+    return found
+
+
+@cache
+def _place(name: str) -> tuple[str, tuple[int, ...]]:
+    """Return the field of a reading and the place in it that the sensor ``name`` fills."""
+    _, joint, kind, *muscle = name.split("_")
+    return kind, (int(joint) - 1, *(int(m) - 1 for m in muscle))
+
+
+def with_measured(reading: Reading, spec: ArmSpec, values: Sequence[float]) -> Reading:
+    """Return ``reading`` with ``values`` in the order of :attr:`ArmSpec.further`: the inverse of :func:`measured`."""
+    if not spec.further:
+        return reading
+    velocity = np.array(values[: spec.joints], np.float64) if spec.velocity_sensor else None
+    temperature = acceleration = None
+    for one, value in zip(spec.sensors, values[len(values) - len(spec.sensors) :], strict=True):
+        if one.kind == "temperature":
+            temperature = np.full((spec.joints, 2), np.nan) if temperature is None else temperature
+            temperature[one.joint - 1, (one.muscle or 1) - 1] = value
+        else:
+            acceleration = np.full(spec.joints, np.nan) if acceleration is None else acceleration
+            acceleration[one.joint - 1] = value
+    return Reading(reading.time, reading.angle, reading.pressure, velocity, temperature, acceleration)
 
 
 class Arm(ABC):
@@ -166,7 +279,7 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
     """Return ``reading`` with float64 arrays of the right shapes; as it is where it has them already.
 
     Raises:
-        ArmFailure: a value is missing, not finite or of the wrong shape.
+        ArmFailure: a value is missing, not finite or of the wrong shape; also of the further sensors of ``spec``.
 
     """
     try:
@@ -181,9 +294,11 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
     # For a handful of numbers Python is several times faster than np.isfinite, and this runs in every period.
     if not all(map(math.isfinite, [time, *angle.tolist(), *pressure.ravel().tolist()])):
         raise ArmFailure(f"{spec.name}: a reading must hold finite numbers, got {reading!r}")
+    if spec.further:
+        measured(reading, spec.further, spec.name)
     if angle is reading.angle and pressure is reading.pressure and type(reading.time) is float:
         return reading
-    return Reading(time, angle, pressure, reading.velocity, reading.temperature)
+    return Reading(time, angle, pressure, reading.velocity, reading.temperature, reading.acceleration)
 
 
 def _array(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -18,6 +18,12 @@ found that readings must be corrected, a table ``[correction]`` with those of :c
     leak = [[0.025, 0.037]]
     leak_error = [[0.0007, 0.0007]]
     ends = [[160.5, 870.0]]
+
+Further sensors are named in the spec, those on a controller's extra channels with the channel and what its counts
+are worth; this is an LM35 on the second muscle, 10 mV a degree on a converter of 5 V::
+
+    velocity_sensor = true
+    sensors = [{kind = "temperature", joint = 1, muscle = 2, channel = 1, scale = 0.489}]
 """
 
 import math
@@ -32,7 +38,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_text
 
@@ -175,6 +181,8 @@ def load_arm_file(path: Path | str) -> ArmFile:
         for part, kind in (("spec", ArmSpec), ("correction", Correction), ("baseline", Baseline)):
             if isinstance(found.get(part), dict):
                 _refuse_unknown(found[part], kind, f"[{part}] ")
+        for sensor in _tables(found.get("spec"), "sensors"):
+            _refuse_unknown(sensor, Sensor, "[spec] sensors: ")
         return msgspec.convert(found, ArmFile)
     except OSError as error:
         raise UnusableInput(f"{path}: cannot be read ({error.strerror or error})") from error
@@ -210,6 +218,12 @@ def _refuse_unknown(found: Mapping[str, Any], kind: type, place: str) -> None:
         raise UnusableInput(f"{place}{', '.join(unknown)} is unknown; known are {', '.join(known)}")
 
 
+def _tables(table: Any, name: str) -> list[dict[str, Any]]:
+    """Return the tables in the list ``name`` of ``table``; what is no table is refused by its type elsewhere."""
+    listed = table.get(name) if isinstance(table, dict) else None
+    return [one for one in listed if isinstance(one, dict)] if isinstance(listed, list) else []
+
+
 def _toml(value: Any) -> str:
     """Return ``value`` as TOML; Python and TOML write numbers alike."""
     if isinstance(value, bool):
@@ -219,4 +233,7 @@ def _toml(value: Any) -> str:
         return msgspec.json.encode(value).decode().replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, dict):
+        entries = [f"{key} = {_toml(entry)}" for key, entry in value.items() if entry is not None]
+        return f"{{{', '.join(entries)}}}"
     return repr(value)

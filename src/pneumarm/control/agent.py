@@ -39,7 +39,7 @@ class AgentController:
             raise UnusableInput("call reset(goal) before act(reading)")
         if reading.time != self._seen:
             reading = checked(reading, self.agent.spec)
-            state = self._tracker.push(reading.time, reading.angle, reading.pressure)
+            state = self._tracker.reading(reading)
             if self._seen is None:
                 self.actor.begin(state, self._goal)
             else:  # a reading that nobody told the actor about: nothing can be learned from the way to it
@@ -54,7 +54,7 @@ class AgentController:
     ) -> None:
         """Learn from ``reading``, to which the valves as ``applied`` led with ``reward`` (joints,)."""
         self._tracker.commanded(applied)
-        state = self._tracker.push(reading.time, reading.angle, reading.pressure)
+        state = self._tracker.reading(reading)
         self.actor.observe(reward, state, terminal)
         self._seen = reading.time
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, Controller, Reading, Step
+from pneumarm.errors import ArmFailure
 from pneumarm.learning import Reward
 from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.watch import Watch, watched
@@ -66,6 +67,7 @@ def move(
     cutoff: int = 100,
     watch: Watch | None = None,
     broken: Callable[[Recorded], None] | None = None,
+    velocity: Literal["derived", "measured"] = "derived",
 ) -> Movement:
     """Move the arm, at rest with closed valves, until ``goal`` is reached or the movement is cut off.
 
@@ -77,6 +79,7 @@ def move(
         cutoff: actions after which a movement that has not reached its goal ends (thesis section 5.4.2: 100).
         watch: sees every reading, such as a :class:`~pneumarm.control.Monitor`.
         broken: given what there is of a movement that breaks off, of the kind :data:`BROKEN`, before that is raised.
+        velocity: whether a goal is reached by the velocity derived from the angles, or by that of the arm's sensor.
 
     """
 
@@ -86,11 +89,20 @@ def move(
         if recorded is not None and broken is not None:
             broken(recorded)
 
-    count = _Count(cycle, controller, np.asarray(goal, np.float64), reward, cutoff)
+    count = _Count(cycle, controller, np.asarray(goal, np.float64), reward, cutoff, velocity == "measured")
     controller.reset(count.goal)
     steps = watched(cycle.run(count.decide), watch, at_rest=True, broken=keep)
     recorded = Recorded.from_steps(steps, cycle.arm.spec, kind=MOVEMENT, at_rest=True)
     return Movement(count.goal, len(steps) - 1, count.switches, count.total, count.success, count.velocity, recorded)
+
+
+def velocity_of(reading: Reading, before: Reading, *, measured: bool) -> NDArray[np.float64]:
+    """Return the velocity (joints,) at ``reading``, as a sensor has measured it or since ``before`` [counts/ms]."""
+    if not measured:
+        return (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
+    if reading.velocity is None:
+        raise ArmFailure("a reading must hold a velocity by which this agent's goals are reached, this has none")
+    return reading.velocity
 
 
 class _Count:
@@ -103,7 +115,9 @@ class _Count:
         goal: NDArray[np.float64],
         reward: Reward,
         cutoff: int,
+        measures: bool,
     ) -> None:
+        self.measures = measures
         self.cycle, self.controller, self.goal = cycle, controller, goal
         self.reward, self.cutoff = reward, cutoff
         self.learner = controller if isinstance(controller, LearningController) else None
@@ -135,7 +149,7 @@ class _Count:
             switched = (applied != self._last_applied).any(axis=1)
         self._last_applied = applied
         self.switches += switched
-        self.velocity = (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
+        self.velocity = velocity_of(reading, before, measured=self.measures)
         self.success = self.reward.reached(reading.angle, self.velocity, self.goal)
         self.total += self.reward.goal if self.success else self.reward.action
         self.total += self.reward.switch * int(switched.sum())

@@ -5,7 +5,7 @@ guard, bit for bit: the same readings with their noise, the same late periods, t
 inflation. Without Python between two periods a movement takes 1.0 instead of 2.5 ms of processor time, and threads do
 not wait for each other; an agent that learns on the arm alone needs 80,000 s of arm time.
 
-It is for virtual arms without faults and for agents of the thesis' kind.
+It is for virtual arms without faults or further sensors, and for agents of the thesis' kind.
 """
 
 from typing import Any, NamedTuple
@@ -132,7 +132,7 @@ class Player:
         begin: how the arm gets to a begin state.
 
     Raises:
-        UnusableInput: agent and arm do not fit, or the arm plays faults.
+        UnusableInput: agent and arm do not fit, or the agent needs further sensors.
 
     """
 
@@ -152,6 +152,7 @@ class Player:
                 f"{spec.joints} joint(s) and the limits {spec.angle_limits}"
             )
         self.agent, self.arm, self._begin = agent, arm, begin
+        window.require((), "a compiled loop of movements")
         joints, place = spec.joints, places(window)
         self._schedule = _schedule(exploration)
         x = np.zeros(place.size, np.float32)
@@ -163,8 +164,8 @@ class Player:
             room_of(joints, place.size),
             random_state(seed),
             place,
-            np.ascontiguousarray(scaling.observation_offset.reshape(joints, 4), np.float64),
-            np.ascontiguousarray(scaling.observation_scale.reshape(joints, 4), np.float64),
+            np.ascontiguousarray(window.of_joints(scaling.observation_offset), np.float64),
+            np.ascontiguousarray(window.of_joints(scaling.observation_scale), np.float64),
             np.ascontiguousarray(scaling.command_scale.reshape(joints, 2), np.float64),
             window.history,
         )

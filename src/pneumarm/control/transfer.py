@@ -309,7 +309,9 @@ def transfer(
                     controller = AgentController(moving)
                 random, goal = begin_and_goal(agent, seed, greedy, i)
                 BEGIN.reach(cycle.arm, random)
-                movement = move(cycle, controller, goal, task.reward, task.cutoff, watch, broken.append)
+                movement = move(
+                    cycle, controller, goal, task.reward, task.cutoff, watch, broken.append, agent.window.velocity
+                )
                 if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * movements:
                     mean.add(learner.weights())
                 note(phase, movement)
@@ -409,6 +411,7 @@ def check_fit(agent: AnyAgent, arm: Arm) -> None:
             raise UnusableInput(
                 f"this agent was trained for an arm whose {name} is {trained}, that of {arm.spec.name} is {found}"
             )
+    agent.window.require(arm.spec.further, arm.spec.name)
 
 
 def summary(episodes: Sequence[Episode]) -> dict[str, Any]:

@@ -256,5 +256,6 @@ def moved(
     for number in numbers:
         random, goal = draw_movement(goals, seed, True, number)
         BEGIN.reach(cycle.arm, random)
-        made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
+        task, velocity = agent.settings, agent.window.velocity
+        made.append(move(cycle, controller, goal, task.reward, task.cutoff, velocity=velocity))
     return made

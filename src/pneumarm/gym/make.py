@@ -116,6 +116,7 @@ def point_to_point(
         if model.window.joints != opened.spec.joints:
             opened.close()
             raise UnusableInput(f"like= has {model.window.joints} joint(s), the arm has {opened.spec.joints}")
+        model.window.require(opened.spec.further, opened.spec.name)
         window, scaling, range_ = model.window, model.scaling, model.goal_range
     if goals is not None:
         range_ = _goals(goals, window.joints)

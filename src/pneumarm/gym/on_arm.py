@@ -49,7 +49,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._goals, self._reward, self._cutoff, self._begin = goals, reward, cutoff, begin
         self._tracker, self._scaling = StateTracker(window, scaling), scaling
         self.action_space = action_space(window.joints)
-        space = observation_space(window, scaling, sensor_ranges(arm.spec), goals)
+        space = observation_space(window, scaling, sensor_ranges(arm.spec, window), goals)
         self.observation_space = cast("Space[Observation]", space)
         self._low, self._high = space.low, space.high
         self._closed = np.zeros((arm.spec.joints, 2), np.int8)
@@ -96,7 +96,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         if not self.action_space.contains(actions if actions.ndim else int(actions)):
             raise UnusableInput(f"actions must be in {self.action_space}, got {action!r}")
         self.arm.watchdog.end()
-        applied, before = self._turn(to_valves(actions.reshape(-1))), self._reading
+        applied = self._turn(to_valves(actions.reshape(-1)))
         self._reading = reading = self.arm.read()
         if reading.time - self._due > self.arm.spec.period / 2:
             self._due = reading.time  # as the control cycle does after a lost period
@@ -104,9 +104,8 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._applied = applied
         self._tracker.commanded(applied)
         observation = self._observation(reading)
-        velocity = (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
         self._count += 1
-        reached = self._reward.reached(reading.angle, velocity, self._goal)
+        reached = self._reward.reached(reading.angle, self._tracker.velocity, self._goal)
         truncated = not reached and self._count >= self._cutoff
         self._over = reached or truncated
         if self._over:

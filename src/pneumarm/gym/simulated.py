@@ -20,7 +20,6 @@ from pneumarm.learning.environment import environment
 from pneumarm.learning.settings import TrainSettings
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
-from pneumarm.transitions.window import QUANTITIES
 
 Observation = NDArray[np.float32]
 
@@ -128,11 +127,11 @@ class SimulatedPointToPoint(gymnasium.Env[Observation, Any]):
 def simulated_space(simulation: Simulation, begin: BeginStates) -> Box:
     """Return the space of what can be observed in ``simulation``."""
     window, scaling = simulation.window, simulation.scaling
-    ranges = sensor_ranges(simulation.spec).reshape(window.joints, len(QUANTITIES), 2)
-    ranges[:, 2:] = simulation.pressure_range
+    flat = sensor_ranges(simulation.spec, window)
+    flat[: window.joint_size].reshape(window.joints, -1, 2)[:, 2:] = simulation.pressure_range
+    flat[window.joint_size :] = simulation.further_range
     recorded = begin.states[:, : window.history * window.observation_size].reshape(-1, window.observation_size)
     raw = recorded * scaling.observation_scale + scaling.observation_offset
-    flat = ranges.reshape(-1, 2)
     flat[:, 0] = np.minimum(flat[:, 0], raw.min(axis=0))
     flat[:, 1] = np.maximum(flat[:, 1], raw.max(axis=0))
     return observation_space(window, scaling, flat, simulation.goal_range)

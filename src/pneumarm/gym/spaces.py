@@ -41,13 +41,17 @@ def nominal_goals(spec: ArmSpec) -> Array:
     return np.tile([low + edge, high - edge], (spec.joints, 1))
 
 
-def sensor_ranges(spec: ArmSpec) -> Array:
-    """Return lowest and highest angle, velocity and pressures of each joint, shape (4 joints, 2) [sensor units]."""
+def sensor_ranges(spec: ArmSpec, window: Window) -> Array:
+    """Return the lowest and highest of what is in an observation, shape (observation_size, 2) [sensor units].
+
+    Of further sensors but for the velocity nothing is known; they may say anything.
+    """
     low, high = spec.angle_range
     fastest = (high - low) / (1e3 * spec.period)
     most = _PRESSURE_MARGIN * spec.max_pressure_counts
     ranges = [[low, high], [-fastest, fastest], [0.0, most], [0.0, most]]
-    return np.tile(np.array(ranges, np.float64), (spec.joints, 1))
+    joints = np.tile(np.array(ranges, np.float64), (spec.joints, 1))
+    return np.concatenate([joints, np.tile([-np.inf, np.inf], (len(window.further), 1))])
 
 
 def observation_space(window: Window, scaling: Scaling, ranges: ArrayLike, goals: ArrayLike) -> Box:
@@ -56,7 +60,7 @@ def observation_space(window: Window, scaling: Scaling, ranges: ArrayLike, goals
     Args:
         window: which observations and actions are in a state.
         scaling: of the observations and of the goal, which is scaled as an angle is.
-        ranges: of the observations, shape (4 joints, 2) [sensor units].
+        ranges: of the observations, shape (observation_size, 2) [sensor units].
         goals: lowest and highest, shape (joints, 2) [counts].
 
     """
@@ -71,6 +75,6 @@ def observation_space(window: Window, scaling: Scaling, ranges: ArrayLike, goals
 
 def scaled_goal(goal: Array, scaling: Scaling) -> Array:
     """Return goals (..., joints) [counts] scaled as angles are."""
-    angle = slice(None, None, len(QUANTITIES))
+    angle = slice(0, goal.shape[-1] * len(QUANTITIES), len(QUANTITIES))
     scaled: Array = (goal - scaling.observation_offset[angle]) / scaling.observation_scale[angle]
     return scaled

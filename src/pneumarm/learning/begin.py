@@ -51,13 +51,13 @@ def begin_states(rows: Rows | Iterable[Rows], window: Window, scaling: Scaling) 
             "collect sequences that begin at rest"
         )
     sigma = sigma[np.argsort(sigma[:, 0], kind="stable")]
-    angle = np.ascontiguousarray(sigma[:, 0 : window.observation_size : 4])
+    angle = np.ascontiguousarray(sigma[:, 0 : window.joint_size : 4])
     return BeginStates(window, scaled_state(sigma, window, scaling), angle)
 
 
 def _resting(rows: Rows, window: Window) -> NDArray[np.float64]:
     """Return the windows (m, state_size) of the resting states in one block, in sensor units."""
-    h, observed = window.history, observations(rows)
+    h, observed = window.history, observations(rows, window)
     began = np.flatnonzero(rows.at_rest & (rows.step == 0))
     parts = [_window([observed[began]] * h, window)]
     if len(rows) > h:

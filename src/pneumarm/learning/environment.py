@@ -105,10 +105,9 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
         )
     if begin.window != simulation.window:
         raise UnusableInput(f"begin states of {begin.window} cannot be used with a simulation of {simulation.window}")
-    joints, reward = simulation.window.joints, settings.reward
-    offset = simulation.scaling.observation_offset.reshape(joints, 4)
-    scale = simulation.scaling.observation_scale.reshape(joints, 4)
-    commands = VALVES[None] / simulation.scaling.command_scale.reshape(joints, 1, 2)
+    window, scaling, reward = simulation.window, simulation.scaling, settings.reward
+    offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+    commands = VALVES[None] / scaling.command_scale.reshape(window.joints, 1, 2)
     task = Task(
         goal_range=np.ascontiguousarray(simulation.goal_range, np.float64),
         unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),

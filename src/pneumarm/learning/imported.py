@@ -22,7 +22,7 @@ from pneumarm.learning.environment import environment
 from pneumarm.learning.settings import TrainSettings
 from pneumarm.learning.testing import TestResult
 from pneumarm.simulation.simulation import Scaling, Simulation
-from pneumarm.transitions.window import Window
+from pneumarm.transitions.window import QUANTITIES, Window
 
 KIND = "pneumarm imported policy"
 Activation = Literal["tanh", "relu"]
@@ -171,7 +171,7 @@ class ImportedActor:
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
         scaling = self._policy.scaling
-        angles = slice(None, None, 4)
+        angles = slice(0, self._policy.window.joint_size, len(QUANTITIES))
         scaled = (np.asarray(goal) - scaling.observation_offset[angles]) / scaling.observation_scale[angles]
         self._inputs[self._policy.window.state_size :] = scaled
         self.follow(state)

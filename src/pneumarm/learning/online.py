@@ -56,10 +56,10 @@ class OnlineLearner:
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
-        joints, scaling = self._agent.window.joints, self._agent.scaling
-        offset = scaling.observation_offset.reshape(joints, 4)[:, 0]
-        scale = scaling.observation_scale.reshape(joints, 4)[:, 0]
-        goal = (np.asarray(goal, np.float64).reshape(joints) - offset) / scale
+        window, scaling = self._agent.window, self._agent.scaling
+        offset = window.of_joints(scaling.observation_offset)[:, 0]
+        scale = window.of_joints(scaling.observation_scale)[:, 0]
+        goal = (np.asarray(goal, np.float64).reshape(window.joints) - offset) / scale
         self._x[self._places.goal : self._places.one] = goal
         self._x[: self._places.command] = self._checked(state)
         begin_acting(self._learner, self._schedule, self._x, self._room, self._random)

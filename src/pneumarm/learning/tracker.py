@@ -1,9 +1,11 @@
 """The state window of a real arm, built from its readings one by one."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm.seam import Reading
+from pneumarm.arm.seam import Reading, measured
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import Window
 
@@ -12,13 +14,14 @@ class StateTracker:
     """Turns the readings of an episode, and the valves set after them, into scaled state windows (eq. 3.5).
 
     The first reading of an episode is taken at rest with closed valves: the window is filled with copies of it, and
-    its velocity is 0. The velocity after that is derived from the time stamps (section 2.3.4).
+    its velocity is 0. The velocity after that is derived from the time stamps (section 2.3.4), unless the window
+    takes that of a sensor, which says what it is at any time.
     """
 
     def __init__(self, window: Window, scaling: Scaling) -> None:
         self.window = window
-        self._offset = scaling.observation_offset.reshape(window.joints, 4)
-        self._scale = scaling.observation_scale.reshape(window.joints, 4)
+        self._offset, self._scale = scaling.observation_offset, scaling.observation_scale
+        self._measures = window.velocity == "measured"
         self._command_scale = scaling.command_scale
         self.reset()
 
@@ -31,23 +34,31 @@ class StateTracker:
         self._state = np.zeros(self.window.state_size, np.float32)
         self._command = np.zeros(self.window.command_size)
 
-    def push(self, time: float, angle: ArrayLike, pressure: ArrayLike) -> NDArray[np.float32]:
+    def push(
+        self, time: float, angle: ArrayLike, pressure: ArrayLike, measured: Sequence[float] = ()
+    ) -> NDArray[np.float32]:
         """Return the scaled state window after a reading.
 
-        ``time`` [s], ``angle`` (joints,) [counts], ``pressure`` (joints, 2) [counts].
+        ``time`` [s], ``angle`` (joints,) [counts], ``pressure`` (joints, 2) [counts], and what the further sensors
+        that the window needs have ``measured``, in the order of :attr:`~pneumarm.transitions.Window.needs`.
         """
         window, state = self.window, self._state
         angle = np.array(angle, np.float64).reshape(window.joints)
         observed, commanded = window.observation_size, window.command_size
         oldest = window.history * observed
         first = self._angle is None
-        if self._angle is not None and time > self._time:
+        if self._measures:
+            self.velocity = np.array(measured[: window.joints], np.float64)
+        elif self._angle is not None and time > self._time:
             self.velocity = (angle - self._angle) / (1e3 * (time - self._time))
         self._time, self._angle = time, angle
-        observation = np.empty((window.joints, 4))
-        observation[:, 0], observation[:, 1] = angle, self.velocity
-        observation[:, 2:] = np.asarray(pressure, np.float64).reshape(window.joints, 2)
-        newest = ((observation - self._offset) / self._scale).ravel()
+        observation = np.empty(observed)
+        joints = window.of_joints(observation)
+        joints[:, 0], joints[:, 1] = angle, self.velocity
+        joints[:, 2:] = np.asarray(pressure, np.float64).reshape(window.joints, 2)
+        if window.further:
+            observation[window.joint_size :] = measured[-len(window.further) :]
+        newest = (observation - self._offset) / self._scale
         if first:
             state[:oldest] = np.tile(newest, window.history)
         else:
@@ -60,7 +71,8 @@ class StateTracker:
 
     def reading(self, reading: Reading) -> NDArray[np.float32]:
         """Return the scaled state window after ``reading``."""
-        return self.push(reading.time, reading.angle, reading.pressure)
+        further = measured(reading, self.window.needs) if self.window.needs else ()
+        return self.push(reading.time, reading.angle, reading.pressure, further)
 
     def commanded(self, valves: ArrayLike) -> None:
         """Note the ``valves`` (joints, 2) as applied after the newest reading."""

@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
+
+import msgspec
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.versions import HISTORY, read_history
@@ -114,11 +116,16 @@ def _read_transfer(path: Path, results: dict[str, Any]) -> TransferData | None:
     return TransferData(before, learning, after, rate, adaptations)
 
 
+_KNOWN = {field.name for field in fields(ArmSpec)}  # of an arm
+
+
 def _read_spec(path: Path) -> ArmSpec:
     stored = _read_json(path)
     try:
-        return ArmSpec(**{**stored, "angle_range": tuple(stored["angle_range"])})
-    except (TypeError, KeyError, ValueError) as error:
+        if not isinstance(stored, dict) or "angle_range" not in stored or set(stored) - _KNOWN:
+            raise UnusableInput(f"it has {', '.join(stored)}")
+        return msgspec.convert(stored, ArmSpec)
+    except (msgspec.ValidationError, UnusableInput) as error:
         raise UnusableInput(f"{path}: expected the spec of an arm, {error}") from error
 
 

@@ -5,12 +5,12 @@ import json
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import Arm, Reading
+from pneumarm.arm.seam import Arm, Reading, with_measured
 from pneumarm.errors import UnusableInput
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
     begin,
-    raw_observation,
+    raw_observations,
     scaled_state,
     simulation_parameters,
     simulation_state,
@@ -51,12 +51,12 @@ class SimulationArm(Arm):
 
     def _settle(self) -> None:
         simulation = self._simulation
-        observation = simulation.scaling.observation_offset.reshape(-1, 4).copy()
-        observation[:, 0] = simulation.goal_range.mean(axis=1)
-        observation[:, 1] = 0.0
         window = simulation.window
+        observation = simulation.scaling.observation_offset.copy()
+        observation[: window.joint_size : 4] = simulation.goal_range.mean(axis=1)
+        observation[1 : window.joint_size : 4] = 0.0
         commands = np.zeros(window.state_size - window.history * window.observation_size)
-        sigma = np.concatenate([np.tile(observation.ravel(), window.history), commands])
+        sigma = np.concatenate([np.tile(observation, window.history), commands])
         begin(self._parameters, self._noise, self._state, scaled_state(sigma, window, simulation.scaling))
         quiet = noise_parameters(NoiseSettings(kind="none"), simulation)
         for _ in range(round(_SETTLE / self.spec.period)):
@@ -68,9 +68,12 @@ class SimulationArm(Arm):
     def read(self) -> Reading:
         """Return the newest simulated observation."""
         window = self._simulation.window
-        observation = raw_observation(self._state.x[: window.state_size], window, self._simulation.scaling)
+        newest = raw_observations(self._state.x[: window.state_size], self._simulation.scaling)
+        observation, further = window.of_joints(newest), newest[window.joint_size :]
         time = self._periods * self.spec.period + self._since
-        return Reading(time, observation[:, 0].copy(), observation[:, 2:].copy())
+        reading = Reading(time, observation[:, 0].copy(), observation[:, 2:].copy())
+        velocity = observation[:, 1] if self.spec.velocity_sensor else ()
+        return with_measured(reading, self.spec, [*velocity, *further])
 
     def set_valves(self, valves: NDArray[np.int8]) -> None:
         """Set the valves; they take effect at the end of the running period."""

@@ -7,15 +7,15 @@ virtual arm (200,000 transitions, held-out sequences) that takes the standard de
 
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.seam import ArmSpec, SensorKind
 from pneumarm.errors import UnusableInput
 from pneumarm.networks import (
     Fit,
@@ -61,7 +61,11 @@ class FitSettings:
     one_network: bool = False
     """One network with all outputs in place of one an output (the alternative in thesis section 3.4)."""
     velocity: Velocity = "derived"
-    """Velocity derived from the predicted angle (thesis), or by a network of its own."""
+    """Velocity derived from the predicted angle (thesis), or by a network of its own, as one that is measured always
+    is."""
+    sensors: tuple[SensorKind, ...] = ()
+    """Further sensors of the arm whose readings belong to the state: velocity in place of the derived one,
+    acceleration, temperature (thesis section 7.3 and appendix A; there: none)."""
     held_out: float = 0.1
     """Share of the sequences that is kept out of the fit, to measure its errors on; at least one sequence."""
     seed: int = 0
@@ -76,6 +80,7 @@ class FitSettings:
             "tolerance": 0 <= self.tolerance < 1,
             "decay": 0 <= self.decay < float("inf"),
             "velocity": self.velocity in ("derived", "network"),
+            "sensors": set(self.sensors) <= set(get_args(SensorKind)) and len(set(self.sensors)) == len(self.sensors),
             "held_out": 0 < self.held_out < 1,
             "seed": self.seed >= 0,
         }
@@ -111,18 +116,23 @@ class FitResult(NamedTuple):
     @property
     def std(self) -> dict[str, Any]:
         """Standard deviation of the one-step error on held-out sequences (eq. 3.6): a number, or one a joint."""
-        return by_quantity(self.held_out.std)
+        return by_quantity(self.held_out.std, self.simulation.window.further)
 
     @property
     def relative_error(self) -> dict[str, Any]:
         """``std`` over the standard deviation of the one-step change."""
-        return by_quantity(self.held_out.relative)
+        return by_quantity(self.held_out.relative, self.simulation.window.further)
 
 
-def by_quantity(values: NDArray[np.float64]) -> dict[str, Any]:
-    """Return ``values`` (4 joints,) as numbers by the names of quantities; lists where there are more joints."""
-    columns = values.reshape(-1, len(QUANTITIES)).T.tolist()
-    return {name: column[0] if len(column) == 1 else column for name, column in zip(QUANTITIES, columns, strict=True)}
+def by_quantity(values: NDArray[np.float64], further: Sequence[str] = ()) -> dict[str, Any]:
+    """Return ``values`` (observation_size,) as numbers by the names of quantities; lists where there are more joints.
+
+    What belongs to ``further`` sensors comes last, by their names.
+    """
+    joints = len(values) - len(further)
+    columns = zip(QUANTITIES, values[:joints].reshape(-1, len(QUANTITIES)).T.tolist(), strict=True)
+    named = {name: column[0] if len(column) == 1 else column for name, column in columns}
+    return named | dict(zip(further, values[joints:].tolist(), strict=True))
 
 
 def fit(
@@ -139,7 +149,8 @@ def fit(
     """Fit a simulation to the ``training`` transitions and measure its errors on the others.
 
     Args:
-        training: the filtered transitions (thesis section 3.2.3), with windows of ``settings.history``.
+        training: the filtered transitions (thesis section 3.2.3), with windows of ``settings.history`` and of
+            ``settings.sensors``.
         held_out: transitions of other sequences, at once or in blocks.
         spec: the arm they are of.
         goal_range: 1st and 99th percentile of the stored angles, (joints, 2) [counts].
@@ -153,7 +164,7 @@ def fit(
 
     """
     settings = settings or FitSettings()
-    window = Window(spec.joints, settings.history)
+    window = Window.of(spec, settings.history, settings.sensors)
     if training.inputs.shape[1] != window.input_size or training.target.shape[1] != window.observation_size:
         raise UnusableInput(
             f"expected transitions of {spec.joints} joint(s) with a history of {settings.history}, that is "
@@ -164,17 +175,19 @@ def fit(
     began = time.perf_counter()
     scaling = Scaling.of(training, window, valves)
     simulation = Simulation(
-        spec=_widened(spec, training),
+        spec=_widened(window.spec(spec), window, training),
         window=window,
         scaling=scaling,
         networks=(),
-        velocity=settings.velocity,
+        velocity="network" if window.velocity == "measured" else settings.velocity,
         error_std=np.zeros((spec.joints, len(QUANTITIES))),
         goal_range=np.asarray(goal_range, np.float64).reshape(spec.joints, 2),
-        pressure_range=_pressure_range(training, spec.joints),
+        pressure_range=_pressure_range(training, window),
         valves=valves,
         held_out=settings.held_out,
         seed=settings.seed,
+        further_std=np.zeros(len(window.further)),
+        further_range=_further_range(training, window),
     )
     places = simulation.outputs
     change = training.target[:, places].astype(np.float64) - training.observation[:, places]
@@ -197,7 +210,7 @@ def fit(
     seconds = time.perf_counter() - began
     errors = statistics(simulation, held_out)
     return FitResult(
-        simulation=replace(simulation, error_std=errors.std.reshape(spec.joints, -1)),
+        simulation=simulation.with_errors(errors.std),
         held_out=errors,
         training=statistics(simulation, training),
         generalisation=None if generalisation is None else statistics(simulation, generalisation),
@@ -245,25 +258,34 @@ def _rescaled(network: Network, factor: NDArray[np.float64]) -> Network:
     )
 
 
-def _widened(spec: ArmSpec, transitions: Transitions) -> ArmSpec:
+def _widened(spec: ArmSpec, window: Window, transitions: Transitions) -> ArmSpec:
     """Return ``spec`` with an angle range that holds all recorded angles, about the same middle.
 
     Sensors go past their nominal ranges, and predictions are clipped to the range.
     """
     low, high = spec.angle_range
-    angle = transitions.target[:, QUANTITIES.index("angle") :: len(QUANTITIES)]
+    angle = window.of_joints(transitions.target)[..., QUANTITIES.index("angle")]
     beyond = max(0.0, low - float(angle.min()), float(angle.max()) - high)
     return replace(spec, angle_range=(low - beyond, high + beyond))
 
 
-def _pressure_range(transitions: Transitions, joints: int) -> NDArray[np.float64]:
+def _pressure_range(transitions: Transitions, window: Window) -> NDArray[np.float64]:
     """Return the range that predicted pressures are clipped to, (joints, 2 muscles, 2) [counts].
 
     No gauge pressure lies below 0, unless the sensors said so; above, the recorded range gets a margin.
     """
-    pressure = transitions.target.reshape(-1, joints, len(QUANTITIES))[:, :, -2:].astype(np.float64)
+    pressure = window.of_joints(transitions.target)[..., -2:].astype(np.float64)
     lowest, highest = np.minimum(pressure.min(axis=0), 0.0), pressure.max(axis=0)
     return np.stack([lowest, highest + _MARGIN * (highest - lowest)], axis=-1)
+
+
+def _further_range(transitions: Transitions, window: Window) -> NDArray[np.float64]:
+    """Return the range of what was recorded of further sensors, (further, 2) [sensor units].
+
+    Where a thermometer never was there is no telling how the arm moves.
+    """
+    further = transitions.target[:, window.joint_size :].astype(np.float64)
+    return np.stack([further.min(axis=0), further.max(axis=0)], axis=-1)
 
 
 class StoreFit(NamedTuple):
@@ -280,12 +302,12 @@ class StoreFit(NamedTuple):
 
     def results(self) -> dict[str, Any]:
         """Return the figures of the fit as ``results.json`` and ``fit --json`` hold them."""
-        result = self.result
+        result, apart, further = self.result, self.result.generalisation, self.simulation.window.further
         return {
             "std": result.std,
             "relative_error": result.relative_error,
-            "training_std": by_quantity(result.training.std),
-            "generalisation_std": None if result.generalisation is None else by_quantity(result.generalisation.std),
+            "training_std": by_quantity(result.training.std, further),
+            "generalisation_std": None if apart is None else by_quantity(apart.std, further),
             "rows": result.rows,
             "epochs": [len(curve) - 1 for curve in result.curves],
             "seconds": result.seconds,
@@ -309,7 +331,8 @@ def fit_store(
     settings = settings or FitSettings()
     if store.transitions < FEWEST:
         raise UnusableInput(f"{store.transitions} transitions are too few to fit; collect at least {FEWEST:,}")
-    window = Window(store.joints, settings.history)
+    window = Window.of(store.spec, settings.history, settings.sensors)
+    window.require(store.further, str(store.path))
     sequences = [entry.number for entry in store.catalogue()]
     settings = replace(settings, held_out=share_held_out(sequences, settings.held_out, settings.seed))
     filtered = filter_transitions(store, window, grid, seed=settings.seed, hold_out=settings.held_out)

@@ -51,6 +51,8 @@ class SimulationParameters(NamedTuple):
     """Derived velocity by change of the angle, and at rest, shape (joints, 2) [scaled]; (0, 2) if predicted."""
     joints: int
     history: int
+    observed: int
+    """Numbers in an observation."""
 
 
 class SimulationState(NamedTuple):
@@ -110,8 +112,7 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
             direct[o : o + n, :inputs] = network.direct.T
         u, o = u + h, o + n
 
-    offset = scaling.observation_offset.reshape(joints, 4)
-    scale = scaling.observation_scale.reshape(joints, 4)
+    offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     limits = simulation.limits
     lowest, highest = (limits - scaling.observation_offset) / scaling.observation_scale
     rate = scale[:, 0] / (1e3 * simulation.spec.period * scale[:, 1])
@@ -127,6 +128,7 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
         velocity=_float32(velocity if simulation.velocity == "derived" else velocity[:0]),
         joints=joints,
         history=window.history,
+        observed=window.observation_size,
     )
 
 
@@ -135,7 +137,8 @@ def simulation_state(simulation: SimulationParameters, random: RandomState) -> S
     inputs, units = simulation.hidden.shape
     outputs = simulation.output_bias.size
     x = np.zeros(inputs, np.float32)
-    x[places(Window(simulation.joints, simulation.history)).one] = 1
+    # After the history of observations and commands, the command and the goal, see the top of this module.
+    x[simulation.history * (simulation.observed + 2 * simulation.joints) + simulation.joints] = 1
     return SimulationState(
         x=x,
         average=np.zeros(outputs, np.float32),
@@ -151,10 +154,15 @@ def scaled_state(sigma: ArrayLike, window: Window, scaling: Scaling) -> NDArray[
 
 
 def raw_observation(sigma: ArrayLike, window: Window, scaling: Scaling) -> NDArray[np.float64]:
-    """Return the newest observation (..., joints, 4) of scaled windows ``sigma``, in sensor units."""
-    newest = np.asarray(sigma, np.float64)[..., : window.observation_size]
-    raw = newest * scaling.observation_scale + scaling.observation_offset
-    return raw.reshape(*newest.shape[:-1], window.joints, 4)
+    """Return the joints' part (..., joints, 4) of the newest observation of scaled windows, in sensor units."""
+    return window.of_joints(raw_observations(sigma, scaling))
+
+
+def raw_observations(sigma: ArrayLike, scaling: Scaling) -> NDArray[np.float64]:
+    """Return the newest observation (..., observation_size) of scaled windows ``sigma``, in sensor units."""
+    newest = np.asarray(sigma, np.float64)[..., : scaling.observation_offset.size]
+    raw: NDArray[np.float64] = newest * scaling.observation_scale + scaling.observation_offset
+    return raw
 
 
 def _float32(array: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -209,7 +217,7 @@ def predict_change(simulation, state):  # type: ignore[no-untyped-def]
 @part
 def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
     """Shift the window in ``x`` by one step: add ``change`` to the newest observation, remember ``command``."""
-    observed, commanded = 4 * simulation.joints, 2 * simulation.joints
+    observed, commanded = simulation.observed, 2 * simulation.joints
     newest = simulation.history * observed
     for i in range(newest - 1, observed - 1, -1):
         x[i] = x[i - observed]
@@ -232,7 +240,7 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
 @part
 def put_command(simulation, x, command):  # type: ignore[no-untyped-def]
     """Put the scaled ``command`` (2 joints,) into ``x``, where the networks of the simulation read it."""
-    first = simulation.history * 4 * simulation.joints + (simulation.history - 1) * 2 * simulation.joints
+    first = simulation.history * simulation.observed + (simulation.history - 1) * 2 * simulation.joints
     for i in range(command.shape[0]):
         x[first + i] = command[i]
 
@@ -241,7 +249,7 @@ def put_command(simulation, x, command):  # type: ignore[no-untyped-def]
 def settle(simulation, noise, state, command):  # type: ignore[no-untyped-def]
     """Let ``state`` go to what ``state.change`` predicts, with noise."""
     x = state.x
-    first = simulation.history * 4 * simulation.joints + (simulation.history - 1) * 2 * simulation.joints
+    first = simulation.history * simulation.observed + (simulation.history - 1) * 2 * simulation.joints
     for i in range(command.shape[0]):
         x[first + i] = np.float32(0.0)  # so that the command of the past is no input of an agent
     add_noise(noise, x, state.change, state.average, state.random)

@@ -74,6 +74,8 @@ class NoiseParameters(NamedTuple):
     """sqrt(2 n - 1)/n, so that the average of standard normal deviates has deviation 1."""
     source: NDArray[np.int64]
     """By joint the output that tells the speed, and the place of the velocity in the state, shape (joints, 2)."""
+    further: int
+    """Outputs after those of the joints: of further sensors, whose noise has no share by speed."""
     speed: NDArray[np.float32]
     """By joint p, q, r in omega = p change + q velocity + r, in [counts/ms], shape (joints, 3)."""
     ramp: NDArray[np.float32]
@@ -83,10 +85,11 @@ class NoiseParameters(NamedTuple):
 def noise_parameters(settings: NoiseSettings, simulation: "Simulation") -> NoiseParameters:
     """Return the noise of ``simulation`` as arrays, scaled as its state is."""
     joints = simulation.window.joints
-    scale = simulation.scaling.observation_scale.reshape(joints, 4)
+    window, scaling = simulation.window, simulation.scaling
+    scale, further = window.of_joints(scaling.observation_scale), len(window.further)
     derived = simulation.velocity == "derived"
-    std = settings.factor * (simulation.error_std / scale).ravel()[simulation.outputs]
-    outputs = std.size // joints
+    std = settings.factor * (simulation.errors / scaling.observation_scale)[simulation.outputs]
+    outputs = (std.size - further) // joints
     if settings.kind == "none" or settings.factor == 0:
         std = std[:0]
     speed = np.zeros((joints, 3))
@@ -94,7 +97,7 @@ def noise_parameters(settings: NoiseSettings, simulation: "Simulation") -> Noise
         speed[:, 0] = scale[:, 0] / (1e3 * simulation.spec.period)
     else:
         speed[:, 0] = speed[:, 1] = scale[:, 1]
-        speed[:, 2] = simulation.scaling.observation_offset.reshape(joints, 4)[:, 1]
+        speed[:, 2] = window.of_joints(scaling.observation_offset)[:, 1]
     first = np.arange(joints)
     output = first * outputs + (0 if derived else 1)
     n = settings.steps if settings.kind == "correlated" else 1
@@ -104,6 +107,7 @@ def noise_parameters(settings: NoiseSettings, simulation: "Simulation") -> Noise
         keep=(n - 1) / n,
         gain=math.sqrt(2 * n - 1) / n,
         source=np.stack([output, 4 * first + 1], axis=1),
+        further=further,
         speed=speed.astype(np.float32),
         ramp=np.array([share, settings.slow, (1 - share) / (settings.fast - settings.slow)], np.float32),
     )
@@ -130,9 +134,12 @@ def add_noise(noise, x, change, average, random):  # type: ignore[no-untyped-def
     """Add noise to ``change`` (outputs,), the scaled change that the networks predict from the state ``x``."""
     if noise.std.shape[0] == 0:
         return
-    outputs = noise.std.shape[0] // noise.speed.shape[0]
+    outputs = (noise.std.shape[0] - noise.further) // noise.speed.shape[0]
     for joint in range(noise.speed.shape[0]):
         share = noise_share(noise, joint, x, change)
         for o in range(joint * outputs, (joint + 1) * outputs):
             average[o] = noise.keep * average[o] + noise.gain * normal(random)
             change[o] += share * noise.std[o] * average[o]
+    for o in range(noise.std.shape[0] - noise.further, noise.std.shape[0]):
+        average[o] = noise.keep * average[o] + noise.gain * normal(random)
+        change[o] += noise.std[o] * average[o]

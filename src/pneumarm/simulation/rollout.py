@@ -50,14 +50,14 @@ class SimulatedStates(NamedTuple):
 
 def simulated_world(simulation: Simulation) -> SimulatedWorld:
     """Return ``simulation`` for rollouts."""
-    joints, scaling = simulation.window.joints, simulation.scaling
+    window, joints, scaling = simulation.window, simulation.window.joints, simulation.scaling
     parameters = simulation_parameters(simulation)
-    unit = np.stack([scaling.observation_offset, scaling.observation_scale], axis=1)
+    offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     return SimulatedWorld(
         simulation=parameters,
         noise=noise_parameters(NoiseSettings(kind="none"), simulation),
         room=simulation_state(parameters, random_state(0)),
-        unit=np.ascontiguousarray(unit.reshape(joints, 4, 2)),
+        unit=np.stack([offset, scale], axis=-1),
         command_scale=np.ascontiguousarray(scaling.command_scale.reshape(joints, 2)),
         command=np.zeros(2 * joints, np.float32),
         limit=simulation.spec.max_pressure_counts,

@@ -10,7 +10,7 @@ Numbered differences from the thesis:
 2. Predictions are clipped to what the sensors can say; pressures to a little above what was ever recorded.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -35,9 +35,9 @@ class Scaling:
     """Pre-processing: scaled = (raw - offset) / scale, so that the data lie within about -1 to 1."""
 
     observation_offset: NDArray[np.float64]
-    """Shape (4 joints,) [sensor units]."""
+    """Shape (observation_size,) [sensor units]."""
     observation_scale: NDArray[np.float64]
-    """Shape (4 joints,) [sensor units]."""
+    """Shape (observation_size,) [sensor units]."""
     command_scale: NDArray[np.float64]
     """Shape (2 joints,); ones for valves. Commands have no offset: 0 is a closed valve."""
 
@@ -55,7 +55,7 @@ class Scaling:
     def inputs(self, raw: ArrayLike, window: Window) -> NDArray[np.float64]:
         """Return the scaled inputs (n, input_size), or states (n, state_size), of ``raw`` ones in sensor units."""
         raw = np.asarray(raw, np.float64)
-        commands = raw.shape[-1] // window.command_size - 2 * window.history
+        commands = (raw.shape[-1] - window.history * window.observation_size) // window.command_size
         offset = np.tile(self.observation_offset, window.history)
         scale = [*[self.observation_scale] * window.history, *[self.command_scale] * commands]
         scaled: NDArray[np.float64] = raw / np.concatenate(scale)
@@ -75,7 +75,7 @@ class Simulation:
 
     The networks read scaled inputs and give scaled *changes*, (o_{k+1} - o_k) / observation_scale, in the order
     angle, pressure 1, pressure 2 joint after joint; with ``velocity == "network"`` angle, velocity, pressure 1,
-    pressure 2.
+    pressure 2. What further sensors say comes last.
     """
 
     spec: ArmSpec
@@ -84,7 +84,8 @@ class Simulation:
     networks: tuple[Network, ...]
     """One network an output, or a single network with all outputs (thesis section 3.4)."""
     velocity: Velocity
-    """Whether the velocity is derived from the predicted angle with the nominal period (section 3.2.4)."""
+    """Whether the velocity is derived from the predicted angle with the nominal period (section 3.2.4); a measured
+    one has a network."""
     error_std: NDArray[np.float64]
     """Standard deviation of the one-step error on held-out transitions, shape (joints, 4) [sensor units]."""
     goal_range: NDArray[np.float64]
@@ -97,24 +98,39 @@ class Simulation:
     """Share of the sequences that were kept out of the fit, chosen by :func:`pneumarm.transitions.held_out`."""
     seed: int = 0
     """Of that choice, of the filter and of the fit, so that an analysis finds the same parts again."""
+    further_std: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """As ``error_std``, of the further sensors in the window, shape (further,) [sensor units]."""
+    further_range: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    """Lowest and highest readings that it predicts of further sensors, shape (further, 2) [sensor units]."""
 
     @property
     def outputs(self) -> NDArray[np.int64]:
         """Places in an observation that the networks predict, in their order."""
         places = np.arange(self.window.observation_size)
-        return places if self.velocity == "network" else places[places % len(QUANTITIES) != _VELOCITY]
+        derived = (places < self.window.joint_size) & (places % len(QUANTITIES) == _VELOCITY)
+        return places if self.velocity == "network" else places[~derived]
+
+    @property
+    def errors(self) -> NDArray[np.float64]:
+        """``error_std`` and ``further_std`` in the order of an observation, shape (observation_size,)."""
+        return np.concatenate([self.error_std.ravel(), self.further_std])
+
+    def with_errors(self, errors: NDArray[np.float64]) -> Self:
+        """Return it with other :attr:`errors`."""
+        size = self.window.joint_size
+        return replace(self, error_std=self.window.of_joints(errors), further_std=errors[size:])
 
     @property
     def limits(self) -> NDArray[np.float64]:
-        """Lowest and highest value of each place in a prediction, shape (2, 4 joints); none for velocities."""
+        """Lowest and highest value of each place in a prediction, shape (2, observation_size)."""
         limits = np.empty((self.window.joints, len(QUANTITIES), 2))
         limits[:, _ANGLE] = self.spec.angle_range
         limits[:, _VELOCITY] = -np.inf, np.inf
         limits[:, -2:] = self.pressure_range
-        return limits.reshape(-1, 2).T
+        return np.concatenate([limits.reshape(-1, 2), self.further_range]).T
 
     def predict(self, inputs: ArrayLike) -> NDArray[np.float64]:
-        """Return o_{k+1} (n, 4 joints) for sigma_k and a_k (n, input_size), both in sensor units."""
+        """Return o_{k+1} (n, observation_size) for sigma_k and a_k (n, input_size), both in sensor units."""
         inputs = np.asarray(inputs, np.float64)
         scaled = self.scaling.inputs(inputs, self.window)
         change = np.concatenate([network(scaled) for network in self.networks], axis=1)
@@ -123,7 +139,7 @@ class Simulation:
         following[:, self.outputs] += change * self.scaling.observation_scale[self.outputs]
         np.clip(following, *self.limits, out=following)
         if self.velocity == "derived":
-            angle, velocity = slice(_ANGLE, None, len(QUANTITIES)), slice(_VELOCITY, None, len(QUANTITIES))
+            angle, velocity = (slice(q, self.window.joint_size, len(QUANTITIES)) for q in (_ANGLE, _VELOCITY))
             following[:, velocity] = (following[:, angle] - now[:, angle]) / (1e3 * self.spec.period)
         return following
 
@@ -156,7 +172,8 @@ class Simulation:
         """Return what a file has to hold: settings for its header, and arrays."""
         direct = [network.direct is not None for network in self.networks]
         header = _Header(self.spec, self.window, self.velocity, self.valves, self.held_out, self.seed, direct)
-        arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in _ARRAYS}
+        names = (*_ARRAYS, *(_FURTHER if self.window.further else ()))
+        arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in names}
         arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
         for number, network in enumerate(self.networks):
             layers = {name: getattr(network, name) for name in _LAYERS}
@@ -185,7 +202,7 @@ class Simulation:
 
         networks = tuple(network(number) for number in range(len(header.direct)))
         scaling = Scaling(**{name: arrays.pop(name) for name in _SCALINGS})
-        rest = {name: arrays.pop(name) for name in _ARRAYS}
+        rest = {name: arrays.pop(name) for name in (*_ARRAYS, *(_FURTHER if header.window.further else ()))}
         if arrays:
             raise ValueError(f"it also holds {', '.join(sorted(arrays))}")
         return cls(
@@ -202,6 +219,7 @@ class Simulation:
 
 
 _ARRAYS = ("error_std", "goal_range", "pressure_range")
+_FURTHER = ("further_std", "further_range")
 _SCALINGS = ("observation_offset", "observation_scale", "command_scale")
 _LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias", "direct")
 
@@ -233,14 +251,19 @@ def _check(simulation: Simulation) -> None:
         raise ValueError(f"its {window} does not fit to an arm with {simulation.spec.joints} joint(s)")
     if not (0 <= simulation.held_out < 1 and simulation.seed >= 0):
         raise ValueError(f"its share held out is {simulation.held_out}, its seed {simulation.seed}")
-    joints = window.joints
-    _expect("observation_offset", scaling.observation_offset, (4 * joints,))
-    _expect("observation_scale", scaling.observation_scale, (4 * joints,), scaling.observation_scale > 0)
+    window.require(simulation.spec.further, "its arm")
+    if window.velocity == "measured" and simulation.velocity != "network":
+        raise ValueError("a measured velocity needs a network of its own")
+    joints, observed, further = window.joints, window.observation_size, len(window.further)
+    _expect("observation_offset", scaling.observation_offset, (observed,))
+    _expect("observation_scale", scaling.observation_scale, (observed,), scaling.observation_scale > 0)
     _expect("command_scale", scaling.command_scale, (2 * joints,), scaling.command_scale > 0)
     _expect("error_std", simulation.error_std, (joints, 4), simulation.error_std >= 0)
+    _expect("further_std", simulation.further_std, (further,), simulation.further_std >= 0)
     for name, array, shape in (
         ("goal_range", simulation.goal_range, (joints, 2)),
         ("pressure_range", simulation.pressure_range, (joints, 2, 2)),
+        ("further_range", simulation.further_range, (further, 2)),
     ):
         _expect(name, array, shape)
         _expect(name, array, shape, array[..., 0] <= array[..., 1])

@@ -109,7 +109,8 @@ def span_grid(blocks: Iterable[Transitions], window: Window, settings: GridSetti
     outside = (1 - settings.inside) / 2
     low, high = counted([outside, 1 - outside])
     per_joint = [settings.angle_bins, settings.velocity_bins, settings.pressure_bins, settings.pressure_bins]
-    bins = per_joint * window.joints
+    # What further sensors say is not divided: each would multiply the cells, and with them what there is to collect.
+    bins = per_joint * window.joints + [1] * len(window.further)
     if valves:
         low, high = low[:size], high[:size]
     else:

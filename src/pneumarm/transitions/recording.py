@@ -15,6 +15,9 @@ The mapping, with every setting that is not of an arm's spec::
     pressure_2 = { column = "p2", unit = "bar", range = [-0.1, 1.3] }
     command_1 = { column = "a1" }
     command_2 = { column = "a2" }
+    velocity = { column = "w", unit = "deg/s" }                       # rad/s, deg/s, counts/ms; this and the rest
+    acceleration = { column = "a" }                                   # [m/s2] are for further sensors
+    temperature_1 = { column = "t1" }                                 # [Celsius]; temperature_2 alike
 
 ``full_scale`` is the pressure [bar] of a normalised 1. ``range`` are the least and the most that a column may hold,
 in its own unit; by default the arm's range of the angle, and -0.2 to 1.2 times its largest pressure.
@@ -25,7 +28,7 @@ import math
 import sys
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Literal, TextIO
 
@@ -33,7 +36,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
 from pneumarm.files import written_whole
 from pneumarm.transitions.rows import Recorded, steps_of
@@ -76,14 +79,33 @@ class Command(_Table, frozen=True, forbid_unknown_fields=True):
     range: tuple[float, float] | None = None
 
 
+class Velocity(_Table, frozen=True, forbid_unknown_fields=True):
+    """The column of a joint's velocity that a sensor of its own measured."""
+
+    column: str
+    unit: Literal["rad/s", "deg/s", "counts/ms"]
+    range: tuple[float, float] | None = None
+
+
+class Further(_Table, frozen=True, forbid_unknown_fields=True):
+    """The column of an accelerometer [m/s2] or a thermometer [Celsius]."""
+
+    column: str
+    range: tuple[float, float] | None = None
+
+
 class Joint(_Table, frozen=True, forbid_unknown_fields=True):
-    """The columns of one joint."""
+    """The columns of one joint; those of further sensors where it has them."""
 
     angle: Angle
     pressure_1: Pressure
     pressure_2: Pressure
     command_1: Command
     command_2: Command
+    velocity: Velocity | None = None
+    acceleration: Further | None = None
+    temperature_1: Further | None = None
+    temperature_2: Further | None = None
 
 
 class Mapping(_Table, frozen=True, forbid_unknown_fields=True):
@@ -165,14 +187,16 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
         if max(map(len, text.splitlines()), default=0) > _LONGEST_MAPPING_LINE:
             raise UnusableInput(f"{path}: a line has {_LONGEST_MAPPING_LINE} characters at most")
         mapping = msgspec.convert(tomllib.loads(text), Mapping)
-        allowed = {field.name for field in fields(ArmSpec)} - {"joints"}
+        allowed = {field.name for field in fields(ArmSpec)} - {"joints", "velocity_sensor", "sensors"}
         if unknown := mapping.arm.keys() - allowed:
             raise UnusableInput(f"[arm] has no {', '.join(sorted(unknown))}; it has {', '.join(sorted(allowed))}")
         if "period" not in mapping.arm:
             raise UnusableInput("[arm] needs the period [s] between two rows")
         if not mapping.joint:
             raise UnusableInput("needs a [[joint]] for each joint of the arm")
-        return mapping, msgspec.convert({**mapping.arm, "joints": len(mapping.joint)}, ArmSpec)
+        spec = msgspec.convert({**mapping.arm, "joints": len(mapping.joint)}, ArmSpec)
+        velocity, sensors = _measures_velocity(mapping.joint), _sensors(mapping.joint)
+        return mapping, replace(spec, velocity_sensor=velocity, sensors=sensors)
     except OSError as error:
         raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
     except (ValueError, RecursionError, UnusableInput) as error:  # TOML, UTF-8 and msgspec's errors are ValueErrors
@@ -180,8 +204,27 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
         raise UnusableInput(message if message.startswith(str(path)) else f"{path}: {message}") from error
 
 
+def _measures_velocity(joints: list[Joint]) -> bool:
+    given = [joint.velocity is not None for joint in joints]
+    if any(given) and not all(given):
+        raise UnusableInput("needs the velocity of every [[joint]], or of none")
+    return all(given)
+
+
+def _sensors(joints: list[Joint]) -> tuple[Sensor, ...]:
+    """Return the accelerometers and thermometers that there are columns of."""
+    found = []
+    for number, joint in enumerate(joints, start=1):
+        if joint.acceleration is not None:
+            found.append(Sensor("acceleration", number))
+        for muscle, given in enumerate((joint.temperature_1, joint.temperature_2), start=1):
+            if given is not None:
+                found.append(Sensor("temperature", number, muscle))
+    return tuple(found)
+
+
 def _columns(mapping: Mapping, spec: ArmSpec) -> list[_Column]:
-    """Return the columns in the order of a row: per joint angle, two pressures, two commands."""
+    """Return the columns in the order of a row: per joint angle, pressures and commands; then further sensors."""
     found = []
     for joint in mapping.joint:
         found.append(_angle(joint.angle, spec))
@@ -190,7 +233,18 @@ def _columns(mapping: Mapping, spec: ArmSpec) -> list[_Column]:
             valves = mapping.commands == "valves"
             low, high = command.range or ((-1.0, 1.0) if valves else (-math.inf, math.inf))
             found.append(_Column(command.column, low, high, whole=valves))
+    found += [_velocity(joint.velocity, spec) for joint in mapping.joint if joint.velocity is not None]
+    for joint in mapping.joint:
+        for further in (joint.acceleration, joint.temperature_1, joint.temperature_2):
+            if further is not None:
+                found.append(_Column(further.column, *(further.range or (-math.inf, math.inf))))
     return found
+
+
+def _velocity(velocity: Velocity, spec: ArmSpec) -> _Column:
+    per_degree = spec.counts_per_degree / 1e3
+    factor = {"rad/s": math.degrees(per_degree), "deg/s": per_degree, "counts/ms": 1.0}[velocity.unit]
+    return _Column(velocity.column, *(velocity.range or (-math.inf, math.inf)), factor)
 
 
 def _angle(angle: Angle, spec: ArmSpec) -> _Column:
@@ -217,7 +271,7 @@ def _pressure(pressure: Pressure, spec: ArmSpec) -> _Column:
 
 def _sequences(reader: "_Reader", spec: ArmSpec) -> Iterator[Recorded]:
     for time, values in reader:
-        per_joint = values.reshape(len(time), spec.joints, 5)
+        per_joint = values[:, : 5 * spec.joints].reshape(len(time), spec.joints, 5)
         command = per_joint[:, :, 3:].copy()
         command[-1] = np.nan
         yield Recorded(
@@ -227,6 +281,7 @@ def _sequences(reader: "_Reader", spec: ArmSpec) -> Iterator[Recorded]:
             command=command,
             step=steps_of(time, spec.period),
             kind="imported",
+            measured=dict(zip(spec.further, values[:, 5 * spec.joints :].T, strict=True)),
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.cycle import Step
-from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.seam import ArmSpec, measured
 from pneumarm.errors import UnusableInput
 
 LONGEST_REASON = 1000
@@ -20,7 +20,8 @@ _SHORTEST = 2  # rows of a sequence: fewer hold no transition
 class Rows:
     """A block of ``n`` rows, whole sequences in order; a row is an observation and the command that followed it.
 
-    Velocity is not among them: it is derived (thesis section 2.3.4), see :mod:`pneumarm.transitions.window`.
+    Velocity is among them only where a sensor tells it; else it is derived (thesis section 2.3.4), see
+    :mod:`pneumarm.transitions.window`.
     """
 
     sequence: NDArray[np.int64]
@@ -39,20 +40,33 @@ class Rows:
     at_rest: NDArray[np.bool_]
     """Whether the row's sequence began at rest with closed valves, so that rows before its first may be taken
     as copies of it, shape (n,)."""
+    measured: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    """What further sensors said, by their names in :attr:`~pneumarm.arm.ArmSpec.further`, each of shape (n,)
+    [counts/ms, m/s2 or Celsius]."""
 
     @property
     def joints(self) -> int:
         """Number of joints."""
         return int(self.angle.shape[1])
 
+    def where(self, kept: NDArray[np.bool_]) -> "Rows":
+        """Return the rows that are ``kept`` (n,)."""
+        arrays = {name: getattr(self, name)[kept] for name in _ARRAYS}
+        return Rows(**arrays, measured={name: values[kept] for name, values in self.measured.items()})
+
     def __len__(self) -> int:
         return len(self.sequence)
 
 
+_ARRAYS = tuple(one.name for one in fields(Rows) if one.name != "measured")
+
+
 def joined(blocks: Iterable[Rows]) -> Rows:
-    """Return ``blocks``, at least one, as a single one."""
+    """Return ``blocks`` of one arm, at least one, as a single one."""
     parts = list(blocks)
-    return Rows(**{one.name: np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Rows)})
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
+    further = {name: np.concatenate([part.measured[name] for part in parts]) for name in parts[0].measured}
+    return Rows(**arrays, measured=further)
 
 
 @dataclass(frozen=True)
@@ -104,6 +118,8 @@ class Recorded:
     """What of it nothing may be learned from."""
     info: Mapping[str, Any] = field(default_factory=dict)
     """Whatever else is to be kept with it, such as the goal: small, and of JSON's types."""
+    measured: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    """What further sensors said, by name, each of shape (n,); see :attr:`Rows.measured`."""
 
     @classmethod
     def from_steps(
@@ -125,6 +141,8 @@ class Recorded:
         for k, step in enumerate(steps[:-1]):
             if step.valves is not None:
                 command[k] = step.valves
+        said = [measured(step.reading, spec.further, spec.name) for step in steps]
+        further = np.array(said, np.float64).reshape(len(steps), len(spec.further))
         return cls(
             time=time,
             angle=np.array([step.reading.angle for step in steps], np.float64),
@@ -134,6 +152,7 @@ class Recorded:
             kind=kind,
             at_rest=at_rest,
             info=info or {},
+            measured=dict(zip(spec.further, further.T, strict=True)),
         )
 
     @property
@@ -176,6 +195,7 @@ def rows_of(recorded: Recorded, sequence: int = 0) -> Rows:
         pressure=recorded.pressure,
         command=recorded.command,
         at_rest=np.full(len(recorded), recorded.at_rest, np.bool_),
+        measured=recorded.measured,
     )
 
 

@@ -3,7 +3,7 @@
 import json
 import sqlite3
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -15,20 +15,26 @@ from pneumarm.errors import PneumarmError, UnusableInput
 
 APPLICATION = 0x706E6575
 """SQLite's application id of a store: "pneu"."""
-VERSION = 2
-"""Version of the tables below. Version 1 had no marks; it is read, and made version 2 by the first writer."""
+VERSION = 3
+"""Version of the tables below. Version 1 had no marks; it is read, and made version 2 by the first writer. Version 3
+has the readings of further sensors; of an arm without any a store is of version 2, which earlier programs read."""
 LONGEST_SEQUENCE = 100_000
 """Most rows of a sequence, so that a block of whole sequences is bounded in memory."""
 MOST_JOINTS = 64
-"""Most joints of an arm, so that the tables have no more columns than SQLite can hold."""
+"""Most joints of an arm, so that the tables have no more columns than SQLite can hold: 9 a joint with all sensors."""
 
 _LONGEST_VALUE = 16 << 20  # bytes of a text or a blob: far over any state of an arm, far under what hurts
 
 
-def row_columns(joints: int) -> list[str]:
-    """Return the names of the columns of a row after its sequence and step."""
+def row_columns(joints: int, further: Sequence[str] = ()) -> list[str]:
+    """Return the names of the columns of a row after its sequence and step; ``further`` sensors come last."""
     names = ["angle", "pressure_1", "pressure_2", "command_1", "command_2"]
-    return ["time", *(f"joint_{j}_{name}" for j in range(1, joints + 1) for name in names)]
+    return ["time", *(f"joint_{j}_{name}" for j in range(1, joints + 1) for name in names), *further]
+
+
+def further_columns(spec: ArmSpec, version: int) -> tuple[str, ...]:
+    """Return the columns of further sensors in a store of a ``version``; before the third there were none."""
+    return spec.further if version >= 3 else ()
 
 
 _MARKS = (
@@ -37,9 +43,10 @@ _MARKS = (
 )
 
 
-def tables(joints: int, version: int = VERSION) -> dict[str, str]:
+def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, str]:
     """Return the statements that create the tables of a ``version``, by name."""
-    values = "".join(f", {name} REAL{'' if '_command_' in name else ' NOT NULL'}" for name in row_columns(joints))
+    columns = row_columns(spec.joints, further_columns(spec, version))
+    values = "".join(f", {name} REAL{'' if '_command_' in name else ' NOT NULL'}" for name in columns)
     made = {
         "store": "CREATE TABLE store (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
         "runs": "CREATE TABLE runs (number INTEGER PRIMARY KEY, purpose TEXT NOT NULL, metadata TEXT NOT NULL)",
@@ -65,8 +72,9 @@ def create_tables(path: Path, spec: ArmSpec, valves: bool) -> None:
         with translated(path):
             connection.execute("PRAGMA journal_mode = MEMORY")  # no second file: this one is put in place whole
             connection.execute(f"PRAGMA application_id = {APPLICATION}")
-            connection.execute(f"PRAGMA user_version = {VERSION}")
-            for statement in tables(spec.joints).values():
+            version = VERSION if spec.further else 2
+            connection.execute(f"PRAGMA user_version = {version}")
+            for statement in tables(spec, version).values():
                 connection.execute(statement)
             settings = {"spec": json.dumps(asdict(spec)), "valves": json.dumps(valves)}
             connection.executemany("INSERT INTO store VALUES (?, ?)", settings.items())
@@ -148,7 +156,7 @@ def read_settings(connection: sqlite3.Connection, path: Path) -> tuple[ArmSpec, 
     if spec.joints > MOST_JOINTS:
         raise damaged(path, f"an arm of {spec.joints} joints")
     found = connection.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 100")
-    if dict(found) != tables(spec.joints, version_of(connection)):
+    if dict(found) != tables(spec, version_of(connection)):
         raise damaged(path, "its tables are not those of a store")
     return spec, valves
 
@@ -159,9 +167,9 @@ def version_of(connection: sqlite3.Connection) -> int:
 
 
 def upgrade(connection: sqlite3.Connection) -> None:
-    """Make a store of version 1, whose tables were checked, one of this version."""
+    """Make a store of version 1, whose tables were checked, one of version 2."""
     if version_of(connection) == 1:
-        connection.executescript(f"BEGIN IMMEDIATE; {_MARKS}; PRAGMA user_version = {VERSION}; COMMIT;")
+        connection.executescript(f"BEGIN IMMEDIATE; {_MARKS}; PRAGMA user_version = 2; COMMIT;")
 
 
 def damaged(path: Path, what: str) -> UnusableInput:

@@ -13,7 +13,7 @@ import math
 import os
 import sqlite3
 import time as wall_clock
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from itertools import chain
@@ -36,6 +36,7 @@ from pneumarm.transitions.schema import (
     connect,
     create_tables,
     damaged,
+    further_columns,
     read_settings,
     row_columns,
     translated,
@@ -81,6 +82,8 @@ class Store:
             self.spec, self.valves = read_settings(connection, path)
             if lock is not None:
                 upgrade(connection)
+            self.further: tuple[str, ...] = further_columns(self.spec, version_of(connection))
+            """Names of the further sensors whose readings it holds; in a store of an older version, none."""
             self._check_sequences()
 
     @classmethod
@@ -373,7 +376,7 @@ class Store:
         )
 
     def _insert(self, connection: sqlite3.Connection, number: int, one: Recorded) -> None:
-        values = _row_values(one, self.spec, self.valves)
+        values = _row_values(one, self.spec, self.further, self.valves)
         connection.execute(
             "INSERT INTO sequences VALUES (?, ?, ?, ?, ?, ?, ?)",
             (
@@ -497,7 +500,7 @@ class Blocks:
 
     def _read(self, number: NDArray[np.int64], length: NDArray[np.int64], at_rest: NDArray[np.bool_]) -> Rows:
         store, joints = self._store, self._store.joints
-        columns = ["step", *row_columns(joints)]
+        columns = ["step", *row_columns(joints, store.further)]
         query = f"SELECT {', '.join(columns)} FROM rows WHERE sequence = ? ORDER BY step LIMIT {LONGEST_SEQUENCE + 1}"
         execute = store._connection.execute
         total = int(length.sum())
@@ -508,7 +511,7 @@ class Blocks:
             except (ValueError, TypeError) as error:
                 raise damaged(store.path, f"rows are missing or no numbers: {error}") from error
             surplus = next(values, None) is not None
-        per_joint = table[:, 2:].reshape(total, joints, 5)
+        per_joint = table[:, 2 : 2 + 5 * joints].reshape(total, joints, 5)
         rows = Rows(
             sequence=np.repeat(number, length),
             step=np.nan_to_num(table[:, 0]).astype(np.int64),
@@ -517,6 +520,7 @@ class Blocks:
             pressure=per_joint[:, :, 1:3].copy(),
             command=per_joint[:, :, 3:5].copy(),
             at_rest=np.repeat(at_rest, length),
+            measured=dict(zip(store.further, table[:, 2 + 5 * joints :].T.copy(), strict=True)),
         )
         first = np.concatenate([[0], np.cumsum(length)[:-1]])
         if surplus or not _is_sound(rows, first, store.spec, store.valves):
@@ -532,7 +536,7 @@ class Blocks:
         kept = np.ones(len(rows), bool)
         for sequence, mark in marks:
             kept &= (rows.sequence != sequence) | unmarked(rows.step, [mark])
-        return Rows(**{name: values[kept] for name, values in vars(rows).items()})
+        return rows.where(kept)
 
 
 def _is_sound(rows: Rows, first: NDArray[np.int64], spec: ArmSpec, valves: bool) -> bool:
@@ -548,6 +552,7 @@ def _is_sound(rows: Rows, first: NDArray[np.int64], spec: ArmSpec, valves: bool)
         and far_outside(rows.angle, rows.pressure, spec) is None
         and np.isnan(rows.command[ends]).all()
         and _commands_possible(rows.command[~ends], valves)
+        and all(np.isfinite(values).all() for values in rows.measured.values())
     )
 
 
@@ -583,8 +588,8 @@ def _as_json(info: Mapping[str, Any]) -> str:
         ) from error
 
 
-def _row_values(one: Recorded, spec: ArmSpec, valves: bool) -> NDArray[np.float64]:
-    """Return the rows (n, columns) of a sequence, checked."""
+def _row_values(one: Recorded, spec: ArmSpec, further: Sequence[str], valves: bool) -> NDArray[np.float64]:
+    """Return the rows (n, columns) of a sequence, checked; what ``further`` does not name is left out."""
     n, joints = len(one), spec.joints
     shapes = {"angle": (n, joints), "pressure": (n, joints, 2), "command": (n, joints, 2), "step": (n,)}
     for name, shape in shapes.items():
@@ -603,4 +608,13 @@ def _row_values(one: Recorded, spec: ArmSpec, valves: bool) -> NDArray[np.float6
         wanted = "-1, 0 or +1" if valves else "finite"
         raise UnusableInput(f"a sequence's commands must be {wanted}, and NaN after the last reading")
     per_joint = np.concatenate([one.angle[:, :, None], one.pressure, one.command], axis=2)
-    return np.concatenate([one.time[:, None], per_joint.reshape(n, -1)], axis=1)
+    values = np.concatenate([one.time[:, None], per_joint.reshape(n, -1)], axis=1)
+    return np.concatenate([values, *(_further_values(one, name) for name in further)], axis=1)
+
+
+def _further_values(one: Recorded, name: str) -> NDArray[np.float64]:
+    """Return what the sensor ``name`` said (n, 1), checked."""
+    values = one.measured.get(name)
+    if values is None or values.shape != (len(one),) or not np.isfinite(values).all():
+        raise UnusableInput(f"a sequence of this arm needs {len(one)} finite readings of its sensor {name}")
+    return values[:, None]

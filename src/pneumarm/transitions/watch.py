@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.cycle import Step
-from pneumarm.arm.seam import ArmSpec, Reading
+from pneumarm.arm.seam import ArmSpec, Reading, with_measured
 from pneumarm.transitions.rows import Mark, Recorded
 from pneumarm.transitions.store import Store
 
@@ -76,7 +76,8 @@ def made_up_readings(spec: ArmSpec, count: int = 4) -> list[Reading]:
     """Return ``count`` readings of an arm that stands still in the middle, half full."""
     angle = np.full(spec.joints, sum(spec.angle_range) / 2)
     pressure = np.full((spec.joints, 2), spec.max_pressure_counts / 2)
-    return [Reading(k * spec.period, angle.copy(), pressure.copy()) for k in range(count)]
+    readings = [Reading(k * spec.period, angle.copy(), pressure.copy()) for k in range(count)]
+    return [with_measured(reading, spec, [0.0] * len(spec.further)) for reading in readings]
 
 
 def keep_watch(store: Store, watch: Watch, run: int) -> int:

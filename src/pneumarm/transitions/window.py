@@ -5,16 +5,21 @@ With the history ``h`` (3 in the thesis) the state is, newest first,
     sigma_k = (o_k, o_{k-1}, ..., o_{k-h+1}, a_{k-1}, ..., a_{k-h+1})
 
 where an observation ``o`` holds, joint after joint, angle [counts], velocity [counts/ms], pressure 1 and
-pressure 2 [counts], and ``a`` the commands of the two muscles of every joint. The input of the simulation is
-sigma_k followed by a_k; the input of an agent is sigma_k followed by the goal (thesis eq. 4.12).
+pressure 2 [counts], then what further sensors said, and ``a`` the commands of the two muscles of every joint. The
+input of the simulation is sigma_k followed by a_k; the input of an agent is sigma_k followed by the goal (thesis
+eq. 4.12).
 """
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.seam import ArmSpec, SensorKind, velocity_name
+from pneumarm.errors import UnusableInput
 from pneumarm.transitions.rows import Rows
 
 QUANTITIES = ("angle", "velocity", "pressure_1", "pressure_2")
@@ -28,11 +33,62 @@ class Window:
     joints: int = 1
     history: int = 3
     """Number of observations in the state (thesis eq. 3.5: three)."""
+    velocity: Literal["derived", "measured"] = "derived"
+    """Whether the velocity is derived from the angle (thesis section 2.3.4), or that of a sensor (section 7.3)."""
+    further: tuple[str, ...] = ()
+    """Names of further sensors whose readings an observation ends in, as in :attr:`~pneumarm.arm.ArmSpec.further`."""
+
+    @classmethod
+    def of(cls, spec: ArmSpec, history: int, kinds: Iterable[SensorKind] = ()) -> "Window":
+        """Return the window of an arm ``spec`` with all its further sensors of these ``kinds``.
+
+        Raises:
+            UnusableInput: it has none of a kind.
+
+        """
+        wanted = set(kinds)
+        offered = {one.kind for one in spec.sensors} | ({"velocity"} if spec.velocity_sensor else set())
+        if missing := wanted - offered:
+            raise UnusableInput(
+                f"{spec.name} has no sensor of {' or '.join(sorted(missing))}; it has "
+                f"{', '.join(sorted(offered)) or 'no further ones'}"
+            )
+        further = tuple(one.name for one in spec.sensors if one.kind in wanted)
+        return cls(spec.joints, history, "measured" if "velocity" in wanted else "derived", further)
+
+    @cached_property
+    def needs(self) -> tuple[str, ...]:
+        """Names of all that it takes besides angles and pressures: velocities if measured, then ``further``."""
+        velocities = [velocity_name(j + 1) for j in range(self.joints)] if self.velocity == "measured" else []
+        return (*velocities, *self.further)
+
+    def require(self, offered: Iterable[str], whose: str) -> None:
+        """Raise UnusableInput where ``whose`` sensors, called as ``offered``, are not all that it needs."""
+        missing = [name for name in self.needs if name not in set(offered)]
+        if missing:
+            raise UnusableInput(
+                f"{whose} lacks {', '.join(missing)}, which this simulation or agent was made with; use an arm that "
+                "has these sensors, or fit and train without them"
+            )
+
+    def spec(self, spec: ArmSpec) -> ArmSpec:
+        """Return ``spec`` with only those further sensors that the window needs."""
+        sensors = tuple(one for one in spec.sensors if one.name in self.further)
+        return replace(spec, velocity_sensor=self.velocity == "measured", sensors=sensors)
+
+    @property
+    def joint_size(self) -> int:
+        """Numbers in one observation that belong to joints, those of :data:`QUANTITIES`; they come first."""
+        return len(QUANTITIES) * self.joints
 
     @property
     def observation_size(self) -> int:
         """Numbers in one observation."""
-        return len(QUANTITIES) * self.joints
+        return self.joint_size + len(self.further)
+
+    def of_joints(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return the part of observations (..., observation_size) that is the joints', (..., joints, 4)."""
+        return values[..., : self.joint_size].reshape(*values.shape[:-1], self.joints, len(QUANTITIES))
 
     @property
     def command_size(self) -> int:
@@ -59,7 +115,12 @@ class Window:
             return [quantity + joint[j] + suffix for j in joints for quantity in quantities]
 
         commands = ("command_1", "command_2")
-        names = [name for lag in range(self.history) for name in named(QUANTITIES, lag)]
+
+        def observed(lag: int) -> list[str]:
+            suffix = "[k]" if lag == 0 else f"[k-{lag}]"
+            return [*named(QUANTITIES, lag), *(name + suffix for name in self.further)]
+
+        names = [name for lag in range(self.history) for name in observed(lag)]
         names += [name for lag in range(1, self.history) for name in named(commands, lag)]
         return names + named(commands, 0)
 
@@ -86,19 +147,35 @@ class Transitions(NamedTuple):
         return self.inputs[:, : self.target.shape[1]]
 
 
-def observations(rows: Rows) -> NDArray[np.float64]:
-    """Return the observations of all rows, shape (n, 4 joints), with the velocity derived.
+def observations(rows: Rows, window: Window) -> NDArray[np.float64]:
+    """Return the observations of all rows, shape (n, observation_size).
 
-    omega_k = (theta_k - theta_{k-1}) / (t_k - t_{k-1}) (thesis section 2.3.4) [counts/ms]; 0 in the first row of
-    a sequence or after a gap.
+    Where the velocity is not measured it is derived: omega_k = (theta_k - theta_{k-1}) / (t_k - t_{k-1}) (thesis
+    section 2.3.4) [counts/ms]; 0 in the first row of a sequence or after a gap.
+
+    Raises:
+        UnusableInput: the rows lack readings of a sensor that the window needs.
+
     """
+    window.require(rows.measured, "the recording")
+    further = [rows.measured[name] for name in window.needs]
+    if window.velocity == "measured":
+        velocity = np.stack(further[: window.joints], axis=1)
+        further = further[window.joints :]
+    else:
+        velocity = _derived_velocity(rows)
+    stacked = np.stack([rows.angle, velocity, rows.pressure[:, :, 0], rows.pressure[:, :, 1]], axis=2)
+    observed = stacked.reshape(len(rows), -1)
+    return np.column_stack([observed, *further]) if further else observed
+
+
+def _derived_velocity(rows: Rows) -> NDArray[np.float64]:
     velocity = np.zeros_like(rows.angle)
     follows = _follows(rows)
     elapsed = 1e3 * np.diff(rows.time)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         velocity[1:] = np.where(follows[1:, None], np.diff(rows.angle, axis=0) / elapsed, 0.0)
-    stacked = np.stack([rows.angle, velocity, rows.pressure[:, :, 0], rows.pressure[:, :, 1]], axis=2)
-    return stacked.reshape(len(rows), -1)
+    return velocity
 
 
 def transitions(rows: Rows, window: Window) -> Transitions:
@@ -108,7 +185,7 @@ def transitions(rows: Rows, window: Window) -> Transitions:
     stood there with closed valves. After a gap, or in a sequence that began in motion, ``history`` rows have to
     pass first (the oldest velocity needs one row more than the window).
     """
-    observed = observations(rows)
+    observed = observations(rows, window)
     command = rows.command.reshape(len(rows), -1)
     follows = _follows(rows)
     index = np.arange(len(rows))

@@ -8,12 +8,13 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import Arm, ArmSpec, Reading
+from pneumarm.arm.seam import Arm, ArmSpec, Reading, with_measured
 from pneumarm.arm.serial.clock import ControllerClock
 from pneumarm.arm.serial.line import Line
 from pneumarm.arm.serial.link import Answer, Link
 from pneumarm.arm.serial.protocol import (
     ANY_OVER_PRESSURE,
+    EXTRAS,
     HIGHEST_COUNT,
     JOINTS,
     LATCHES,
@@ -72,7 +73,7 @@ class SerialArm(Arm):
         cut_off: pressure [bar] at which the controller cuts a muscle off; 1.5 times ``spec.max_pressure`` by default.
 
     Raises:
-        UnusableInput: more joints than the controller has pins for, or a controller of another protocol.
+        UnusableInput: more joints or sensors than the controller has pins for, or a controller of another protocol.
         ArmFailure: no controller answers, or it finds the arm unfit to move.
 
     """
@@ -88,6 +89,12 @@ class SerialArm(Arm):
     ) -> None:
         if spec.joints > JOINTS:
             raise UnusableInput(f"{spec.name}: a controller has pins for {JOINTS} joints, not for {spec.joints}")
+        for one in spec.sensors:
+            if one.channel is None or one.channel > EXTRAS:
+                raise UnusableInput(
+                    f"{spec.name}: {one.name} needs one of the controller's {EXTRAS} extra channels, its spec says "
+                    f"{one.channel}; correct it, or leave the sensor out"
+                )
         self.spec = spec
         self.link = Link(line, spec.period, spec.name, secrets.randbelow(SEQUENCES))
         self.hello: Hello | None = None
@@ -235,12 +242,14 @@ class SerialArm(Arm):
         self._status(answer)
         sensors = Sensors.of(answer.frame.values)
         joints = self.spec.joints
-        return Reading(
+        reading = Reading(
             self._clock.map(sensors.time, answer.sent, answer.received),
             np.array(sensors.angle[:joints], np.float64),
             np.array(sensors.pressure[: 2 * joints], np.float64).reshape(joints, 2),
-            np.array(sensors.velocity[:joints]) / VELOCITY_SCALE if self.spec.velocity_sensor else None,
         )
+        velocity = [value / VELOCITY_SCALE for value in sensors.velocity[:joints] if self.spec.velocity_sensor]
+        further = [one.value(sensors.extra[(one.channel or 1) - 1]) for one in self.spec.sensors]
+        return with_measured(reading, self.spec, [*velocity, *further])
 
     def _status(self, answer: Answer) -> Flag:
         """Return the flags of an answer that is no refusal."""

@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import Arm, Reading, checked
+from pneumarm.arm.seam import Arm, Reading, checked, measured
 from pneumarm.arm.serial.line import Line
 from pneumarm.arm.serial.protocol import (
     DEAD_MAN_MS,
@@ -268,7 +268,12 @@ class EmulatedBoard:
         if since > 0:
             for joint, change in enumerate((now.angle - self._earlier.angle).tolist()):
                 velocity[joint] = min(max(round(VELOCITY_SCALE * change / since), -32767), 32767)
-        return Sensors(time, flags, valves, tuple(angle), tuple(pressure), tuple(velocity), (0,) * EXTRAS)
+        extra, sensors = [0] * EXTRAS, self.arm.spec.sensors
+        if sensors:
+            for one, value in zip(sensors, measured(now, (one.name for one in sensors)), strict=True):
+                if one.channel is not None and one.channel <= EXTRAS:
+                    extra[one.channel - 1] = _count(one.counts(value))
+        return Sensors(time, flags, valves, tuple(angle), tuple(pressure), tuple(velocity), tuple(extra))
 
 
 def _count(value: float) -> int:

@@ -21,6 +21,7 @@ from pneumarm.arm.virtual.faults import (
     WornPotentiometer,
     read_plan,
 )
+from pneumarm.arm.virtual.further import usual_sensors
 from pneumarm.arm.virtual.parameters import (
     AirParameters,
     ArmParameters,
@@ -62,5 +63,6 @@ __all__ = [
     "preset_parameters",
     "read_plan",
     "resting_angle",
+    "usual_sensors",
     "without_noise",
 ]

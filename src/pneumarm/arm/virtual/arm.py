@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm.seam import Arm, ArmSpec, Reading
+from pneumarm.arm.seam import Arm, ArmSpec, Reading, Sensor, with_measured
 from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, Constants, constants
 from pneumarm.arm.virtual.faults import Fault, Plan
+from pneumarm.arm.virtual.further import begin_sampling, changing, further_sensors, pass_sampling, sense_further
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
 from pneumarm.arm.virtual.playing import FaultPlayer
 from pneumarm.arm.virtual.rest import pass_time, static_angle
@@ -91,9 +92,11 @@ class VirtualArm(Arm):
         seed: seeds the noise of the sensors, the jitter, and the fluctuation of the supply.
         name: what reports call the arm.
         faults: what goes wrong with it, and when; see :mod:`pneumarm.arm.virtual.faults`.
+        velocity_sensor: whether it also reads the velocity, from faster samples of its angle.
+        sensors: accelerometers and thermometers that it has besides; see :mod:`pneumarm.arm.virtual.further`.
 
     Raises:
-        UnusableInput: the arm cannot play the faults.
+        UnusableInput: the arm cannot play the faults, or has no joint for a sensor.
 
     """
 
@@ -104,6 +107,8 @@ class VirtualArm(Arm):
         seed: int = 0,
         name: str = "virtual",
         faults: Sequence[Fault] = (),
+        velocity_sensor: bool = False,
+        sensors: Sequence[Sensor] = (),
     ) -> None:
         self.parameters = parameters if parameters is not None else ArmParameters()
         joints = len(self.parameters.joints)
@@ -115,6 +120,8 @@ class VirtualArm(Arm):
             max_pressure=self.parameters.max_pressure / BAR,
             latency=LATENCY,
             name=name,
+            velocity_sensor=velocity_sensor,
+            sensors=tuple(sensors),
         )
         self._constants = constants(self.parameters)
         self._muscles = np.zeros((joints, 2), MUSCLE)
@@ -145,6 +152,9 @@ class VirtualArm(Arm):
         )
         start(*self._physics)
         self._player: FaultPlayer | None = None
+        self._further = further_sensors(self.spec, seed) if self.spec.further else None
+        if self._further is not None:
+            begin_sampling(self._sensing, self._further.sound, self._further)
         self.faults = tuple(faults)
 
     @property
@@ -199,11 +209,13 @@ class VirtualArm(Arm):
         """What kernels move the arm by.
 
         Raises:
-            UnusableInput: the arm plays faults, which only its own methods do.
+            UnusableInput: the arm plays faults or has further sensors, which only its own methods do.
 
         """
         if self._player is not None:
             raise UnusableInput(f"{self.spec.name}: kernels cannot move an arm that plays faults; remove them")
+        if self._further is not None:
+            raise UnusableInput(f"{self.spec.name}: kernels cannot read further sensors; open the arm without them")
         fixed = self._constants
         return Live(
             self._muscles,
@@ -251,8 +263,14 @@ class VirtualArm(Arm):
         angle, pressure = np.empty(joints), np.empty((joints, 2))
         if self._player is not None:
             time = sense_with_faults(*self._sensing, self._player.track, self._player.leap, angle, pressure)
-            return Reading(time, angle, pressure)
-        return Reading(sense(*self._sensing, angle, pressure), angle, pressure)
+        else:
+            time = sense(*self._sensing, angle, pressure)
+        reading = Reading(time, angle, pressure)
+        if self._further is None:
+            return reading
+        values = np.empty(len(self.spec.further))
+        sense_further(self._sensing, self._constants.joints, self._further, values)
+        return with_measured(reading, self.spec, values.tolist())
 
     def set_valves(self, valves: ArrayLike) -> None:
         """Set the valves (joints, 2) of -1 out, 0 closed, +1 in; the air notices after the pipe's delay.
@@ -282,6 +300,8 @@ class VirtualArm(Arm):
             raise PneumarmError(f"an arm can wait for 0 to {LONGEST_WAIT:g} s, got {seconds!r}")
         if self._player is not None:
             self._play(self._player, self.time + seconds)
+        elif self._further is not None:
+            self._pass(self.time + seconds)
         else:
             pass_for(*self._physics, seconds)
 
@@ -296,19 +316,36 @@ class VirtualArm(Arm):
             raise PneumarmError(f"an arm can wait for up to {LONGEST_WAIT:g} s, got the time {time!r}")
         if self._player is not None:
             self._play(self._player, time, late=True)
+        elif self._further is not None:
+            self._pass_late(time)
         else:
             pass_until(*self._physics, self._random[_JITTER], self._lateness, time)
 
     def _play(self, player: FaultPlayer, until: float, *, late: bool = False) -> None:
         """Let time pass until ``until`` [s], or until a little ``late``, cut where faults change."""
         while (change := player.next_change()) < until:
-            pass_time(*self._physics, change)
+            self._pass(change)
             self._update(player)
         if late:
-            pass_until(*self._physics, self._random[_JITTER], self._lateness, until)
+            self._pass_late(until)
         else:
-            pass_time(*self._physics, until)
+            self._pass(until)
         self._update(player)
+
+    def _pass(self, until: float) -> None:
+        """Let time pass until ``until`` [s], with samples of the angle where there is a sensor that needs them."""
+        if self._further is None:
+            pass_time(*self._physics, until)
+        else:
+            track = self._further.sound if self._player is None else self._player.track
+            pass_sampling(self._physics, self._sensing, track, self._further, until)
+
+    def _pass_late(self, until: float) -> None:
+        """Let time pass until ``until`` [s], or a little more; not at all if it is past."""
+        if self._further is None:
+            pass_until(*self._physics, self._random[_JITTER], self._lateness, until)
+        elif until > self.time:
+            self._pass(until + drawn_lateness(self._random[_JITTER], self._lateness))
 
     def _update(self, player: FaultPlayer) -> None:
         if player.update(self.time):
@@ -328,7 +365,8 @@ class VirtualArm(Arm):
         self.set_valves(np.zeros(self._muscles.shape, np.int8))
 
     def _parts(self) -> tuple[NDArray[Any], ...]:
-        return self._muscles, self._joints, self._surroundings, self._random
+        further = () if self._further is None else changing(self._further)
+        return self._muscles, self._joints, self._surroundings, self._random, *further
 
     def _digest(self) -> bytes:
         digest = hashlib.blake2b(digest_size=16)
@@ -336,6 +374,8 @@ class VirtualArm(Arm):
         for record in self._constants if player is None else player.sound:
             digest.update(record.tobytes())
         digest.update(struct.pack("<d", self._lateness))
+        if self._further is not None:
+            digest.update(repr((self.spec.velocity_sensor, self.spec.sensors)).encode())
         if player is not None:
             digest.update(player.digest())
         return digest.digest()
@@ -401,13 +441,18 @@ def pass_for(muscles, muscle_c, joints, joint_c, air, air_c, random, seconds):  
 
 
 @kernel
+def drawn_lateness(jitter, lateness):  # type: ignore[no-untyped-def]
+    """Return how long the operating system takes to wake up [s]."""
+    return min(-lateness * math.log(1.0 - uniform(jitter)), MOST_LATENESS * lateness)
+
+
+@kernel
 def pass_until(  # type: ignore[no-untyped-def]
     muscles, muscle_c, joints, joint_c, air, air_c, random, jitter, lateness, time
 ):
     """Let time pass until ``time`` [s] and then as long as the operating system takes to wake up."""
     if time > air[0].time:
-        late = min(-lateness * math.log(1.0 - uniform(jitter)), MOST_LATENESS * lateness)
-        pass_time(muscles, muscle_c, joints, joint_c, air, air_c, random, time + late)
+        pass_time(muscles, muscle_c, joints, joint_c, air, air_c, random, time + drawn_lateness(jitter, lateness))
 
 
 def resting_angle(parameters: ArmParameters, pressures: ArrayLike, *, end_stops: bool = True) -> NDArray[np.float64]:

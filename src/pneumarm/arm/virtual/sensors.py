@@ -82,21 +82,28 @@ def sense_with_faults(  # type: ignore[no-untyped-def]
     """As :func:`sense`, with potentiometers ``track`` (joints,) and ``leap`` (joints, 2) [Pa] added to pressures."""
     c = sensors_c[0]
     for j in range(len(joints)):
-        value = c.middle + c.counts_per_radian * joints[j].angle
-        if c.wear > 0.0:
-            value = worn(value, c)
-        value = shown(value, track[j], c, random)
-        angle[j] = median_conversion(value, c.angle_noise, c, random, scratch)
-        if c.dropout > 0.0 and uniform(random) < c.dropout:
-            angle[j] = 0.0
-        if not math.isnan(track[j].frozen):
-            angle[j] = track[j].frozen
-        if not math.isnan(track[j].rail):
-            angle[j] = track[j].rail
+        angle[j] = potentiometer(joints[j], track[j], c, random, scratch)
         for m in range(2):
             value = c.counts_per_pascal * (muscles[j, m].pressure - ATMOSPHERE + leap[j, m])
             pressure[j, m] = median_conversion(value, c.pressure_noise, c, random, scratch)
     return surroundings[0].time
+
+
+@kernel
+def potentiometer(joint, track, c, random, scratch):  # type: ignore[no-untyped-def]
+    """Return what the potentiometer ``track`` says of ``joint`` [counts]."""
+    value = c.middle + c.counts_per_radian * joint.angle
+    if c.wear > 0.0:
+        value = worn(value, c)
+    value = shown(value, track, c, random)
+    angle = median_conversion(value, c.angle_noise, c, random, scratch)
+    if c.dropout > 0.0 and uniform(random) < c.dropout:
+        angle = 0.0
+    if not math.isnan(track.frozen):
+        angle = track.frozen
+    if not math.isnan(track.rail):
+        angle = track.rail
+    return angle
 
 
 @kernel

@@ -136,22 +136,47 @@ class Predictor(NamedTuple):
     """Place of the command among the inputs."""
     bar: float
     """Counts of a bar."""
+    measured: NDArray[np.float64]
+    """What the further sensors of its window said, newest first, as :attr:`~pneumarm.transitions.Window.needs` calls
+    them, shape (history, needs) [sensor units]. The monitor writes it; the kernel reads it."""
+    velocities: int
+    """How many of these are velocities, which stand in place of the derived ones: joints or 0."""
+    further_offset: NDArray[np.float64]
+    """Of the others, shape (further,) [sensor units]."""
+    further_scale: NDArray[np.float64]
+    """Shape (further,) [sensor units]."""
 
 
 def predictor(simulation: Simulation) -> Predictor:
     """Return ``simulation`` for kernels."""
     packed, joints = simulation_parameters(simulation), simulation.window.joints
-    scaling = simulation.scaling
+    scaling, window = simulation.scaling, simulation.window
     return Predictor(
         simulation=packed,
         state=simulation_state(packed, random_state(0)),
-        offset=np.ascontiguousarray(scaling.observation_offset.reshape(joints, 4)),
-        scale=np.ascontiguousarray(scaling.observation_scale.reshape(joints, 4)),
+        offset=np.ascontiguousarray(window.of_joints(scaling.observation_offset)),
+        scale=np.ascontiguousarray(window.of_joints(scaling.observation_scale)),
         command_scale=scaling.command_scale,
         std=np.maximum(simulation.error_std, _LEAST_STD),
         first_command=places(simulation.window).command,
         bar=simulation.spec.counts_per_bar,
+        measured=np.zeros((window.history, len(window.needs))),
+        velocities=joints if window.velocity == "measured" else 0,
+        further_offset=scaling.observation_offset[window.joint_size :].copy(),
+        further_scale=scaling.observation_scale[window.joint_size :].copy(),
     )
+
+
+@part
+def expect_further(predictor, lag):  # type: ignore[no-untyped-def]
+    """Put what further sensors said ``lag`` readings ago where the networks read it."""
+    first, joints, velocities = predictor.simulation.observed * lag, predictor.simulation.joints, predictor.velocities
+    for j in range(velocities):
+        scaled = (predictor.measured[lag, j] - predictor.offset[j, 1]) / predictor.scale[j, 1]
+        predictor.state.x[first + 4 * j + 1] = np.float32(scaled)
+    for i in range(predictor.further_scale.shape[0]):
+        scaled = (predictor.measured[lag, velocities + i] - predictor.further_offset[i]) / predictor.further_scale[i]
+        predictor.state.x[first + 4 * joints + i] = np.float32(scaled)
 
 
 @part
@@ -164,7 +189,8 @@ def expect_by_simulation(predictor, readings, memory, expected, angle):  # type:
         for j in range(joints):
             for q in range(4):
                 scaled = (memory.observed[lag, j, q] - predictor.offset[j, q]) / predictor.scale[j, q]
-                x[4 * (joints * lag + j) + q] = np.float32(scaled)
+                x[simulation.observed * lag + 4 * j + q] = np.float32(scaled)
+        expect_further(predictor, lag)
     for h in range(expected.shape[0]):
         for m in range(muscles):
             bar = memory.observed[0, m // 2, 2 + m % 2] / predictor.bar
@@ -172,9 +198,9 @@ def expect_by_simulation(predictor, readings, memory, expected, angle):  # type:
             x[predictor.first_command + m] = np.float32(now)
             for lag in range(1, history):
                 earlier = carried_out(readings, h, memory.command[lag], m, bar) / predictor.command_scale[m]
-                x[4 * joints * history + muscles * (lag - 1) + m] = np.float32(earlier)
+                x[simulation.observed * history + muscles * (lag - 1) + m] = np.float32(earlier)
         predict_change(simulation, state)
-        for o in range(simulation.place.shape[0]):
+        for o in range(simulation.place.shape[0] - predictor.further_scale.shape[0]):
             j, q = simulation.place[o] // 4, simulation.place[o] % 4
             scaled = (memory.observed[0, j, q] - predictor.offset[j, q]) / predictor.scale[j, q] + state.change[o]
             scaled = min(max(scaled, simulation.lowest[o]), simulation.highest[o])

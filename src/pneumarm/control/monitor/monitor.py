@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import ArmSpec, Reading
+from pneumarm.arm.seam import ArmSpec, Reading, measured
 from pneumarm.control.monitor.evidence import (
     Memory,
     Thresholds,
@@ -16,7 +16,7 @@ from pneumarm.control.monitor.evidence import (
     see_by_rules,
     see_by_simulation,
 )
-from pneumarm.control.monitor.expectation import RuleSettings, predictor, rule_parameters
+from pneumarm.control.monitor.expectation import RuleParameters, RuleSettings, predictor, rule_parameters
 from pneumarm.control.monitor.hypotheses import hypotheses
 from pneumarm.errors import UnusableInput
 from pneumarm.simulation.simulation import Simulation
@@ -194,7 +194,9 @@ class Monitor:
             return
         if self._simulation is None or simulation.window != self._simulation.window:
             raise UnusableInput("a monitor can go on only with a simulation that was adapted from the one it has")
+        measured_before = self._measured
         self._simulation, self._expects = simulation, predictor(simulation)
+        self._measured[...] = measured_before
         memory = self._memory
         memory.disagreement[...] = 0.0
         memory.score[[one.kind in _CHANGES for one in self._hypotheses]] = 0.0
@@ -243,10 +245,24 @@ class Monitor:
         self._see(
             self._expects, self._readings, self._thresholds, memory, reading.time, reading.angle, reading.pressure
         )
+        self._note_further(reading)
         # Not by a kernel: handing the memory over to one takes longer than the kernel.
         memory.command[0] = 0.0 if valves is None else valves.ravel()
         if self._suspicious():
             self._decide(reading.time)
+
+    @property
+    def _measured(self) -> NDArray[np.float64]:
+        """What further sensors said, shape (history, needs); (0, 0) where none is needed."""
+        return np.zeros((0, 0)) if isinstance(self._expects, RuleParameters) else self._expects.measured
+
+    def _note_further(self, reading: Reading) -> None:
+        """Remember what the further sensors say that the simulation needs."""
+        kept = self._measured
+        if kept.size and self._simulation is not None:
+            values = measured(reading, self._simulation.window.needs, self.spec.name)
+            kept[1:] = values if self._memory.clock[1] <= 1 else kept[:-1].copy()
+            kept[0] = values
 
     def _go_on_from(self, now: float) -> None:
         """Go on where the arm's clock began anew and shows ``now`` [s], as after a reset of its controller.
@@ -366,6 +382,8 @@ class Monitor:
             "earlier": self._earlier,
             "simulation": self._simulation is not None,
         }
+        if self._measured.size:
+            state["measured"] = self._measured.tolist()
         return json.dumps(state).encode()
 
     def set_state(self, state: bytes) -> None:
@@ -382,12 +400,14 @@ class Monitor:
             earlier = int(saved.get("earlier", 0))
             memory = Memory(**arrays)
             same = [a.shape == b.shape for a, b in zip(memory, self._memory, strict=True)]
+            further = np.array(saved.get("measured", []), np.float64).reshape(self._measured.shape)
             if not all(same) or saved["simulation"] is not (self._simulation is not None):
                 raise ValueError("it has other sizes")
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise UnusableInput(f"the state of the monitor is damaged or of another arm ({error})") from error
         for mine, values in zip(self._memory, memory, strict=True):
             mine[...] = values
+        self._measured[...] = further
         self.findings, self._earlier = findings, earlier
         self._open = {
             (one.kind, one.detail, one.joint, one.muscle): place

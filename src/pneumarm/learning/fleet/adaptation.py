@@ -34,6 +34,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Rows
 
 _LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias")
+_KNOWN = ("error_std", "pressure_range", "further_std", "further_range")
 What = Literal["noticed", "accepted", "refused", "rolled back"]
 
 
@@ -270,7 +271,7 @@ def _plastic(agent: PolicyAgent) -> list[NDArray[np.floating]]:
     """Return all arrays that an adaptation changes."""
     simulation = agent.simulation
     layers = [getattr(network, name) for network in simulation.networks for name in _LAYERS]
-    return [agent.policy, simulation.error_std, simulation.pressure_range, *layers]
+    return [agent.policy, *(getattr(simulation, name) for name in _KNOWN), *layers]
 
 
 def _with_plastic(agent: PolicyAgent, numbers: NDArray[np.float64]) -> PolicyAgent:
@@ -278,10 +279,11 @@ def _with_plastic(agent: PolicyAgent, numbers: NDArray[np.float64]) -> PolicyAge
     parts = _plastic(agent)
     ends = np.cumsum([part.size for part in parts])
     taken = [numbers[e - p.size : e].reshape(p.shape).copy() for e, p in zip(ends, parts, strict=True)]
-    policy, error_std, pressure_range, *layers = taken
+    policy, known, layers = taken[0], taken[1 : 1 + len(_KNOWN)], taken[1 + len(_KNOWN) :]
     size = len(_LAYERS)
     networks = tuple(Network(*layers[i : i + size]) for i in range(0, len(layers), size))
-    simulation = replace(agent.simulation, networks=networks, error_std=error_std, pressure_range=pressure_range)
+    changed: dict[str, Any] = dict(zip(_KNOWN, known, strict=True))
+    simulation = replace(agent.simulation, networks=networks, **changed)
     return replace(agent, simulation=simulation, policy=policy.astype(np.float32))
 
 

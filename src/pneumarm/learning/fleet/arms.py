@@ -102,7 +102,7 @@ def limits(
     ``still`` is the largest change that counts as none, ``tolerance`` the distance from the goal within which a joint
     may stand still [both counts], ``patience`` the steps without change after which another action is taken.
     """
-    offset, scale = scaling.observation_offset.reshape(-1, 4), scaling.observation_scale.reshape(-1, 4)
+    offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     return Limits(
         inlet=np.ascontiguousarray((spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:], np.float32),
         still=np.ascontiguousarray(still / scale[:, [0, 2, 3]], np.float32),

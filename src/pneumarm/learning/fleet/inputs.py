@@ -26,7 +26,7 @@ class InputParameters(NamedTuple):
 
 def input_parameters(window: Window, scaling: Scaling, squash: tuple[float, ...]) -> InputParameters:
     """Return the inputs for an arm; ``squash`` are the errors at which tansig bends [counts]."""
-    scale = scaling.observation_scale.reshape(-1, 4)[:, :1]
+    scale = window.of_joints(scaling.observation_scale)[:, :1]
     gain = np.ascontiguousarray(scale / np.array(squash), np.float32)
     return InputParameters(gain, window.state_size, places(window).goal)
 

@@ -112,9 +112,15 @@ def refit(now: Simulation, origin: Simulation, rows: Rows, settings: RefitSettin
         predicted[fold == each] = residue(fitted, _part(found, fold == each))
     whole = _fitted(origin, found, settings, seed)
     old, new = (values[:, now.outputs] ** 2 for values in (residue(now, found), predicted))
-    rms = np.sqrt(np.mean(predicted**2, axis=0)).reshape(now.window.joints, -1)
+    window, rms = now.window, np.sqrt(np.mean(predicted**2, axis=0))
+    pressure, further = window.of_joints(found.target)[..., -2:], found.target[:, window.joint_size :]
+    reached = replace(
+        whole,
+        pressure_range=_reaching(origin.pressure_range, pressure),
+        further_range=_reaching(origin.further_range, further),
+    )
     return Refit(
-        simulation=replace(whole, error_std=rms, pressure_range=_reaching(origin.pressure_range, found)),
+        simulation=reached.with_errors(rms),
         movements=len(numbers),
         before=np.sqrt(old.mean(axis=0)),
         after=np.sqrt(new.mean(axis=0)),
@@ -226,11 +232,11 @@ def _advanced(
     return np.concatenate([observation, observed[:, : -window.observation_size], commands], axis=1)
 
 
-def _reaching(pressure_range: Floats, found: Transitions) -> Floats:
-    """Return the range of pressures (joints, 2, 2), wide enough for all that were read."""
-    pressure = found.target.reshape(len(found.target), len(pressure_range), -1)[:, :, -2:].astype(np.float64)
-    low, high = np.moveaxis(pressure_range, -1, 0)
-    return np.stack([np.minimum(low, pressure.min(axis=0)), np.maximum(high, pressure.max(axis=0))], axis=-1)
+def _reaching(limits: Floats, read: NDArray[np.float32]) -> Floats:
+    """Return the range ``limits`` (..., 2) of readings, wide enough for all that were ``read`` (n, ...)."""
+    low, high = np.moveaxis(limits, -1, 0)
+    found = read.astype(np.float64)
+    return np.stack([np.minimum(low, found.min(axis=0)), np.maximum(high, found.max(axis=0))], axis=-1)
 
 
 def _part(found: Transitions, chosen: NDArray[np.bool_]) -> Transitions:

@@ -144,13 +144,15 @@ def standardised_squares(simulation: Simulation, rows: Rows) -> NDArray[np.float
 def error_squares(simulation: Simulation) -> NDArray[np.float64]:
     """Return the mean squared error of the fit, shape (outputs,), not 0 even for a simulation without error."""
     scale = simulation.scaling.observation_scale[simulation.outputs]
-    return np.maximum(simulation.error_std.ravel()[simulation.outputs], 1e-6 * scale) ** 2
+    return np.maximum(simulation.errors[simulation.outputs], 1e-6 * scale) ** 2
 
 
 def output_names(simulation: Simulation) -> list[str]:
     """Return what each output is called: ``angle``, and with several joints ``angle of joint 2``."""
-    joints, size = simulation.window.joints, len(QUANTITIES)
-    return [
-        QUANTITIES[place % size] + (f" of joint {place // size + 1}" if joints > 1 else "")
-        for place in simulation.outputs
+    window = simulation.window
+    names = [
+        quantity + (f" of joint {joint + 1}" if window.joints > 1 else "")
+        for joint in range(window.joints)
+        for quantity in QUANTITIES
     ]
+    return [[*names, *window.further][place] for place in simulation.outputs]

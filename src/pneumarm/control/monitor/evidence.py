@@ -7,7 +7,8 @@ For every hypothesis h the log-likelihood ratio of a reading against the healthy
 (the cumulative sum test: E. S. Page, "Continuous inspection schemes", Biometrika 41, 1954). Residuals follow a
 Student distribution of four degrees of freedom, and a single reading counts for little: what a simulation gets wrong
 in a fast movement must not look like a fault. Where h and the healthy arm differ by little, nothing is summed: there
-a lasting error of the simulation, however small, would prove either in the end. When S_h last was 0 tells since when.
+a lasting error of the simulation, however small, would prove either in the end. The last reading that spoke against h
+while S_h was 0 tells since when: what was read after it may have been spoiled, even where it told nothing.
 Whether the readings agree with the simulation at all is weighed in the same way, against residuals that are several
 times as large as usual.
 """
@@ -75,7 +76,7 @@ class Memory(NamedTuple):
     score: NDArray[np.float64]
     """S_h, shape (hypotheses,)."""
     since: NDArray[np.float64]
-    """When each was 0 the last time, shape (hypotheses,) [s]."""
+    """When a reading last spoke against each while it was 0, shape (hypotheses,) [s]."""
     disagreement: NDArray[np.float64]
     """Evidence that angle, pressure 1, pressure 2 are not those of the simulation's arm, shape (joints, 3)."""
     disagreement_since: NDArray[np.float64]
@@ -171,7 +172,7 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
                 evidence += surprise((read - memory.expected[0, m]) / std)
                 evidence -= surprise((read - memory.expected[h, m]) / std)
         evidence = min(max(evidence, -thresholds.most), thresholds.most)
-        if memory.score[h] <= 0.0:
+        if memory.score[h] <= 0.0 and evidence < 0.0:
             memory.since[h] = time
         memory.score[h] = min(max(memory.score[h] + evidence, 0.0), 2.0 * thresholds.alarm)
 

@@ -65,7 +65,7 @@ class MonitorSettings:
     """Readings on a rail, after a jump there, that show a broken potentiometer."""
     jump: float = 10.0
     """Least angle that counts as a jump onto a rail [degrees]; more where the arm was moving there."""
-    frozen: int = 12
+    frozen: int = 10
     """Equal angles in a row, while the pressures change, that show a potentiometer which is frozen."""
     acted: float = 0.10
     """Change of a pressure that shows that valves act [bar]."""
@@ -258,10 +258,14 @@ class Monitor:
 
     def _decide(self, now: float) -> None:
         """Open findings for what has enough evidence, and close those that have none left."""
-        holding: dict[_Key, float] = {}
-        holding |= self._judge_potentiometers()
+        memory = self._memory
+        holding = self._judge_potentiometers()
+        if holding:  # what follows from a wrong angle proves nothing
+            memory.score[...] = 0.0
         holding |= self._judge_valves()
-        holding |= self._judge_agreement(bool(holding) or any(key[0] != "changed" for key in self._open))
+        if any(key[0] not in _CHANGES for key in holding):  # what a fault explains says nothing of the arm
+            memory.disagreement[...] = 0.0
+        holding |= self._judge_agreement(any(key[0] == "leak" for key in holding))
         for key, since in holding.items():
             if key not in self._open:
                 kind, detail, joint, muscle = key
@@ -279,6 +283,13 @@ class Monitor:
         place = self._open.pop(key)
         self.findings[place] = replace(self.findings[place], until=now)
 
+    def _rename(self, key: _Key, to: _Key) -> None:
+        """Call what is open another name: with few readings several faults look alike."""
+        place = self._open.pop(key)
+        kind, detail, joint, muscle = to
+        self._open[to] = place
+        self.findings[place] = replace(self.findings[place], kind=kind, detail=detail, joint=joint, muscle=muscle)
+
     def _judge_potentiometers(self) -> dict[_Key, float]:
         memory, settings = self._memory, self.settings
         found: dict[_Key, float] = {}
@@ -293,13 +304,16 @@ class Monitor:
         return found
 
     def _judge_valves(self) -> dict[_Key, float]:
+        """What was found stays until nothing speaks for it, or is renamed where another fault explains more."""
         memory = self._memory
         order = np.argsort(memory.score)[::-1]
         best = int(order[0])
         keys = [(one.kind, one.detail, one.joint, one.muscle) for one in self._hypotheses]
-        found = {
-            keys[h]: float(memory.since[h]) for h in order.tolist() if keys[h] in self._open and memory.score[h] > 0
-        }
+        known = [h for h in order.tolist() if keys[h] in self._open]
+        if known and memory.score[best] - memory.score[known[0]] >= self.settings.lead:
+            self._rename(keys[known[0]], keys[best])
+            known = [best, *known[1:]]
+        found = {keys[h]: float(memory.since[h]) for h in known if memory.score[h] > 0}
         if found:
             return found
         lead = memory.score[best] - memory.score[int(order[1])]

@@ -10,7 +10,10 @@ in a fast movement must not look like a fault. Where h and the healthy arm diffe
 a lasting error of the simulation, however small, would prove either in the end. The last reading that spoke against h
 while S_h was 0 tells since when: what was read after it may have been spoiled, even where it told nothing.
 Whether the readings agree with the simulation at all is weighed in the same way, against residuals that are several
-times as large as usual.
+times as large as usual. Two figures tell why they may be. Noise of a sensor makes residuals that alternate: it is in
+a reading and, with the other sign, in what is expected of the next, so that of white noise n the residual is about
+n_k+1 - n_k, whose correlation with the one before it is -1/2. A worn potentiometer makes large ones at some angles
+only, so their mean square is kept by angle.
 """
 
 import math
@@ -24,6 +27,10 @@ from pneumarm.kernels import kernel, part
 
 FREEDOM = 4.0
 """Degrees of freedom of the Student distribution of residuals."""
+ZONES = 32
+"""Parts of the range of an angle by which residuals are kept."""
+_VISITS = 30.0  # residuals that the mean square of a zone is over, at most
+_LARGEST = 5.0  # a residual that counts in these figures
 
 
 class Thresholds(NamedTuple):
@@ -81,6 +88,11 @@ class Memory(NamedTuple):
     """Evidence that angle, pressure 1, pressure 2 are not those of the simulation's arm, shape (joints, 3)."""
     disagreement_since: NDArray[np.float64]
     """Shape (joints, 3) [s]."""
+    scatter: NDArray[np.float64]
+    """Residuals of angle, pressure 1, pressure 2 since they began to disagree: sum of squares, sum of products with
+    the one before, the last one; shape (joints, 3, 3)."""
+    zone: NDArray[np.float64]
+    """By part of the range of an angle: residuals in it, and their mean square, shape (joints, ZONES, 2)."""
     same: NDArray[np.float64]
     """By joint: readings of the same angle in a row; since when [s]; least and most pressures meanwhile; (j, 6)."""
     rail: NDArray[np.float64]
@@ -103,6 +115,8 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
         since=np.zeros(hypotheses),
         disagreement=np.zeros((joints, 3)),
         disagreement_since=np.zeros((joints, 3)),
+        scatter=np.zeros((joints, 3, 3)),
+        zone=np.zeros((joints, ZONES, 2)),
         same=np.zeros((joints, 6)),
         rail=np.zeros((joints, 4)),
         expected=np.zeros((hypotheses, 2 * joints)),
@@ -132,6 +146,7 @@ def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pres
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
             weigh_disagreement(thresholds, memory, j, 0, error, time)
+            place_residual(thresholds, memory, j, angle[j], error)
             for side in range(2):
                 m = 2 * j + side
                 error = memory.clock[3] * (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
@@ -166,7 +181,7 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
                 least = max(least, thresholds.clear)
             telling = abs(difference) > least and not (before > thresholds.full and memory.command[0, m] > 0.0)
             if readings.leak[h, m] > 0.0:
-                telling = is_calm(thresholds, memory, m)
+                telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
             if telling:
                 std = math.sqrt(memory.std[m] ** 2 + (thresholds.unsure * difference) ** 2)
                 evidence += surprise((read - memory.expected[0, m]) / std)
@@ -190,10 +205,24 @@ def is_calm(thresholds, memory, m):  # type: ignore[no-untyped-def]
 def weigh_disagreement(thresholds, memory, j, q, error, time):  # type: ignore[no-untyped-def]
     """Add the evidence of a standardised residual that residuals are ``apart`` times as large as usual."""
     evidence = surprise(error) - surprise(error / thresholds.apart) - math.log(thresholds.apart)
+    cut, scatter = min(max(error, -_LARGEST), _LARGEST), memory.scatter[j, q]
     if memory.disagreement[j, q] <= 0.0:
         memory.disagreement_since[j, q] = time
+        scatter[0] = scatter[1] = 0.0
+    scatter[0] += cut * cut
+    scatter[1] += cut * scatter[2]
+    scatter[2] = cut
     total = memory.disagreement[j, q] + min(evidence, thresholds.most)
     memory.disagreement[j, q] = min(max(total, 0.0), 2.0 * thresholds.changed)
+
+
+@part
+def place_residual(thresholds, memory, j, angle, error):  # type: ignore[no-untyped-def]
+    """Keep the standardised residual of an ``angle`` [counts] with those at angles like it."""
+    part_of_range = (angle - thresholds.low) / (thresholds.high - thresholds.low)
+    zone = memory.zone[j, min(max(int(ZONES * part_of_range), 0), ZONES - 1)]
+    zone[0] += 1.0
+    zone[1] += (min(error * error, _LARGEST * _LARGEST) - zone[1]) / min(zone[0], _VISITS)
 
 
 @kernel
@@ -213,7 +242,7 @@ def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: 
             rail[2] = 1.0 if not fresh and far > limit else 0.0
         else:
             rail[0] += 1.0
-        if fresh or angle[j] != before or rail[0] > 0.0:
+        if same[0] == 0.0 or angle[j] != before or rail[0] > 0.0:
             same[0], same[1] = 1.0, time
             same[2], same[4] = pressure[j, 0], pressure[j, 0]
             same[3], same[5] = pressure[j, 1], pressure[j, 1]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, Reading
 from pneumarm.control.monitor.evidence import (
+    ZONES,
     Memory,
     Thresholds,
     new_memory,
@@ -23,8 +24,10 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
-_CHANGES = ("changed", "leak")
-"""Kinds of findings with which valves do as they are told and sensors tell the truth: of another arm than before."""
+_DISAGREEMENTS = ("changed", "sensor-noise", "worn-potentiometer")
+"""Kinds of findings with which readings no longer agree with the simulation, so that it proves less of valves."""
+_CHANGES = (*_DISAGREEMENTS, "leak")
+"""Kinds of findings with which valves do as they are told: what is read is what arm and sensors are like now."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,12 @@ class MonitorSettings:
     """An arm has changed whose errors are so many times as large as usual."""
     changed: float = 40.0
     """Log-likelihood ratio from which on the arm counts as changed."""
+    alternating: float = 0.3
+    """Correlation of residuals with those before them under minus which they are noise of a sensor."""
+    worn: float = 3.0
+    """Mean square of the residuals from which on a part of a potentiometer's range counts as worn ..."""
+    sound: float = 1.0
+    """... while the median of all parts is below this [both as the residuals usually are]."""
     rail: int = 3
     """Readings on a rail, after a jump there, that show a broken potentiometer."""
     jump: float = 10.0
@@ -89,6 +98,9 @@ class MonitorSettings:
             "fast": 0 < self.fast < math.inf,
             "apart": 1 < self.apart < math.inf,
             "changed": 0 < self.changed < math.inf,
+            "alternating": 0 < self.alternating < 1,
+            "worn": self.sound < self.worn < math.inf,
+            "sound": 0 < self.sound < math.inf,
             "rail": self.rail >= 1,
             "jump": 0 < self.jump < math.inf,
             "frozen": self.frozen >= 2,
@@ -105,7 +117,7 @@ class Finding:
 
     kind: str
     """As the faults of a virtual arm are called; ``low-supply``; ``changed`` where readings no longer agree with the
-    simulation, whatever the reason."""
+    simulation, and neither noise of a sensor nor a worn potentiometer is the reason."""
     detail: str
     """What it is in words."""
     joint: int | None
@@ -138,6 +150,7 @@ class Finding:
         return self.since <= end and (self.until is None or self.until >= begin)
 
 
+_FEWEST = 10  # residuals of which a mean square is taken seriously
 _Key = tuple[str, str, int | None, int | None]
 
 
@@ -195,7 +208,7 @@ class Monitor:
             raise UnusableInput("a monitor can go on only with a simulation that was adapted from the one it has")
         self._simulation, self._expects = simulation, predictor(simulation)
         memory = self._memory
-        memory.disagreement[...] = 0.0
+        memory.disagreement[...] = memory.zone[...] = 0.0
         memory.score[[one.kind in _CHANGES for one in self._hypotheses]] = 0.0
         for key in [key for key in self._open if key[0] in _CHANGES]:
             self._close(key, float(memory.clock[0]))
@@ -230,7 +243,13 @@ class Monitor:
         memory.clock[1] = 0.0
         memory.clock[2] = 1.0 if at_rest else memory.observed.shape[0] + 1.0
         memory.command[...] = 0.0
-        memory.same[...] = memory.rail[...] = 0.0
+        memory.scatter[..., 2] = 0.0
+        broken = {(key[0], key[2]) for key in self._open}
+        for j in range(self.spec.joints):  # what is broken stays so
+            if ("frozen-potentiometer", j + 1) not in broken:
+                memory.same[j] = 0.0
+            if ("dead-potentiometer", j + 1) not in broken:
+                memory.rail[j] = 0.0
 
     def see(self, reading: Reading, valves: NDArray[np.int8] | None) -> None:
         """Weigh a reading and remember the ``valves`` (joints, 2) as applied after it."""
@@ -277,7 +296,7 @@ class Monitor:
 
     def _width(self) -> float:
         """Return how large residuals are, in usual ones: a simulation of another arm is no proof of a stuck valve."""
-        return self.settings.apart if any(key[0] == "changed" for key in self._open) else 1.0
+        return self.settings.apart if any(key[0] in _DISAGREEMENTS for key in self._open) else 1.0
 
     def _close(self, key: _Key, now: float) -> None:
         place = self._open.pop(key)
@@ -327,11 +346,38 @@ class Monitor:
         memory, settings = self._memory, self.settings
         found: dict[_Key, float] = {}
         for j, q in np.argwhere(memory.disagreement > 0).tolist():
-            key = ("changed", f"{_QUANTITIES[q]} does not agree with the simulation", j + 1, q or None)
+            place = (j + 1, q or None)
+            known = next((key for key in self._open if key[0] in _DISAGREEMENTS and key[2:] == place), None)
             enough = memory.disagreement[j, q] >= settings.changed and not explained
-            if enough or key in self._open:
-                found[key] = float(memory.disagreement_since[j, q])
+            if known is None and not enough:
+                continue
+            key = known
+            if known is None or known[0] == "changed":
+                key = (*self._why(j, q), *place)
+                if known is not None and key != known:
+                    self._rename(known, key)
+            found[key] = float(memory.disagreement_since[j, q])
         return found
+
+    def _why(self, j: int, q: int) -> tuple[str, str]:
+        """Return what it is a sign of that quantity ``q`` of joint ``j`` does not agree with the simulation."""
+        squares, products, _ = self._memory.scatter[j, q]
+        if q == 0 and (worn := self._worn_at(j)) is not None:
+            return "worn-potentiometer", f"its reading is wrong around {worn:.0f} degrees"
+        if products < -self.settings.alternating * squares:
+            return "sensor-noise", f"the reading of {_QUANTITIES[q]} is noisy"
+        return "changed", f"{_QUANTITIES[q]} does not agree with the simulation"
+
+    def _worn_at(self, j: int) -> float | None:
+        """Return the angle [degrees] around which the potentiometer of joint ``j`` is worn; None where it is not."""
+        visits, squares = self._memory.zone[j].T
+        seen = visits >= _FEWEST
+        bad = seen & (squares > self.settings.worn)
+        if not bad.any() or np.median(squares[seen]) > self.settings.sound:
+            return None
+        low, high = self.spec.angle_range
+        middle = low + (np.arange(ZONES) + 0.5) / ZONES * (high - low)
+        return float(self.spec.degrees(np.average(middle, weights=bad * squares)))
 
     # ---- what is known
 

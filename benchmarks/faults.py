@@ -326,10 +326,8 @@ def measure() -> Iterator[str]:
             yield HEADER
             yield from table
         for name, chosen in (("simulation", simulations), ("rules alone", dict.fromkeys(arms, None))):
-            found, done = healthy_collecting(arms, chosen, hours)
-            yield f"{len(found)} false alarms in {done:.1f} h of healthy collecting, {name} {list(map(str, found))}"
-        found, done = healthy_movements(arms[:2], simulations, agents, hours / 5)
-        yield f"{len(found)} false alarms in {done:.1f} h of healthy movements {list(map(str, found))}"
+            yield false_alarms(f"collecting, {name}", *healthy_collecting(arms, chosen, hours))
+        yield false_alarms("movements", *healthy_movements(arms[:2], simulations, agents, hours / 5))
     for name, factor, watch in (
         ("3 x", 3.0, 45.0),
         ("1.5 x", 1.5, 540.0),
@@ -337,6 +335,15 @@ def measure() -> Iterator[str]:
         ("healthy", 1.0, 540.0),
     ):
         yield leaks_found(arms, name, factor, LeakTest(watch=watch))
+
+
+def false_alarms(what: str, found: list[Finding], hours: float) -> str:
+    """Return a line about what was ``found`` in ``hours`` watched of healthy arms."""
+    spoiling = sum(one.spoils for one in found)
+    return (
+        f"{spoiling} false alarms and {len(found) - spoiling} changes in {hours:.1f} h of healthy {what} "
+        f"{list(map(str, found))}"
+    )
 
 
 HEADER = (
@@ -385,11 +392,9 @@ def fitted(folder: Path, arm: int) -> Simulation:
 def healthy_collecting(
     arms: list[int], simulations: dict[int, Simulation | None], hours: float
 ) -> tuple[list[Finding], float]:
-    """Return what was found wrong with healthy arms, each collecting from a cold morning on, and the hours watched.
-
-    That an arm has changed is not a false alarm here: the monitor says it of an arm that has warmed up, too.
-    """
-    found, passed = [], 0.0
+    """Return what was found wrong with healthy arms that collect from a cold morning on, and the hours watched."""
+    found: list[Finding] = []
+    passed = 0.0
     for arm in arms:
         opened = VirtualArm(draw_parameters(arm), seed=1000 + arm)
         monitor = Monitor(opened.spec, simulations[arm])
@@ -397,7 +402,7 @@ def healthy_collecting(
             passed += opened.spec.period / 3600
             if opened.time >= hours * 3600 / len(arms):
                 break
-        found += [one for one in monitor.findings if one.spoils]
+        found += monitor.findings
     return found, passed
 
 
@@ -405,7 +410,8 @@ def healthy_movements(
     arms: list[int], simulations: dict[int, Simulation], agents: dict[int, AnyAgent], hours: float
 ) -> tuple[list[Finding], float]:
     """Return what was found wrong with healthy arms that a policy moves and adapts to, and the hours that took."""
-    found, seconds = [], 0.0
+    found: list[Finding] = []
+    seconds = 0.0
     for arm in arms:
         opened = VirtualArm(draw_parameters(arm), seed=2000 + arm)
         monitor = Monitor(opened.spec, simulations[arm])
@@ -413,7 +419,7 @@ def healthy_movements(
         settings = TransferSettings(episodes=episodes // 2, test_episodes=max(1, episodes // 4))
         with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", opened.spec) as store:
             transfer(agents[arm], opened, store, settings, seed=arm, watch=monitor)
-        found += [one for one in monitor.findings if one.spoils]
+        found += monitor.findings
         seconds += opened.time
     return found, seconds / 3600
 

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from benchmarks.faults import KINDS, played, watched_steps
+from benchmarks.faults import KINDS, false_alarms, fitted, healthy_collecting, judged, play, watched_steps
 
 from pneumarm.arm import Reading
 from pneumarm.arm.virtual import DeadPotentiometer, Leak, StuckValve, SupplyLoss, VirtualArm, draw_parameters
@@ -35,19 +35,19 @@ def by_name():
     ("name", "within"),
     [
         ("inlet stuck closed", 4.0),
-        ("inlet stuck open", 8.0),
+        ("inlet stuck open", 4.0),
         ("outlet stuck closed", 4.0),
         ("inlet and outlet swapped", 2.0),
         ("muscles swapped", 2.0),
-        ("supply lost", 4.0),
-        ("potentiometer dead", 0.17),
-        ("potentiometer frozen", 1.0),
+        ("supply lost", 1.0),
+        ("potentiometer dead", 0.07),
+        ("potentiometer frozen", 0.5),
     ],
 )
 def test_finds_faults_with_a_simulation(simulation, name, within):
     for seed in range(3):
-        case = played(by_name()[name], 3, seed, simulation, patience=20.0)
-        assert case.found is not None
+        case = judged(play(by_name()[name], 3, seed), simulation)
+        assert case.kinds[0] in by_name()[name].found_as
         assert case.early == 0
         assert case.since_contradiction <= within
 
@@ -55,8 +55,8 @@ def test_finds_faults_with_a_simulation(simulation, name, within):
 @pytest.mark.parametrize("name", ["inlet stuck closed", "muscles swapped", "supply lost", "potentiometer dead"])
 def test_finds_faults_before_there_is_a_simulation(name):
     for arm in (1, 2):
-        case = played(by_name()[name], arm, arm, None, patience=30.0)
-        assert case.found is not None
+        case = judged(play(by_name()[name], arm, arm), None)
+        assert case.kinds
         assert case.early == 0
 
 
@@ -74,6 +74,16 @@ def test_leaves_healthy_arms_alone(simulation):
             if arm.time > 300:
                 break
         assert monitor.findings == []
+
+
+@pytest.mark.soak
+def test_cries_wolf_at_most_once_in_ten_hours(tmp_path):
+    arms = list(range(11, 21))
+    simulations = {arm: fitted(tmp_path, arm) for arm in arms}
+    found, hours = healthy_collecting(arms, simulations, 15.0)
+    print(false_alarms("collecting", found, hours))
+    assert hours >= 10.0  # the arms are not watched on their way to begin states
+    assert sum(one.spoils for one in found) <= 1
 
 
 def test_a_fault_that_ends_is_over():

@@ -39,7 +39,7 @@ class Thresholds(NamedTuple):
     most: float
     """Evidence of a single reading at most."""
     alarm: float
-    """Evidence of a fault from which on it counts as found; evidence is kept up to twice this."""
+    """Evidence of a fault from which on it counts as found; that of none grows beyond twice this."""
     telling: float
     """Expected pressures that differ by less than so many standard deviations tell nothing."""
     inflation: float
@@ -171,6 +171,7 @@ def surprise(error):  # type: ignore[no-untyped-def]
 @part
 def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ignore[no-untyped-def]
     """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis."""
+    most = 0.0
     for h in range(1, memory.score.shape[0]):
         evidence = 0.0
         for m in range(memory.std.shape[0]):
@@ -189,7 +190,12 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
         evidence = min(max(evidence, -thresholds.most), thresholds.most)
         if memory.score[h] <= 0.0 and evidence < 0.0:
             memory.since[h] = time
-        memory.score[h] = min(max(memory.score[h] + evidence, 0.0), 2.0 * thresholds.alarm)
+        memory.score[h] = max(memory.score[h] + evidence, 0.0)
+        most = max(most, memory.score[h])
+    if most > 2.0 * thresholds.alarm:
+        # All are lowered alike: what one has more than another tells them apart.
+        for h in range(1, memory.score.shape[0]):
+            memory.score[h] = max(memory.score[h] - (most - 2.0 * thresholds.alarm), 0.0)
 
 
 @part

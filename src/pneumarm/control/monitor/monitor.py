@@ -39,7 +39,7 @@ class MonitorSettings:
     alarm_by_rules: float = 9.0
     """... by the rules, which take more for possible and so give less evidence for the same."""
     lead: float = 4.0
-    """By how much it must exceed that of any other fault, up to one and a half times the alarm."""
+    """By how much that of another fault must exceed it for what was found to be called by the name of the other."""
     most: float = 5.0
     """Evidence that a single reading gives at most."""
     telling: float = 1.5
@@ -335,9 +335,7 @@ class Monitor:
         found = {keys[h]: float(memory.since[h]) for h in known if memory.score[h] > 0}
         if found:
             return found
-        lead = memory.score[best] - memory.score[int(order[1])]
-        alarm = self._thresholds.alarm
-        if memory.score[best] >= (alarm if lead >= self.settings.lead else 1.5 * alarm):
+        if memory.score[best] >= self._thresholds.alarm:
             found[keys[best]] = float(memory.since[best])
         return found
 

@@ -82,7 +82,6 @@ class Kind:
     """Time from the contradiction in which it is to be found [s]."""
 
 
-_CHANGED = ("changed",)
 KINDS = (
     Kind("inlet stuck closed", lambda m, t: StuckValve(muscle=m, begin=t), ("stuck-valve",)),
     Kind("inlet stuck open", lambda m, t: StuckValve(muscle=m, position="open", begin=t), ("stuck-valve",)),
@@ -98,11 +97,14 @@ KINDS = (
     Kind("supply halved", lambda m, t: SupplyLoss(to=0.5, begin=t), ("low-supply",)),
     Kind("potentiometer dead", lambda m, t: DeadPotentiometer(begin=t), ("dead-potentiometer",), 0.067),
     Kind("potentiometer frozen", lambda m, t: FrozenPotentiometer(begin=t), ("frozen-potentiometer",), 0.5),
-    Kind("potentiometer logarithmic", lambda m, t: LogarithmicPotentiometer(begin=t), _CHANGED, 60.0),
+    Kind("potentiometer logarithmic", lambda m, t: LogarithmicPotentiometer(begin=t), ("changed",), 60.0),
     Kind(
-        "potentiometer worn", lambda m, t: WornPotentiometer(angle=5, height=15, contact=8, begin=t), _CHANGED, 60.0
+        "potentiometer worn",
+        lambda m, t: WornPotentiometer(angle=5, height=15, contact=8, begin=t),
+        ("worn-potentiometer",),
+        60.0,
     ),
-    Kind("noise", lambda m, t: SensorNoise(angle=6, pressure=6, begin=t), _CHANGED, 60.0),
+    Kind("noise", lambda m, t: SensorNoise(angle=6, pressure=6, begin=t), ("sensor-noise",), 60.0),
     Kind("torn hose (2000 x leak)", lambda m, t: Leak(muscle=m, factor=2000, begin=t), ("leak",), 60.0),
 )
 

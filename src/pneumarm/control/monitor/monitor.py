@@ -25,7 +25,8 @@ from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
 _DISAGREEMENTS = ("changed", "sensor-noise", "worn-potentiometer")
-"""Kinds of findings with which readings no longer agree with the simulation, so that it proves less of valves."""
+"""Kinds of findings with which readings no longer agree with the simulation, so that it proves less of valves; from
+the least to the most special."""
 _CHANGES = (*_DISAGREEMENTS, "leak")
 """Kinds of findings with which valves do as they are told: what is read is what arm and sensors are like now."""
 
@@ -66,10 +67,10 @@ class MonitorSettings:
     """Log-likelihood ratio from which on the arm counts as changed."""
     alternating: float = 0.3
     """Correlation of residuals with those before them under minus which they are noise of a sensor."""
-    worn: float = 3.0
+    worn: float = 6.0
     """Mean square of the residuals from which on a part of a potentiometer's range counts as worn ..."""
     sound: float = 1.0
-    """... while the median of all parts is below this [both as the residuals usually are]."""
+    """... while a quarter of all parts are below this; both in squares of the residuals that are usual."""
     rail: int = 3
     """Readings on a rail, after a jump there, that show a broken potentiometer."""
     jump: float = 10.0
@@ -349,29 +350,33 @@ class Monitor:
             enough = memory.disagreement[j, q] >= settings.changed and not explained
             if known is None and not enough:
                 continue
-            key = known
-            if known is None or known[0] == "changed":
-                key = (*self._why(j, q), *place)
-                if known is not None and key != known:
+            key: _Key = (*self._why(j, q), *place)
+            if known is not None:
+                if _DISAGREEMENTS.index(key[0]) > _DISAGREEMENTS.index(known[0]):
                     self._rename(known, key)
+                else:
+                    key = known
             found[key] = float(memory.disagreement_since[j, q])
+        for key in self._open:  # elsewhere in its range a worn potentiometer reads as it should
+            if key[0] == "worn-potentiometer" and key[2] is not None and self._worn_at(key[2] - 1) is not None:
+                found.setdefault(key, self.findings[self._open[key]].since)
         return found
 
     def _why(self, j: int, q: int) -> tuple[str, str]:
         """Return what it is a sign of that quantity ``q`` of joint ``j`` does not agree with the simulation."""
         squares, products, _ = self._memory.scatter[j, q]
+        if products >= -self.settings.alternating * squares:
+            return "changed", f"{_QUANTITIES[q]} does not agree with the simulation"
         if q == 0 and (worn := self._worn_at(j)) is not None:
             return "worn-potentiometer", f"its reading is wrong around {worn:.0f} degrees"
-        if products < -self.settings.alternating * squares:
-            return "sensor-noise", f"the reading of {_QUANTITIES[q]} is noisy"
-        return "changed", f"{_QUANTITIES[q]} does not agree with the simulation"
+        return "sensor-noise", f"the reading of {_QUANTITIES[q]} is noisy"
 
     def _worn_at(self, j: int) -> float | None:
         """Return the angle [degrees] around which the potentiometer of joint ``j`` is worn; None where it is not."""
         visits, squares = self._memory.zone[j].T
         seen = visits >= _FEWEST
         bad = seen & (squares > self.settings.worn)
-        if not bad.any() or np.median(squares[seen]) > self.settings.sound:
+        if not bad.any() or np.quantile(squares[seen], 0.25) > self.settings.sound:
             return None
         low, high = self.spec.angle_range
         middle = low + (np.arange(ZONES) + 0.5) / ZONES * (high - low)

@@ -1,8 +1,10 @@
 """How soon the monitor finds faults, whether it names them rightly, and how often it cries wolf.
 
-Every case is an arm of its own draw, a muscle and a moment drawn at random, while the arm is collecting. Times are
-watched time (the arm is not watched while it is brought to a begin state): since the fault began, and for valves
-since the first reading at which what was told and what was done differed in a muscle where it makes a difference.
+Every case is an arm of its own draw, a muscle and a moment drawn at random, while the arm is collecting, or while a
+policy moves it. The same arm without the fault is given the same commands beside it: the *contradiction* is the first
+reading that differs by more than noise does from what that one reads (CONTRADICTS). Times are watched time (the arm
+is not watched while it is brought to a begin state), from the begin of the fault and from the contradiction.
+*Unmarked* are readings from the contradiction on that are not marked, and so may be learned from.
 Healthy hours are collecting from a cold morning on, and movements by a policy before, while and after it adapts.
 Settings come from the environment:
 
@@ -12,46 +14,59 @@ PNEUMARM_FAULTS_HOURS    healthy hours of collecting, 10; and a fifth of that of
 PNEUMARM_FAULTS_FOLDER   where stores, simulations and agents are kept; a temporary folder by default
 """
 
+import math
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm import ControlCycle, Step, guarded
+from pneumarm.arm import Arm, ArmSpec, ControlCycle, Reading, Step, guarded
 from pneumarm.arm.virtual import (
     DeadPotentiometer,
     Fault,
     FrozenPotentiometer,
     Leak,
+    LogarithmicPotentiometer,
+    SensorNoise,
     StuckValve,
     SupplyLoss,
     SwappedMuscles,
     SwappedValves,
     VirtualArm,
+    WornPotentiometer,
     draw_parameters,
 )
-from pneumarm.arm.virtual.parameters import BAR
 from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
-from pneumarm.control import TransferSettings, transfer
-from pneumarm.control.monitor import Finding, Monitor
-from pneumarm.learning import train
+from pneumarm.control import AgentController, TransferSettings, transfer
+from pneumarm.control.monitor import Finding, Monitor, marks_of
+from pneumarm.control.movement import move
+from pneumarm.control.transfer import BEGIN, draw_movement
+from pneumarm.learning import AnyAgent, load_agent, train
 from pneumarm.learning.begin import begin_states
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.fit import FitSettings, fit_store
+from pneumarm.statistics import wilson
 from pneumarm.transitions import CollectSettings, Store, collect
 from pneumarm.transitions.collect import random_actions
+from pneumarm.transitions.rows import Mark, Recorded
+from pneumarm.transitions.watch import Watch
 
 TRANSITIONS = 20_000
 """Transitions that each arm's simulation is fitted to."""
-HEADER = f"{'fault':27}{'found':>9}{'rightly':>9}{'since begin':>16}{'contradiction':>16}{'in 2 s':>8}{'early':>7}"
 WARM_UP = 20.0
 """Healthy watched time before a fault [s]; then up to as long again."""
 PATIENCE = 60.0
 """Watched time after which a fault counts as not found [s]."""
-_LITTLE_AIR, _MUCH_AIR = 0.1 * BAR, 0.7 * BAR  # an outlet makes a difference above, an inlet below
+AFTERWARDS = 20.0
+"""Watched time after a contradiction in which the monitor may go on to say more [s]."""
+CONTRADICTS = (0.5, 0.02)
+"""A reading contradicts that differs by more than this from that of a sound arm [degrees], [bar]."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +78,8 @@ class Kind:
     """Makes the fault of muscle 1 or 2 and a begin."""
     found_as: tuple[str, ...]
     """How it may rightly be called."""
+    within: float = 2.0
+    """Time from the contradiction in which it is to be found [s]."""
 
 
 KINDS = (
@@ -76,29 +93,157 @@ KINDS = (
     ),
     Kind("inlet and outlet swapped", lambda m, t: SwappedValves(muscle=m, begin=t), ("swapped-valves",)),
     Kind("muscles swapped", lambda m, t: SwappedMuscles(muscle=m, begin=t), ("swapped-muscles",)),
-    Kind("supply lost", lambda m, t: SupplyLoss(begin=t), ("low-supply",)),
+    Kind("supply lost", lambda m, t: SupplyLoss(begin=t), ("low-supply",), 0.5),
     Kind("supply halved", lambda m, t: SupplyLoss(to=0.5, begin=t), ("low-supply",)),
-    Kind("potentiometer dead", lambda m, t: DeadPotentiometer(begin=t), ("dead-potentiometer",)),
-    Kind("potentiometer frozen", lambda m, t: FrozenPotentiometer(begin=t), ("frozen-potentiometer",)),
-    Kind("torn hose (2000 x leak)", lambda m, t: Leak(muscle=m, factor=2000, begin=t), ("leak", "stuck-valve")),
+    Kind("potentiometer dead", lambda m, t: DeadPotentiometer(begin=t), ("dead-potentiometer",), 0.067),
+    Kind("potentiometer frozen", lambda m, t: FrozenPotentiometer(begin=t), ("frozen-potentiometer",), 0.5),
+    Kind("potentiometer logarithmic", lambda m, t: LogarithmicPotentiometer(begin=t), ("changed",), 60.0),
+    Kind(
+        "potentiometer worn",
+        lambda m, t: WornPotentiometer(angle=5, height=15, contact=8, begin=t),
+        ("worn-potentiometer",),
+        60.0,
+    ),
+    Kind("noise", lambda m, t: SensorNoise(angle=6, pressure=6, begin=t), ("sensor-noise",), 60.0),
+    Kind("torn hose (2000 x leak)", lambda m, t: Leak(muscle=m, factor=2000, begin=t), ("leak",), 60.0),
 )
+
+
+class Turn(NamedTuple):
+    """What a monitor is shown."""
+
+    reading: Reading
+    valves: NDArray[np.int8] | None
+    first: bool
+    """Whether a sequence begins with it."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """A healthy arm to which a fault happened, as a monitor sees it."""
+
+    spec: ArmSpec
+    turns: list[Turn]
+    begin: int
+    """The first turn that can tell of the fault."""
+    contradiction: int | None
+    """The turn that contradicts; None where none does."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What came of a case."""
+    """What a monitor made of a fault."""
 
-    found: Finding | None
-    """The first finding after the fault began."""
+    kinds: tuple[str, ...]
+    """Of the findings after the fault began, in the order of being found."""
     since_begin: float
-    """Watched time from the begin of the fault until it was found [s]."""
+    """Watched time from the begin of the fault until the first one [s]."""
     since_contradiction: float
-    """... from the first contradiction."""
+    """... from the contradiction."""
+    unmarked: int
+    """Readings from the contradiction until then that are not marked."""
     early: int
     """Findings before the fault began."""
 
 
-def watched_steps(arm: VirtualArm, monitor: Monitor, seed: int) -> Iterator[Step]:
+class Twins(Arm):
+    """A virtual arm, and beside it the same arm without faults under the same commands."""
+
+    def __init__(self, arm: VirtualArm, seed: int) -> None:
+        self.arm, self.spec, self._seed = arm, arm.spec, seed
+        self.sound: VirtualArm | None = None
+        """The other one, once there is a fault."""
+        self.differs = False
+        """Whether their last readings differed by more than noise does."""
+        degrees, bar = CONTRADICTS
+        self._far = np.array([degrees * self.spec.counts_per_degree, bar * self.spec.counts_per_bar])
+
+    def fail(self, fault: Fault) -> None:
+        """Let ``fault`` happen."""
+        self.sound = VirtualArm(self.arm.parameters, seed=self._seed)
+        self.sound.set_state(self.arm.get_state())
+        self.arm.faults = (fault,)
+
+    def level(self) -> None:
+        """Give the sound arm, at rest with closed valves, the air and the angle of the other one."""
+        if self.sound is not None:
+            muscles, joints = self.sound.records.muscles, self.sound.records.joints
+            muscles[...], joints[...] = self.arm.records.muscles, self.arm.records.joints
+            muscles["open"] = muscles["pending"] = 0
+
+    def read(self) -> Reading:
+        reading = self.arm.read()
+        if self.sound is not None:
+            sound = self.sound.read()
+            angle, pressure = abs(reading.angle - sound.angle), abs(reading.pressure - sound.pressure)
+            self.differs = bool((angle > self._far[0]).any() or (pressure > self._far[1]).any())
+        return reading
+
+    def set_valves(self, valves: ArrayLike) -> None:
+        for arm in filter(None, (self.arm, self.sound)):
+            arm.set_valves(valves)
+
+    def wait(self, seconds: float) -> None:
+        for arm in filter(None, (self.arm, self.sound)):
+            arm.wait(seconds)
+
+    def wait_until(self, time: float) -> None:
+        for arm in filter(None, (self.arm, self.sound)):
+            arm.wait_until(time)
+
+    def close(self) -> None:
+        self.arm.close()
+
+
+class Stage:
+    """Lets a fault happen to an arm and keeps what a monitor would see: a ``Watch`` that watches nothing."""
+
+    def __init__(self, twins: Twins, make: Callable[[float], Fault], random: np.random.Generator, watch: float):
+        self.turns: list[Turn] = []
+        self.broke: int | None = None
+        self.contradiction: int | None = None
+        self._twins, self._make, self._random, self._first = twins, make, random, True
+        self._warm = WARM_UP * (1 + random.random()) / twins.spec.period
+        self._watch, self._patience = watch / twins.spec.period, PATIENCE / twins.spec.period
+
+    @property
+    def over(self) -> bool:
+        """Whether enough has been seen."""
+        if self.broke is None:
+            return False
+        after = len(self.turns) - self.broke if self.contradiction is None else len(self.turns) - self.contradiction
+        return after > (self._patience if self.contradiction is None else self._watch)
+
+    def begin(self, *, at_rest: bool) -> None:
+        self._first = True
+        if self.contradiction is None:
+            self._twins.level()
+
+    def see(self, reading: Reading, valves: NDArray[np.int8] | None) -> None:
+        if self.contradiction is None and self._twins.differs and not self._first:
+            self.contradiction = len(self.turns)
+        self.turns.append(Turn(reading, valves, self._first))
+        self._first = False
+        if self.broke is None and len(self.turns) >= self._warm and valves is not None:
+            # Between two readings, so that the first reading that can tell of it is the next one.
+            period = self._twins.spec.period
+            self._twins.fail(self._make(self._twins.arm.time + float(self._random.random()) * period))
+            self.broke = len(self.turns)
+
+    def marks(self, recorded: Recorded) -> tuple[Mark, ...]:
+        return ()
+
+    def spoiled_since(self) -> None:
+        return None
+
+    def get_state(self) -> bytes:
+        return b""
+
+    def set_state(self, state: bytes) -> None:
+        pass
+
+
+def watched_steps(arm: Arm, monitor: Watch, seed: int) -> Iterator[Step]:
     """Collect for ever, as :func:`pneumarm.transitions.collect` does, and yield the turns that ``monitor`` saw."""
     settings, random, guard = CollectSettings(), np.random.default_rng([seed, 7]), guarded(arm)
     while True:
@@ -114,50 +259,48 @@ def watched_steps(arm: VirtualArm, monitor: Monitor, seed: int) -> Iterator[Step
             yield step
 
 
-def played(kind: Kind, arm_seed: int, seed: int, simulation: Simulation | None, patience: float = PATIENCE) -> Case:
-    """Let the fault happen to a healthy arm, and wait until it is found."""
+def play(kind: Kind, arm_seed: int, seed: int, agent: AnyAgent | None = None) -> Played:
+    """Let a fault happen to a healthy arm that collects, or that ``agent`` moves."""
     random = np.random.default_rng([seed, arm_seed])
-    muscle, warm = int(random.integers(1, 3)), WARM_UP * (1 + random.random())
-    arm = VirtualArm(draw_parameters(arm_seed), seed=seed)
-    monitor = Monitor(arm.spec, simulation)
-    period = arm.spec.period
-    fault: Fault | None = None
-    begin = contradicted = None
-    early = passed = 0.0
-    for step in watched_steps(arm, monitor, seed):
-        passed += period
-        if fault is None:
-            if passed >= warm and step.valves is not None:
-                early = len(monitor.findings)
-                # Between two readings, so that the first reading that can tell of it is the next one.
-                fault = kind.make(muscle, arm.time + float(random.random()) * period)
-                arm.faults = (fault,)
-                begin = passed
-            continue
-        if contradicted is None and _contradicts(arm, fault, step):
-            contradicted = passed
-        if len(monitor.findings) > early:
-            since = passed - (begin if contradicted is None else contradicted)
-            return Case(monitor.findings[int(early)], passed - begin, since, int(early))
-        if passed - begin > patience:
-            return Case(None, float("inf"), float("inf"), int(early))
-    raise AssertionError("collecting never ends")
+    muscle = int(random.integers(1, 3))
+    twins = Twins(VirtualArm(draw_parameters(arm_seed), seed=seed), seed)
+    stage = Stage(twins, lambda time: kind.make(muscle, time), random, max(AFTERWARDS, kind.within))
+    if agent is None:
+        for _ in watched_steps(twins, stage, seed):
+            if stage.over:
+                break
+    else:
+        cycle, controller, number = ControlCycle(guarded(twins)), AgentController(agent), 0
+        while not stage.over:
+            drawn, goal = draw_movement(agent.goal_range, seed, True, number)
+            BEGIN.reach(cycle.arm, drawn)
+            move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff, stage)
+            number += 1
+    assert stage.broke is not None
+    return Played(twins.spec, stage.turns, stage.broke, stage.contradiction)
 
 
-def _contradicts(arm: VirtualArm, fault: Fault, step: Step) -> bool:
-    """Whether what the valves were told and what they do differ where it makes a difference."""
-    if step.valves is None:
-        return False
-    sides = arm.records.muscles["open"]
-    pressure = arm.pressure
-    told = np.stack([step.valves == 1, step.valves == -1], axis=-1)
-    done = sides.astype(bool)
-    differs = (told != done) & (arm.records.muscles["pending"] == 0)
-    if isinstance(fault, SupplyLoss):
-        return bool((done[..., 0] & (pressure < _MUCH_AIR)).any())
-    return bool(
-        (differs[..., 0] & (pressure < _MUCH_AIR)).any() or (differs[..., 1] & (pressure > _LITTLE_AIR)).any()
-    )
+def judged(played: Played, simulation: Simulation | None) -> Case:
+    """Return what a monitor makes of what was played."""
+    monitor, period = Monitor(played.spec, simulation), played.spec.period
+    early, found = 0, math.inf
+    for number, turn in enumerate(played.turns):
+        if turn.first:
+            monitor.begin(at_rest=True)
+        if number == played.begin:
+            early = len(monitor.findings)
+        monitor.see(turn.reading, turn.valves)
+        if number >= played.begin and len(monitor.findings) > early and found == math.inf:
+            found = number
+    contradiction = math.inf if played.contradiction is None else played.contradiction
+    kinds = tuple(dict.fromkeys(one.kind for one in monitor.findings[early:]))
+    unmarked = 0
+    if played.contradiction is not None and found < math.inf:
+        time = np.array([turn.reading.time for turn in played.turns[played.contradiction : int(found) + 1]])
+        marks = marks_of(monitor.findings[early:], time, np.arange(len(time)))
+        unmarked = len(time) - sum(mark.last - mark.first + 1 for mark in marks)
+    since = 0.0 if found < contradiction else (found - contradiction) * period
+    return Case(kinds, (found - played.begin + 1) * period, since, unmarked, early)
 
 
 def measure() -> Iterator[str]:
@@ -168,17 +311,25 @@ def measure() -> Iterator[str]:
         folder = Path(os.environ.get("PNEUMARM_FAULTS_FOLDER", temporary))
         folder.mkdir(exist_ok=True)
         simulations = {arm: fitted(folder, arm) for arm in arms}
-        for name, chosen in (("simulation", simulations), ("rules alone", dict.fromkeys(arms, None))):
-            yield f"with {name}; times [s] are medians and 95 %"
+        agents = {arm: trained(folder, arm, simulations[arm]) for arm in arms}
+        lines: dict[str, list[str]] = {"collecting, with simulation": [], "collecting, rules alone": [], "moving": []}
+        for kind in KINDS:
+            collecting, alone, moving = [], [], []
+            for i in range(cases):
+                arm = arms[i % len(arms)]
+                played = play(kind, arm, i)
+                collecting.append(judged(played, simulations[arm]))
+                alone.append(judged(played, None))
+                moving.append(judged(play(kind, arm, i, agents[arm]), simulations[arm]))
+            for name, judgements in zip(lines, (collecting, alone, moving), strict=True):
+                lines[name].append(line(kind, judgements))
+        for name, table in lines.items():
+            yield f"{name}; times [s] are medians and 95 %"
             yield HEADER
-            for kind in KINDS:
-                yield line(
-                    kind, [played(kind, arms[i % len(arms)], i, chosen[arms[i % len(arms)]]) for i in range(cases)]
-                )
-            false, done = healthy_collecting(arms, chosen, hours)
-            yield f"{len(false)} false alarms in {done:.1f} h of healthy collecting {[str(one) for one in false]}"
-        false, done = healthy_movements(folder, arms[:2], simulations, hours / 5)
-        yield f"{len(false)} false alarms in {done:.1f} h of healthy movements {[str(one) for one in false]}"
+            yield from table
+        for name, chosen in (("simulation", simulations), ("rules alone", dict.fromkeys(arms, None))):
+            yield false_alarms(f"collecting, {name}", *healthy_collecting(arms, chosen, hours))
+        yield false_alarms("movements", *healthy_movements(arms[:2], simulations, agents, hours / 5))
     for name, factor, watch in (
         ("3 x", 3.0, 45.0),
         ("1.5 x", 1.5, 540.0),
@@ -188,19 +339,45 @@ def measure() -> Iterator[str]:
         yield leaks_found(arms, name, factor, LeakTest(watch=watch))
 
 
-def line(kind: Kind, cases: list[Case]) -> str:
-    """Return a line of the table."""
-    found = [one for one in cases if one.found is not None]
-    rightly = sum(one.found is not None and one.found.kind in kind.found_as for one in cases)
-    begin, contradiction = (
-        "{:.2f} {:.2f}".format(np.median(values), np.quantile(values, 0.95, method="higher"))
-        for values in ([one.since_begin for one in cases], [one.since_contradiction for one in cases])
-    )
-    soon = np.mean([one.since_contradiction <= 2.0 for one in cases])
+def false_alarms(what: str, found: list[Finding], hours: float) -> str:
+    """Return a line about what was ``found`` in ``hours`` watched of healthy arms."""
+    spoiling = sum(one.spoils for one in found)
     return (
-        f"{kind.name:27}{f'{len(found)}/{len(cases)}':>9}{rightly:>9}{begin:>16}{contradiction:>16}{soon:>8.0%}"
-        f"{sum(one.early for one in cases):>7}"
+        f"{spoiling} false alarms and {len(found) - spoiling} changes in {hours:.1f} h of healthy {what} "
+        f"{list(map(str, found))}"
     )
+
+
+HEADER = (
+    f"{'fault':27}{'found':>9}{'since begin':>13}{'contradiction':>16}{'in time':>26}{'unmarked':>10}{'early':>6}  as"
+)
+
+
+def line(kind: Kind, cases: Sequence[Case]) -> str:
+    """Return a line of the table."""
+    begin, contradiction, unmarked = (
+        "{:.2f} {:.2f}".format(np.median(values), np.quantile(values, 0.95, method="higher"))
+        for values in zip(*((one.since_begin, one.since_contradiction, one.unmarked) for one in cases), strict=True)
+    )
+    soon = [one.since_contradiction < kind.within + 1e-9 for one in cases]
+    low, high = wilson(sum(soon), len(soon))
+    names = Counter(" then ".join(one.kinds) or "nothing" for one in cases)
+    return (
+        f"{kind.name:27}{f'{sum(bool(one.kinds) for one in cases)}/{len(cases)}':>9}{begin:>13}{contradiction:>16}"
+        f"{f'{np.mean(soon):.0%} ({low:.0%}-{high:.0%}) in {kind.within:.2g} s':>26}{unmarked:>10}"
+        f"{sum(one.early for one in cases):>6}  "
+        + ", ".join(f"{name} {count}" for name, count in names.most_common())
+    )
+
+
+def trained(folder: Path, arm: int, simulation: Simulation) -> AnyAgent:
+    """Return an agent trained in ``simulation``."""
+    file = folder / f"{arm}.agent"
+    if not file.exists():
+        with Store.open(folder / f"{arm}.db") as store:
+            begin = begin_states(store, simulation.window, simulation.scaling)
+        train(simulation, begin, None, 1).agent.save(file)
+    return load_agent(file)
 
 
 def fitted(folder: Path, arm: int) -> Simulation:
@@ -217,11 +394,9 @@ def fitted(folder: Path, arm: int) -> Simulation:
 def healthy_collecting(
     arms: list[int], simulations: dict[int, Simulation | None], hours: float
 ) -> tuple[list[Finding], float]:
-    """Return what was found wrong with healthy arms, each collecting from a cold morning on, and the hours watched.
-
-    That an arm has changed is not a false alarm here: the monitor says it of an arm that has warmed up, too.
-    """
-    found, passed = [], 0.0
+    """Return what was found wrong with healthy arms that collect from a cold morning on, and the hours watched."""
+    found: list[Finding] = []
+    passed = 0.0
     for arm in arms:
         opened = VirtualArm(draw_parameters(arm), seed=1000 + arm)
         monitor = Monitor(opened.spec, simulations[arm])
@@ -229,27 +404,24 @@ def healthy_collecting(
             passed += opened.spec.period / 3600
             if opened.time >= hours * 3600 / len(arms):
                 break
-        found += [one for one in monitor.findings if one.spoils]
+        found += monitor.findings
     return found, passed
 
 
 def healthy_movements(
-    folder: Path, arms: list[int], simulations: dict[int, Simulation], hours: float
+    arms: list[int], simulations: dict[int, Simulation], agents: dict[int, AnyAgent], hours: float
 ) -> tuple[list[Finding], float]:
     """Return what was found wrong with healthy arms that a policy moves and adapts to, and the hours that took."""
-    found, seconds = [], 0.0
+    found: list[Finding] = []
+    seconds = 0.0
     for arm in arms:
-        simulation = simulations[arm]
-        with Store.open(folder / f"{arm}.db") as store:
-            begin = begin_states(store, simulation.window, simulation.scaling)
-        agent = train(simulation, begin, None, 1).agent
         opened = VirtualArm(draw_parameters(arm), seed=2000 + arm)
-        monitor = Monitor(opened.spec, simulation)
+        monitor = Monitor(opened.spec, simulations[arm])
         episodes = max(1, round(hours * 3600 / len(arms) / 5.5))
         settings = TransferSettings(episodes=episodes // 2, test_episodes=max(1, episodes // 4))
         with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", opened.spec) as store:
-            transfer(agent, opened, store, settings, seed=arm, watch=monitor)
-        found += [one for one in monitor.findings if one.spoils]
+            transfer(agents[arm], opened, store, settings, seed=arm, watch=monitor)
+        found += monitor.findings
         seconds += opened.time
     return found, seconds / 3600
 

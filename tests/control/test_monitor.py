@@ -6,10 +6,18 @@ from functools import cache
 
 import numpy as np
 import pytest
-from benchmarks.faults import KINDS, played, watched_steps
+from benchmarks.faults import KINDS, false_alarms, fitted, healthy_collecting, judged, play, watched_steps
 
 from pneumarm.arm import Reading
-from pneumarm.arm.virtual import DeadPotentiometer, Leak, StuckValve, SupplyLoss, VirtualArm, draw_parameters
+from pneumarm.arm.virtual import (
+    DeadPotentiometer,
+    Leak,
+    StuckValve,
+    SupplyLoss,
+    VirtualArm,
+    WornPotentiometer,
+    draw_parameters,
+)
 from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control import Finding, Monitor
 from pneumarm.control.monitor import marks_of
@@ -36,28 +44,50 @@ def by_name():
     ("name", "within"),
     [
         ("inlet stuck closed", 4.0),
-        ("inlet stuck open", 8.0),
+        ("inlet stuck open", 4.0),
         ("outlet stuck closed", 4.0),
         ("inlet and outlet swapped", 2.0),
         ("muscles swapped", 2.0),
-        ("supply lost", 4.0),
-        ("potentiometer dead", 0.17),
-        ("potentiometer frozen", 1.0),
+        ("supply lost", 1.0),
+        ("potentiometer dead", 0.07),
+        ("potentiometer frozen", 0.5),
     ],
 )
 def test_finds_faults_with_a_simulation(simulation, name, within):
     for seed in range(3):
-        case = played(by_name()[name], 3, seed, simulation, patience=20.0)
-        assert case.found is not None
+        case = judged(play(by_name()[name], 3, seed), simulation)
+        assert case.kinds[0] in by_name()[name].found_as
         assert case.early == 0
-        assert case.since_contradiction <= within
+        assert case.since_contradiction <= within + 1e-9
+        assert case.unmarked <= 30
+
+
+@pytest.mark.parametrize("name", ["potentiometer dead", "supply lost", "potentiometer worn", "noise"])
+def test_says_nothing_else_of_an_arm_with_one_fault(simulation, name):
+    """A wrong angle misleads whatever expects pressures, and few readings tell a lost supply from a stuck inlet."""
+    kind = by_name()[name]
+    for seed in (0, 1):
+        assert set(judged(play(kind, 3, seed), simulation).kinds) <= set(kind.found_as)
+
+
+def test_a_worn_potentiometer_is_told_with_the_angle(simulation):
+    worn = WornPotentiometer(angle=10.0, width=4.0, height=25.0, contact=15.0)
+    arm = VirtualArm(draw_parameters(3), seed=4, faults=[worn])
+    monitor = Monitor(arm.spec, simulation)
+    for _ in watched_steps(arm, monitor, 4):
+        if any(one.kind == "worn-potentiometer" for one in monitor.findings) or arm.time > 200:
+            break
+    found = monitor.findings[-1]
+    assert {one.kind for one in monitor.findings} <= {"worn-potentiometer", "sensor-noise"}
+    assert (found.kind, found.spoils) == ("worn-potentiometer", False)
+    assert abs(float(found.detail.split()[-2]) - 10.0) < 4.0
 
 
 @pytest.mark.parametrize("name", ["inlet stuck closed", "muscles swapped", "supply lost", "potentiometer dead"])
 def test_finds_faults_before_there_is_a_simulation(name):
     for arm in (1, 2):
-        case = played(by_name()[name], arm, arm, None, patience=30.0)
-        assert case.found is not None
+        case = judged(play(by_name()[name], arm, arm), None)
+        assert case.kinds
         assert case.early == 0
 
 
@@ -75,6 +105,16 @@ def test_leaves_healthy_arms_alone(simulation):
             if arm.time > 300:
                 break
         assert monitor.findings == []
+
+
+@pytest.mark.soak
+def test_cries_wolf_at_most_once_in_ten_hours(tmp_path):
+    arms = list(range(11, 21))
+    simulations = {arm: fitted(tmp_path, arm) for arm in arms}
+    found, hours = healthy_collecting(arms, simulations, 16.0)
+    print(false_alarms("collecting", found, hours))
+    assert hours >= 10.0  # the arms are not watched on their way to begin states
+    assert sum(one.spoils for one in found) <= 1
 
 
 def test_a_fault_that_ends_is_over():
@@ -205,7 +245,7 @@ def test_collecting_gives_up_on_an_arm_that_stays_broken_and_says_why(tmp_path):
     arm = VirtualArm(draw_parameters(3), seed=3, faults=[DeadPotentiometer(begin=15.0), StuckValve(begin=15.0)])
     with (
         Store.for_arm(tmp_path / "db", arm.spec) as store,
-        pytest.raises(ArmFailure, match="stuck-valve"),
+        pytest.raises(ArmFailure, match="dead-potentiometer"),
     ):
         collect(arm, store, 20_000, 3, watch=Monitor(arm.spec))
 
@@ -233,3 +273,18 @@ def test_a_leak_three_times_as_large_is_found_within_a_minute():
         now = leak_test(arm)
         assert now.seconds < 60
         assert leaking(healthy, now).tolist() == [[False, True]]
+
+
+def test_a_tight_muscle_that_leaks_half_as_much_again_is_found_within_ten_minutes():
+    """Arm 4 turns as it leaks, which changes its pressures more than the leak does."""
+    test = LeakTest(watch=540.0)
+    arm = VirtualArm(draw_parameters(4), seed=4)
+    arm.wait(300.0)
+    healthy = leak_test(arm, test)
+    assert not leaking(healthy, leak_test(arm, test), test).any()
+    arm.faults = (Leak(muscle=1, factor=1.5, begin=arm.time),)
+    now = leak_test(arm, test)
+    assert now.seconds < 600
+    assert leaking(healthy, now, test).tolist() == [[True, False]]
+    uncorrected = replace(test, compression=0.0)
+    assert (leak_test(arm, uncorrected).rate[0, 0] - now.rate[0, 0]) > (now.rate - healthy.rate)[0, 0]

@@ -7,9 +7,13 @@ For every hypothesis h the log-likelihood ratio of a reading against the healthy
 (the cumulative sum test: E. S. Page, "Continuous inspection schemes", Biometrika 41, 1954). Residuals follow a
 Student distribution of four degrees of freedom, and a single reading counts for little: what a simulation gets wrong
 in a fast movement must not look like a fault. Where h and the healthy arm differ by little, nothing is summed: there
-a lasting error of the simulation, however small, would prove either in the end. When S_h last was 0 tells since when.
+a lasting error of the simulation, however small, would prove either in the end. The last reading that spoke against h
+while S_h was 0 tells since when: what was read after it may have been spoiled, even where it told nothing.
 Whether the readings agree with the simulation at all is weighed in the same way, against residuals that are several
-times as large as usual.
+times as large as usual. Two figures tell why they may be. Noise of a sensor makes residuals that alternate: it is in
+a reading and, with the other sign, in what is expected of the next, so that of white noise n the residual is about
+n_k+1 - n_k, whose correlation with the one before it is -1/2. A worn potentiometer makes large ones at some angles
+only, so their mean square is kept by angle.
 """
 
 import math
@@ -23,6 +27,10 @@ from pneumarm.kernels import kernel, part
 
 FREEDOM = 4.0
 """Degrees of freedom of the Student distribution of residuals."""
+ZONES = 32
+"""Parts of the range of an angle by which residuals are kept."""
+_VISITS = 30.0  # residuals that the mean square of a zone is over, at most
+_LARGEST = 5.0  # a residual that counts in these figures
 
 
 class Thresholds(NamedTuple):
@@ -31,7 +39,7 @@ class Thresholds(NamedTuple):
     most: float
     """Evidence of a single reading at most."""
     alarm: float
-    """Evidence of a fault from which on it counts as found; evidence is kept up to twice this."""
+    """Evidence of a fault from which on it counts as found; that of none grows beyond twice this."""
     telling: float
     """Expected pressures that differ by less than so many standard deviations tell nothing."""
     inflation: float
@@ -75,11 +83,16 @@ class Memory(NamedTuple):
     score: NDArray[np.float64]
     """S_h, shape (hypotheses,)."""
     since: NDArray[np.float64]
-    """When each was 0 the last time, shape (hypotheses,) [s]."""
+    """When a reading last spoke against each while it was 0, shape (hypotheses,) [s]."""
     disagreement: NDArray[np.float64]
     """Evidence that angle, pressure 1, pressure 2 are not those of the simulation's arm, shape (joints, 3)."""
     disagreement_since: NDArray[np.float64]
     """Shape (joints, 3) [s]."""
+    scatter: NDArray[np.float64]
+    """Residuals of angle, pressure 1, pressure 2 since they began to disagree: sum of squares, sum of products with
+    the one before, the last one; shape (joints, 3, 3)."""
+    zone: NDArray[np.float64]
+    """By part of the range of an angle: residuals in it, and their mean square, shape (joints, ZONES, 2)."""
     same: NDArray[np.float64]
     """By joint: readings of the same angle in a row; since when [s]; least and most pressures meanwhile; (j, 6)."""
     rail: NDArray[np.float64]
@@ -102,6 +115,8 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
         since=np.zeros(hypotheses),
         disagreement=np.zeros((joints, 3)),
         disagreement_since=np.zeros((joints, 3)),
+        scatter=np.zeros((joints, 3, 3)),
+        zone=np.zeros((joints, ZONES, 2)),
         same=np.zeros((joints, 6)),
         rail=np.zeros((joints, 4)),
         expected=np.zeros((hypotheses, 2 * joints)),
@@ -131,6 +146,7 @@ def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pres
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
             weigh_disagreement(thresholds, memory, j, 0, error, time)
+            place_residual(thresholds, memory, j, angle[j], error)
             for side in range(2):
                 m = 2 * j + side
                 error = memory.clock[3] * (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
@@ -155,6 +171,7 @@ def surprise(error):  # type: ignore[no-untyped-def]
 @part
 def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ignore[no-untyped-def]
     """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis."""
+    most = 0.0
     for h in range(1, memory.score.shape[0]):
         evidence = 0.0
         for m in range(memory.std.shape[0]):
@@ -165,15 +182,20 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
                 least = max(least, thresholds.clear)
             telling = abs(difference) > least and not (before > thresholds.full and memory.command[0, m] > 0.0)
             if readings.leak[h, m] > 0.0:
-                telling = is_calm(thresholds, memory, m)
+                telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
             if telling:
                 std = math.sqrt(memory.std[m] ** 2 + (thresholds.unsure * difference) ** 2)
                 evidence += surprise((read - memory.expected[0, m]) / std)
                 evidence -= surprise((read - memory.expected[h, m]) / std)
         evidence = min(max(evidence, -thresholds.most), thresholds.most)
-        if memory.score[h] <= 0.0:
+        if memory.score[h] <= 0.0 and evidence < 0.0:
             memory.since[h] = time
-        memory.score[h] = min(max(memory.score[h] + evidence, 0.0), 2.0 * thresholds.alarm)
+        memory.score[h] = max(memory.score[h] + evidence, 0.0)
+        most = max(most, memory.score[h])
+    if most > 2.0 * thresholds.alarm:
+        # All are lowered alike: what one has more than another tells them apart.
+        for h in range(1, memory.score.shape[0]):
+            memory.score[h] = max(memory.score[h] - (most - 2.0 * thresholds.alarm), 0.0)
 
 
 @part
@@ -189,10 +211,24 @@ def is_calm(thresholds, memory, m):  # type: ignore[no-untyped-def]
 def weigh_disagreement(thresholds, memory, j, q, error, time):  # type: ignore[no-untyped-def]
     """Add the evidence of a standardised residual that residuals are ``apart`` times as large as usual."""
     evidence = surprise(error) - surprise(error / thresholds.apart) - math.log(thresholds.apart)
+    cut, scatter = min(max(error, -_LARGEST), _LARGEST), memory.scatter[j, q]
     if memory.disagreement[j, q] <= 0.0:
         memory.disagreement_since[j, q] = time
+        scatter[0] = scatter[1] = 0.0
+    scatter[0] += cut * cut
+    scatter[1] += cut * scatter[2]
+    scatter[2] = cut
     total = memory.disagreement[j, q] + min(evidence, thresholds.most)
     memory.disagreement[j, q] = min(max(total, 0.0), 2.0 * thresholds.changed)
+
+
+@part
+def place_residual(thresholds, memory, j, angle, error):  # type: ignore[no-untyped-def]
+    """Keep the standardised residual of an ``angle`` [counts] with those at angles like it."""
+    part_of_range = (angle - thresholds.low) / (thresholds.high - thresholds.low)
+    zone = memory.zone[j, min(max(int(ZONES * part_of_range), 0), ZONES - 1)]
+    zone[0] += 1.0
+    zone[1] += (min(error * error, _LARGEST * _LARGEST) - zone[1]) / min(zone[0], _VISITS)
 
 
 @kernel
@@ -212,7 +248,7 @@ def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: 
             rail[2] = 1.0 if not fresh and far > limit else 0.0
         else:
             rail[0] += 1.0
-        if fresh or angle[j] != before or rail[0] > 0.0:
+        if same[0] == 0.0 or angle[j] != before or rail[0] > 0.0:
             same[0], same[1] = 1.0, time
             same[2], same[4] = pressure[j, 0], pressure[j, 0]
             same[3], same[5] = pressure[j, 1], pressure[j, 1]

@@ -27,7 +27,7 @@ from pneumarm.simulation.kernel import (
 )
 from pneumarm.simulation.simulation import Simulation
 
-_ATMOSPHERE = 1.013  # bar
+ATMOSPHERE = 1.013  # bar
 _LEAST_STD = 0.5  # counts; below this the converter's rounding is all there is
 
 
@@ -87,7 +87,7 @@ def rule_parameters(settings: RuleSettings, spec: ArmSpec) -> RuleParameters:
         bar=spec.counts_per_bar,
         before=min(1.0, settings.delay / spec.period),
         compression=settings.compression / spec.counts_per_degree,
-        atmosphere=_ATMOSPHERE * spec.counts_per_bar,
+        atmosphere=ATMOSPHERE * spec.counts_per_bar,
         noise=settings.noise,
         unsure_moving=settings.unsure_moving / spec.counts_per_degree,
     )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, Reading, measured
 from pneumarm.control.monitor.evidence import (
+    ZONES,
     Memory,
     Thresholds,
     new_memory,
@@ -23,8 +24,11 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
-_CHANGES = ("changed", "leak")
-"""Kinds of findings with which valves do as they are told and sensors tell the truth: of another arm than before."""
+_DISAGREEMENTS = ("changed", "sensor-noise", "worn-potentiometer")
+"""Kinds of findings with which readings no longer agree with the simulation, so that it proves less of valves; from
+the least to the most special."""
+_CHANGES = (*_DISAGREEMENTS, "leak")
+"""Kinds of findings with which valves do as they are told: what is read is what arm and sensors are like now."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class MonitorSettings:
     alarm_by_rules: float = 9.0
     """... by the rules, which take more for possible and so give less evidence for the same."""
     lead: float = 4.0
-    """By how much it must exceed that of any other fault, up to one and a half times the alarm."""
+    """By how much that of another fault must exceed it for what was found to be called by the name of the other."""
     most: float = 5.0
     """Evidence that a single reading gives at most."""
     telling: float = 1.5
@@ -61,11 +65,17 @@ class MonitorSettings:
     """An arm has changed whose errors are so many times as large as usual."""
     changed: float = 40.0
     """Log-likelihood ratio from which on the arm counts as changed."""
+    alternating: float = 0.3
+    """Correlation of residuals with those before them under minus which they are noise of a sensor."""
+    worn: float = 6.0
+    """Mean square of the residuals from which on a part of a potentiometer's range counts as worn ..."""
+    sound: float = 1.0
+    """... while a quarter of all parts are below this; both in squares of the residuals that are usual."""
     rail: int = 3
     """Readings on a rail, after a jump there, that show a broken potentiometer."""
     jump: float = 10.0
     """Least angle that counts as a jump onto a rail [degrees]; more where the arm was moving there."""
-    frozen: int = 12
+    frozen: int = 10
     """Equal angles in a row, while the pressures change, that show a potentiometer which is frozen."""
     acted: float = 0.10
     """Change of a pressure that shows that valves act [bar]."""
@@ -89,6 +99,9 @@ class MonitorSettings:
             "fast": 0 < self.fast < math.inf,
             "apart": 1 < self.apart < math.inf,
             "changed": 0 < self.changed < math.inf,
+            "alternating": 0 < self.alternating < 1,
+            "worn": self.sound < self.worn < math.inf,
+            "sound": 0 < self.sound < math.inf,
             "rail": self.rail >= 1,
             "jump": 0 < self.jump < math.inf,
             "frozen": self.frozen >= 2,
@@ -105,7 +118,7 @@ class Finding:
 
     kind: str
     """As the faults of a virtual arm are called; ``low-supply``; ``changed`` where readings no longer agree with the
-    simulation, whatever the reason."""
+    simulation, and neither noise of a sensor nor a worn potentiometer is the reason."""
     detail: str
     """What it is in words."""
     joint: int | None
@@ -138,6 +151,7 @@ class Finding:
         return self.since <= end and (self.until is None or self.until >= begin)
 
 
+_FEWEST = 10  # residuals of which a mean square is taken seriously
 _Key = tuple[str, str, int | None, int | None]
 
 
@@ -198,7 +212,7 @@ class Monitor:
         self._simulation, self._expects = simulation, predictor(simulation)
         self._measured[...] = measured_before
         memory = self._memory
-        memory.disagreement[...] = 0.0
+        memory.disagreement[...] = memory.zone[...] = 0.0
         memory.score[[one.kind in _CHANGES for one in self._hypotheses]] = 0.0
         for key in [key for key in self._open if key[0] in _CHANGES]:
             self._close(key, float(memory.clock[0]))
@@ -233,7 +247,13 @@ class Monitor:
         memory.clock[1] = 0.0
         memory.clock[2] = 1.0 if at_rest else memory.observed.shape[0] + 1.0
         memory.command[...] = 0.0
-        memory.same[...] = memory.rail[...] = 0.0
+        memory.scatter[..., 2] = 0.0
+        broken = {(key[0], key[2]) for key in self._open}
+        for j in range(self.spec.joints):  # what is broken stays so
+            if ("frozen-potentiometer", j + 1) not in broken:
+                memory.same[j] = 0.0
+            if ("dead-potentiometer", j + 1) not in broken:
+                memory.rail[j] = 0.0
 
     def see(self, reading: Reading, valves: NDArray[np.int8] | None) -> None:
         """Weigh a reading and remember the ``valves`` (joints, 2) as applied after it."""
@@ -294,10 +314,14 @@ class Monitor:
 
     def _decide(self, now: float) -> None:
         """Open findings for what has enough evidence, and close those that have none left."""
-        holding: dict[_Key, float] = {}
-        holding |= self._judge_potentiometers()
+        memory = self._memory
+        holding = self._judge_potentiometers()
+        if holding:  # what follows from a wrong angle proves nothing
+            memory.score[...] = 0.0
         holding |= self._judge_valves()
-        holding |= self._judge_agreement(bool(holding) or any(key[0] != "changed" for key in self._open))
+        if any(key[0] not in _CHANGES for key in holding):  # what a fault explains says nothing of the arm
+            memory.disagreement[...] = 0.0
+        holding |= self._judge_agreement(any(key[0] == "leak" for key in holding))
         for key, since in holding.items():
             if key not in self._open:
                 kind, detail, joint, muscle = key
@@ -309,11 +333,18 @@ class Monitor:
 
     def _width(self) -> float:
         """Return how large residuals are, in usual ones: a simulation of another arm is no proof of a stuck valve."""
-        return self.settings.apart if any(key[0] == "changed" for key in self._open) else 1.0
+        return self.settings.apart if any(key[0] in _DISAGREEMENTS for key in self._open) else 1.0
 
     def _close(self, key: _Key, now: float) -> None:
         place = self._open.pop(key)
         self.findings[place] = replace(self.findings[place], until=now)
+
+    def _rename(self, key: _Key, to: _Key) -> None:
+        """Call what is open another name: with few readings several faults look alike."""
+        place = self._open.pop(key)
+        kind, detail, joint, muscle = to
+        self._open[to] = place
+        self.findings[place] = replace(self.findings[place], kind=kind, detail=detail, joint=joint, muscle=muscle)
 
     def _judge_potentiometers(self) -> dict[_Key, float]:
         memory, settings = self._memory, self.settings
@@ -329,18 +360,19 @@ class Monitor:
         return found
 
     def _judge_valves(self) -> dict[_Key, float]:
+        """What was found stays until nothing speaks for it, or is renamed where another fault explains more."""
         memory = self._memory
         order = np.argsort(memory.score)[::-1]
         best = int(order[0])
         keys = [(one.kind, one.detail, one.joint, one.muscle) for one in self._hypotheses]
-        found = {
-            keys[h]: float(memory.since[h]) for h in order.tolist() if keys[h] in self._open and memory.score[h] > 0
-        }
+        known = [h for h in order.tolist() if keys[h] in self._open]
+        if known and memory.score[best] - memory.score[known[0]] >= self.settings.lead:
+            self._rename(keys[known[0]], keys[best])
+            known = [best, *known[1:]]
+        found = {keys[h]: float(memory.since[h]) for h in known if memory.score[h] > 0}
         if found:
             return found
-        lead = memory.score[best] - memory.score[int(order[1])]
-        alarm = self._thresholds.alarm
-        if memory.score[best] >= (alarm if lead >= self.settings.lead else 1.5 * alarm):
+        if memory.score[best] >= self._thresholds.alarm:
             found[keys[best]] = float(memory.since[best])
         return found
 
@@ -349,11 +381,42 @@ class Monitor:
         memory, settings = self._memory, self.settings
         found: dict[_Key, float] = {}
         for j, q in np.argwhere(memory.disagreement > 0).tolist():
-            key = ("changed", f"{_QUANTITIES[q]} does not agree with the simulation", j + 1, q or None)
+            place = (j + 1, q or None)
+            known = next((key for key in self._open if key[0] in _DISAGREEMENTS and key[2:] == place), None)
             enough = memory.disagreement[j, q] >= settings.changed and not explained
-            if enough or key in self._open:
-                found[key] = float(memory.disagreement_since[j, q])
+            if known is None and not enough:
+                continue
+            key: _Key = (*self._why(j, q), *place)
+            if known is not None:
+                if _DISAGREEMENTS.index(key[0]) > _DISAGREEMENTS.index(known[0]):
+                    self._rename(known, key)
+                else:
+                    key = known
+            found[key] = float(memory.disagreement_since[j, q])
+        for key in self._open:  # elsewhere in its range a worn potentiometer reads as it should
+            if key[0] == "worn-potentiometer" and key[2] is not None and self._worn_at(key[2] - 1) is not None:
+                found.setdefault(key, self.findings[self._open[key]].since)
         return found
+
+    def _why(self, j: int, q: int) -> tuple[str, str]:
+        """Return what it is a sign of that quantity ``q`` of joint ``j`` does not agree with the simulation."""
+        squares, products, _ = self._memory.scatter[j, q]
+        if products >= -self.settings.alternating * squares:
+            return "changed", f"{_QUANTITIES[q]} does not agree with the simulation"
+        if q == 0 and (worn := self._worn_at(j)) is not None:
+            return "worn-potentiometer", f"its reading is wrong around {worn:.0f} degrees"
+        return "sensor-noise", f"the reading of {_QUANTITIES[q]} is noisy"
+
+    def _worn_at(self, j: int) -> float | None:
+        """Return the angle [degrees] around which the potentiometer of joint ``j`` is worn; None where it is not."""
+        visits, squares = self._memory.zone[j].T
+        seen = visits >= _FEWEST
+        bad = seen & (squares > self.settings.worn)
+        if not bad.any() or np.quantile(squares[seen], 0.25) > self.settings.sound:
+            return None
+        low, high = self.spec.angle_range
+        middle = low + (np.arange(ZONES) + 0.5) / ZONES * (high - low)
+        return float(self.spec.degrees(np.average(middle, weights=bad * squares)))
 
     # ---- what is known
 

@@ -11,12 +11,18 @@ from pneumarm.transitions import Mark, Recorded, Store, Window, transitions
 from pneumarm.transitions.rows import joinable
 
 
-def recorded(marks=(), n=10):
+def recorded(marks=(), n=10, begin=0.0):
     command = np.zeros((n, 1, 2))
     command[-1] = np.nan
     angle = np.arange(n, dtype=float)[:, None] + 500
     return Recorded(
-        np.arange(n) / 30, angle, np.full((n, 1, 2), 50.0), command, np.arange(n), at_rest=True, marks=tuple(marks)
+        begin + np.arange(n) / 30,
+        angle,
+        np.full((n, 1, 2), 50.0),
+        command,
+        np.arange(n),
+        at_rest=True,
+        marks=tuple(marks),
     )
 
 
@@ -39,8 +45,8 @@ def test_marked_rows_are_left_out_and_no_transition_spans_them(tmp_path):
 def test_rows_can_be_marked_later(tmp_path):
     with Store.create(tmp_path / "db", ArmSpec()) as store:
         run = store.begin_run("test", {})
-        for _ in range(2):
-            store.append(recorded())
+        for begin in (0.0, 1.0):
+            store.append(recorded(begin=begin))
         store.mark(2, [Mark(0, 9, "all of it")])
         assert store.transitions == 9
         assert [set(rows.sequence.tolist()) for rows in store] == [{1}]

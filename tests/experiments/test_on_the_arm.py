@@ -13,6 +13,7 @@ from pneumarm.arm.virtual.parameters import without_noise
 from pneumarm.control.playing import Player
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments import displacement, goal_area, on_the_arm_only, overnight, transfer, transferability
+from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, run_seed, sorted_rows
 from pneumarm.experiments.moving import (
     MOVEMENTS,
@@ -80,7 +81,8 @@ def test_an_experiment_leaves_a_page(name: str, small_material: Material, tmp_pa
     page = write_page(experiment, tmp_path, analysis, rows.runs, rows.arms).read_text()
     assert page.count("data:image/svg") == sum(len(section.figures) for section in analysis.sections) > 0
     results = json.loads((tmp_path / "results.json").read_text())
-    assert len(results["claims"]) == len(analysis.claims) > 0
+    assert len(results["claims"]) == len(analysis.claims)
+    assert {claim.about for claim in analysis.claims} == keys_of(experiment.name)
     assert all(claim["thesis"] for claim in results["claims"])
     assert json.dumps(experiment.settings()) != json.dumps(type(experiment)().settings())
 

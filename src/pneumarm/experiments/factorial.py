@@ -48,10 +48,10 @@ class Said(NamedTuple):
     column: int
     raises: bool
     """Whether it is the higher level that gives more."""
+    about: str
+    """See :attr:`~.experiment.Claim.about`."""
     loss: Spread = "mean"
     """Or std: whether the runs spread more."""
-    about: str = ""
-    """See :attr:`~.experiment.Claim.about`."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Factorial(Experiment):
     def trials(self) -> Mapping[int, str]:
         """Trials of the array."""
         return {
-            trial: ", ".join(f"{label} {level}" for label, level in self.design.settings(trial).items())
+            trial: ", ".join(f"{label} {_level(level)}" for label, level in self.design.settings(trial).items())
             for trial in range(1, self.design.array.trials + 1)
         }
 
@@ -184,10 +184,16 @@ class Factorial(Experiment):
 
     def _best(self, ours: Mapping[str, TableAnalysis]) -> str:
         first = next(iter(ours.values()))
-        settings = ", ".join(f"{self.design.factor(f).name} {level}" for f, level in first.best.settings.items())
+        settings = ", ".join(
+            f"{self.design.factor(f).name} {_level(level)}" for f, level in first.best.settings.items()
+        )
         return f"Best settings by the ranked effects here: {settings}" + (
             f" (trial {first.best.trial})." if first.best.trial else " (not among the trials)."
         )
+
+
+def _level(level: Any) -> str:
+    return f"{level:g}" if isinstance(level, float) else str(level)
 
 
 def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis, effect: Interval) -> Claim:
@@ -195,11 +201,17 @@ def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAna
     column, design = said.column, our.design
     theirs = float(their.effects[said.loss].signed[column - 1])
     factor = design.on(column)
-    what = f"{factor.name} at {factor.levels[-1]}" if factor else f"the higher level of {design.label(column)}"
+    if factor:
+        low, high = (_level(level) for level in (factor.levels[0], factor.levels[-1]))
+        what = f"{factor.name[0].upper()}{factor.name[1:]} {high} instead of {low}"
+    else:
+        what = (
+            f"That {' and '.join(design.factor(label).name for label in design.label(column))} are at unlike levels"
+        )
     of = "" if said.loss == "mean" else "standard deviation of the "
     return Claim(
         f"{what} (column {column}) {'raises' if said.raises else 'lowers'} the {of}{quantity}",
-        f"{theirs:+.2f} ± {their.margin(said.loss):.2f}",
+        str(Interval(theirs, their.margin(said.loss), their.results.shape[1])),
         str(effect),
         above(effect) if said.raises else below(effect),
         said.about,

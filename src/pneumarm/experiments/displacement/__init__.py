@@ -339,31 +339,47 @@ def _claims(rows: Rows, ratio: Interval, displacements: tuple[float, float, floa
     harder = over(values(rows, f"{small}: out of the way", 1) - values(rows, f"{large}: out of the way", 1))
     ringing = mean(rows, f"{middle}: ringing", 1)
     return [
-        Claim("Actions grow with the displacement", said["relation"], plain(of_actions), above(of_actions, 0.5)),
-        Claim("Switches depend on it less", said["relation"], f"correlation less by {plain(less)}", above(less)),
+        Claim(
+            "Actions grow with the displacement",
+            said["relation"],
+            plain(of_actions),
+            above(of_actions, 0.5),
+            "displacement",
+        ),
+        Claim(
+            "Switches depend on it less",
+            said["relation"],
+            f"correlation less by {plain(less)}",
+            above(less),
+            "displacement",
+        ),
         Claim(
             "Short movements make more switches an action: they are less smooth",
             said["ratio"],
             plain(ratio),
             above(ratio),
+            "small-displacements",
         ),
         Claim(
             "Only a few movements switch more than five times (5 % at most)",
             "only a few",
             f"{plain(few, 1, 100)} % do not",
             above(few, 0.95),
+            "displacement",
         ),
         Claim(
             f"Movements of {small} go farther out of the way than those of {large}",
             f"{said['excursion']:g}° in figure 5.18",
             f"{plain(short, 1)}° against {plain(long, 1)}°",
             above(harder),
+            "small-displacements",
         ),
         Claim(
             f"After a movement of {middle} the arm rings by {said['damping']:g}° and more",
             f"{said['damping']:g}° in figure 5.17",
             f"{plain(ringing, 1)}°",
             above(ringing, said["damping"]),
+            "ringing",
         ),
     ]
 

@@ -211,24 +211,28 @@ class EnoughData(Experiment):
                 f"{said['transitions']:,} transitions in two hours were enough",
                 f"reward more: {signed(gain)}",
                 below(gain, _MARGIN),
+                "data",
             ),
             Claim(
                 f"As much again fills few more cells: fewer than {100 * _MUCH:g} % are new in the second half",
                 "a way to check it (section 3.2.3); no number",
                 f"of {self.trials[last]}: {plain(new._replace(mean=100 * new.mean, half=100 * new.half), 1)} %",
                 below(new, _MUCH),
+                "data",
             ),
             Claim(
                 "Fewer transitions would do",
                 "this number might decrease (section 6.1.4)",
                 self._enough(rows) + (self._shown(rows, fewest) if fewest else ""),
                 "open" if fewest is None else "holds" if fewest < usual else "does not hold",
+                "data",
             ),
             Claim(
                 "What fits better moves better: the least data gives less reward on the arm",
                 "follows from section 3.4; no number",
                 f"{self.trials[last]} less {self.trials[1]}: {signed(difference(rows, 'reward', last, 1))}",
                 above(difference(rows, "reward", last, 1)),
+                "data",
             ),
         ]
 

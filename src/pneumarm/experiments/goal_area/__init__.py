@@ -140,14 +140,22 @@ class GoalArea(Experiment):
                     said["slow"],
                     f"{plain(slow, 1, 100)} %",
                     above(slow, 0.5),
+                    "goal-area",
                 ),
                 Claim(
                     "Half the speed at the goal is possible (97 % success and more)",
                     said["pushed"],
                     f"{plain(half_speed, 1, 100)} %",
                     above(half_speed, _NEAR_ALL),
+                    "goal-area",
                 ),
-                Claim("Half the angle costs reward on the arm", "supposed", plain(costs[3]), below(costs[3])),
+                Claim(
+                    "Half the angle costs reward on the arm",
+                    "supposed",
+                    plain(costs[3]),
+                    below(costs[3]),
+                    "goal-area",
+                ),
             ],
         )
 

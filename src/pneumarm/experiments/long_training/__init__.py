@@ -12,6 +12,7 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import ALL, Factorial, Said
+from pneumarm.experiments.findings import training_on_improves, training_on_improves_little, trial_10_is_good
 
 EXPERIMENT = Factorial(
     name="long-training",
@@ -25,4 +26,5 @@ EXPERIMENT = Factorial(
     continued=50_000,
     criteria=("gain", *ALL),
     said=(Said("gain", 4, raises=True, loss="std", about="q-fluctuates"),),
+    findings=(training_on_improves, training_on_improves_little, trial_10_is_good),
 )

@@ -15,6 +15,7 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial
+from pneumarm.experiments.findings import agents_meet_the_criterium
 from pneumarm.learning import Exploration
 
 EXPERIMENT = Factorial(
@@ -28,4 +29,5 @@ EXPERIMENT = Factorial(
     thesis={
         name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
     },
+    findings=(agents_meet_the_criterium,),
 )

@@ -17,7 +17,7 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import above, interval
+from pneumarm.experiments.differences import above, all_hold, interval
 from pneumarm.experiments.evidence import (
     Column,
     difference,
@@ -173,34 +173,34 @@ class NoiseForTransfer(Experiment):
             )
             / 2
         )
-        verdicts = (above(longer), within(much, _MARGIN))
-        both = "holds" if verdicts == ("holds", "holds") else "open"
-        if "does not hold" in verdicts:
-            both = "does not hold"
         return [
             Claim(
                 "Noise makes an agent better on the arm",
                 "[10] found so; seems necessary (section 3.4); no number",
                 f"reward with the thesis' noise less that without: {signed(gain)}",
                 above(gain),
+                "noise",
             ),
             Claim(
                 f"Too much noise ({max(self.factors):g} times) needs more training, to a marginal effect on the arm",
                 "[10] found so; no number",
                 f"{signed(longer, 0)} episodes; reward {signed(much)}, marginal being within {_MARGIN:g}",
-                both,  # type: ignore[arg-type]
+                all_hold([above(longer), within(much, _MARGIN)]),
+                "noise",
             ),
             Claim(
                 "Correlated noise is better than white noise",
                 "taken as more realistic (section 3.4); no number",
                 f"difference of the reward at 1 times: {signed(kind)}",
                 above(kind),
+                "noise-kind",
             ),
             Claim(
                 "Less noise for a slow arm is better",
                 "by figure 3.2; no number",
                 f"difference of the reward at 1 times: {signed(speed)}",
                 above(speed),
+                "noise-kind",
             ),
         ]
 

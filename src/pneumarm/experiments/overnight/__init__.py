@@ -205,11 +205,15 @@ def _claims(frozen: tuple[Interval, Interval], lost: Interval, adapted: Interval
     drop, warmed = frozen
     return [
         Claim(
-            f"{said['hours']:g} h of rest cost the learning agent reward", "a sudden drop", plain(lost), above(lost)
+            f"{said['hours']:g} h of rest cost the learning agent reward",
+            "a sudden drop",
+            plain(lost),
+            above(lost),
+            "overnight",
         ),
-        Claim("They cost an agent that does not learn reward", "expected", plain(drop), above(drop)),
-        Claim("The arm itself comes back as it warms up", recovers, plain(warmed), above(warmed)),
-        Claim("The agent adapts: learning brings back more", recovers, plain(adapted), above(adapted)),
+        Claim("They cost an agent that does not learn reward", "expected", plain(drop), above(drop), "overnight"),
+        Claim("The arm itself comes back as it warms up", recovers, plain(warmed), above(warmed), "overnight"),
+        Claim("The agent adapts: learning brings back more", recovers, plain(adapted), above(adapted), "overnight"),
     ]
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
-from pneumarm.experiments.differences import Interval, above, below
+from pneumarm.experiments.differences import Interval, above, all_hold, below
 from pneumarm.experiments.evidence import (
     Column,
     change,
@@ -302,50 +302,49 @@ class StateHistory(Experiment):
                 "History is necessary: three observations predict all quantities better than one",
                 "a great deal (appendix A); no number",
                 words(history),
-                _all([below(found) for found in history.values()]),
+                all_hold([below(found) for found in history.values()]),
+                "history",
             ),
             Claim(
                 f"One observation more than three changes no error significantly, that is by over {_MARGIN:g} %",
                 "not significantly (appendix A); no number",
                 words(more),
-                _all(verdicts),
+                all_hold(verdicts),
+                "history",
             ),
             Claim(
                 "The length of the step improves the prediction of the angle",
                 "improves the isoplots (section 3.3); no number",
                 words(known),
                 below(known["angle"]),
+                "period",
             ),
             Claim(
                 f"The length of the step has no significant influence, that is none over {_MARGIN:g} %",
                 "no significant influence (appendix A, against section 3.3); no number",
                 words(known),
-                _all([within(found, _MARGIN) for found in known.values()]),
+                all_hold([within(found, _MARGIN) for found in known.values()]),
+                "period",
             ),
             Claim(
                 "An agent with three observations is better on the arm than with one",
                 "not tried",
                 f"reward: {signed(reward)}",
                 above(reward),
+                "history",
             ),
             Claim(
                 f"An agent gains nothing by a fourth, that is no more than {_ENOUGH_REWARD:g}",
                 "not tried",
                 f"reward: {signed(further)}",
                 below(further, _ENOUGH_REWARD),
+                "history",
             ),
         ]
 
 
 def _called(history: int) -> str:
     return "the last observation alone" if history == 1 else f"{history} observations"
-
-
-def _all(verdicts: list[Any]) -> Any:
-    """Return whether something holds of all."""
-    if "does not hold" in verdicts:
-        return "does not hold"
-    return "holds" if all(verdict == "holds" for verdict in verdicts) else "open"
 
 
 def _nested(lines: list[list[str]], columns: list[Column]) -> Table:

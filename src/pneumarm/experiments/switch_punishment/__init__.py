@@ -12,7 +12,7 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial, Said
-from pneumarm.experiments.findings import punishment_halves_switches
+from pneumarm.experiments.findings import punishment_costs_actions, punishment_halves_switches
 
 EXPERIMENT = Factorial(
     name="switch-punishment",
@@ -29,7 +29,7 @@ EXPERIMENT = Factorial(
     said=(
         Said("switches", 12, raises=True, about="punishment"),
         Said("actions", 12, raises=False, about="punishment"),
-        Said("episodes", 12, raises=True, about="punishment"),
+        Said("episodes", 12, raises=True, about="punishment-episodes"),
     ),
-    findings=(punishment_halves_switches,),
+    findings=(punishment_halves_switches, punishment_costs_actions),
 )

@@ -14,6 +14,7 @@ from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.claims import conclusions, judge, keys_of, read_results, sections
 from pneumarm.experiments.experiment import Analysis, Claim, Row, Rows, sorted_rows
 from pneumarm.experiments.factorial import Factorial
+from pneumarm.experiments.findings import weights_dominate
 from pneumarm.experiments.page import write_page
 from pneumarm.experiments.registry import PLACES, experiment
 from pneumarm.experiments.switch_punishment import EXPERIMENT as PUNISHMENT
@@ -148,12 +149,12 @@ def claims(made: Factorial, table: Rows) -> list[Claim]:
 def test_weights_dominate_where_runs_decide_and_not_where_a_column_does() -> None:
     draw = np.random.default_rng(0)
     column = ALL_GOALS.design.array.column(4)
+    _, theirs = ALL_GOALS.analyses(rows(ALL_GOALS, wobble, arms=1))
 
     def said(weights: float, effect: float) -> Claim:
         luck = {(arm, run): weights * draw.normal() for arm in range(3) for run in range(1, 5)}
         table = rows(ALL_GOALS, lambda a, t, r: 50 * a + luck[a, r] + effect * column[t - 1] + draw.normal())
-        (claim,) = (c for c in claims(ALL_GOALS, table) if c.text.startswith("Weights are good or bad"))
-        return claim
+        return weights_dominate(ALL_GOALS, table, {}, theirs)
 
     assert said(weights=10, effect=1).verdict == "holds"
     refuted = said(weights=2, effect=20)

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import msgspec
+import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_table
-from pneumarm.experiments.design.assignment import Design
+from pneumarm.experiments.design.assignment import Design, Factor
 from pneumarm.experiments.design.effects import effects
 from pneumarm.experiments.design.loss import loss
 from pneumarm.experiments.differences import Interval, above, below, interval
@@ -120,13 +121,14 @@ class Factorial(Experiment):
         from pneumarm.experiments.design.page import table_sections
 
         ours, theirs = self.analyses(rows)
-        sections = [side_by_side(self.trials, {n: a.results for n, a in ours.items()}, self.thesis, self.words)]
+        results = {n: a.results for n, a in ours.items()}
+        sections = [side_by_side(self.trials, results, self.thesis, self.words, self.labels)]
         for name, analysis in ours.items():
             if name.startswith(EXPLORING):
                 continue  # these are in the table above; their pictures would double the page
             sections += table_sections(analysis, self.words.get(name, name), name)
         return Analysis(
-            summary=[self.question, self._best(ours)],
+            summary=[self.question, *self._answer(rows, ours)],
             figures={
                 "rows": len(rows.rows),
                 "arms": list(rows.arms),
@@ -141,6 +143,11 @@ class Factorial(Experiment):
             sections=sections,
             claims=self.claims(rows, ours, theirs),
         )
+
+    @property
+    def labels(self) -> str:
+        """What the letters of the factors mean."""
+        return "; ".join(f"{factor.label}: {factor.name}" for factor in self.design.factors) + "."
 
     @property
     def words(self) -> Mapping[str, str]:
@@ -182,14 +189,42 @@ class Factorial(Experiment):
         found = [effects(self.design.array, loss(table, loss_name)) for table in tables]
         return interval([effect.signed[column - 1] for effect in found])
 
-    def _best(self, ours: Mapping[str, TableAnalysis]) -> str:
-        first = next(iter(ours.values()))
+    def _answer(self, rows: Rows, ours: Analyses) -> list[str]:
+        """Return in words which factors surely matter, how much is due to one trial, and which settings are best."""
+        judged_alike = not any(factor.setting.startswith("reward.") for factor in self.design.factors)
+        name = next(iter(ours)) if judged_alike else "switches"
+        analysis, text = ours[name], []
+        if all(len(factor.levels) == _TWO for factor in self.design.factors):
+            found = {f.label: self.effect(rows, name, f.column, analysis) for f in self.design.factors}
+            surely = [
+                f"{self.design.factor(label).name} {_step(self.design.factor(label))} ({effect})"
+                for label, effect in found.items()
+                if abs(effect.mean) > effect.half
+            ]
+            text.append(f"What surely changes the {self.words[name]}: {', '.join(surely) or 'none of the factors'}.")
+            means = analysis.results.mean(axis=1)
+            far = int(np.argmax(np.abs(means - np.median(means))))
+            share = 2 * abs(float(means[far] - np.median(means))) / len(means)
+            text.append(
+                f"Trial {far + 1} is farthest from the others ({means[far]:.2f}, median {np.median(means):.2f}): it "
+                f"alone makes {share:.2f} of every effect and interaction."
+            )
+        return [*text, self._best(analysis)] if judged_alike else text
+
+    def _best(self, first: TableAnalysis) -> str:
         settings = ", ".join(
             f"{self.design.factor(f).name} {_level(level)}" for f, level in first.best.settings.items()
         )
         return f"Best settings by the ranked effects here: {settings}" + (
             f" (trial {first.best.trial})." if first.best.trial else " (not among the trials)."
         )
+
+
+_TWO = 2
+
+
+def _step(factor: Factor) -> str:
+    return f"{_level(factor.levels[-1])} instead of {_level(factor.levels[0])}"
 
 
 def _level(level: Any) -> str:
@@ -202,8 +237,7 @@ def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAna
     theirs = float(their.effects[said.loss].signed[column - 1])
     factor = design.on(column)
     if factor:
-        low, high = (_level(level) for level in (factor.levels[0], factor.levels[-1]))
-        what = f"{factor.name[0].upper()}{factor.name[1:]} {high} instead of {low}"
+        what = f"{factor.name[0].upper()}{factor.name[1:]} {_step(factor)}"
     else:
         what = (
             f"That {' and '.join(design.factor(label).name for label in design.label(column))} are at unlike levels"

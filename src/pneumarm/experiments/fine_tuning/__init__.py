@@ -98,10 +98,11 @@ class FineTuning(Experiment):
         }
         trials = Section(
             "Trials",
+            [self.array.labels],
             figures=[
                 Picture(
-                    forest_figure(list(self.trials.values()), shown),
-                    "Results of the trials, means with their 95 % intervals.",
+                    forest_figure(list(self.trials.values()), shown, reference=-1),
+                    "Results of the trials, means with their 95 % intervals; the line through all is trial 10's.",
                     "; ".join(f"trial {n}: reward {v.mean():.1f}" for n, v in zip(self.trials, reward, strict=True)),
                 )
             ],

@@ -194,7 +194,7 @@ class ShapingSettings(Experiment):
         shown = {name: [interval(values) for values in samples[name]] for name in _SHOWN}
         picture = Picture(
             forest_figure(list(self.trials.values()), {_WORDS[name]: found for name, found in shown.items()}),
-            "Results by settings of shaping, means with their 95 % intervals.",
+            "Results by settings of shaping, means with their 95 % intervals; the line is the thesis' settings.",
             "; ".join(f"{self.trials[n]}: reward {v.mean():.1f}" for n, v in enumerate(tables["reward"], 1)),
         )
         return Section("Results", figures=[picture], tables=[table])

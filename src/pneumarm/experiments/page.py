@@ -1,9 +1,10 @@
 """What an experiment leaves: its page and its results as JSON, drawn from the rows alone."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from pneumarm.console import jsonable
-from pneumarm.experiments.experiment import Analysis, Experiment
+from pneumarm.experiments.experiment import Analysis, Claim, Experiment
 from pneumarm.files import write_json, write_text
 from pneumarm.report.page import Section, Table, render
 
@@ -21,12 +22,25 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     write_json(folder / RESULTS, jsonable({**analysis.figures, **of, "claims": claims}))
     where = f"{experiment.source}. {runs} runs of {len(experiment.trials)} trials on {', '.join(arms)}."
     sections = [*analysis.sections]
+    summary = [where, *analysis.summary]
     if analysis.claims:
+        summary.append(_count(analysis.claims))
         rows = [[c.text, c.thesis, c.ours, c.verdict] for c in analysis.claims]
         table = Table(
             ["claim", "thesis", "here", "verdict"], rows, "What the thesis found, and what holds here.", words=True
         )
         sections.insert(0, Section("Claims", tables=[table]))
     page = folder / PAGE
-    write_text(page, render(experiment.title, [where, *analysis.summary], sections))
+    write_text(page, render(experiment.title, summary, sections))
     return page
+
+
+def _count(claims: Sequence[Claim]) -> str:
+    """Say in words how many claims hold."""
+    holding, refuted, left = (
+        sum(claim.verdict == verdict for claim in claims) for verdict in ("holds", "does not hold", "open")
+    )
+    return (
+        f"Of {len(claims)} claims of the thesis {holding} hold here, {refuted} do not, and {left} are open: their 95 % "
+        "intervals allow both."
+    )

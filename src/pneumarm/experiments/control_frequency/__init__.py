@@ -23,8 +23,10 @@ from pneumarm.experiments.evidence import (
     Column,
     change,
     difference,
+    mean,
     numbers,
     picture,
+    plain,
     samples,
     seen,
     signed,
@@ -166,6 +168,7 @@ class ControlFrequency(Experiment):
         return Analysis(
             summary=[
                 self.question,
+                self._answer(rows),
                 "What is set per action is the same per time at all frequencies: cut-off, discount, cost of an "
                 "action, correlation of the noise. Goals are those of 30 Hz. Values are means over arms with 95 % "
                 "intervals.",
@@ -174,7 +177,11 @@ class ControlFrequency(Experiment):
             sections=[
                 Section(
                     "Error of a step",
-                    ["Standard deviation of the error (eq. 3.6) on sequences that were not fitted."],
+                    [
+                        "Standard deviation of the error (eq. 3.6) on sequences that were not fitted. At 30 Hz (table "
+                        "5.2) the thesis' arm had other muscles and a new potentiometer, so that only its 20 and 40 "
+                        "Hz (table 5.1) can be compared with each other."
+                    ],
                     tables=[table(rows, trials, step, "Tables 5.1 and 5.2 done again.")],
                     figures=[shown(step, "Error of a step against the control frequency (tables 5.1, 5.2).")],
                 ),
@@ -194,6 +201,18 @@ class ControlFrequency(Experiment):
                 ),
             ],
             claims=self.claims(rows),
+        )
+
+    def _answer(self, rows: Rows) -> str:
+        trials = self.trials
+        errors = {
+            name: ", ".join(f"{mean(rows, f'std {name}', trial).mean:.{digits}f}" for trial in trials)
+            for name, digits in (("angle", 2), ("velocity", 3))
+        }
+        rewards = ", ".join(plain(mean(rows, "reward", trial), 1) for trial in trials)
+        return (
+            f"At {', '.join(trials.values())} the error of a step is {errors['angle']} counts of the angle and "
+            f"{errors['velocity']} counts/ms of the velocity; on the arm agents earn {rewards}."
         )
 
     def claims(self, rows: Rows) -> list[Claim]:

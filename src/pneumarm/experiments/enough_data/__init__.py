@@ -129,10 +129,11 @@ class EnoughData(Experiment):
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return coverage, fit and performance by minutes."""
+        said = thesis(__name__)
         coverage = [
-            Column("transitions", "transitions [-]", 0),
+            Column("transitions", "transitions [-]", 0, thesis={self._usual: said["transitions"]}),
             Column("occupied", "cells with data [-]", 0),
-            Column("rows", "filtered set [-]", 0),
+            Column("rows", "filtered set [-]", 0, thesis={self._usual: said["filtered"]}),
             Column("new", "cells new in the second half [%]", 1, 100.0),
             Column("unseen", "further transitions in empty cells [%]", 2, 100.0),
         ]
@@ -176,6 +177,12 @@ class EnoughData(Experiment):
             claims=self.claims(rows),
         )
 
+    @property
+    def _usual(self) -> int:
+        """The trial that is nearest to the thesis' two hours."""
+        wanted = thesis(__name__)["minutes"]
+        return int(np.argmin([abs(minutes - wanted) for minutes in self.minutes])) + 1
+
     def _fewest(self, rows: Rows) -> int | None:
         """Return the first trial from which on no reward is shown to be worse than the last by the margin or more."""
         last = len(self.minutes)
@@ -201,7 +208,7 @@ class EnoughData(Experiment):
         """Return what the thesis says, and what the rows say to it."""
         said = thesis(__name__)
         last = len(self.minutes)
-        usual = int(np.argmin([abs(minutes - said["minutes"]) for minutes in self.minutes])) + 1
+        usual = self._usual
         new = mean(rows, "new", last)
         gain = difference(rows, "reward", last, usual)
         fewest = self._fewest(rows)

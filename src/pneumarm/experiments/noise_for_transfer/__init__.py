@@ -138,6 +138,7 @@ class NoiseForTransfer(Experiment):
         return Analysis(
             summary=[
                 self.question,
+                self._answer(rows),
                 "The noise is that of training; in the test in simulation an agent meets its own. Values are means "
                 "over arms with 95 % intervals.",
             ],
@@ -147,6 +148,17 @@ class NoiseForTransfer(Experiment):
                 Section("Against the amount", figures=pictures),
             ],
             claims=self.claims(rows),
+        )
+
+    def _answer(self, rows: Rows) -> str:
+        gains = {trial: difference(rows, "reward", trial, 1) for trial in self.trials if trial != 1}
+        best = max(gains, key=lambda trial: gains[trial].mean)
+        sure = [self.trials[trial] for trial, gain in gains.items() if gain.low > 0]
+        worse = [self.trials[trial] for trial, gain in gains.items() if gain.high < 0]
+        return (
+            f"On average agents earn most on the arm with {self.trials[best]}: {signed(gains[best])} against none, "
+            f"which looks too good, being the best of {len(gains)}. Taken alone, those surely better than none are: "
+            f"{'; '.join(sure) or 'none of them'}; surely worse: {'; '.join(worse) or 'none of them'}."
         )
 
     def claims(self, rows: Rows) -> list[Claim]:

@@ -117,12 +117,12 @@ class Transferability(Experiment):
         said = thesis(__name__)
         unpunished, unshaped = (over_arms(lost[t] - lost[BASE]) for t in (NO_PUNISHMENT, NO_SHAPING))
         noiseless, louder = (difference(rows, "reward", BASE, NO_NOISE), difference(rows, "reward", TWICE, BASE))
-        base = over_arms(lost[BASE])
         return Analysis(
             summary=[
                 self.question,
-                f"Trial 10 loses {plain(base)} of its reward on the way to the arm. Intervals are over arms, each "
-                "the mean of its runs.",
+                "Of their reward agents lose on the way to the arm: "
+                + "; ".join(f"{words} {plain(over_arms(lost[trial]), 1)}" for trial, words in self.trials.items())
+                + ". Intervals are over arms, each the mean of its runs.",
             ],
             figures={
                 "lost": {words: number(over_arms(lost[trial])) for trial, words in self.trials.items()},

@@ -41,6 +41,6 @@ def _count(claims: Sequence[Claim]) -> str:
         sum(claim.verdict == verdict for claim in claims) for verdict in ("holds", "does not hold", "open")
     )
     return (
-        f"Of {len(claims)} claims of the thesis {holding} hold here, {refuted} do not, and {left} are open: their 95 % "
-        "intervals allow both."
+        f"Of {len(claims)} claims of the thesis {holding} hold here, {refuted} do not, and {left} are open: their "
+        "95 % intervals allow both."
     )

@@ -243,6 +243,7 @@ class StateHistory(Experiment):
         ticks = [str(history) for history in self.histories]
 
         def shown(which: Mapping[int, str], columns: list[Column], caption: str) -> Picture:
+            columns = [replace(column, thesis=None) for column in columns]  # another arm, out of scale
             figure = picture(rows, list(which), self.histories, ticks, "observations in the state [-]", columns)
             return Picture(figure, caption, seen(rows, which, columns))
 
@@ -278,7 +279,7 @@ class StateHistory(Experiment):
                         shown(without, step, "Error of a step by history, the length of the step unknown."),
                         shown(
                             with_period,
-                            [replace(column, thesis=None) for column in step],
+                            step,
                             "Error of a step by history, the length of the step known.",
                         ),
                     ],

@@ -131,7 +131,8 @@ def read_results(laboratory: Path) -> dict[str, Results]:
     """Return the results of all experiments in the folder ``laboratory``, by name.
 
     Raises:
-        UnusableInput: there is no such folder, or a file in it is not what an experiment leaves.
+        UnusableInput: there is no such folder, no experiment was finished in it, or a file in it is not what an
+            experiment leaves.
 
     """
     if not laboratory.is_dir():
@@ -143,6 +144,11 @@ def read_results(laboratory: Path) -> dict[str, Results]:
         except (OSError, msgspec.DecodeError) as error:
             raise UnusableInput(f"{path}: expected results of an experiment ({error}); run it again") from error
         found[results.experiment] = results
+    if not found:
+        raise UnusableInput(
+            f"{laboratory}: expected experiments with results; finish one first, as by pneumarm experiment "
+            f"{next(iter(PLACES))} --out {laboratory}"
+        )
     return found
 
 

@@ -179,8 +179,8 @@ class ControlFrequency(Experiment):
                     "Error of a step",
                     [
                         "Standard deviation of the error (eq. 3.6) on sequences that were not fitted. At 30 Hz "
-                        "(table 5.2) the thesis' arm had other muscles and a new potentiometer, so that only its 20 and 40 "
-                        "Hz (table 5.1) can be compared with each other."
+                        "(table 5.2) the thesis' arm had other muscles and a new potentiometer, so that only its "
+                        "20 and 40 Hz (table 5.1) can be compared with each other."
                     ],
                     tables=[table(rows, trials, step, "Tables 5.1 and 5.2 done again.")],
                     figures=[shown(step, "Error of a step against the control frequency (tables 5.1, 5.2).")],

@@ -123,6 +123,8 @@ def test_a_damaged_result_is_said(tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match="expected the folder of a laboratory"):
         read_results(tmp_path / "nothing")
     (tmp_path / "all-goals").mkdir()
+    with pytest.raises(UnusableInput, match="expected experiments with results; finish one first"):
+        read_results(tmp_path)
     (tmp_path / "all-goals" / "results.json").write_text('{"experiment": "all-goals"}')
     with pytest.raises(UnusableInput, match=r"results.json: expected results of an experiment .*run it again"):
         read_results(tmp_path)

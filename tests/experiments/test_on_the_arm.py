@@ -208,6 +208,7 @@ def test_what_is_a_sample() -> None:
     assert mean(one, "x", 1)[::2] == (2.0, 2)
     assert mean(one, "y", 1).samples == 0
     assert plain(mean(one, "y", 1)) == "none"
+    assert plain(mean(two, "x", 1), 0, factor=-1) == "-5 ± 38"  # half is t(0.975, 1) 12.7 times 3
     assert difference(one, "x", 1, 1).half == 0
     assert over_arms([[1.0, np.nan], [3.0, 3.0]])[::2] == (2.0, 2)
 

@@ -77,7 +77,7 @@ def plain(found: Interval, digits: int = 2, factor: float = 1.0) -> str:
     """Return ``factor`` times a mean and its interval for people."""
     if found.samples == 0:
         return "none"
-    half = f" ± {factor * found.half:.{digits}f}" if math.isfinite(found.half) else ""
+    half = f" ± {abs(factor) * found.half:.{digits}f}" if math.isfinite(found.half) else ""
     return f"{factor * found.mean:.{digits}f}{half}"
 
 

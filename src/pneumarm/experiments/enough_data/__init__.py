@@ -156,7 +156,7 @@ class EnoughData(Experiment):
         places, ticks = list(self.minutes), [f"{minutes:g}" for minutes in self.minutes]
 
         def section(title: str, columns: list[Column], caption: str) -> Section:
-            label = "collecting, on the arm's clock [min]"
+            label = "collecting [min]"
             figure = picture(rows, list(trials), places, ticks, label, columns, log=True)
             shown = Picture(figure, f"{caption} against the minutes of collecting.", seen(rows, trials, columns))
             return Section(title, tables=[table(rows, trials, columns, f"{caption}.")], figures=[shown])

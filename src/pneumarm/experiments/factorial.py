@@ -3,6 +3,7 @@
 The same class does all of them; what they are is data, in the folder of each.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -209,7 +210,18 @@ class Factorial(Experiment):
                 f"Trial {far + 1} is farthest from the others ({means[far]:.2f}, median {np.median(means):.2f}): it "
                 f"alone makes {share:.2f} of every effect and interaction."
             )
+        text.insert(0, self._averages(rows, ours))
         return [*text, self._best(analysis)] if judged_alike else text
+
+    def _averages(self, rows: Rows, ours: Analyses) -> str:
+        """Return in words the means over all trials, and beside them the thesis'."""
+        said = []
+        for name, table in ((name, analysis.results) for name, analysis in ours.items() if name in self.thesis):
+            found = interval(rows.samples(table.mean(axis=0)))
+            digits = 0 if abs(found.mean) >= _THOUSANDS else 2
+            half = f" ± {found.half:.{digits}f}" if math.isfinite(found.half) else ""
+            said.append(f"{self.words[name]} {found.mean:.{digits}f}{half} ({self.thesis[name].mean():.{digits}f})")
+        return f"Means over all trials, in brackets the thesis': {'; '.join(said)}."
 
     def _best(self, first: TableAnalysis) -> str:
         settings = ", ".join(
@@ -220,7 +232,7 @@ class Factorial(Experiment):
         )
 
 
-_TWO = 2
+_TWO, _THOUSANDS = 2, 1000
 
 
 def _step(factor: Factor) -> str:

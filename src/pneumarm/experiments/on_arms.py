@@ -101,7 +101,7 @@ def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], capt
         [words, *(plain(mean(rows, c.figure, trial), c.digits, c.factor) for c in columns)]
         for trial, words in trials.items()
     ]
-    return Table(["", *(column.words for column in columns)], lines, caption)
+    return Table(["trial", *(column.words for column in columns)], lines, caption)
 
 
 class Curve(NamedTuple):

@@ -9,7 +9,7 @@ trained and moved on the arm only without it.
 
 Answer here: three observations, as in the thesis: against one they take a fifth off the error of the angle and three
 fifths off those of the pressures, and agents are better on the arm; no gain by a fourth is shown. The length of steps
-takes some 8 % off the error of the angle, as section 3.3 says and appendix A does not.
+takes some 6 % off the error of the angle, as section 3.3 says and appendix A does not.
 """
 
 from collections.abc import Mapping

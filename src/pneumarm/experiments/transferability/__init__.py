@@ -7,6 +7,10 @@ morning, and all are judged by the same reward, in the simulation with the thesi
 without learning.
 
     pneumarm experiment transferability
+
+Answer here, on five arms: trial 10 loses 3 ± 3 of its reward on the way to the arm, and no other kind of agent surely
+loses more or less. They differ in what they earn in either place: without shaping 12 less on the arm, and without the
+punishment a third of the movements fail, so that no more is lost by the transfer.
 """
 
 from collections.abc import Mapping
@@ -121,7 +125,7 @@ class Transferability(Experiment):
             summary=[
                 self.question,
                 "Of their reward agents lose on the way to the arm: "
-                + "; ".join(f"{words} {plain(over_arms(lost[trial]), 1)}" for trial, words in self.trials.items())
+                + "; ".join(f"{words}: {plain(over_arms(lost[trial]), 1)}" for trial, words in self.trials.items())
                 + ". Intervals are over arms, each the mean of its runs.",
             ],
             figures={
@@ -146,28 +150,28 @@ class Transferability(Experiment):
                 Claim(
                     "Agents that are not punished for switches lose more on the way to the arm",
                     said["punishment"],
-                    plain(unpunished),
+                    f"lost more: {plain(unpunished)}",
                     above(unpunished),
                     "punishment-transfer",
                 ),
                 Claim(
                     "Agents that learned without shaping lose more on the way to the arm",
                     said["shaping"],
-                    plain(unshaped),
+                    f"lost more: {plain(unshaped)}",
                     above(unshaped),
                     "shaping-transfer",
                 ),
                 Claim(
                     "Noise in the simulation raises the reward on the arm",
                     said["noise"],
-                    plain(noiseless),
+                    f"by {plain(noiseless)}",
                     above(noiseless),
                     "noise",
                 ),
                 Claim(
                     f"Twice the noise changes the reward on the arm by less than {_MARGIN:g}",
                     said["more_noise"],
-                    plain(louder),
+                    f"by {plain(louder)}",
                     within(louder, _MARGIN),
                     "noise",
                 ),

@@ -7,7 +7,8 @@ each way and watched every millisecond, which is figure 2.8 measured.
     pneumarm experiment valves-closed --out laboratory
 
 Answer here: the simulation can extrapolate: its error is larger in counts with valves left as they are, but smaller
-in parts of what the arm then moves, which accelerates a third more. That agents gain by it, five arms do not show.
+in parts of what the arm then moves, which accelerates a quarter more. That agents gain by it, in time, switches or
+reward, five arms do not show.
 """
 
 from collections.abc import Mapping

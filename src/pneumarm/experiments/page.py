@@ -20,7 +20,9 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     ]
     of = {"experiment": experiment.name, "arms": list(arms), "runs": runs}
     write_json(folder / RESULTS, jsonable({**analysis.figures, **of, "claims": claims}))
-    where = f"{experiment.source}. {runs} runs of {len(experiment.trials)} trials on {', '.join(arms)}."
+    where = (
+        f"{experiment.source}. {_many(runs, 'run')} of {_many(len(experiment.trials), 'trial')} on {', '.join(arms)}."
+    )
     sections = [*analysis.sections]
     summary = [where, *analysis.summary]
     if analysis.claims:
@@ -35,12 +37,14 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     return page
 
 
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
 def _count(claims: Sequence[Claim]) -> str:
     """Say in words how many claims hold."""
     holding, refuted, left = (
         sum(claim.verdict == verdict for claim in claims) for verdict in ("holds", "does not hold", "open")
     )
-    return (
-        f"Of {len(claims)} claims of the thesis {holding} hold here, {refuted} do not, and {left} are open: their "
-        "95 % intervals allow both."
-    )
+    said = f"{holding} of {len(claims)} claims of the thesis hold here, {refuted} do not"
+    return said + (f", and {left} are open: their 95 % intervals allow both." if left else ".")

@@ -342,7 +342,7 @@ def _claims(rows: Rows, ratio: Interval, displacements: tuple[float, float, floa
         Claim(
             "Actions grow with the displacement",
             said["relation"],
-            plain(of_actions),
+            f"correlation {plain(of_actions)}",
             above(of_actions, 0.5),
             "displacement",
         ),
@@ -356,7 +356,7 @@ def _claims(rows: Rows, ratio: Interval, displacements: tuple[float, float, floa
         Claim(
             "Short movements make more switches an action: they are less smooth",
             said["ratio"],
-            plain(ratio),
+            f"more by {plain(ratio)}",
             above(ratio),
             "small-displacements",
         ),
@@ -370,18 +370,22 @@ def _claims(rows: Rows, ratio: Interval, displacements: tuple[float, float, floa
         Claim(
             f"Movements of {small} go farther out of the way than those of {large}",
             f"{said['excursion']:g}° in figure 5.18",
-            f"{plain(short, 1)}° against {plain(long, 1)}°",
+            f"{_degrees(short)} against {_degrees(long)}",
             above(harder),
             "small-displacements",
         ),
         Claim(
             f"After a movement of {middle} the arm rings by {said['damping']:g}° and more",
             f"{said['damping']:g}° in figure 5.17",
-            f"{plain(ringing, 1)}°",
+            _degrees(ringing),
             above(ringing, said["damping"]),
             "ringing",
         ),
     ]
+
+
+def _degrees(found: Interval) -> str:
+    return f"{plain(found, 1)}°" if found.samples else "no such movements"
 
 
 EXPERIMENT = Displacement()

@@ -164,7 +164,7 @@ class GoalArea(Experiment):
                 Claim(
                     "Half the angle costs reward on the arm",
                     said["smaller"],
-                    plain(costs[3]),
+                    f"reward {plain(costs[3])}",
                     below(costs[3]),
                     "goal-area",
                 ),

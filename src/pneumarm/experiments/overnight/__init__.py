@@ -129,7 +129,7 @@ class Overnight(Experiment):
         found = {trial: _hitch(course_, place) for trial, course_ in courses.items()}
         lost = over_arms((courses[NO_NIGHT] - courses[LEARNING])[:, :, place])
         adapted = over_arms(_gain(courses[LEARNING], place) - _gain(courses[NO_NIGHT], place))
-        names = ["", "drop after the night", "gained on the second day"]
+        names = ["trial", "drop after the night", "gained on the second day"]
         lines = [[days.words, *(plain(one) for one in found[trial])] for trial, days in DAYS.items()]
         return Analysis(
             summary=[
@@ -207,13 +207,31 @@ def _claims(frozen: tuple[Interval, Interval], lost: Interval, adapted: Interval
         Claim(
             f"{said['hours']:g} h of rest cost the learning agent reward",
             "a sudden drop",
-            plain(lost),
+            f"lost: {plain(lost)}",
             above(lost),
             "overnight",
         ),
-        Claim("They cost an agent that does not learn reward", "expected", plain(drop), above(drop), "overnight"),
-        Claim("The arm itself comes back as it warms up", recovers, plain(warmed), above(warmed), "overnight"),
-        Claim("The agent adapts: learning brings back more", recovers, plain(adapted), above(adapted), "overnight"),
+        Claim(
+            "They cost an agent that does not learn reward",
+            "expected",
+            f"lost: {plain(drop)}",
+            above(drop),
+            "overnight",
+        ),
+        Claim(
+            "The arm itself comes back as it warms up",
+            recovers,
+            f"gained: {plain(warmed)}",
+            above(warmed),
+            "overnight",
+        ),
+        Claim(
+            "The agent adapts: learning brings back more",
+            recovers,
+            f"gained more: {plain(adapted)}",
+            above(adapted),
+            "overnight",
+        ),
     ]
 
 

@@ -182,8 +182,8 @@ class Transfer(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                f"On arrival the reward of the agent that does not learn drops by {plain(drop)} from that in the "
-                f"simulation, where it explores as much (thesis: by more than {thesis(__name__)['drop']:g}). Of the "
+                f"On arrival the agent that does not learn loses {plain(drop)} of its reward in the simulation, "
+                f"where it explores as much (thesis: more than {thesis(__name__)['drop']:g}). Of the "
                 f"causes, measured with greedy movements, the largest is: {largest} ({plain(causes[largest])}).",
                 "Intervals are over arms, each the mean of its runs.",
             ],
@@ -230,11 +230,17 @@ class Transfer(Experiment):
         drop = over_arms(_arrival(rows, 1, "reward"))
         success = over_arms(np.mean([blocks(rows, "success_rate", t).mean(axis=-1) for t in RATES], axis=0))
         claims = [
-            Claim("The reward drops on arrival", f"more than {said['drop']:g}", plain(drop), above(drop), "drop"),
+            Claim(
+                "The reward drops on arrival",
+                f"more than {said['drop']:g}",
+                f"lost: {plain(drop)}",
+                above(drop),
+                "drop",
+            ),
             Claim(
                 f"It drops by more than {said['drop']:g}",
                 f"more than {said['drop']:g}",
-                plain(drop),
+                f"lost: {plain(drop)}",
                 above(drop, said["drop"]),
                 "drop",
             ),
@@ -261,7 +267,7 @@ class Transfer(Experiment):
             Claim(
                 "Even the agent that does not learn improves, as the arm warms up",
                 "yes",
-                plain(gained),
+                f"gained: {plain(gained)}",
                 above(gained),
                 "recovery",
             )
@@ -272,7 +278,7 @@ class Transfer(Experiment):
                 Claim(
                     f"The agent that learns with {RATES[trial]:g} ends better than the one that does not learn",
                     "yes",
-                    plain(better),
+                    f"better by {plain(better)}",
                     above(better),
                     "recovery",
                 )
@@ -285,7 +291,7 @@ class Transfer(Experiment):
                 Claim(
                     f"With 0.05 progress is seen after some {said['progress']} movements",
                     "yes",
-                    plain(seen),
+                    f"gained: {plain(seen)}",
                     above(seen),
                     "recovery",
                 )
@@ -330,8 +336,20 @@ def _causes(rows: Rows) -> dict[str, Interval]:
 def _claims_on_causes(causes: Mapping[str, Interval]) -> list[Claim]:
     gap, cold = causes[_MODEL], causes[_COLD]
     return [
-        Claim("The gap between simulation and arm takes reward", "partly; no number", plain(gap), above(gap), _DROP),
-        Claim("That the arm is cold takes reward", "one of the reasons; no number", plain(cold), above(cold), _DROP),
+        Claim(
+            "The gap between simulation and arm takes reward",
+            "partly; no number",
+            f"lost: {plain(gap)}",
+            above(gap),
+            _DROP,
+        ),
+        Claim(
+            "That the arm is cold takes reward",
+            "one of the reasons; no number",
+            f"lost: {plain(cold)}",
+            above(cold),
+            _DROP,
+        ),
     ]
 
 

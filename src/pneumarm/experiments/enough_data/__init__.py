@@ -225,7 +225,7 @@ class EnoughData(Experiment):
                 "a way to check it (section 3.2.3); no number",
                 f"of {self.trials[last]}: {plain(new._replace(mean=100 * new.mean, half=100 * new.half), 1)} %",
                 below(new, _MUCH),
-                "data",
+                "coverage",
             ),
             Claim(
                 "Fewer transitions would do",

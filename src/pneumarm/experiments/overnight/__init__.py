@@ -7,8 +7,9 @@ without a night, because what a learning agent earns goes up and down anyway.
 
     pneumarm experiment overnight
 
-On arms 1 to 5, an agent each and 60,000 transitions, there is no hitch: the agent that never learns loses -4.8 ± 4.0
-after 14 h. What the night does to one that learns (-4 ± 20) is lost in what its reward goes up and down by anyway.
+On arms 1 to 5, four runs each, there is no hitch: the agent that never learns loses -0.1 ± 2.6 of its reward after 14
+h, and the one that learns -1.2 ± 5.1 against the same agent without a night. There is nothing to win back, by warming
+up or by learning.
 """
 
 from collections.abc import Mapping
@@ -136,8 +137,8 @@ class Overnight(Experiment):
                 self.question,
                 f"The night costs the agent that learns {plain(lost)} of its reward, against the same agent without "
                 f"one, and the one that never learns {plain(found[FROZEN][0])}. On the second day the latter gains "
-                f"{plain(found[FROZEN][1])}, as the arm warms up; learning after a night gains {plain(adapted)} more "
-                "than learning without one.",
+                f"{plain(found[FROZEN][1])}, while the arm warms up; learning after a night gains {plain(adapted)} "
+                "more than learning without one.",
                 "Intervals are over arms, each the mean of its runs.",
             ],
             figures={

@@ -46,5 +46,7 @@ def _count(claims: Sequence[Claim]) -> str:
     holding, refuted, left = (
         sum(claim.verdict == verdict for claim in claims) for verdict in ("holds", "does not hold", "open")
     )
-    said = f"{holding} of {len(claims)} claims of the thesis hold here, {refuted} do not"
-    return said + (f", and {left} are open: their 95 % intervals allow both." if left else ".")
+    said = (
+        f"{holding} of {len(claims)} claims of the thesis hold here, {refuted} {'does' if refuted == 1 else 'do'} not"
+    )
+    return said + (f", and {left} {'is' if left == 1 else 'are'} open: 95 % intervals allow both." if left else ".")

@@ -8,6 +8,10 @@ Differences from the thesis: 1000 movements to adapt, not 2500; 60 degrees, not 
 goals of some arms.
 
     pneumarm experiment displacement
+
+Answer here, on five arms: actions grow with the displacement and switches less so, as in the thesis. Short movements
+switch more often an action and go farther out of the way, but by 1.3 ± 0.7 degrees, not 20, and they succeed as often
+as long ones. A quarter of the movements of this learning agent switch more than five times, in the thesis a few.
 """
 
 from collections.abc import Mapping, Sequence
@@ -340,7 +344,7 @@ def _claims(rows: Rows, ratio: Interval, displacements: tuple[float, float, floa
     ringing = mean(rows, f"{middle}: ringing", 1)
     return [
         Claim(
-            "Actions grow with the displacement",
+            "Actions grow clearly with the displacement: the correlation is above 0.5",
             said["relation"],
             f"correlation {plain(of_actions)}",
             above(of_actions, 0.5),

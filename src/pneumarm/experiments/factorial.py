@@ -202,7 +202,9 @@ class Factorial(Experiment):
                 for label, effect in found.items()
                 if abs(effect.mean) > effect.half
             ]
-            text.append(f"What surely changes the {self.words[name]}: {', '.join(surely) or 'none of the factors'}.")
+            text.append(
+                f"What surely has an effect on the {self.words[name]}: {', '.join(surely) or 'none of the factors'}."
+            )
             means = analysis.results.mean(axis=1)
             far = int(np.argmax(np.abs(means - np.median(means))))
             share = 2 * abs(float(means[far] - np.median(means))) / len(means)
@@ -211,7 +213,7 @@ class Factorial(Experiment):
                 f"alone makes {share:.2f} of every effect and interaction."
             )
         text.insert(0, self._averages(rows, ours))
-        return [*text, self._best(analysis)] if judged_alike else text
+        return [*text, self._best(ours.get("reward", analysis))] if judged_alike else text
 
     def _averages(self, rows: Rows, ours: Analyses) -> str:
         """Return in words the means over all trials, and beside them the thesis'."""

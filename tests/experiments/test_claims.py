@@ -4,15 +4,17 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
 from pneumarm.cli import main
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
-from pneumarm.experiments.claims import conclusions, judge, read_results, sections
+from pneumarm.experiments.claims import conclusions, judge, keys_of, read_results, sections
 from pneumarm.experiments.experiment import Analysis, Claim, Row, Rows, sorted_rows
 from pneumarm.experiments.factorial import Factorial
+from pneumarm.experiments.findings import weights_dominate
 from pneumarm.experiments.page import write_page
 from pneumarm.experiments.registry import PLACES, experiment
 from pneumarm.experiments.switch_punishment import EXPERIMENT as PUNISHMENT
@@ -44,17 +46,17 @@ def test_every_conclusion_names_experiments_of_the_thesis() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in PLACES if isinstance(experiment(name), Factorial)])
-def test_effects_are_about_conclusions_that_name_their_experiment(name: str) -> None:
-    keys = {each.key for each in conclusions() if name in each.experiments}
-    for said in experiment(name).said:  # type: ignore[attr-defined]
-        assert said.about in keys
+def test_claims_are_about_all_conclusions_that_name_their_experiment(name: str) -> None:
+    made = experiment(name)
+    assert isinstance(made, Factorial)
+    assert {claim.about for claim in claims(made, rows(made, wobble))} == keys_of(name)
 
 
 def test_verdicts_add_up(tmp_path: Path) -> None:
     verdicts = [("sarsa", "holds"), ("sarsa", "holds"), ("neurons", "holds"), ("neurons", "does not hold")]
     verdicts += [("gamma", "does not hold"), ("gamma", "open"), ("traces", "open"), ("traces", "holds")]
     results(tmp_path, "all-goals", verdicts)
-    results(tmp_path, "no-shaping", [("", "open")])
+    results(tmp_path, "no-shaping", [("shaping-not-indispensable", "open")])
     found = judged(tmp_path)
     expected = {"sarsa": "holds", "neurons": "in part", "gamma": "does not hold", "traces": "open"}
     assert {key: found[key].verdict for key in expected} == expected
@@ -63,6 +65,8 @@ def test_verdicts_add_up(tmp_path: Path) -> None:
     both = found["shaping-not-indispensable"]
     assert len(both.claims) == 1
     assert both.missing == ("shaping-settings",)
+    assert found["sarsa"].explained() == "Verdict: holds."
+    assert found["neurons"].explained() == "Verdict: in part. Holds: neurons. Does not hold: neurons."
 
 
 def test_a_claim_about_nothing_listed_is_not_lost(tmp_path: Path) -> None:
@@ -94,10 +98,33 @@ def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "5 arms, 20 runs" in (tmp_path / "claims.html").read_text()
 
 
+def test_the_table_for_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All conclusions, each followed by its claims, thesis beside ours; the terminal shows the same."""
+    results(tmp_path, "all-goals", [("sarsa", "holds"), ("gamma", "open"), ("sarsa", "does not hold")])
+    with pytest.raises(SystemExit) as ended:
+        main(["claims", "--out", str(tmp_path), "--markdown"])
+    assert ended.value.code == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert {line.count(" | ") for line in lines[2:]} == {4}
+    assert len(lines) == 2 + len(conclusions()) + 3
+    at = next(i for i, line in enumerate(lines) if "SARSA is better" in line)
+    assert lines[at].endswith("| **in part** |")
+    assert lines[at + 1 : at + 3] == [
+        f"| sarsa | 1 | 2 | all-goals: 5 arms, 20 runs | {verdict} |" for verdict in ("holds", "does not hold")
+    ]
+    with pytest.raises(SystemExit):
+        main(["claims", "--out", str(tmp_path)])
+    shown = " ".join(capsys.readouterr().out.split())
+    for each in conclusions():
+        assert each.says in shown
+
+
 def test_a_damaged_result_is_said(tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match="expected the folder of a laboratory"):
         read_results(tmp_path / "nothing")
     (tmp_path / "all-goals").mkdir()
+    with pytest.raises(UnusableInput, match="expected experiments with results; finish one first"):
+        read_results(tmp_path)
     (tmp_path / "all-goals" / "results.json").write_text('{"experiment": "all-goals"}')
     with pytest.raises(UnusableInput, match=r"results.json: expected results of an experiment .*run it again"):
         read_results(tmp_path)
@@ -112,7 +139,7 @@ def rows(made: Factorial, reward: Any, arms: int = 3, runs: int = 4, success: fl
                 value = float(reward(arm, trial, run))
                 names = ("reward", "actions", "switches", "episodes")
                 figures = {name: abs(value) + 1 if name == "switches" else value for name in names}
-                figures |= {"success_rate": success, "learning success_rate": 1.0}
+                figures |= {"success_rate": success, "learning success_rate": 1.0, "gain": value, "met": 1.0}
                 found.append(Row(f"arm {arm}", trial, run, figures, 0.0))
     return sorted_rows(found)
 
@@ -124,17 +151,18 @@ def claims(made: Factorial, table: Rows) -> list[Claim]:
 def test_weights_dominate_where_runs_decide_and_not_where_a_column_does() -> None:
     draw = np.random.default_rng(0)
     column = ALL_GOALS.design.array.column(4)
+    _, theirs = ALL_GOALS.analyses(rows(ALL_GOALS, wobble, arms=1))
 
     def said(weights: float, effect: float) -> Claim:
         luck = {(arm, run): weights * draw.normal() for arm in range(3) for run in range(1, 5)}
         table = rows(ALL_GOALS, lambda a, t, r: 50 * a + luck[a, r] + effect * column[t - 1] + draw.normal())
-        (claim,) = (c for c in claims(ALL_GOALS, table) if c.text.startswith("Weights are good or bad"))
-        return claim
+        return weights_dominate(ALL_GOALS, table, {}, theirs)
 
     assert said(weights=10, effect=1).verdict == "holds"
     refuted = said(weights=2, effect=20)
     assert refuted.verdict == "does not hold"
     assert "the largest column (4)" in refuted.ours
+    assert [said(weights=0, effect=0).verdict for _ in range(20)].count("open") == 20  # whichever column is largest
 
 
 def test_the_share_of_variance_within_settings() -> None:
@@ -177,6 +205,40 @@ def test_switches_are_compared_by_their_ratio() -> None:
     assert 2.7 < float(found[2.0].ours.split()[0]) < 3.0
 
 
+def test_actions_of_successes_follow_from_the_means() -> None:
+    """The punished need a quarter less for a success, but fail more often, so that all movements say the contrary."""
+    punished = PUNISHMENT.design.array.column(12) == PUNISHMENT.design.array.column(12).min()
+    found = []
+    for row in rows(PUNISHMENT, wobble).rows:
+        success, actions = (0.6, 9.0) if punished[row.trial - 1] else (0.9, 12.0)
+        mean = success * (actions + wobble(row.run, row.trial, row.run)) + (1 - success) * PUNISHMENT.base.cutoff
+        found.append(msgspec.structs.replace(row, figures={**row.figures, "actions": mean, "success_rate": success}))
+    of_all, of_successes = (claim for claim in claims(PUNISHMENT, sorted_rows(found)) if "actions" in claim.text)
+    assert of_all.verdict == "holds"
+    assert of_successes.verdict == "does not hold"
+    assert float(of_successes.ours.split()[0]) == pytest.approx(-3, abs=0.1)
+
+
+def test_the_fewest_switches_are_those_of_agents_that_reach_their_goals() -> None:
+    table = rows(ALL_GOALS, lambda a, t, r: 2.0 + wobble(a, t, r))
+    stuck = [
+        msgspec.structs.replace(row, figures={**row.figures, "switches": 0.0, "success_rate": 0.5})
+        if row.trial == 3
+        else row
+        for row in table.rows
+    ]
+    (claim,) = (c for c in claims(ALL_GOALS, sorted_rows(stuck)) if c.about == "fewest-switches")
+    assert claim.verdict == "holds"
+    assert "3.0" in claim.ours
+
+
+def test_trial_10_is_compared_with_the_others() -> None:
+    for more, verdict, rank in ((5.0, "holds", 1), (-5.0, "does not hold", 16)):
+        table = rows(ALL_GOALS, lambda a, t, r, m=more: m * (t == 10) + wobble(a, t, r))
+        (claim,) = (c for c in claims(ALL_GOALS, table) if c.about == "trial-10")
+        assert (claim.verdict, claim.ours.rsplit(" ", 1)[1]) == (verdict, str(rank))
+
+
 def test_success_is_judged_greedy_and_told_learning() -> None:
     for success, verdict in ((0.8, "does not hold"), (1.0, "holds")):
         table = rows(ALL_GOALS, wobble, success=success)
@@ -193,5 +255,4 @@ def test_results_carry_what_claims_need(tmp_path: Path) -> None:
     write_page(ALL_GOALS, tmp_path / "all-goals", analysis, table.runs, table.arms)
     found = read_results(tmp_path)["all-goals"]
     assert (len(found.arms), found.runs) == (3, 4)
-    named = {each.key for each in conclusions() if "all-goals" in each.experiments}
-    assert {claim.about for claim in found.claims} == named
+    assert {claim.about for claim in found.claims} == keys_of("all-goals")

@@ -15,15 +15,16 @@ from pneumarm.experiments.registry import PLACES, experiment
 
 LIST = Path(__file__).parents[2] / "docs" / "figures.md"
 WANTED = (
-    [f"3.{n}" for n in range(1, 6)]
+    ["2.8"]
+    + [f"3.{n}" for n in range(1, 6)]
     + ["4.2", "4.3"]
-    + [f"5.{n}" for n in range(1, 17)]
+    + [f"5.{n}" for n in range(1, 20)]
     + [f"C.{n}" for n in range(1, 36)]
 )
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")]
     for line in LIST.read_text().splitlines()
-    if re.match(r"\| [3-5C]\.", line)
+    if re.match(r"\| [2-5C]\.", line)
 ]
 
 

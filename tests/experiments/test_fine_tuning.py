@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.experiment import Row, Rows, sorted_rows
 from pneumarm.experiments.fine_tuning import EXPERIMENT, returns_figure
 from pneumarm.experiments.registry import experiment
@@ -53,7 +54,7 @@ def test_the_page_has_the_array_and_trial_10() -> None:
     found = EXPERIMENT.analyse(rows({4: 9.0}, {4: 9.0}, runs=2))
     assert found.figures["ours"]["reward"]["best"]["settings"]["a"] == 0.075
     assert any("trial 4" in paragraph for paragraph in found.summary)
-    assert len(found.claims) == 1
+    assert [claim.about for claim in found.claims] == list(keys_of(EXPERIMENT.name))
 
 
 def test_returns_are_sums_of_discounted_rewards() -> None:

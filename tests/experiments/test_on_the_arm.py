@@ -13,6 +13,7 @@ from pneumarm.arm.virtual.parameters import without_noise
 from pneumarm.control.playing import Player
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments import displacement, goal_area, on_the_arm_only, overnight, transfer, transferability
+from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, run_seed, sorted_rows
 from pneumarm.experiments.moving import (
     MOVEMENTS,
@@ -80,7 +81,8 @@ def test_an_experiment_leaves_a_page(name: str, small_material: Material, tmp_pa
     page = write_page(experiment, tmp_path, analysis, rows.runs, rows.arms).read_text()
     assert page.count("data:image/svg") == sum(len(section.figures) for section in analysis.sections) > 0
     results = json.loads((tmp_path / "results.json").read_text())
-    assert len(results["claims"]) == len(analysis.claims) > 0
+    assert len(results["claims"]) == len(analysis.claims)
+    assert {claim.about for claim in analysis.claims} == keys_of(experiment.name)
     assert all(claim["thesis"] for claim in results["claims"])
     assert json.dumps(experiment.settings()) != json.dumps(type(experiment)().settings())
 
@@ -206,6 +208,7 @@ def test_what_is_a_sample() -> None:
     assert mean(one, "x", 1)[::2] == (2.0, 2)
     assert mean(one, "y", 1).samples == 0
     assert plain(mean(one, "y", 1)) == "none"
+    assert plain(mean(two, "x", 1), 0, factor=-1) == "-5 ± 38"  # half is t(0.975, 1) 12.7 times 3
     assert difference(one, "x", 1, 1).half == 0
     assert over_arms([[1.0, np.nan], [3.0, 3.0]])[::2] == (2.0, 2)
 

@@ -9,6 +9,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
+from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.experiment import LaboratorySettings, Row, Rows, sorted_rows
 from pneumarm.experiments.preparation import PLAN, Simulated, simulated
 from pneumarm.experiments.shaping_settings import EXPERIMENT, Material, strategy_figure
@@ -73,6 +74,10 @@ def rows(met: dict[int, float], arms: int = 5, runs: int = 4) -> Rows:
                 figures["met"] = met.get(trial, 1.0)
                 found.append(Row(f"arm {arm}", trial, run, figures, 0.0))
     return sorted_rows(found)
+
+
+def test_claims_are_about_what_the_experiment_tests() -> None:
+    assert {claim.about for claim in EXPERIMENT.analyse(rows({})).claims} == keys_of(EXPERIMENT.name)
 
 
 def verdicts(found: Rows) -> dict[str, str]:

@@ -12,6 +12,7 @@ import pytest
 from toy import Toy
 
 from pneumarm.errors import UnusableInput
+from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import LaboratorySettings, Row, run_seed, sorted_rows
 from pneumarm.experiments.page import write_page
 from pneumarm.experiments.rows import RowWriter, read_rows
@@ -64,6 +65,16 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
         sweep(Toy(), tmp_path, runs=0)
     with pytest.raises(UnusableInput, match="does not exist; create it first"):
         sweep(Toy(), tmp_path / "missing" / "laboratory")
+
+
+def test_settings_that_decided_no_row_are_none(tmp_path: Path) -> None:
+    """Who misspells an arm begins again with any settings; who names an arm twice means one."""
+    with pytest.raises(UnusableInput, match="nosuch"):
+        sweep(ALL_GOALS, tmp_path, ["nosuch"])
+    with pytest.raises(UnusableInput, match="nosuch"):
+        sweep(ALL_GOALS, tmp_path, ["nosuch"], settings=LaboratorySettings(transitions=2400))
+    twice = sweep(Toy(), tmp_path, ["virtual", "virtual"])
+    assert twice.computed == len(twice.rows.rows) == Toy().runs * len(Toy().trials)
 
 
 def test_a_line_cut_short_is_computed_again(tmp_path: Path) -> None:

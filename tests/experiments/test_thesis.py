@@ -146,6 +146,7 @@ def test_another_design(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     [
         ("", "expected a table"),
         ("trial,run 1\n", "it has 1 lines"),
+        ("trial;run 1\n1;2\n", "separated by commas; it has 2 lines, the first 'trial;run 1'"),
         ("trial,run 1\n1,x\n", "line 2"),
         ("trial,run 1\n1,1\n1,2\n", "trial 1 is there twice"),
         ("trial,run 1\n1,1\n3,2\n", "expected the trials 1 to 2"),

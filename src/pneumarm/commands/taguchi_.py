@@ -48,7 +48,13 @@ def analyse_(
         Print one JSON object on stdout and nothing else there.
     """
     read = read_table(results, columns)
-    analysis = analyse_table(load_design(design) if design else thesis_design(), read.results, goal)
+    chosen = load_design(design) if design else thesis_design()
+    if len(read.results) != chosen.array.trials:
+        raise UnusableInput(
+            f"{results}: {chosen.array.name} needs {chosen.array.trials} trials, got {len(read.results)}; give the "
+            "design that they were made by with --design"
+        )
+    analysis = analyse_table(chosen, read.results, goal)
     figures = analysis.figures()
     if confirmation is not None:
         observed = read_table(confirmation, columns).results

@@ -14,7 +14,9 @@ Results = Mapping[str, Sequence[Any] | Array]
 """By criterion the results of every trial: (trials, runs), or an array of runs for each trial."""
 
 
-def side_by_side(trials: Mapping[int, str], ours: Results, thesis: Results, words: Mapping[str, str]) -> Section:
+def side_by_side(
+    trials: Mapping[int, str], ours: Results, thesis: Results, words: Mapping[str, str], labels: str = ""
+) -> Section:
     """Return means and standard deviations over the runs of every trial, ours and the thesis', a table a criterion.
 
     Args:
@@ -22,6 +24,7 @@ def side_by_side(trials: Mapping[int, str], ours: Results, thesis: Results, word
         ours: greedy and, where the test was also made so, exploring.
         thesis: the same, for the criteria that the thesis has.
         words: criteria in words.
+        labels: what the trials' words mean, where they are abbreviated.
 
     """
     tables = []
@@ -34,13 +37,13 @@ def side_by_side(trials: Mapping[int, str], ours: Results, thesis: Results, word
         if name in thesis:
             columns["thesis"] = thesis[name]
         rows = [
-            [str(trial), text, *(mean_and_spread(results[place]) for results in columns.values())]
+            [f"{trial}: {text}", *(mean_and_spread(results[place]) for results in columns.values())]
             for place, (trial, text) in enumerate(trials.items())
         ]
-        text = words.get(name, name)
-        tables.append(Table(["trial", "settings", *columns], rows, f"{text[0].upper()}{text[1:]}."))
+        named = words.get(name, name)
+        tables.append(Table(["trial", *columns], rows, f"{named[0].upper()}{named[1:]}."))
     title = "The thesis beside ours" if thesis else "Trials by criterion"
-    return Section(title, ["Mean ± standard deviation over the runs."], tables=tables)
+    return Section(title, [f"Mean ± standard deviation over all runs. {labels}".strip()], tables=tables)
 
 
 def mean_and_spread(values: Array) -> str:

@@ -5,6 +5,7 @@ on each arm; those differences are the sample. Student's t gives the interval of
 """
 
 import math
+from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike
 from pneumarm.experiments.design.distributions import t_quantile
 
 Verdict = Literal["holds", "does not hold", "open"]
+_HUNDREDS = 100.0
 
 
 class Interval(NamedTuple):
@@ -23,8 +25,10 @@ class Interval(NamedTuple):
     samples: int
 
     def __str__(self) -> str:
-        """Return it for people."""
-        return f"{self.mean:+.2f}" + (f" ± {self.half:.2f}" if math.isfinite(self.half) else "")
+        """Return it for people, hundreds without decimals."""
+        known = math.isfinite(self.half)
+        digits = 0 if max(abs(self.mean), self.half if known else 0.0) >= _HUNDREDS else 2
+        return f"{self.mean:+.{digits}f}" + (f" ± {self.half:.{digits}f}" if known else "")
 
     @property
     def low(self) -> float:
@@ -37,12 +41,20 @@ class Interval(NamedTuple):
         return self.mean + self.half
 
 
-def interval(samples: ArrayLike) -> Interval:
-    """Return the mean of ``samples`` (n,), n at least 1, with its interval by Student's t."""
+def interval(samples: ArrayLike, confidence: float = 0.95) -> Interval:
+    """Return the mean of ``samples`` (n,), n at least 1, with its interval by Student's t.
+
+    What was chosen among several before it is looked at needs more ``confidence`` (:func:`of_the_best`).
+    """
     x = np.asarray(samples, np.float64)
     n = len(x)
-    half = t_quantile(0.95, n - 1) * float(x.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
+    half = t_quantile(confidence, n - 1) * float(x.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
     return Interval(float(x.mean()), half, n)
+
+
+def of_the_best(count: int) -> float:
+    """Return the confidence that leaves 95 % to an interval of the largest of ``count`` (Bonferroni)."""
+    return 1 - 0.05 / count
 
 
 def above(found: Interval, threshold: float = 0.0) -> Verdict:
@@ -55,3 +67,9 @@ def above(found: Interval, threshold: float = 0.0) -> Verdict:
 def below(found: Interval, threshold: float = 0.0) -> Verdict:
     """Return whether what is estimated is below ``threshold``; open while the interval includes it."""
     return above(Interval(-found.mean, found.half, found.samples), -threshold)
+
+
+def all_hold(verdicts: Iterable[Verdict]) -> Verdict:
+    """Return whether something holds of all: it does not where it does not of one, and is open where one is."""
+    found = set(verdicts)
+    return "does not hold" if "does not hold" in found else "open" if "open" in found else "holds"

@@ -155,7 +155,7 @@ def picture(
         if column.thesis:
             compared = True
             there = [(places[i], column.thesis[t]) for i, t in enumerate(trials) if t in column.thesis]
-            axis.plot(*zip(*there, strict=True), color=MIDDLE, marker="s", ls="--")
+            axis.plot(*zip(*there, strict=True), color=MIDDLE, marker="s", ls="none")  # not of one arm: no line
         axis.set_title(textwrap.fill(column.words, _TITLE))
         axis.set_xlabel(label)
         if log:
@@ -167,7 +167,7 @@ def picture(
     handles = [key(DARK, marker="o"), key(GREY, lw=0.7)]
     names = ["mean; bars: its 95 % interval", single]
     if compared:
-        handles.append(key(MIDDLE, "--", marker="s"))
+        handles.append(key(MIDDLE, "none", marker="s"))
         names.append("thesis")
     legend_below(figure, handles, names)
     return figure

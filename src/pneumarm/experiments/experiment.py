@@ -124,9 +124,8 @@ class Claim:
     ours: str
     """Ours, with an interval where there is one."""
     verdict: Literal["holds", "does not hold", "open"]
-    about: str = ""
-    """Which of the thesis' conclusions it is about, by its key in ``claims/conclusions.toml``; by default those of
-    its experiment."""
+    about: str
+    """Which of the thesis' conclusions it is about, by its key in ``claims/conclusions.toml``."""
 
 
 @dataclass(frozen=True)

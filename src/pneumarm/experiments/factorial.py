@@ -3,17 +3,19 @@
 The same class does all of them; what they are is data, in the folder of each.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import msgspec
+import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_table
-from pneumarm.experiments.design.assignment import Design
+from pneumarm.experiments.design.assignment import Design, Factor
 from pneumarm.experiments.design.effects import effects
 from pneumarm.experiments.design.loss import loss
 from pneumarm.experiments.differences import Interval, above, below, interval
@@ -48,10 +50,10 @@ class Said(NamedTuple):
     column: int
     raises: bool
     """Whether it is the higher level that gives more."""
+    about: str
+    """See :attr:`~.experiment.Claim.about`."""
     loss: Spread = "mean"
     """Or std: whether the runs spread more."""
-    about: str = ""
-    """See :attr:`~.experiment.Claim.about`."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class Factorial(Experiment):
     def trials(self) -> Mapping[int, str]:
         """Trials of the array."""
         return {
-            trial: ", ".join(f"{label} {level}" for label, level in self.design.settings(trial).items())
+            trial: ", ".join(f"{label} {_level(level)}" for label, level in self.design.settings(trial).items())
             for trial in range(1, self.design.array.trials + 1)
         }
 
@@ -120,13 +122,14 @@ class Factorial(Experiment):
         from pneumarm.experiments.design.page import table_sections
 
         ours, theirs = self.analyses(rows)
-        sections = [side_by_side(self.trials, {n: a.results for n, a in ours.items()}, self.thesis, self.words)]
+        results = {n: a.results for n, a in ours.items()}
+        sections = [side_by_side(self.trials, results, self.thesis, self.words, self.labels)]
         for name, analysis in ours.items():
             if name.startswith(EXPLORING):
                 continue  # these are in the table above; their pictures would double the page
             sections += table_sections(analysis, self.words.get(name, name), name)
         return Analysis(
-            summary=[self.question, self._best(ours)],
+            summary=[self.question, *self._answer(rows, ours)],
             figures={
                 "rows": len(rows.rows),
                 "arms": list(rows.arms),
@@ -141,6 +144,11 @@ class Factorial(Experiment):
             sections=sections,
             claims=self.claims(rows, ours, theirs),
         )
+
+    @property
+    def labels(self) -> str:
+        """What the letters of the factors mean."""
+        return "; ".join(f"{factor.label}: {factor.name}" for factor in self.design.factors) + "."
 
     @property
     def words(self) -> Mapping[str, str]:
@@ -182,12 +190,59 @@ class Factorial(Experiment):
         found = [effects(self.design.array, loss(table, loss_name)) for table in tables]
         return interval([effect.signed[column - 1] for effect in found])
 
-    def _best(self, ours: Mapping[str, TableAnalysis]) -> str:
-        first = next(iter(ours.values()))
-        settings = ", ".join(f"{self.design.factor(f).name} {level}" for f, level in first.best.settings.items())
+    def _answer(self, rows: Rows, ours: Analyses) -> list[str]:
+        """Return in words which factors surely matter, how much is due to one trial, and which settings are best."""
+        judged_alike = not any(factor.setting.startswith("reward.") for factor in self.design.factors)
+        name = next(iter(ours)) if judged_alike else "switches"
+        analysis, text = ours[name], []
+        if all(len(factor.levels) == _TWO for factor in self.design.factors):
+            found = {f.label: self.effect(rows, name, f.column, analysis) for f in self.design.factors}
+            surely = [
+                f"{self.design.factor(label).name} {_step(self.design.factor(label))} ({effect})"
+                for label, effect in found.items()
+                if abs(effect.mean) > effect.half
+            ]
+            text.append(
+                f"What surely has an effect on the {self.words[name]}: {', '.join(surely) or 'none of the factors'}."
+            )
+            means = analysis.results.mean(axis=1)
+            far = int(np.argmax(np.abs(means - np.median(means))))
+            share = 2 * abs(float(means[far] - np.median(means))) / len(means)
+            text.append(
+                f"Trial {far + 1} is farthest from the others ({means[far]:.2f}, median {np.median(means):.2f}): it "
+                f"alone makes {share:.2f} of every effect and interaction."
+            )
+        text.insert(0, self._averages(rows, ours))
+        return [*text, self._best(ours.get("reward", analysis))] if judged_alike else text
+
+    def _averages(self, rows: Rows, ours: Analyses) -> str:
+        """Return in words the means over all trials, and beside them the thesis'."""
+        said = []
+        for name, table in ((name, analysis.results) for name, analysis in ours.items() if name in self.thesis):
+            found = interval(rows.samples(table.mean(axis=0)))
+            digits = 0 if abs(found.mean) >= _THOUSANDS else 2
+            half = f" ± {found.half:.{digits}f}" if math.isfinite(found.half) else ""
+            said.append(f"{self.words[name]} {found.mean:.{digits}f}{half} ({self.thesis[name].mean():.{digits}f})")
+        return f"Means over all trials, in brackets the thesis': {'; '.join(said)}."
+
+    def _best(self, first: TableAnalysis) -> str:
+        settings = ", ".join(
+            f"{self.design.factor(f).name} {_level(level)}" for f, level in first.best.settings.items()
+        )
         return f"Best settings by the ranked effects here: {settings}" + (
             f" (trial {first.best.trial})." if first.best.trial else " (not among the trials)."
         )
+
+
+_TWO, _THOUSANDS = 2, 1000
+
+
+def _step(factor: Factor) -> str:
+    return f"{_level(factor.levels[-1])} instead of {_level(factor.levels[0])}"
+
+
+def _level(level: Any) -> str:
+    return f"{level:g}" if isinstance(level, float) else str(level)
 
 
 def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis, effect: Interval) -> Claim:
@@ -195,11 +250,16 @@ def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAna
     column, design = said.column, our.design
     theirs = float(their.effects[said.loss].signed[column - 1])
     factor = design.on(column)
-    what = f"{factor.name} at {factor.levels[-1]}" if factor else f"the higher level of {design.label(column)}"
+    if factor:
+        what = f"{factor.name[0].upper()}{factor.name[1:]} {_step(factor)}"
+    else:
+        what = (
+            f"That {' and '.join(design.factor(label).name for label in design.label(column))} are at unlike levels"
+        )
     of = "" if said.loss == "mean" else "standard deviation of the "
     return Claim(
         f"{what} (column {column}) {'raises' if said.raises else 'lowers'} the {of}{quantity}",
-        f"{theirs:+.2f} ± {their.margin(said.loss):.2f}",
+        str(Interval(theirs, their.margin(said.loss), their.results.shape[1])),
         str(effect),
         above(effect) if said.raises else below(effect),
         said.about,

@@ -4,14 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.experiments.design.anova import Source, anova
-from pneumarm.experiments.differences import Interval, Verdict, above, interval
+from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best
 from pneumarm.experiments.evidence import within
 from pneumarm.experiments.experiment import Claim, Rows
 from pneumarm.experiments.factorial import Analyses, Factorial
 from pneumarm.experiments.trainings import LEARNING
 
-_SURELY = 0.05  # probability by chance below which an effect counts
 _NEARLY_ALL = 0.95  # success rate: what the criterium demands (section 4.3.2)
+_SMALLEST = 1e-9
+_FEWEST = 2.5  # switches (section 5.4.2)
+_TRIAL_10 = 10
 _MARGINAL = 8.0  # reward: what a switch costs (section 5.4.1)
 _TRACES, _PUNISHMENT = 11, 12  # columns of table 5.3; in appendix C.1 the second holds the punishment
 
@@ -41,17 +43,14 @@ def _within_settings(table: NDArray[np.float64]) -> float:
 def weights_dominate(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
     """Compare what runs, that is initial weights, make of the reward with what any column does.
 
-    Shares are of the sum of squares within arms, without what chance would contribute; the runs and columns of
-    several arms are added up, so that no difference between arms counts as one of weights.
+    Shares are of the sum of squares within arms, without what chance would contribute, so that no difference between
+    arms counts as one of weights.
     """
     names = [str(column) for column in range(1, made.design.array.columns + 1)]
     trials = list(made.trials)
-    found = [
-        anova(made.design.array, rows.table("reward", trials, arm), names)
-        for arm in rows.arms
-        if rows.table("reward", trials, arm).shape[1] > 1
-    ]
-    thesis = anova(made.design.array, theirs["reward"].results, names)
+    tables = [rows.table("reward", trials, arm) for arm in rows.arms]
+    found = [_shares(anova(made.design.array, table, names)) for table in tables if table.shape[1] > 1]
+    thesis = _shares(anova(made.design.array, theirs["reward"].results, names))
     text, verdict = _dominance(found) if found else ("one run", "open")
     return Claim(
         "Weights are good or bad whatever the settings: they explain more than any factor or interaction",
@@ -62,28 +61,24 @@ def weights_dominate(made: Factorial, rows: Rows, ours: Analyses, theirs: Analys
     )
 
 
-def _dominance(tables: list[tuple[Source, ...]]) -> tuple[str, Verdict]:
-    """Return in words how much runs and the largest column explain, and whether the runs surely do so."""
-    error = sum(t[-2].squares for t in tables) / sum(t[-2].freedom for t in tables)
-    total = sum(t[-1].squares for t in tables)
-    shares = {}
-    for sources in zip(*(t[:-2] for t in tables), strict=True):
-        squares, freedom = sum(s.squares for s in sources), sum(s.freedom for s in sources)
-        shares[sources[0].name] = max(0.0, squares - freedom * error) / total if total > 0 else 0.0
-    weights = shares.pop("runs")
-    largest = max(shares, key=shares.__getitem__)
-    p = max(t[-3].p for t in tables) if len(tables) == 1 else _least_known([t[-3].p for t in tables])
-    text = (
-        f"weights {100 * weights:.1f} % of the variance, the largest column ({largest}) {100 * shares[largest]:.1f} %"
-    )
-    if not p < _SURELY:
-        return f"{text}; the weights are not told from chance (p = {p:.2g})", "open"
-    return f"{text} (p = {p:.2g})", "holds" if weights > shares[largest] else "does not hold"
+def _shares(sources: tuple[Source, ...]) -> dict[str, float]:
+    """Return the shares of variance of all sources but the last two, the rest and the total; 0 of no variance."""
+    *known, rest, total = sources
+    error = rest.squares / rest.freedom
+    return {s.name: (s.squares - s.freedom * error) / total.squares if total.squares > 0 else 0.0 for s in known}
 
 
-def _least_known(p: list[float]) -> float:
-    """Return the probability that chance alone makes the smallest of ``p`` so small (Bonferroni)."""
-    return min(1.0, len(p) * min(p))
+def _dominance(shares: list[dict[str, float]]) -> tuple[str, Verdict]:
+    """Return in words how much runs and the largest column explain on arms, and whether the runs surely explain more.
+
+    The largest column is chosen among all, so more than the usual confidence is asked for.
+    """
+    by_source = {name: np.array([each[name] for each in shares]) for name in shares[0]}
+    weights = by_source.pop("runs")
+    largest = max(by_source, key=lambda name: float(by_source[name].mean()))
+    text = f"weights {_percent(interval(weights))} of the variance, the largest column ({largest}) "
+    text += _percent(interval(by_source[largest]))
+    return text, above(interval(weights - by_source[largest], of_the_best(len(by_source))))
 
 
 def traces_are_marginal(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
@@ -115,6 +110,104 @@ def nearly_all_succeed(made: Factorial, rows: Rows, ours: Analyses, theirs: Anal
     )
 
 
+def fewest_switches(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Ask whether 2.5 switches are the least that a movement takes, of agents that reach their goals."""
+    switches, success = (rows.table(name, list(made.trials)) for name in ("switches", "success_rate"))
+    able = np.where(success >= _NEARLY_ALL, switches, np.inf).reshape(len(made.trials), len(rows.arms), -1)
+    fewest = able.min(axis=(0, 2))
+    their = float(theirs["switches"].results.min())
+    text = (
+        f"All agents that reach {100 * _NEARLY_ALL:.0f} % of their goals switch {_FEWEST} times a movement and more"
+    )
+    if not np.isfinite(fewest).all():
+        return Claim(text, f"at least {their:.2f} (table C.9)", "no such agents on an arm", "open", "fewest-switches")
+    found = interval(fewest)
+    return Claim(
+        text,
+        f"at least {their:.2f} (table C.9)",
+        f"the fewest of any agent, mean over arms: {_value(found)}",
+        above(found, _FEWEST),
+        "fewest-switches",
+    )
+
+
+def trial_10_is_good(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Compare trial 10 with what the other trials do on average, and tell its rank."""
+    reward = rows.table("reward", list(made.trials))
+    others = np.arange(1, len(reward) + 1) != _TRIAL_10
+    found = interval(rows.samples(reward[_TRIAL_10 - 1] - reward[others].mean(axis=0)))
+    their = theirs["reward"].results
+    more = float(their[_TRIAL_10 - 1].mean() - their[others].mean())
+    return Claim(
+        "Trial 10 earns more than the other trials do on average",
+        f"{more:+.2f}, rank {_rank(their)} of {len(their)}",
+        f"{found}, rank {_rank(reward)}",
+        above(found),
+        "trial-10",
+    )
+
+
+def _rank(reward: NDArray[np.float64]) -> int:
+    means = reward.mean(axis=1)
+    return 1 + int((means > means[_TRIAL_10 - 1]).sum())
+
+
+def training_on_improves(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Ask whether training on raises the reward."""
+    found, their = _gains(made, rows, theirs)
+    return Claim("Training on raises the reward", their, str(found), above(found), "long-training")
+
+
+def training_on_improves_little(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Ask whether training on changes the reward by less than the price of a switch."""
+    found, their = _gains(made, rows, theirs)
+    text = f"It raises it by little: less than a switch costs ({_MARGINAL:g})"
+    return Claim(text, their, str(found), below(found, _MARGINAL), "long-training")
+
+
+def _gains(made: Factorial, rows: Rows, theirs: Analyses) -> tuple[Interval, str]:
+    """Return the mean gain over trials, and the thesis' in words."""
+    gain, their = rows.table("gain", list(made.trials)), theirs["gain"].results
+    words = f"{their.mean():+.2f}; {int((their > 0).sum())} of {their.size} results are better (table 5.8)"
+    return interval(rows.samples(gain.mean(axis=0))), words
+
+
+def agents_meet_the_criterium(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Ask whether nearly all agents meet the criterium."""
+    met = rows.table("met", list(made.trials))
+    found, count = interval(rows.samples(met.mean(axis=0))), theirs["episodes"].results.size
+    return Claim(
+        f"Without shaping nearly all agents ({100 * _NEARLY_ALL:.0f} %) meet the criterium of training",
+        f"all {count} (table C.22)",
+        f"{_percent(found)}: {int(met.sum())} of {met.size}",
+        above(found, _NEARLY_ALL),
+        "shaping-not-indispensable",
+    )
+
+
+def punishment_costs_actions(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Compare the actions of movements that reach their goal, with the punishment and without.
+
+    A movement that fails takes as many actions as are allowed, so those of the others follow from both means. In the
+    thesis nearly none fails.
+    """
+    at = made.design.array.column(_PUNISHMENT)
+    actions, success = (rows.table(name, list(made.trials)) for name in ("actions", "success_rate"))
+    won = np.where(success > 0, (actions - made.base.cutoff * (1 - success)) / np.maximum(success, _SMALLEST), np.nan)
+
+    def less(table: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.nanmean(table[at == at.min()], axis=0) - np.nanmean(table[at == at.max()], axis=0))
+
+    found = interval(rows.samples(less(won)))
+    return Claim(
+        "With the punishment movements that reach their goal take more actions",
+        f"{interval(less(theirs['actions'].results)).mean:+.2f} of all movements, nearly all successful",
+        str(found),
+        above(found),
+        "punishment",
+    )
+
+
 def punishment_halves_switches(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
     """Compare the switches of agents that are punished for them with those of agents that are not."""
     at = made.design.array.column(_PUNISHMENT)
@@ -125,7 +218,7 @@ def punishment_halves_switches(made: Factorial, rows: Rows, ours: Analyses, thei
     return Claim(
         "Without the punishment there are more than twice as many switches",
         f"{interval(their).mean:.2f} times (appendix C.1)",
-        f"{found.mean:.2f} ± {found.half:.2f} times",
+        f"{_value(found)} times",
         above(found, 2.0),
         "punishment",
     )
@@ -134,6 +227,10 @@ def punishment_halves_switches(made: Factorial, rows: Rows, ours: Analyses, thei
 def _ratio(switches: NDArray[np.float64], level: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return how many times the switches (trials, runs) at the last level are those at the first, by run."""
     return np.asarray(switches[level == level.max()].mean(axis=0) / switches[level == level.min()].mean(axis=0))
+
+
+def _value(found: Interval) -> str:
+    return f"{found.mean:.2f}" + (f" ± {found.half:.2f}" if np.isfinite(found.half) else "")
 
 
 def _percent(found: Interval) -> str:

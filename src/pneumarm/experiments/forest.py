@@ -12,12 +12,13 @@ _SHORT = 60  # characters of an axis label on a line
 
 
 @styled
-def forest_figure(names: Sequence[str], quantities: Mapping[str, Sequence[Interval]]) -> Figure:
-    """Draw a panel a quantity, and in it a line a trial: its mean and 95 % interval. The first is the reference.
+def forest_figure(names: Sequence[str], quantities: Mapping[str, Sequence[Interval]], reference: int = 0) -> Figure:
+    """Draw a panel a quantity, and in it a line a trial: its mean and 95 % interval.
 
     Args:
         names: of the trials, from top to bottom.
         quantities: intervals of every trial by what they are of, which becomes the label of the axis.
+        reference: place of the trial whose means are drawn through all lines.
 
     """
     figure, axes = panels(1, len(quantities), 0.9 + 0.24 * len(names), sharey=True)
@@ -25,7 +26,7 @@ def forest_figure(names: Sequence[str], quantities: Mapping[str, Sequence[Interv
     for axis, (label, found) in zip(axes[0], quantities.items(), strict=True):
         means = [each.mean for each in found]
         halves = [each.half if np.isfinite(each.half) else 0.0 for each in found]
-        axis.axvline(means[0], color=PALE, linewidth=1.2)
+        axis.axvline(means[reference], color=PALE, linewidth=1.2)
         axis.errorbar(means, places, xerr=halves, fmt="o", color=DARK, capsize=2, linewidth=1)
         axis.set_xlabel(_wrapped(label, _SHORT // len(quantities)))
         axis.grid(visible=False, axis="y")

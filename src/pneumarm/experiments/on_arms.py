@@ -77,7 +77,7 @@ def plain(found: Interval, digits: int = 2, factor: float = 1.0) -> str:
     """Return ``factor`` times a mean and its interval for people."""
     if found.samples == 0:
         return "none"
-    half = f" ± {factor * found.half:.{digits}f}" if math.isfinite(found.half) else ""
+    half = f" ± {abs(factor) * found.half:.{digits}f}" if math.isfinite(found.half) else ""
     return f"{factor * found.mean:.{digits}f}{half}"
 
 
@@ -101,7 +101,7 @@ def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], capt
         [words, *(plain(mean(rows, c.figure, trial), c.digits, c.factor) for c in columns)]
         for trial, words in trials.items()
     ]
-    return Table(["", *(column.words for column in columns)], lines, caption)
+    return Table(["trial", *(column.words for column in columns)], lines, caption)
 
 
 class Curve(NamedTuple):

@@ -1,9 +1,10 @@
 """What an experiment leaves: its page and its results as JSON, drawn from the rows alone."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from pneumarm.console import jsonable
-from pneumarm.experiments.experiment import Analysis, Experiment
+from pneumarm.experiments.experiment import Analysis, Claim, Experiment
 from pneumarm.files import write_json, write_text
 from pneumarm.report.page import Section, Table, render
 
@@ -19,14 +20,33 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     ]
     of = {"experiment": experiment.name, "arms": list(arms), "runs": runs}
     write_json(folder / RESULTS, jsonable({**analysis.figures, **of, "claims": claims}))
-    where = f"{experiment.source}. {runs} runs of {len(experiment.trials)} trials on {', '.join(arms)}."
+    where = (
+        f"{experiment.source}. {_many(runs, 'run')} of {_many(len(experiment.trials), 'trial')} on {', '.join(arms)}."
+    )
     sections = [*analysis.sections]
+    summary = [where, *analysis.summary]
     if analysis.claims:
+        summary.append(_count(analysis.claims))
         rows = [[c.text, c.thesis, c.ours, c.verdict] for c in analysis.claims]
         table = Table(
             ["claim", "thesis", "here", "verdict"], rows, "What the thesis found, and what holds here.", words=True
         )
         sections.insert(0, Section("Claims", tables=[table]))
     page = folder / PAGE
-    write_text(page, render(experiment.title, [where, *analysis.summary], sections))
+    write_text(page, render(experiment.title, summary, sections))
     return page
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
+def _count(claims: Sequence[Claim]) -> str:
+    """Say in words how many claims hold."""
+    holding, refuted, left = (
+        sum(claim.verdict == verdict for claim in claims) for verdict in ("holds", "does not hold", "open")
+    )
+    said = (
+        f"{holding} of {len(claims)} claims of the thesis hold here, {refuted} {'does' if refuted == 1 else 'do'} not"
+    )
+    return said + (f", and {left} {'is' if left == 1 else 'are'} open: 95 % intervals allow both." if left else ".")

@@ -15,6 +15,7 @@ from pneumarm.transitions import Store, collect
 STORE = "transitions.db"
 SIMULATION = "simulation.safetensors"
 PLAN = "faults.toml"
+SETTINGS = "settings.json"
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def claim(folder: Path, wanted: object) -> None:
 
     """
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / "settings.json"
+    file = folder / SETTINGS
     wanted = json.loads(json.dumps(wanted))
     if not file.exists():
         write_json(file, wanted)

@@ -16,7 +16,7 @@ from typing import Any
 
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, Row, Rows, sorted_rows
-from pneumarm.experiments.preparation import claim
+from pneumarm.experiments.preparation import SETTINGS, claim
 from pneumarm.experiments.rows import RowWriter
 from pneumarm.files import require_folder
 from pneumarm.learning.training import cores
@@ -78,9 +78,13 @@ def sweep(
     require_folder(laboratory)
     laboratory.mkdir(exist_ok=True)
     folder = laboratory / experiment.name
-    claim(folder, {"experiment": experiment.settings(), **asdict(settings)})
+    folder.mkdir(exist_ok=True)
+    arms = tuple(dict.fromkeys(arms))
     keys = [(arm, trial, run) for arm in arms for run in range(1, runs + 1) for trial in experiment.trials]
     with RowWriter(folder / ROWS) as writer:
+        if not writer.rows:  # then no settings decided anything yet, as where an arm was misspelt
+            (folder / SETTINGS).unlink(missing_ok=True)
+        claim(folder, {"experiment": experiment.settings(), **asdict(settings)})
         there = {row.key for row in writer.rows}
         missing = [key for key in keys if key not in there]
         materials = {}

@@ -18,8 +18,10 @@ from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial, Said
 from pneumarm.experiments.findings import (
+    fewest_switches,
     nearly_all_succeed,
     traces_are_marginal,
+    trial_10_is_good,
     weights_dominate,
     weights_matter_more_than_settings,
 )
@@ -48,11 +50,19 @@ EXPERIMENT = Factorial(
         Said("reward", 2, raises=False, about="neurons"),
         Said("reward", 2, raises=True, loss="std", about="neurons"),
         Said("reward", 1, raises=False, about="learning-rate"),
+        Said("reward", 1, raises=True, loss="std", about="learning-rate"),
         Said("reward", 11, raises=False, about="traces"),
         Said("reward", 12, raises=True, about="gamma"),
         Said("reward", 12, raises=True, loss="std", about="gamma"),
         Said("episodes", 12, raises=False, about="gamma-episodes"),
         Said("episodes", 11, raises=True, about="traces"),
     ),
-    findings=(weights_matter_more_than_settings, weights_dominate, traces_are_marginal, nearly_all_succeed),
+    findings=(
+        weights_matter_more_than_settings,
+        weights_dominate,
+        traces_are_marginal,
+        trial_10_is_good,
+        nearly_all_succeed,
+        fewest_switches,
+    ),
 )

@@ -3,7 +3,9 @@
     pneumarm claims --out laboratory
 
 ``conclusions.toml`` says what the thesis concludes and which experiments test it; what an experiment finds is in its
-``results.json``. Nothing is run: an experiment without results is listed with the command that makes them. A
+``results.json``. Nothing is run: an experiment without results is listed with the command that makes them.
+
+A claim holds, or does not, where its 95 % interval over arms lies on one side of what was claimed; else it is open. A
 conclusion *holds* where all its claims do, *does not hold* where none does and one is refuted, holds *in part* where
 some do and some are refuted, and is *open* otherwise.
 """
@@ -50,7 +52,7 @@ class Found(msgspec.Struct, frozen=True):
     thesis: str
     ours: str
     verdict: Literal["holds", "does not hold", "open"]
-    about: str = ""
+    about: str
 
 
 class Results(msgspec.Struct, frozen=True):
@@ -97,6 +99,22 @@ class Judged:
             return "in part" if "holds" in verdicts else "does not hold"
         return "open"
 
+    @property
+    def parts(self) -> Mapping[str, tuple[str, ...]]:
+        """Its claims by their verdict."""
+        found = {v: tuple(c.claim for _, c in self.claims if c.verdict == v) for v in _PARTS}
+        return {v: these for v, these in found.items() if these}
+
+    def explained(self) -> str:
+        """Return the verdict in words, and what it comes from where its claims differ."""
+        if len(self.parts) < 2:
+            return f"Verdict: {self.verdict}."
+        said = [f"{v.capitalize()}: {'; '.join(these)}." for v, these in self.parts.items()]
+        return " ".join([f"Verdict: {self.verdict}.", *said])
+
+
+_PARTS = ("holds", "does not hold", "open")
+
 
 def conclusions() -> tuple[Conclusion, ...]:
     """Return what the thesis concludes, in its order."""
@@ -104,11 +122,17 @@ def conclusions() -> tuple[Conclusion, ...]:
     return msgspec.convert(tomllib.loads(text), _File).conclusions
 
 
+def keys_of(experiment: str) -> frozenset[str]:
+    """Return the keys of the conclusions that an experiment tests."""
+    return frozenset(each.key for each in conclusions() if experiment in each.experiments)
+
+
 def read_results(laboratory: Path) -> dict[str, Results]:
     """Return the results of all experiments in the folder ``laboratory``, by name.
 
     Raises:
-        UnusableInput: there is no such folder, or a file in it is not what an experiment leaves.
+        UnusableInput: there is no such folder, no experiment was finished in it, or a file in it is not what an
+            experiment leaves.
 
     """
     if not laboratory.is_dir():
@@ -120,14 +144,19 @@ def read_results(laboratory: Path) -> dict[str, Results]:
         except (OSError, msgspec.DecodeError) as error:
             raise UnusableInput(f"{path}: expected results of an experiment ({error}); run it again") from error
         found[results.experiment] = results
+    if not found:
+        raise UnusableInput(
+            f"{laboratory}: expected experiments with results; finish one first, as by pneumarm experiment "
+            f"{next(iter(PLACES))} --out {laboratory}"
+        )
     return found
 
 
 def judge(results: Mapping[str, Results]) -> list[Judged]:
     """Return every conclusion of the thesis with the claims on it.
 
-    Claims of experiments that no conclusion names, or about none that names their experiment, follow under the
-    experiment's own question, so that nothing that was found is left out.
+    Claims about none that names their experiment follow under the experiment's own question, so that nothing that was
+    found is left out.
     """
     listed = conclusions()
     judged = [
@@ -138,7 +167,7 @@ def judge(results: Mapping[str, Results]) -> list[Judged]:
                 for name in conclusion.experiments
                 if name in results
                 for claim in results[name].claims
-                if claim.about in ("", conclusion.key)
+                if claim.about == conclusion.key
             ),
             tuple(name for name in conclusion.experiments if name not in results),
         )
@@ -169,8 +198,8 @@ def sections(judged: Sequence[Judged], laboratory: Path) -> list[Section]:
         "What the thesis concludes, and whether it holds here.",
         words=True,
     )
-    made = [Section("Verdicts", tables=[overview])]
-    made += [_evidence(number, each) for number, each in enumerate(judged, 1) if each.claims]
+    made = [Section("Verdicts", _RULES, tables=[overview])]
+    made += [_evidence(each) for each in judged if each.claims]
     missing = list(dict.fromkeys(name for each in judged for name in each.missing))
     few = {r.experiment: r for each in judged for r, _ in each.claims if not r.enough}
     if missing or few:
@@ -187,18 +216,43 @@ def sections(judged: Sequence[Judged], laboratory: Path) -> list[Section]:
     return made
 
 
-def _evidence(number: int, judged: Judged) -> Section:
-    rows = [
+_RULES = (
+    "A claim holds, or does not hold, where the 95 % interval of what was found lies on one side of what is claimed; "
+    "else it is open. Runs on one arm share its simulation, so intervals are over arms.",
+    "A conclusion holds where all its claims do. It does not hold where one is refuted and none holds, and holds in "
+    "part where some hold and some are refuted; otherwise it is open. Of twenty claims that are neither true nor "
+    "false one is judged by chance.",
+)
+HEADER = ("claim", "thesis", "here, with 95 % intervals", "from", "verdict")
+
+
+def evidence(judged: Judged) -> list[list[str]]:
+    """Return a line for each claim, by :data:`HEADER`: thesis beside ours, arms and runs, verdict."""
+    return [
         [claim.claim, claim.thesis, claim.ours, f"{results.experiment}: {results.sample}", claim.verdict]
         for results, claim in judged.claims
     ]
+
+
+def as_markdown(judged: Sequence[Judged]) -> str:
+    """Return everything as a table for a note or a paper: a line for each conclusion and below it its claims."""
+    lines = [f"| {' | '.join(HEADER)} |", "|---" * len(HEADER) + "|"]
+    for each in judged:
+        missing = ", ".join(each.missing)
+        cells = [f"**{each.conclusion.says}**", each.conclusion.section, "", missing and f"missing: {missing}"]
+        rows = [[*cells, f"**{each.verdict}**"], *evidence(each)]
+        lines += [f"| {' | '.join(cell.replace('|', '&#124;') for cell in row)} |" for row in rows]
+    return "\n".join(lines)
+
+
+def _evidence(judged: Judged) -> Section:
     table = Table(
-        ["claim", "thesis", "here, with 95 % intervals", "from", "verdict"],
-        rows,
+        list(HEADER),
+        evidence(judged),
         f"Thesis section {judged.conclusion.section.removeprefix('Thesis section ')}.",
         words=True,
     )
-    return Section(f"{number}. {judged.conclusion.says}", [f"Verdict: {judged.verdict}."], tables=[table])
+    return Section(judged.conclusion.says, [judged.explained()], tables=[table])
 
 
 def _more(name: str, laboratory: Path) -> str:
@@ -219,7 +273,13 @@ def summary(judged: Sequence[Judged]) -> list[str]:
         "not run": "were not tested yet",
     }
     said = ", ".join(f"{count} {words[verdict]}" for verdict, count in counts.items() if count)
-    return [f"Of {len(judged)} conclusions {said}. All of it is made from the results of the experiments."]
+    claims = [claim for each in judged for _, claim in each.claims]
+    holding = sum(claim.verdict == "holds" for claim in claims)
+    refuted = sum(claim.verdict == "does not hold" for claim in claims)
+    return [
+        f"Of {len(judged)} conclusions {said}. They rest on {len(claims)} claims: {holding} hold, {refuted} do not, "
+        f"{len(claims) - holding - refuted} are open. All of it is made from the results of the experiments."
+    ]
 
 
 def figures(judged: Sequence[Judged]) -> dict[str, Any]:

@@ -1,6 +1,8 @@
 """Pictures of an analysis: effects plots and half-normal probability plots."""
 
+import textwrap
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,6 +15,8 @@ from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, panels, 
 _STYLES = tuple((colour, line) for line in ("-", "--", ":", "-.") for colour in (DARK, MIDDLE, LIGHT, GREY))
 _MARKERS = "osD^vP*X"
 _PER_ROW = 16  # columns of an array side by side
+_MOST_NAMED = 8  # lines that can be told apart; more are drawn alike
+_LABEL, _HALF_LABEL = 34, 40  # letters in a line of an axis label
 _REACH = 0.32  # of a column's levels to both sides of its place
 
 
@@ -27,22 +31,21 @@ def effects_figure(analysis: TableAnalysis, lines: Mapping[str, Effects], quanti
         axis = axes[row, 0]
         columns = range(row * _PER_ROW, min((row + 1) * _PER_ROW, array.columns))
         for number, (name, found) in enumerate(lines.items()):
-            colour, style = _STYLES[number % len(_STYLES)]
+            drawn = _drawn(number, len(lines))
             for place, column in enumerate(columns):
                 average = found.averages[column]
                 x = place + np.linspace(-_REACH, _REACH, len(average))
                 label = name if place == 0 and row == 0 else None
-                marker = _MARKERS[number % len(_MARKERS)]
-                axis.plot(x, average, color=colour, linestyle=style, marker=marker, markersize=3, label=label)
+                axis.plot(x, average, markersize=3, label=label, **drawn)
         for place in range(1, len(columns)):
             axis.axvline(place - 0.5, color=PALE, linewidth=0.6)
         axis.set_xticks(range(len(columns)), [f"{c + 1}\n{labels[c]}" for c in columns])
         axis.set_xlim(-0.5, len(columns) - 0.5)
         axis.grid(visible=False, axis="x")
-        axis.set_ylabel(quantity)
+        axis.set_ylabel(textwrap.fill(quantity, _LABEL))
     axes[-1, 0].set_xlabel("column of the array and what is on it; levels from left to right")
-    if len(lines) > 1:
-        figure.legend(loc="outside upper center", ncols=min(8, len(lines)))
+    if 1 < len(lines) <= _MOST_NAMED:
+        figure.legend(loc="outside upper center", ncols=len(lines))
     return figure
 
 
@@ -76,7 +79,7 @@ def half_normal_figure(analysis: TableAnalysis, names: tuple[str, ...], quantity
         axis.set_yticks(y, [f"{p:.1f}" for p in percent])
         axis.set_xlim(0, limit)
         axis.set_ylim(0, y[-1] * 1.08)
-        axis.set_xlabel(f"estimated effect on the {name}{_unit(quantity)}")
+        axis.set_xlabel(textwrap.fill(f"estimated effect on the {name}{_unit(quantity)}", _HALF_LABEL))
         axis.set_title(name)
         axis.legend(loc="lower right")
     axes[0, 0].set_ylabel("probability [%]")
@@ -90,16 +93,23 @@ def half_normal_runs_figure(analysis: TableAnalysis, quantity: str) -> Figure:
     axis, columns = axes[0, 0], analysis.design.array.columns
     y, percent = positions(columns), percentages(columns)
     for number, found in enumerate(analysis.runs):
-        colour, style = _STYLES[number % len(_STYLES)]
-        marker = _MARKERS[number % len(_MARKERS)]
-        sizes = np.sort(found.sizes)
-        axis.plot(sizes, y, color=colour, linestyle=style, linewidth=0.8, marker=marker, label=f"run {number + 1}")
+        drawn = {**_drawn(number, len(analysis.runs)), "linewidth": 0.8}
+        axis.plot(np.sort(found.sizes), y, label=f"run {number + 1}", **drawn)
     axis.set_yticks(y, [f"{p:.1f}" for p in percent])
     axis.set_xlim(0, None)
     axis.set_xlabel(f"estimated effect on the {quantity}")
     axis.set_ylabel("probability [%]")
-    figure.legend(loc="outside upper center", ncols=min(8, len(analysis.runs)))
+    if len(analysis.runs) <= _MOST_NAMED:
+        figure.legend(loc="outside upper center", ncols=len(analysis.runs))
     return figure
+
+
+def _drawn(number: int, of: int) -> dict[str, Any]:
+    """Return how line ``number`` is drawn: told apart from the others where they are few, else thin."""
+    if of > _MOST_NAMED:
+        return {"color": GREY, "linewidth": 0.7, "alpha": 0.7}
+    colour, style = _STYLES[number % len(_STYLES)]
+    return {"color": colour, "linestyle": style, "marker": _MARKERS[number % len(_MARKERS)]}
 
 
 def _unit(quantity: str) -> str:

@@ -16,13 +16,19 @@ _MOST_RUNS = 8  # side by side; of more only the losses are shown
 def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "") -> list[Section]:
     """Return the sections on one table of results of a ``quantity``; ``prefix`` keeps titles of several apart."""
     before = f"{prefix}: " if prefix else ""
+    meant = "; ".join(f"{factor.label}: {factor.name}" for factor in analysis.design.factors)
     return [
         Section(
             f"{before}results",
             [f"{analysis.goal.capitalize()} is better. Losses are of all runs of a trial."],
             tables=[results_table(analysis, quantity)],
         ),
-        Section(f"{before}effects", [_significance(analysis)], pictures(analysis, quantity), [_rankings(analysis)]),
+        Section(
+            f"{before}effects",
+            [f"{meant}. {_significance(analysis)}"],
+            pictures(analysis, quantity),
+            [_rankings(analysis)],
+        ),
         Section(
             f"{before}analysis of variance",
             [
@@ -53,7 +59,7 @@ def results_table(analysis: TableAnalysis, quantity: str) -> Table:
             ]
         )
     header = ["trial", *(f"{f.label}: {f.name}" for f in factors), *(f"run {r + 1}" for r in range(runs)), *losses]
-    return Table(header, rows, f"Loss table: {quantity} by trial and run (thesis table 5.5, C.7), and its losses.")
+    return Table(header, rows, f"Loss table: {quantity} by trial and run, and its losses (as thesis table 5.5).")
 
 
 def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
@@ -65,14 +71,14 @@ def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
         drawn.append(
             Picture(
                 effects_figure(analysis, lines, quantity),
-                f"Effects on the {quantity} for all runs apart (thesis fig. 5.1).",
+                f"Effects on the {quantity} for all runs apart, a line a run (as thesis fig. 5.1).",
                 f"{len(lines)} lines in {analysis.design.array.columns} columns.",
             )
         )
         drawn.append(
             Picture(
                 half_normal_runs_figure(analysis, quantity),
-                "Half-normal probability plots for all runs apart (thesis fig. C.2).",
+                "Half-normal probability plots for all runs apart, a line a run (as thesis fig. C.2).",
                 f"Largest effects by run: {', '.join(f'{found.sizes.max():.2f}' for found in analysis.runs)}.",
             )
         )
@@ -82,14 +88,14 @@ def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
         drawn.append(
             Picture(
                 effects_figure(analysis, {name: analysis.effects[name]}, f"{name} of {quantity}"),
-                f"Effects on the {name} of the {quantity} (thesis fig. {number}).",
+                f"Effects on the {name} of the {quantity} (as thesis fig. {number}).",
                 f"The largest effect is that of column {largest}.",
             )
         )
     drawn.append(
         Picture(
             half_normal_figure(analysis, names, quantity),
-            "Half-normal probability plots of the effects (thesis eq. 5.3, fig. 5.4, 5.5), with Lenth's margins.",
+            "Half-normal probability plots of the effects (thesis eq. 5.3; as fig. 5.4, 5.5), with Lenth's margins.",
             "; ".join(f"{name}: beyond the margin {_listed(analysis, name)}" for name in names),
         )
     )
@@ -151,7 +157,7 @@ def _rankings(analysis: TableAnalysis) -> Table:
             row += [_column(analysis, column), f"{effect.sizes[column - 1]:.2f}"]
         rows.append(row)
     header = ["rank", *(part for name in names for part in (name, "effect"))]
-    return Table(header, rows, "Columns by the size of their effects (thesis tables 5.6 and 5.9).")
+    return Table(header, rows, "Columns by the size of their effects (as thesis tables 5.6 and 5.9).")
 
 
 def _variance(analysis: TableAnalysis) -> Table:

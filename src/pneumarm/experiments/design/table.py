@@ -38,7 +38,8 @@ def parse_table(text: str, source: str, columns: str | None = None) -> ResultTab
     """
     lines = [line for line in csv.reader(text.splitlines()) if any(cell.strip() for cell in line)]
     if len(lines) < 2 or len(lines[0]) < 2:
-        raise UnusableInput(f"{source}: {_EXPECTED}, it has {len(lines)} lines")
+        first = f", the first {','.join(lines[0])!r}" if lines else ""
+        raise UnusableInput(f"{source}: {_EXPECTED}, separated by commas; it has {len(lines)} lines{first}")
     header = [cell.strip() for cell in lines[0]]
     taken = [i for i, name in enumerate(header) if i and name.lower().startswith((columns or "run").lower())]
     if not taken and columns is None:
@@ -70,7 +71,8 @@ def read_table(path: Path, columns: str | None = None) -> ResultTable:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise UnusableInput(f"{path}: {_EXPECTED}, but it cannot be read ({error})") from error
+        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        raise UnusableInput(f"{path}: {_EXPECTED}, but it cannot be read ({reason})") from error
     return parse_table(text, str(path), columns)
 
 

@@ -8,6 +8,10 @@ Differences from the thesis: 1000 movements to adapt, not 2500; 60 degrees, not 
 goals of some arms.
 
     pneumarm experiment displacement
+
+Answer here, on five arms: actions grow with the displacement and switches less so, as in the thesis. Short movements
+switch more often an action and go farther out of the way, but by 1.3 ± 0.7 degrees, not 20, and they succeed as often
+as long ones. A quarter of the movements of this learning agent switch more than five times, in the thesis a few.
 """
 
 from collections.abc import Mapping, Sequence
@@ -339,33 +343,53 @@ def _claims(rows: Rows, ratio: Interval, displacements: tuple[float, float, floa
     harder = over(values(rows, f"{small}: out of the way", 1) - values(rows, f"{large}: out of the way", 1))
     ringing = mean(rows, f"{middle}: ringing", 1)
     return [
-        Claim("Actions grow with the displacement", said["relation"], plain(of_actions), above(of_actions, 0.5)),
-        Claim("Switches depend on it less", said["relation"], f"correlation less by {plain(less)}", above(less)),
+        Claim(
+            "Actions grow clearly with the displacement: the correlation is above 0.5",
+            said["relation"],
+            f"correlation {plain(of_actions)}",
+            above(of_actions, 0.5),
+            "displacement",
+        ),
+        Claim(
+            "Switches depend on it less",
+            said["relation"],
+            f"correlation less by {plain(less)}",
+            above(less),
+            "displacement",
+        ),
         Claim(
             "Short movements make more switches an action: they are less smooth",
             said["ratio"],
-            plain(ratio),
+            f"more by {plain(ratio)}",
             above(ratio),
+            "small-displacements",
         ),
         Claim(
             "Only a few movements switch more than five times (5 % at most)",
             "only a few",
             f"{plain(few, 1, 100)} % do not",
             above(few, 0.95),
+            "displacement",
         ),
         Claim(
             f"Movements of {small} go farther out of the way than those of {large}",
             f"{said['excursion']:g}° in figure 5.18",
-            f"{plain(short, 1)}° against {plain(long, 1)}°",
+            f"{_degrees(short)} against {_degrees(long)}",
             above(harder),
+            "small-displacements",
         ),
         Claim(
             f"After a movement of {middle} the arm rings by {said['damping']:g}° and more",
             f"{said['damping']:g}° in figure 5.17",
-            f"{plain(ringing, 1)}°",
+            _degrees(ringing),
             above(ringing, said["damping"]),
+            "ringing",
         ),
     ]
+
+
+def _degrees(found: Interval) -> str:
+    return f"{plain(found, 1)}°" if found.samples else "no such movements"
 
 
 EXPERIMENT = Displacement()

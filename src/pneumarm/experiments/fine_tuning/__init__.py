@@ -23,7 +23,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.experiments.all_goals import BASE
-from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.differences import above, interval
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
@@ -99,10 +98,11 @@ class FineTuning(Experiment):
         }
         trials = Section(
             "Trials",
+            [self.array.labels],
             figures=[
                 Picture(
-                    forest_figure(list(self.trials.values()), shown),
-                    "Results of the trials, means with their 95 % intervals.",
+                    forest_figure(list(self.trials.values()), shown, reference=-1),
+                    "Results of the trials, means with their 95 % intervals; the line through all is trial 10's.",
                     "; ".join(f"trial {n}: reward {v.mean():.1f}" for n, v in zip(self.trials, reward, strict=True)),
                 )
             ],
@@ -120,15 +120,17 @@ class FineTuning(Experiment):
         reward = rows.table("reward", list(self.trials))
         odd = np.tile(np.arange(1, rows.runs + 1) % 2 == 1, len(rows.arms))
         text = "Levels that lie closer together give settings better than those of trial 10"
-        thesis = "supposed (sections 5.3 and 5.4.2, no numbers)"
+        thesis = "supposed (sections 5.3 and 5.4.2); trial 10 earns 10.18 (table C.7)"
         if odd.all():
-            return Claim(text, thesis, "one run: nothing left to confirm with", "open"), "One run confirms nothing."
+            return Claim(
+                text, thesis, "one run: nothing left to confirm with", "open", "fine-tuning"
+            ), "One run confirms nothing."
         best = int(np.argmax(reward[:-1, odd].mean(axis=1)))
         even = reward[:, ~odd]
         difference = interval(rows.samples(even[best] - even[-1]))
-        ours = f"{difference} ({mean_and_spread(even[best])} against {mean_and_spread(even[-1])})"
+        ours = f"{difference}: {even[best].mean():.2f} against {even[-1].mean():.2f}"
         return (
-            Claim(text, thesis, ours, above(difference)),
+            Claim(text, thesis, ours, above(difference), "fine-tuning"),
             f"Best in odd runs: {self.trials[best + 1]} (trial {best + 1}). In even runs it differs from trial 10 of "
             f"all-goals by {difference} of reward.",
         )

@@ -5,6 +5,10 @@ may be possible. Agents learn each goal area by themselves and are tested with i
 as it is in the morning: greedy and without learning, the same begin states and goals.
 
     pneumarm experiment goal-area
+
+Answer here, on five arms: 96 % of the movements succeed with the thesis' goal area. Half the speed or half the angle
+costs some 20 of reward each, and 6 points of success; both cost twice as much. Fewer than half of the movements end
+at less than half the speed that is allowed.
 """
 
 from collections.abc import Mapping
@@ -36,6 +40,7 @@ AREAS = {1: (25.0, 1.0), 2: (25.0, 0.5), 3: (12.0, 1.0), 4: (12.0, 0.5)}
 """Tolerances of angle [counts] and velocity [counts/ms] by trial."""
 _SIMULATION = "simulation: "
 _NEAR_ALL = 0.97
+_AS_GOOD = 0.03  # success that may be lost
 
 
 @dataclass(frozen=True)
@@ -106,7 +111,7 @@ class GoalArea(Experiment):
             Column("half as fast at the end", "end at half the speed allowed [%]", 1, 100.0),
         ]
         said = thesis(__name__)
-        slow, half_speed = mean(rows, "half as fast at the end", base), mean(rows, "success_rate", 2)
+        slow, half_speed = mean(rows, "half as fast at the end", base), difference(rows, "success_rate", 2, base)
         costs = {t: difference(rows, "reward", t, base) for t in AREAS if t != base}
         return Analysis(
             summary=[
@@ -136,18 +141,33 @@ class GoalArea(Experiment):
             ],
             claims=[
                 Claim(
-                    "Most movements end at less than half the speed allowed",
+                    "With 25 counts and 1 count/ms movements succeed on the arm (97 % and more)",
+                    said["suits"],
+                    f"{plain(mean(rows, 'success_rate', base), 1, 100)} %",
+                    above(mean(rows, "success_rate", base), _NEAR_ALL),
+                    "goal-area",
+                ),
+                Claim(
+                    "Movements end slower than they need: most at less than half the speed allowed",
                     said["slow"],
                     f"{plain(slow, 1, 100)} %",
                     above(slow, 0.5),
+                    "goal-area",
                 ),
                 Claim(
-                    "Half the speed at the goal is possible (97 % success and more)",
+                    f"Half the speed at the goal is possible: {100 * _AS_GOOD:g} points of success less at most",
                     said["pushed"],
-                    f"{plain(half_speed, 1, 100)} %",
-                    above(half_speed, _NEAR_ALL),
+                    f"{plain(half_speed, 1, 100)} points",
+                    above(half_speed, -_AS_GOOD),
+                    "goal-area",
                 ),
-                Claim("Half the angle costs reward on the arm", "supposed", plain(costs[3]), below(costs[3])),
+                Claim(
+                    "Half the angle costs reward on the arm",
+                    said["smaller"],
+                    f"reward {plain(costs[3])}",
+                    below(costs[3]),
+                    "goal-area",
+                ),
             ],
         )
 

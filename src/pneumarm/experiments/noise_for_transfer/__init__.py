@@ -6,8 +6,9 @@ and make the same movements on the arm.
 
     pneumarm experiment noise-for-transfer --out laboratory
 
-Answer here: a gain by noise is not shown on five arms, whose simulations are better than the thesis'; with correlated
-noise of the size of the error agents earned a little more than with white noise.
+Answer here: agents trained without noise earn as much on the arm as with the thesis' noise, whose simulation is
+better than the thesis'. Four times the noise costs some 13 of reward, and far more where a slow arm gets as much as a
+fast one. More noise shortens the training instead of lengthening it.
 """
 
 from collections.abc import Mapping
@@ -17,12 +18,14 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import above, interval
+from pneumarm.experiments.differences import above, all_hold, interval
 from pneumarm.experiments.evidence import (
     Column,
     difference,
+    mean,
     numbers,
     picture,
+    plain,
     samples,
     seen,
     signed,
@@ -138,8 +141,10 @@ class NoiseForTransfer(Experiment):
         return Analysis(
             summary=[
                 self.question,
-                "The noise is that of training; in the test in simulation an agent meets its own. Values are means "
-                "over arms with 95 % intervals.",
+                self._answer(rows),
+                "A noise is white or correlated, fixed or less for a slow arm (by velocity), and so many times as "
+                "large as the fit's error. It is that of training; in the test in simulation an agent meets its own. "
+                "Values are means over arms with 95 % intervals.",
             ],
             figures=numbers(rows, trials, columns),
             sections=[
@@ -147,6 +152,17 @@ class NoiseForTransfer(Experiment):
                 Section("Against the amount", figures=pictures),
             ],
             claims=self.claims(rows),
+        )
+
+    def _answer(self, rows: Rows) -> str:
+        gains = {trial: difference(rows, "reward", trial, 1) for trial in self.trials if trial != 1}
+        best = max(gains, key=lambda trial: gains[trial].mean)
+        sure = [self.trials[trial] for trial, gain in gains.items() if gain.low > 0]
+        worse = [self.trials[trial] for trial, gain in gains.items() if gain.high < 0]
+        return (
+            f"Without noise agents earn {plain(mean(rows, 'reward', 1), 1)} on the arm. Of {len(gains)} noises the "
+            f"best on average is {self.trials[best]}: {signed(gains[best], 1)} against none. Surely better, "
+            f"each taken alone: {'; '.join(sure) or 'none'}; surely worse: {'; '.join(worse) or 'none'}."
         )
 
     def claims(self, rows: Rows) -> list[Claim]:
@@ -173,34 +189,34 @@ class NoiseForTransfer(Experiment):
             )
             / 2
         )
-        verdicts = (above(longer), within(much, _MARGIN))
-        both = "holds" if verdicts == ("holds", "holds") else "open"
-        if "does not hold" in verdicts:
-            both = "does not hold"
         return [
             Claim(
                 "Noise makes an agent better on the arm",
                 "[10] found so; seems necessary (section 3.4); no number",
                 f"reward with the thesis' noise less that without: {signed(gain)}",
                 above(gain),
+                "noise",
             ),
             Claim(
                 f"Too much noise ({max(self.factors):g} times) needs more training, to a marginal effect on the arm",
                 "[10] found so; no number",
                 f"{signed(longer, 0)} episodes; reward {signed(much)}, marginal being within {_MARGIN:g}",
-                both,  # type: ignore[arg-type]
+                all_hold([above(longer), within(much, _MARGIN)]),
+                "noise",
             ),
             Claim(
                 "Correlated noise is better than white noise",
                 "taken as more realistic (section 3.4); no number",
                 f"difference of the reward at 1 times: {signed(kind)}",
                 above(kind),
+                "noise-kind",
             ),
             Claim(
                 "Less noise for a slow arm is better",
                 "by figure 3.2; no number",
                 f"difference of the reward at 1 times: {signed(speed)}",
                 above(speed),
+                "noise-kind",
             ),
         ]
 

@@ -5,7 +5,8 @@ which is trial 10 of all-goals. Both are confirmed here, with the weights of the
 
     pneumarm experiment optimal-settings
 
-On the nominal virtual arm (seed 0) eight runs do not tell them apart: the difference within runs is -25 ± 37.
+On arms 1 to 5, four runs each, the printed settings are better by 28 ± 16, in the thesis those of the rule by 3.5 ±
+3.5: a learning rate of 0.10 is too much here.
 """
 
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from typing import Any
 import msgspec
 
 from pneumarm.experiments.all_goals import BASE
-from pneumarm.experiments.comparison import mean_and_spread, side_by_side
+from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.differences import above, interval
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
@@ -69,13 +70,14 @@ class Confirmation(Experiment):
         printed = {name: packaged_table(__name__, f"thesis_{name}") for name in _CRITERIA}
         arrayed = {name: packaged_table("pneumarm.experiments.all_goals", f"thesis_{name}") for name in _CRITERIA}
         thesis = {name: [printed[name][0], arrayed[name][_TRIAL_10 - 1]] for name in _CRITERIA}
-        difference = ours["reward"][1] - ours["reward"][0]
-        theirs = thesis["reward"][1] - thesis["reward"][0]
+        # Runs on one arm share its simulation, so where there are several arms they are the sample.
+        difference = interval(rows.samples(ours["reward"][1] - ours["reward"][0]))
+        theirs = interval(thesis["reward"][1] - thesis["reward"][0])
         return Analysis(
             summary=[
                 self.question,
-                f"Reward with 0.10 less that with 0.05, within runs: {interval(difference)}; "
-                f"the thesis' numbers give {interval(theirs)}.",
+                f"Reward with 0.10 less that with 0.05, within runs: {difference}; "
+                f"the thesis' numbers give {theirs}.",
             ],
             figures={
                 name: {"mean": table.mean(axis=1).tolist(), "runs": table.tolist()} for name, table in ours.items()
@@ -84,12 +86,17 @@ class Confirmation(Experiment):
             claims=[
                 Claim(
                     "The rule's settings (learning rate 0.10) give more reward than the printed ones (0.05)",
-                    f"{mean_and_spread(thesis['reward'][1])} against {mean_and_spread(thesis['reward'][0])}",
-                    f"{mean_and_spread(ours['reward'][1])} against {mean_and_spread(ours['reward'][0])}",
-                    above(interval(difference)),
+                    f"{theirs}: {_against(thesis['reward'])} (tables C.7 and 5.7)",
+                    f"{difference}: {_against(ours['reward'])}",
+                    above(difference),
+                    "optimal",
                 )
             ],
         )
+
+
+def _against(reward: Any) -> str:
+    return f"{reward[1].mean():.2f} against {reward[0].mean():.2f}"
 
 
 EXPERIMENT = Confirmation()

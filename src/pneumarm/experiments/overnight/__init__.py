@@ -7,8 +7,9 @@ without a night, because what a learning agent earns goes up and down anyway.
 
     pneumarm experiment overnight
 
-On arms 1 to 5, an agent each and 60,000 transitions, there is no hitch: the agent that never learns loses -4.8 ± 4.0
-after 14 h. What the night does to one that learns (-4 ± 20) is lost in what its reward goes up and down by anyway.
+On arms 1 to 5, four runs each, there is no hitch: the agent that never learns loses -0.1 ± 2.6 of its reward after 14
+h, and the one that learns -1.2 ± 5.1 against the same agent without a night. There is nothing to win back, by warming
+up or by learning.
 """
 
 from collections.abc import Mapping
@@ -129,15 +130,15 @@ class Overnight(Experiment):
         found = {trial: _hitch(course_, place) for trial, course_ in courses.items()}
         lost = over_arms((courses[NO_NIGHT] - courses[LEARNING])[:, :, place])
         adapted = over_arms(_gain(courses[LEARNING], place) - _gain(courses[NO_NIGHT], place))
-        names = ["", "drop after the night", "gained on the second day"]
+        names = ["trial", "drop after the night", "gained on the second day"]
         lines = [[days.words, *(plain(one) for one in found[trial])] for trial, days in DAYS.items()]
         return Analysis(
             summary=[
                 self.question,
                 f"The night costs the agent that learns {plain(lost)} of its reward, against the same agent without "
                 f"one, and the one that never learns {plain(found[FROZEN][0])}. On the second day the latter gains "
-                f"{plain(found[FROZEN][1])}, as the arm warms up; learning after a night gains {plain(adapted)} more "
-                "than learning without one.",
+                f"{plain(found[FROZEN][1])}, while the arm warms up; learning after a night gains {plain(adapted)} "
+                "more than learning without one.",
                 "Intervals are over arms, each the mean of its runs.",
             ],
             figures={
@@ -205,11 +206,33 @@ def _claims(frozen: tuple[Interval, Interval], lost: Interval, adapted: Interval
     drop, warmed = frozen
     return [
         Claim(
-            f"{said['hours']:g} h of rest cost the learning agent reward", "a sudden drop", plain(lost), above(lost)
+            f"{said['hours']:g} h of rest cost the learning agent reward",
+            "a sudden drop",
+            f"lost: {plain(lost)}",
+            above(lost),
+            "overnight",
         ),
-        Claim("They cost an agent that does not learn reward", "expected", plain(drop), above(drop)),
-        Claim("The arm itself comes back as it warms up", recovers, plain(warmed), above(warmed)),
-        Claim("The agent adapts: learning brings back more", recovers, plain(adapted), above(adapted)),
+        Claim(
+            "They cost an agent that does not learn reward",
+            "expected",
+            f"lost: {plain(drop)}",
+            above(drop),
+            "overnight",
+        ),
+        Claim(
+            "The arm itself comes back as it warms up",
+            recovers,
+            f"gained: {plain(warmed)}",
+            above(warmed),
+            "overnight",
+        ),
+        Claim(
+            "The agent adapts: learning brings back more",
+            recovers,
+            f"gained more: {plain(adapted)}",
+            above(adapted),
+            "overnight",
+        ),
     ]
 
 

@@ -32,7 +32,7 @@ from pneumarm.arm import ArmSpec
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_table
-from pneumarm.experiments.differences import Interval, above, below, interval
+from pneumarm.experiments.differences import Interval, Verdict, above, below, interval
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
 from pneumarm.experiments.forest import forest_figure
 from pneumarm.experiments.preparation import Simulated, simulated
@@ -194,7 +194,7 @@ class ShapingSettings(Experiment):
         shown = {name: [interval(values) for values in samples[name]] for name in _SHOWN}
         picture = Picture(
             forest_figure(list(self.trials.values()), {_WORDS[name]: found for name, found in shown.items()}),
-            "Results by settings of shaping, means with their 95 % intervals.",
+            "Results by settings of shaping, means with their 95 % intervals; the line is the thesis' settings.",
             "; ".join(f"{self.trials[n]}: reward {v.mean():.1f}" for n, v in enumerate(tables["reward"], 1)),
         )
         return Section("Results", figures=[picture], tables=[table])
@@ -278,7 +278,7 @@ def _thesis(kind: str) -> Tables:
     return {name: packaged_table(package, f"thesis_{name}")[:, :3] for name in ("reward", "episodes")}
 
 
-def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Any]:
+def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Verdict]:
     """Return both standard deviations on an arm, and whether the first is surely smaller (Pitman and Morgan).
 
     Runs are pairs; the variances differ where sum and difference of the pairs are correlated.

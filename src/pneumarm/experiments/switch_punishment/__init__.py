@@ -4,15 +4,17 @@ As all-goals, with the punishment (-8 or none) in place of the discount factor a
 
     pneumarm experiment switch-punishment
 
-On the nominal virtual arm (seed 0) agents that are punished switch 1.4 times a movement, others 4.2 times: less than
-half, as in the thesis. They also need fewer actions (12.5 against 17.8), where the thesis' need more.
+On arms 1 to 5, four runs each, agents that are not punished switch 3.1 ± 0.6 times as often, in the thesis 2.8 times.
+Those that are punished also need fewer actions for a success, by 1.6 ± 1.1, where the thesis' need 1.6 more. The
+punishment shortens no training, because nearly all end at the earliest, when the deviation has grown to the whole
+range.
 """
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial, Said
-from pneumarm.experiments.findings import punishment_halves_switches
+from pneumarm.experiments.findings import punishment_costs_actions, punishment_halves_switches
 
 EXPERIMENT = Factorial(
     name="switch-punishment",
@@ -29,7 +31,7 @@ EXPERIMENT = Factorial(
     said=(
         Said("switches", 12, raises=True, about="punishment"),
         Said("actions", 12, raises=False, about="punishment"),
-        Said("episodes", 12, raises=True, about="punishment"),
+        Said("episodes", 12, raises=True, about="punishment-episodes"),
     ),
-    findings=(punishment_halves_switches,),
+    findings=(punishment_halves_switches, punishment_costs_actions),
 )

@@ -7,6 +7,10 @@ morning, and all are judged by the same reward, in the simulation with the thesi
 without learning.
 
     pneumarm experiment transferability
+
+Answer here, on five arms: trial 10 loses 3 ± 3 of its reward on the way to the arm, and no other kind of agent surely
+loses more or less. They differ in what they earn in either place: without shaping 12 less on the arm, and without the
+punishment a third of the movements fail, so that no more is lost by the transfer.
 """
 
 from collections.abc import Mapping
@@ -16,7 +20,8 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import above, below
+from pneumarm.experiments.differences import above
+from pneumarm.experiments.evidence import within
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
 from pneumarm.experiments.moving import ARMS, THESIS, Material, agent_of, greedy_test, material, means, simulated_test
 from pneumarm.experiments.on_arms import (
@@ -46,6 +51,7 @@ KINDS: Mapping[int, tuple[str, TrainSettings]] = {
     TWICE: ("twice the noise", replace(THESIS, noise=NoiseSettings(factor=2.0))),
 }
 _SIMULATION = "simulation: "
+_MARGIN = 3.0  # reward that is marginal
 
 
 @dataclass(frozen=True)
@@ -115,12 +121,12 @@ class Transferability(Experiment):
         said = thesis(__name__)
         unpunished, unshaped = (over_arms(lost[t] - lost[BASE]) for t in (NO_PUNISHMENT, NO_SHAPING))
         noiseless, louder = (difference(rows, "reward", BASE, NO_NOISE), difference(rows, "reward", TWICE, BASE))
-        base = over_arms(lost[BASE])
         return Analysis(
             summary=[
                 self.question,
-                f"Trial 10 loses {plain(base)} of its reward on the way to the arm. Intervals are over arms, each "
-                "the mean of its runs.",
+                "Of their reward agents lose on the way to the arm: "
+                + "; ".join(f"{words}: {plain(over_arms(lost[trial]), 1)}" for trial, words in self.trials.items())
+                + ". Intervals are over arms, each the mean of its runs.",
             ],
             figures={
                 "lost": {words: number(over_arms(lost[trial])) for trial, words in self.trials.items()},
@@ -144,26 +150,30 @@ class Transferability(Experiment):
                 Claim(
                     "Agents that are not punished for switches lose more on the way to the arm",
                     said["punishment"],
-                    plain(unpunished),
+                    f"lost more: {plain(unpunished)}",
                     above(unpunished),
+                    "punishment-transfer",
                 ),
                 Claim(
                     "Agents that learned without shaping lose more on the way to the arm",
                     said["shaping"],
-                    plain(unshaped),
+                    f"lost more: {plain(unshaped)}",
                     above(unshaped),
+                    "shaping-transfer",
                 ),
                 Claim(
                     "Noise in the simulation raises the reward on the arm",
                     said["noise"],
-                    plain(noiseless),
+                    f"by {plain(noiseless)}",
                     above(noiseless),
+                    "noise",
                 ),
                 Claim(
-                    "Twice the noise changes the reward on the arm by less than 3",
+                    f"Twice the noise changes the reward on the arm by less than {_MARGIN:g}",
                     said["more_noise"],
-                    plain(louder),
-                    below(louder._replace(mean=abs(louder.mean)), 3.0),
+                    f"by {plain(louder)}",
+                    within(louder, _MARGIN),
+                    "noise",
                 ),
             ],
         )

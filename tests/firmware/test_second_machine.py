@@ -26,7 +26,7 @@ OF_SAFETY = {
 }
 OF_REQUESTS = {name for name in vars(test_requests) if name.startswith("test_")}
 for _module, _names in ((test_safety, OF_SAFETY), (test_requests, OF_REQUESTS)):
-    globals().update({name: getattr(_module, name) for name in _names})
+    globals().update({name: getattr(_module, name) for name in sorted(_names)})
 
 
 @contextmanager

@@ -35,7 +35,7 @@ OF_REQUESTS = {name for name in vars(test_requests) if name.startswith("test_")}
     "test_firmware_is_the_hash_of_the_sources"
 }
 for _module, _names in ((test_line, OF_THE_LINE), (test_safety, OF_SAFETY), (test_requests, OF_REQUESTS)):
-    globals().update({name: getattr(_module, name) for name in _names})
+    globals().update({name: getattr(_module, name) for name in sorted(_names)})
 
 
 @pytest.fixture(autouse=True)

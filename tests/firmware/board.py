@@ -5,6 +5,7 @@ cycle of its pin, and its sensors give the voltages for the chip's next step. An
 table: analog inputs are what the test sets.
 """
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -101,7 +102,7 @@ class SimulatedBoard:
 
     def read(self, size: int, timeout: float) -> bytes:
         """Return ``size`` bytes from the board, or those that came within ``timeout`` [s] of the board's time."""
-        end = self.chip.cycle + round(timeout * FREQUENCY)
+        end = self.chip.cycle + math.ceil(timeout * FREQUENCY)  # never less, or who waits on would wait for ever
         while len(self._waiting) < size and self.chip.cycle < end:
             self._run_until(min(end, self.chip.cycle + _SLICE))
         data = bytes(self._waiting[:size])

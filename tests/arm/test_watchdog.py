@@ -12,7 +12,7 @@ from pneumarm.arm import Reading
 from pneumarm.arm.cycle import ControlCycle
 from pneumarm.arm.guard import HELD, GuardedArm, Interventions
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.errors import ControllerFailure
+from pneumarm.errors import ArmFailure, ControllerFailure
 
 PERIOD = 0.02
 OPEN = np.array([[1, 0]], np.int8)
@@ -145,7 +145,7 @@ def test_one_that_goes_on_is_interrupted_again(arm, monkeypatch):
         list(ControlCycle(GuardedArm(arm), patience=0.2).run(after(1, stubborn)))
 
 
-def test_an_arm_that_fails_meanwhile_is_told_of_by_whoever_moves_it_next(arm):
+def test_an_arm_that_fails_meanwhile_is_told_of(arm):
     def decide(reading):
         arm.read = lambda: 1 / 0
         sleep(0.2)
@@ -154,6 +154,38 @@ def test_an_arm_that_fails_meanwhile_is_told_of_by_whoever_moves_it_next(arm):
     with pytest.raises(ZeroDivisionError):
         list(ControlCycle(GuardedArm(arm)).run(decide))
     assert arm.valves == [[0, 0]]
+
+
+def test_an_arm_that_fails_only_once_meanwhile_is_told_of_too(arm):
+    """A clock that went back is said once; whoever went on would wait for a time of the old clock."""
+
+    def decide(reading):
+        arm.begun += 0.5 * PERIOD + reading.time
+        arm.time = 0.0
+        sleep(0.2)
+        return OPEN
+
+    guard = GuardedArm(arm)
+    arm.begun -= 100.0
+    with pytest.raises(ArmFailure, match="its clock went back"):
+        list(ControlCycle(guard).run(decide))
+    assert arm.valves == [[0, 0]]
+
+
+def test_an_interrupt_before_the_controller_is_asked_leaves_nothing_to_look_after(arm, monkeypatch):
+    guard = GuardedArm(arm)
+    begin = guard.watchdog.begin
+
+    def interrupted(*args):
+        begin(*args)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(guard.watchdog, "begin", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        list(ControlCycle(guard).run(lambda reading: OPEN))
+    touched = len(arm.set)
+    sleep((HELD + 3) * PERIOD)
+    assert arm.valves == [[0, 0]] and len(arm.set) == touched
 
 
 @pytest.mark.parametrize("states", [True, False])

@@ -48,12 +48,13 @@ class Watchdog:
         self._stands_still: bool | None = None  # the arm's clock while we compute; None while that is not known
         self._needed = True  # whether the arm has to be seen to
         self._interrupted: float | None = None  # when the decider was [s]
+        self._failure: Exception | None = None  # of the arm, while it was seen to
 
     def begin(self, reading: Reading, patience: float = PATIENCE) -> None:
         """Look after the decision on ``reading``; the calling thread is interrupted after ``patience`` [s]."""
         with self._lock:
             self._since, self._patience, self._decider = monotonic(), patience, get_ident()
-            self._needed, self._interrupted = not self._stands_still, None
+            self._needed, self._interrupted, self._failure = not self._stands_still, None, None
             self._reading = reading
             if self._thread is None:
                 self._thread = Thread(target=self._look, name="pneumarm watchdog", daemon=True)
@@ -64,9 +65,11 @@ class Watchdog:
 
         Raises:
             ControllerFailure: the controller was stopped because it had not decided for too long; all is vented.
+            Exception: what the arm raised while it was seen to, unless another error is on its way already.
 
         """
-        arrived = isinstance(sys.exc_info()[1], KeyboardInterrupt)
+        leaving = sys.exc_info()[1]
+        arrived = isinstance(leaving, KeyboardInterrupt)
         try:
             self._end()
         except KeyboardInterrupt:
@@ -78,6 +81,9 @@ class Watchdog:
             with suppress(KeyboardInterrupt):
                 sleep(0.0 if arrived else _ARRIVING)  # here it harms nothing
             raise self._arm.give_up(self._patience)
+        if self._failure is not None and leaving is None:
+            failure, self._failure = self._failure, None
+            raise failure
 
     def _end(self) -> None:
         with self._lock:
@@ -112,8 +118,8 @@ class Watchdog:
                 if self._stands_still is None:
                     self._stands_still = self._arm.get_state() is not None
                 self._needed = not self._stands_still and self._arm.stand_in(reading)
-            except Exception:  # the arm failed, and whoever moves it next will be told
-                self._needed = False
+            except Exception as error:  # told when the decision comes: the arm may not say it twice
+                self._needed, self._failure = False, error
         nap = period if self._needed else _SELDOM
         return min(nap, self._patience - out) if out < self._patience else nap
 

@@ -185,7 +185,8 @@ def test_an_interrupt_before_the_controller_is_asked_leaves_nothing_to_look_afte
         list(ControlCycle(guard).run(lambda reading: OPEN))
     touched = len(arm.set)
     sleep((HELD + 3) * PERIOD)
-    assert arm.valves == [[0, 0]] and len(arm.set) == touched
+    assert arm.valves == [[0, 0]]
+    assert len(arm.set) == touched
 
 
 @pytest.mark.parametrize("states", [True, False])

@@ -29,6 +29,23 @@ def fit_(
         fitted = fit_store(store, settings, progress=report)
     fitted.simulation.save(out)
     result = fitted.results()
-    header = ("one-step error on held-out sequences", *result["std"])
-    rows = [("std [counts, counts/ms]", *result["std"].values()), ("relative", *result["relative_error"].values())]
+    header = ("one-step error on held-out sequences", "std", "in", "relative")
+    rows = [
+        (name, _short(std), _unit(name), _short(result["relative_error"][name]))
+        for name, std in result["std"].items()
+    ]
     show(result, json, lambda: [table(header, rows)])
+
+
+def _short(value: float | list[float]) -> str:
+    """Return a number, or those of several joints."""
+    return ", ".join(f"{one:.4g}" for one in (value if isinstance(value, list) else [value]))
+
+
+def _unit(name: str) -> str:
+    """Return the unit of a quantity, or of the further sensor that is called so."""
+    if "acceleration" in name:
+        return "m/s2"
+    if "temperature" in name:
+        return "Celsius"
+    return "counts/ms" if name == "velocity" else "counts"

@@ -277,6 +277,18 @@ def test_sensors_are_shown_with_closed_valves(capsys):
     assert run(capsys, "arm", "sensors", "virtual", "--every", 0)[0] == 2
 
 
+def test_further_sensors_are_shown_with_their_units(capsys):
+    arm = "virtual:seed=2,sensors=temperature+velocity"
+    _, out, _ = run(capsys, "arm", "sensors", arm, "--seconds", 0.5, "--json")
+    units = {row["sensor"]: row["unit"] for row in json.loads(out)["sensors"]}
+    assert units == {
+        **dict.fromkeys(("angle", "pressure 1", "pressure 2"), "counts"),
+        "velocity": "counts/ms",
+        **dict.fromkeys(("temperature 1", "temperature 2"), "°C"),
+    }
+    assert "joint 1 temperature 2: " in run(capsys, "arm", "sensors", arm, "--seconds", 0.5)[1]
+
+
 def test_what_counts_of_a_serial_arm_mean_is_not_guessed(capsys, tmp_path, monkeypatch):
     arm, file = "serial:/dev/nowhere", tmp_path / "arm.toml"
     monkeypatch.setattr(sys, "stdin", io.StringIO(""))

@@ -1,8 +1,10 @@
 """``pneumarm fit``."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+from pneumarm.arm.seam import unit_of
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
 from pneumarm.files import require_folder
@@ -29,11 +31,9 @@ def fit_(
         fitted = fit_store(store, settings, progress=report)
     fitted.simulation.save(out)
     result = fitted.results()
+    further, relative = fitted.simulation.window.further, result["relative_error"]
     header = ("one-step error on held-out sequences", "std", "in", "relative")
-    rows = [
-        (name, _short(std), _unit(name), _short(result["relative_error"][name]))
-        for name, std in result["std"].items()
-    ]
+    rows = [(name, _short(std), _unit(name, further), _short(relative[name])) for name, std in result["std"].items()]
     show(result, json, lambda: [table(header, rows)])
 
 
@@ -42,10 +42,8 @@ def _short(value: float | list[float]) -> str:
     return ", ".join(f"{one:.4g}" for one in (value if isinstance(value, list) else [value]))
 
 
-def _unit(name: str) -> str:
-    """Return the unit of a quantity, or of the further sensor that is called so."""
-    if "acceleration" in name:
-        return "m/s2"
-    if "temperature" in name:
-        return "Celsius"
+def _unit(name: str, further: Sequence[str]) -> str:
+    """Return the unit of a quantity, or of what the further sensor called ``name`` says."""
+    if name in further:
+        return unit_of(name)
     return "counts/ms" if name == "velocity" else "counts"

@@ -50,8 +50,8 @@ def train_(
     training.agent.save(out)
     result = training.results()
     figures = [(name, value) for name, value in result.items() if name != _EACH]
-    agents = [(i + 1, *(one[column] for column in COLUMNS)) for i, one in enumerate(result[_EACH])]
-    show(result, json, lambda: [table(("trained", ""), figures), table(("agent, validated", *COLUMNS), agents)])
+    each = [(i + 1, *(one[column] for column in COLUMNS)) for i, one in enumerate(result[_EACH])]
+    show(result, json, lambda: [table(("trained", ""), figures), table(("agent, validated", *COLUMNS), each)])
 
 
 _EACH = "validation"  # figures of every agent, in the results

@@ -74,7 +74,7 @@ def said(results: Mapping[str, Any], doing: str) -> list[str]:
     if total.interventions.replaced or total.interventions.limited:
         lines.append(f"guard while {doing}: {total.interventions}")
     if total.missed_deadlines:
-        lines.append(f"late while {doing}: {total.missed_deadlines:,} control periods began too late")
+        lines.append(f"late while {doing}: {total.missed_deadlines:,} control periods")
     return lines
 
 

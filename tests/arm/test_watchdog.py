@@ -1,5 +1,7 @@
 """A controller that does not come back: the arm is held, then vented, and the controller is stopped."""
 
+import gc
+import math
 import signal
 from threading import Thread
 from threading import enumerate as threads
@@ -218,6 +220,20 @@ def test_the_thread_ends_when_nothing_is_to_be_looked_at(arm):
     while running() and monotonic() < deadline:
         sleep(0.01)
     assert not running()
+
+
+def test_nobody_sees_to_an_arm_that_nobody_holds(arm):
+    """Such as that of an environment which was dropped and not closed."""
+    guard = GuardedArm(arm)
+    guard.watchdog.begin(guard.read(), math.inf)
+    thread = guard.watchdog._thread
+    sleep((HELD + 2) * PERIOD)
+    assert arm.valves == VENTED
+    assert thread.is_alive()
+    del guard
+    gc.collect()
+    thread.join(5)
+    assert not thread.is_alive()
 
 
 def test_an_arm_whose_clock_goes_back_has_failed_and_can_be_used_again(smallest_arm):

@@ -4,6 +4,7 @@ import ctypes
 import math
 import signal
 import sys
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from threading import Lock, Thread, get_ident, main_thread
@@ -43,6 +44,7 @@ class Watchdog:
         self._thread: Thread | None = None
         self._reading: Reading | None = None  # after which a decision is out; None while none is
         self._since = 0.0  # when it was asked for [s]
+        self._seen = -1.0  # what that was at the last look
         self._patience = PATIENCE
         self._decider = 0
         self._stands_still: bool | None = None  # the arm's clock while we compute; None while that is not known
@@ -57,7 +59,8 @@ class Watchdog:
             self._needed, self._interrupted, self._failure = not self._stands_still, None, None
             self._reading = reading
             if self._thread is None:
-                self._thread = Thread(target=self._look, name="pneumarm watchdog", daemon=True)
+                self._seen = -1.0
+                self._thread = Thread(target=_look, args=(weakref.ref(self),), name="pneumarm watchdog", daemon=True)
                 self._thread.start()
 
     def end(self) -> None:
@@ -89,20 +92,16 @@ class Watchdog:
         with self._lock:
             self._reading = None
 
-    def _look(self) -> None:
-        period = self._arm.spec.period
-        seen = -1.0
-        while True:
-            with self._lock:
-                if self._reading is not None:
-                    nap = self._attend(self._reading)
-                elif self._since == seen:  # no decision was asked for since the last look
-                    self._thread = None
-                    return
-                else:
-                    nap = period
-                seen = self._since
-            sleep(nap)
+    def look(self) -> float | None:
+        """Look once; return how long [s] there is nothing more to see, None where there is nothing to look at."""
+        with self._lock:
+            seen, self._seen = self._seen, self._since
+            if self._reading is not None:
+                return self._attend(self._reading)
+            if self._since == seen:  # no decision was asked for since the last look
+                self._thread = None
+                return None
+            return self._arm.spec.period
 
     def _attend(self, reading: Reading) -> float:
         """Do what the decision on ``reading`` needs by now; return for how long [s] it needs nothing more."""
@@ -122,6 +121,13 @@ class Watchdog:
                 self._needed, self._failure = False, error
         nap = period if self._needed else _SELDOM
         return min(nap, self._patience - out) if out < self._patience else nap
+
+
+def _look(watchdog: "weakref.ref[Watchdog]") -> None:
+    """Look while there is something to look at and somebody holds the arm: no dead-man is fed for nobody."""
+    while (dog := watchdog()) is not None and (nap := dog.look()) is not None:
+        del dog
+        sleep(nap)
 
 
 def _interrupt(thread: int) -> None:

@@ -131,7 +131,7 @@ def _run(arguments: list[str]) -> int:
         leave_by_exceptions()
         app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
-        complain(f"{error} See pneumarm --help.")
+        complain(f"{error} See {' '.join(['pneumarm', *(error.command_chain or ())])} --help.")
         return 2
     except PneumarmError as error:
         complain(error)

@@ -61,7 +61,7 @@ class RunSettings(LearnSettings):
     """What a run is asked for. A folder is resumed with the same settings only."""
 
     arm: str = "virtual"
-    """virtual, virtual:seed=N, simulation:FILE or python:module:callable."""
+    """virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable."""
     seed: int = 0
     """Of everything that is drawn at random."""
     joints: int = 1

@@ -101,6 +101,8 @@ def test_a_spec_refuses_a_sensor_twice_and_one_of_a_joint_that_it_has_not():
         ArmSpec(sensors=(Sensor("acceleration"), Sensor("acceleration", channel=2)))
     with pytest.raises(UnusableInput, match="sensors"):
         ArmSpec(sensors=(Sensor("acceleration", 2),))
+    with pytest.raises(UnusableInput, match="sensors"):
+        ArmSpec(sensors=(Sensor("acceleration", channel=1), Sensor("temperature", muscle=1, channel=1)))
 
 
 def test_a_reading_without_what_the_spec_promises_is_a_failure_of_the_arm():

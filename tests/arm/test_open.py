@@ -1,6 +1,9 @@
+import itertools
+
 import pytest
 
 from pneumarm.arm import open_arm
+from pneumarm.arm.spec_file import save_spec
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters
 from pneumarm.errors import UnusableInput
 
@@ -44,3 +47,32 @@ def test_unknown_names_are_refused_with_what_is_expected(name):
 def test_an_unknown_preset_is_refused():
     with pytest.raises(UnusableInput, match="preset 'Z': expected one of A, B, C"):
         open_arm("virtual:preset=Z")
+
+
+def test_options_come_in_any_order(tmp_path):
+    plan, known = tmp_path / "a,plan.toml", tmp_path / "arm.toml"
+    plan.write_text('[[fault]]\nkind = "supply-loss"\n')
+    with open_arm("virtual:seed=7,sensors=velocity") as arm:
+        save_spec(arm.spec, known)
+    for options in itertools.permutations(("seed=7", f"faults={plan}", "sensors=velocity", f"spec={known}")):
+        with open_arm(f"virtual:{','.join(options)}") as arm:
+            assert arm.arm.parameters == draw_parameters(7)
+            assert arm.spec.velocity_sensor
+            assert len(arm.arm.faults) == 1
+    with open_arm(f"virtual:spec={known}") as arm:
+        assert arm.arm.parameters == VirtualArm().parameters
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("virtual:seed=7,seed=8", "an option is given twice"),
+        ("virtual:seed=7,preset=A", "expected virtual"),
+        ("virtual:seed=7,sensors=", "expected further sensors of velocity"),
+        ("serial:/dev/nowhere,sensors=velocity", "only a virtual arm has sensors="),
+        ("simulation:FILE,faults=plan.toml,seed=3", "only a virtual arm has faults=, seed="),
+    ],
+)
+def test_options_that_cannot_be_are_refused(name, said):
+    with pytest.raises(UnusableInput, match=said):
+        open_arm(name)

@@ -1,5 +1,7 @@
 """A controller that does not come back: the arm is held, then vented, and the controller is stopped."""
 
+import gc
+import math
 import signal
 from threading import Thread
 from threading import enumerate as threads
@@ -12,7 +14,7 @@ from pneumarm.arm import Reading
 from pneumarm.arm.cycle import ControlCycle
 from pneumarm.arm.guard import HELD, GuardedArm, Interventions
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.errors import ControllerFailure
+from pneumarm.errors import ArmFailure, ControllerFailure
 
 PERIOD = 0.02
 OPEN = np.array([[1, 0]], np.int8)
@@ -145,7 +147,7 @@ def test_one_that_goes_on_is_interrupted_again(arm, monkeypatch):
         list(ControlCycle(GuardedArm(arm), patience=0.2).run(after(1, stubborn)))
 
 
-def test_an_arm_that_fails_meanwhile_is_told_of_by_whoever_moves_it_next(arm):
+def test_an_arm_that_fails_meanwhile_is_told_of(arm):
     def decide(reading):
         arm.read = lambda: 1 / 0
         sleep(0.2)
@@ -154,6 +156,39 @@ def test_an_arm_that_fails_meanwhile_is_told_of_by_whoever_moves_it_next(arm):
     with pytest.raises(ZeroDivisionError):
         list(ControlCycle(GuardedArm(arm)).run(decide))
     assert arm.valves == [[0, 0]]
+
+
+def test_an_arm_that_fails_only_once_meanwhile_is_told_of_too(arm):
+    """A clock that went back is said once; whoever went on would wait for a time of the old clock."""
+
+    def decide(reading):
+        arm.begun += 0.5 * PERIOD + reading.time
+        arm.time = 0.0
+        sleep(0.2)
+        return OPEN
+
+    guard = GuardedArm(arm)
+    arm.begun -= 100.0
+    with pytest.raises(ArmFailure, match="its clock went back"):
+        list(ControlCycle(guard).run(decide))
+    assert arm.valves == [[0, 0]]
+
+
+def test_an_interrupt_before_the_controller_is_asked_leaves_nothing_to_look_after(arm, monkeypatch):
+    guard = GuardedArm(arm)
+    begin = guard.watchdog.begin
+
+    def interrupted(*args):
+        begin(*args)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(guard.watchdog, "begin", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        list(ControlCycle(guard).run(lambda reading: OPEN))
+    touched = len(arm.set)
+    sleep((HELD + 3) * PERIOD)
+    assert arm.valves == [[0, 0]]
+    assert len(arm.set) == touched
 
 
 @pytest.mark.parametrize("states", [True, False])
@@ -185,6 +220,20 @@ def test_the_thread_ends_when_nothing_is_to_be_looked_at(arm):
     while running() and monotonic() < deadline:
         sleep(0.01)
     assert not running()
+
+
+def test_nobody_sees_to_an_arm_that_nobody_holds(arm):
+    """Such as that of an environment which was dropped and not closed."""
+    guard = GuardedArm(arm)
+    guard.watchdog.begin(guard.read(), math.inf)
+    thread = guard.watchdog._thread
+    sleep((HELD + 2) * PERIOD)
+    assert arm.valves == VENTED
+    assert thread.is_alive()
+    del guard
+    gc.collect()
+    thread.join(5)
+    assert not thread.is_alive()
 
 
 def test_an_arm_whose_clock_goes_back_has_failed_and_can_be_used_again(smallest_arm):

@@ -27,7 +27,7 @@ from pneumarm.arm.virtual import (
 from pneumarm.checkup import CheckupSettings, Known, calibrate, diagnose, ends, joint_figures, measure
 from pneumarm.checkup.figures import LAGS, autocorrelation, irregularity, ljung_box, onset
 from pneumarm.cli import main
-from pneumarm.commands import arm_ as commands
+from pneumarm.commands import asking
 from pneumarm.errors import UnusableInput
 
 
@@ -277,6 +277,18 @@ def test_sensors_are_shown_with_closed_valves(capsys):
     assert run(capsys, "arm", "sensors", "virtual", "--every", 0)[0] == 2
 
 
+def test_further_sensors_are_shown_with_their_units(capsys):
+    arm = "virtual:seed=2,sensors=temperature+velocity"
+    _, out, _ = run(capsys, "arm", "sensors", arm, "--seconds", 0.5, "--json")
+    units = {row["sensor"]: row["unit"] for row in json.loads(out)["sensors"]}
+    assert units == {
+        **dict.fromkeys(("angle", "pressure 1", "pressure 2"), "counts"),
+        "velocity": "counts/ms",
+        **dict.fromkeys(("temperature 1", "temperature 2"), "°C"),
+    }
+    assert "joint 1 temperature 2: " in run(capsys, "arm", "sensors", arm, "--seconds", 0.5)[1]
+
+
 def test_what_counts_of_a_serial_arm_mean_is_not_guessed(capsys, tmp_path, monkeypatch):
     arm, file = "serial:/dev/nowhere", tmp_path / "arm.toml"
     monkeypatch.setattr(sys, "stdin", io.StringIO(""))
@@ -307,10 +319,10 @@ def test_a_person_is_asked_while_the_arm_is_held(monkeypatch):
         true = inner.spec.degrees(arm.read().angle)[0]
         os.write(master, b"about thirty\n" if len(asked) == 1 else f"{true:.1f}\n".encode())
 
-    monkeypatch.setattr(commands, "say", lambda text: say(text) if "protractor" in text else None)
+    monkeypatch.setattr(asking, "say", lambda text: say(text) if "protractor" in text else None)
     with open(slave) as terminal, guard:
         monkeypatch.setattr(sys, "stdin", terminal)
-        known = commands._asked(guard, checkup, Known(counts_per_bar=166.0))
+        known = asking.asked_for(guard, checkup, Known(counts_per_bar=166.0))
     os.close(master)
     assert len(asked) == 3
     spec = calibrate(checkup, known).file.spec

@@ -15,7 +15,7 @@ class Counts:
     interventions: Interventions = field(default_factory=Interventions)
     """How often the guard did what."""
     missed_deadlines: int = 0
-    """Control periods that began more than half a period late."""
+    """Points of the grid of control periods that passed without a turn within half a period."""
     link: Mapping[str, int] = field(default_factory=dict)
     """What happened on the link to the arm, by name; empty for an arm without one."""
 

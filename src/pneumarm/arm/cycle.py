@@ -66,14 +66,14 @@ class ControlCycle:
             while True:
                 reading = arm.read()
                 due = reading.time if due is None else due
-                missed = max(round((reading.time - due) / period), 0)
+                missed = missed_turns(reading.time - due, period)
                 self.missed_deadlines += missed
                 due += (missed + 1) * period
                 if self.close_while_computing:
                     arm.set_valves(closed)
                 began, raised = monotonic(), None
-                arm.watchdog.begin(reading, self.patience)
                 try:
+                    arm.watchdog.begin(reading, self.patience)
                     valves = decide(reading)
                 except PneumarmError:
                     raise
@@ -105,6 +105,11 @@ class ControlCycle:
             raise
         else:
             arm.set_valves(closed)
+
+
+def missed_turns(late: float, period: float) -> int:
+    """Return how many turns of the grid a turn has missed that is ``late`` [s]; the next is due after these."""
+    return max(round(late / period), 0)
 
 
 @dataclass(frozen=True)

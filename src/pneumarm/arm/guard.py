@@ -75,6 +75,16 @@ class Interventions:
         """Valves kept closed and decisions replaced."""
         return sum(astuple(self)) - self.vented
 
+    @property
+    def replaced(self) -> int:
+        """Decisions replaced."""
+        return self.nonsense + self.raised + self.late
+
+    @property
+    def limited(self) -> int:
+        """Valves kept closed at limits that a sound arm does not reach: of the angle, of the time of inflation."""
+        return self.angle + self.inflation
+
     def __add__(self, other: "Interventions") -> "Interventions":
         return Interventions(*[a + b for a, b in zip(astuple(self), astuple(other), strict=True)])
 

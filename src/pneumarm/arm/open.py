@@ -1,7 +1,9 @@
 """Open an arm by its name on the command line."""
 
 import importlib
+import re
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +12,11 @@ from pneumarm.errors import UnusableInput
 
 _FORMS = (
     "virtual, virtual:seed=7, virtual:preset=A, virtual:seed=7,sensors=velocity+temperature, "
-    "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, emulated:ARM or python:module:callable"
+    "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, emulated:ARM or python:module:callable, "
+    "each with ,spec=arm.toml if you like"
 )
-_FAULTS = ",faults="
-_SENSORS = ",sensors="
-_SPEC = ",spec="
+_OPTION = re.compile(r"[:,](?=(?:seed|preset|sensors|faults|spec)=)")
+"""Stands before an option; files may have commas in their names."""
 
 
 def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
@@ -27,39 +29,51 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
     ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
     ``python:module:callable`` calls ``callable()`` for the arm.
-    ``spec`` is a file from ``pneumarm arm calibrate``, which any name may also end in: ``NAME,spec=arm.toml``.
+    ``spec`` is a file from ``pneumarm arm calibrate``, an option of any name: ``NAME,spec=arm.toml``.
+    Options come in any order.
     The arm is not guarded: see :func:`pneumarm.arm.guarded`.
 
     Raises:
         UnusableInput: no arm has this name, or the file is not one of this arm.
 
     """
-    name, found, file = name.partition(_SPEC)
-    if found or spec is not None:
-        from pneumarm.arm.corrected import CorrectedArm
-        from pneumarm.arm.spec_file import load_arm_file
+    place, options = _parts(name)
+    file = options.pop("spec", None)
+    if spec is None and file is None:
+        return _open(place, options, seed)
+    from pneumarm.arm.corrected import CorrectedArm
+    from pneumarm.arm.spec_file import load_arm_file
 
-        known = load_arm_file(spec or file)
-        arm = _open(name, seed, known.spec)
-        try:
-            return CorrectedArm(arm, known)
-        except UnusableInput:
-            arm.close()
-            raise
-    return _open(name, seed)
+    known = load_arm_file(spec if spec is not None else str(file))
+    arm = _open(place, options, seed, known.spec)
+    try:
+        return CorrectedArm(arm, known)
+    except UnusableInput:
+        arm.close()
+        raise
 
 
-def _open(name: str, seed: int, spec: ArmSpec | None = None) -> Arm:
-    kind, _, rest = name.partition(":")
-    if kind == "virtual":
-        return _virtual(name, rest, seed, spec)
+def _parts(name: str) -> tuple[str, dict[str, str]]:
+    """Return the ``name`` of an arm without its options, and these, in the order in which they are given."""
+    place, *given = _OPTION.split(name)
+    options = dict(option.split("=", 1) for option in given)
+    if len(options) < len(given):
+        raise UnusableInput(f"arm {name!r}: an option is given twice; expected {_FORMS}")
+    return place, options
+
+
+def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None = None) -> Arm:
+    name = ":".join([place, *([",".join(f"{key}={value}" for key, value in options.items())] if options else [])])
+    kind, _, rest = place.partition(":")
+    if place == "virtual":
+        return _virtual(name, options, seed, spec)
     if kind == "emulated" and rest:
         from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
 
-        inner = _open(rest, seed, spec)
+        inner = _open(rest, options, seed, spec)
         return SerialArm(BoardLine(EmulatedBoard(inner)), replace(spec or inner.spec, name=name))
-    if _FAULTS in rest:
-        raise UnusableInput(f"arm {name!r}: only a virtual arm plays faults; remove {_FAULTS!r} and what follows")
+    if options:
+        raise UnusableInput(f"arm {name!r}: only a virtual arm has {'=, '.join(options)}=; leave that out")
     if kind == "simulation" and rest:
         from pneumarm.simulation import Simulation, SimulationArm
 
@@ -74,29 +88,25 @@ def _open(name: str, seed: int, spec: ArmSpec | None = None) -> Arm:
     raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
 
 
-def _virtual(name: str, rest: str, seed: int, spec: ArmSpec | None) -> Arm:
-    """Return the virtual arm with the options ``rest``: seed=N or preset=P, then sensors=KINDS, then faults=FILE.
+def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None) -> Arm:
+    """Return the virtual arm with ``options``: a seed or a preset, kinds of sensors, a file of faults.
 
     Without ``sensors`` it has the further sensors that its ``spec`` names, if it has one.
     """
     from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, read_plan, usual_sensors
 
-    options, separator, file = (f",{rest}" if rest.startswith(("faults=", "sensors=")) else rest).partition(_FAULTS)
-    first, _, kinds = options.partition(_SENSORS)
-    key, _, value = first.partition("=")
-    if not first and name != "virtual:":
-        parameters = None
-    elif key == "seed" and value.isdecimal():
-        parameters = draw_parameters(int(value))
-    elif key == "preset":
-        parameters = preset_parameters(value)
-    else:
+    drawn, preset = options.get("seed"), options.get("preset")
+    if (drawn is not None and preset is not None) or not (drawn is None or drawn.isdecimal()):
         raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
-    if kinds:
-        velocity, sensors = usual_sensors(kinds.split("+"), 1 if parameters is None else len(parameters.joints))
+    parameters = None if preset is None else preset_parameters(preset)
+    if drawn is not None:
+        parameters = draw_parameters(int(drawn))
+    if "sensors" in options:
+        kinds = options["sensors"].split("+")
+        velocity, sensors = usual_sensors(kinds, 1 if parameters is None else len(parameters.joints))
     else:
         velocity, sensors = (spec.velocity_sensor, spec.sensors) if spec is not None else (False, ())
-    faults = read_plan(file) if separator else ()
+    faults = read_plan(options["faults"]) if "faults" in options else ()
     return VirtualArm(parameters, seed=seed, name=name, faults=faults, velocity_sensor=velocity, sensors=sensors)
 
 

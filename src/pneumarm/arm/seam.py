@@ -93,7 +93,7 @@ class ArmSpec:
     """Whether readings carry the velocity that the arm measures itself, as a controller does that samples faster
     (thesis sections 5.1 and 7.3)."""
     sensors: tuple[Sensor, ...] = ()
-    """Further sensors whose readings it carries (thesis appendix A)."""
+    """Further sensors whose readings it carries, no two in one place or on one channel (thesis appendix A)."""
     latency: float = 0.0
     """Time [s] between reading and acting that the control cycle has to let pass on this arm.
 
@@ -116,7 +116,8 @@ class ArmSpec:
             "angle_limits": math.isfinite(lowest) and math.isfinite(highest) and lowest < highest,
             "latency": math.isfinite(self.latency) and 0 <= self.latency < self.period,
             "sensors": all(one.joint <= self.joints for one in self.sensors)
-            and len({one.name for one in self.sensors}) == len(self.sensors),
+            and _unlike(one.name for one in self.sensors)
+            and _unlike(one.channel for one in self.sensors),
         }
         for name, valid in checks.items():
             if not valid:
@@ -141,6 +142,12 @@ class ArmSpec:
     def bar(self, counts: ArrayLike) -> NDArray[np.float64]:
         """Convert pressures [counts] to bar gauge."""
         return np.asarray(counts, np.float64) / self.counts_per_bar
+
+
+def _unlike(values: Iterable[object]) -> bool:
+    """Return whether no two of ``values`` that are there are equal."""
+    there = [value for value in values if value is not None]
+    return len(set(there)) == len(there)
 
 
 def _positive(value: float) -> bool:
@@ -168,6 +175,14 @@ class Reading:
 def velocity_name(joint: int) -> str:
     """Return what the measured velocity of ``joint``, from 1, is called."""
     return f"joint_{joint}_velocity"
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of what the further sensor called ``name`` says."""
+    return _UNITS[_place(name)[0]]
+
+
+_UNITS = {"velocity": "counts/ms", "acceleration": "m/s2", "temperature": "°C"}
 
 
 def measured(reading: Reading, names: Iterable[str], whose: str = "the arm") -> list[float]:

@@ -4,6 +4,7 @@ import ctypes
 import math
 import signal
 import sys
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from threading import Lock, Thread, get_ident, main_thread
@@ -43,20 +44,23 @@ class Watchdog:
         self._thread: Thread | None = None
         self._reading: Reading | None = None  # after which a decision is out; None while none is
         self._since = 0.0  # when it was asked for [s]
+        self._seen = -1.0  # what that was at the last look
         self._patience = PATIENCE
         self._decider = 0
         self._stands_still: bool | None = None  # the arm's clock while we compute; None while that is not known
         self._needed = True  # whether the arm has to be seen to
         self._interrupted: float | None = None  # when the decider was [s]
+        self._failure: Exception | None = None  # of the arm, while it was seen to
 
     def begin(self, reading: Reading, patience: float = PATIENCE) -> None:
         """Look after the decision on ``reading``; the calling thread is interrupted after ``patience`` [s]."""
         with self._lock:
             self._since, self._patience, self._decider = monotonic(), patience, get_ident()
-            self._needed, self._interrupted = not self._stands_still, None
+            self._needed, self._interrupted, self._failure = not self._stands_still, None, None
             self._reading = reading
             if self._thread is None:
-                self._thread = Thread(target=self._look, name="pneumarm watchdog", daemon=True)
+                self._seen = -1.0
+                self._thread = Thread(target=_look, args=(weakref.ref(self),), name="pneumarm watchdog", daemon=True)
                 self._thread.start()
 
     def end(self) -> None:
@@ -64,9 +68,11 @@ class Watchdog:
 
         Raises:
             ControllerFailure: the controller was stopped because it had not decided for too long; all is vented.
+            Exception: what the arm raised while it was seen to, unless another error is on its way already.
 
         """
-        arrived = isinstance(sys.exc_info()[1], KeyboardInterrupt)
+        leaving = sys.exc_info()[1]
+        arrived = isinstance(leaving, KeyboardInterrupt)
         try:
             self._end()
         except KeyboardInterrupt:
@@ -78,25 +84,24 @@ class Watchdog:
             with suppress(KeyboardInterrupt):
                 sleep(0.0 if arrived else _ARRIVING)  # here it harms nothing
             raise self._arm.give_up(self._patience)
+        if self._failure is not None and leaving is None:
+            failure, self._failure = self._failure, None
+            raise failure
 
     def _end(self) -> None:
         with self._lock:
             self._reading = None
 
-    def _look(self) -> None:
-        period = self._arm.spec.period
-        seen = -1.0
-        while True:
-            with self._lock:
-                if self._reading is not None:
-                    nap = self._attend(self._reading)
-                elif self._since == seen:  # no decision was asked for since the last look
-                    self._thread = None
-                    return
-                else:
-                    nap = period
-                seen = self._since
-            sleep(nap)
+    def look(self) -> float | None:
+        """Look once; return how long [s] there is nothing more to see, None where there is nothing to look at."""
+        with self._lock:
+            seen, self._seen = self._seen, self._since
+            if self._reading is not None:
+                return self._attend(self._reading)
+            if self._since == seen:  # no decision was asked for since the last look
+                self._thread = None
+                return None
+            return self._arm.spec.period
 
     def _attend(self, reading: Reading) -> float:
         """Do what the decision on ``reading`` needs by now; return for how long [s] it needs nothing more."""
@@ -112,10 +117,17 @@ class Watchdog:
                 if self._stands_still is None:
                     self._stands_still = self._arm.get_state() is not None
                 self._needed = not self._stands_still and self._arm.stand_in(reading)
-            except Exception:  # the arm failed, and whoever moves it next will be told
-                self._needed = False
+            except Exception as error:  # told when the decision comes: the arm may not say it twice
+                self._needed, self._failure = False, error
         nap = period if self._needed else _SELDOM
         return min(nap, self._patience - out) if out < self._patience else nap
+
+
+def _look(watchdog: "weakref.ref[Watchdog]") -> None:
+    """Look while there is something to look at and somebody holds the arm: no dead-man is fed for nobody."""
+    while (dog := watchdog()) is not None and (nap := dog.look()) is not None:
+        del dog
+        sleep(nap)
 
 
 def _interrupt(thread: int) -> None:

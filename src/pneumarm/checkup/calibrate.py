@@ -79,9 +79,8 @@ def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
     if (np.diff(at_ends) < _LEAST_SWEEP * np.diff(spec.angle_range)).any():
         raise UnusableInput(f"{spec.name}: its angle hardly moves; run `pneumarm arm check` and mend what it finds")
     per_degree, angle_range = spec.counts_per_degree, spec.angle_range
-    scales = [(0.0, 0.0, 1.0)] * len(
-        lines
-    )  # where a joint's 0 degrees are, where they go, and how they are stretched
+    # By joint where its 0 degrees are, where they go, and how angles are stretched.
+    scales = [(0.0, 0.0, 1.0)] * len(lines)
     if known.counts_per_degree is not None:
         per_degree = known.counts_per_degree
     if known.angles:

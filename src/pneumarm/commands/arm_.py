@@ -1,19 +1,18 @@
 """``pneumarm arm check``, ``calibrate``, ``sensors``, ``valves``, ``errors`` and ``emulate``."""
 
-import math
-import select
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from pneumarm.appendix_a.runs import RunsSettings
-from pneumarm.arm import Arm, ArmSpec, GuardedArm, Reading, guarded, open_arm
+from pneumarm.arm import Arm, ArmSpec, Reading, guarded, open_arm
 from pneumarm.arm.corrected import CorrectedArm
+from pneumarm.arm.seam import measured, unit_of
 from pneumarm.arm.spec_file import save_arm_file
 from pneumarm.checkup import (
     Checkup,
@@ -21,12 +20,11 @@ from pneumarm.checkup import (
     Known,
     calibrate,
     diagnose,
-    ends,
-    fill_alone,
     joint_figures,
     measure,
 )
 from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, muscle_row
+from pneumarm.commands.asking import asked_for, missing_of
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.errors import UnusableInput
@@ -155,7 +153,7 @@ def calibrate_(
     """
     require_folder(out)
     known = Known(angles, counts_per_degree, supply, counts_per_bar)
-    missing = _missing(arm, known)
+    missing = missing_of(arm, known)
     asking = sys.stdin.isatty() and not json
     if missing and not asking:
         raise UnusableInput(f"{arm}: what its counts mean must be said: give {' and '.join(missing)}")
@@ -170,7 +168,7 @@ def calibrate_(
         for finding in findings:
             say(str(finding))
         if missing:
-            known = _asked(guarded(opened), checkup, known)
+            known = asked_for(guarded(opened), checkup, known)
     calibration = calibrate(checkup, known)
     save_arm_file(calibration.file, out)
     result = {
@@ -191,59 +189,6 @@ def calibrate_(
     show(result, json, lambda: [table((str(out), ""), list(asdict(spec).items()))])
 
 
-def _missing(arm: str, known: Known) -> list[str]:
-    """Return the options that must say what the counts of ``arm`` mean: a serial port cannot tell."""
-    if not arm.startswith("serial:") or ",spec=" in arm:
-        return []
-    angle = [] if known.angles or known.counts_per_degree else ["--angles or --counts-per-degree"]
-    pressure = [] if known.supply or known.counts_per_bar else ["--supply or --counts-per-bar"]
-    return angle + pressure
-
-
-def _asked(guard: GuardedArm, checkup: Checkup, known: Known) -> Known:
-    """Return what is known with what a person says who has protractor and manometer before them."""
-    if not (known.angles or known.counts_per_degree):
-        known = replace(known, angles=tuple(_protractor(guard, checkup, j) for j in range(guard.spec.joints)))
-    if not (known.supply or known.counts_per_bar):
-        known = replace(known, supply=_answer(guard, "What does the manometer of the supply show [bar]?"))
-    return known
-
-
-def _protractor(guard: GuardedArm, checkup: Checkup, joint: int) -> tuple[float, float]:
-    """Return the angles [degrees] of ``joint`` at the ends of the check-up, from those that it is held at now."""
-    said, counts = [], []
-    for muscle in (1, 0):
-        fill_alone(guard, joint, muscle, checkup.settings)
-        question = f"Joint {joint + 1} stands with muscle {muscle + 1} full. Its angle by the protractor [degrees]?"
-        said.append(_answer(guard, question))
-        counts.append(float(guard.read().angle[joint]))
-    if not (said[0] < said[1] and counts[0] < counts[1]):
-        raise UnusableInput(f"{guard.spec.name}: with muscle 1 full the angle must be the higher one, got {said}")
-    per_degree = (counts[1] - counts[0]) / (said[1] - said[0])
-    then = ends(checkup.joints[joint])  # it has crept a little since
-    low, high = (s + (float(t) - c) / per_degree for s, t, c in zip(said, then, counts, strict=True))
-    return low, high
-
-
-def _answer(guard: GuardedArm, question: str) -> float:
-    """Return the number that a person answers; meanwhile the arm stays as it is."""
-    while True:
-        say(question)
-        while not select.select([sys.stdin], [], [], 0.0)[0]:
-            guard.wait(_TURN)
-        line = sys.stdin.readline()
-        if not line:
-            raise UnusableInput("no answer came; give --angles and --supply as options")
-        try:
-            value = float(line.replace(",", "."))
-        except ValueError:
-            value = float("nan")
-        if math.isfinite(value):
-            return value
-        say(f"{line.strip()!r} is no number.")
-
-
-_TURN = 0.05  # s between two looks at the keyboard
 _NO_HINDRANCE = ("angle logarithmic", "low supply", "rising supply", "leak", "noise", "noise not white", "jitter")
 """Findings with which the sensors can be calibrated all the same."""
 
@@ -319,23 +264,40 @@ def sensors_(arm: str, /, *, seconds: float = 60.0, every: float = 0.2, json: Js
             if not json:
                 print(f"{reading.time - begin:7.1f} s   {_sensed(reading, spec)}", flush=True)
             guard.wait(every)
-    counts = np.array([np.column_stack([reading.angle, reading.pressure]) for reading in seen])
-    rows = [
-        {"joint": j + 1, "sensor": name, "lowest": counts[:, j, k].min(), "highest": counts[:, j, k].max()}
-        for j in range(spec.joints if seen else 0)
-        for k, name in enumerate(("angle", "pressure 1", "pressure 2"))
-    ]
-    header = ("joint", "sensor", "lowest [counts]", "highest [counts]")
+    rows = _extremes(seen, spec) if seen else []
+    header = ("joint", "sensor", "unit", "lowest", "highest")
     show({"sensors": rows}, json, lambda: [table(header, [list(row.values()) for row in rows])])
 
 
+def _extremes(seen: Sequence[Reading], spec: ArmSpec) -> list[dict[str, Any]]:
+    """Return the lowest and the highest that each sensor said in the readings ``seen``, at least one."""
+    counts = np.array([np.column_stack([reading.angle, reading.pressure]) for reading in seen])
+    found = [
+        (j + 1, name, "counts", counts[:, j, k])
+        for j in range(spec.joints)
+        for k, name in enumerate(("angle", "pressure 1", "pressure 2"))
+    ]
+    further = np.array([measured(reading, spec.further) for reading in seen])
+    for name, values in zip(spec.further, further.T, strict=True):
+        _, joint, sensor = name.split("_", 2)
+        found.append((int(joint), sensor.replace("_", " "), unit_of(name), values))
+    return [
+        {"joint": joint, "sensor": name, "unit": unit, "lowest": values.min(), "highest": values.max()}
+        for joint, name, unit, values in found
+    ]
+
+
 def _sensed(reading: Reading, spec: ArmSpec) -> str:
-    """Return what the sensors say in degrees and bar, and in counts behind it."""
+    """Return what the sensors say in degrees and bar, in counts behind it, then what further sensors say."""
     degrees, bar = spec.degrees(reading.angle), spec.bar(reading.pressure)
-    return "   ".join(
+    joints = [
         f"joint {j + 1}: {degrees[j]:6.1f}° ({reading.angle[j]:4.0f})"
         + "".join(f"  {bar[j, m]:5.2f} bar ({reading.pressure[j, m]:4.0f})" for m in range(2))
         for j in range(spec.joints)
+    ]
+    further = zip(spec.further, measured(reading, spec.further), strict=True)
+    return "   ".join(
+        [*joints, *(f"{name.replace('_', ' ')}: {value:.2f} {unit_of(name)}" for name, value in further)]
     )
 
 

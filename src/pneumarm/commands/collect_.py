@@ -1,15 +1,14 @@
 """``pneumarm collect``."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-from pneumarm.arm import open_arm
+from pneumarm.arm import ArmSpec, open_arm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import Monitor, open_controller
-from pneumarm.control.found import collected_results, said
-from pneumarm.transitions import CollectSettings, Store, collect, require_enough
+from pneumarm.control.found import LINK, collected_results, said
+from pneumarm.transitions import CollectResult, CollectSettings, Store, collect, require_enough
 
 
 def collect_(
@@ -28,7 +27,7 @@ def collect_(
     Parameters
     ----------
     arm
-        virtual, virtual:seed=N, simulation:FILE or python:module:callable.
+        virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     db
         The store; made where there is none.
     transitions
@@ -54,4 +53,19 @@ def collect_(
     results = collected_results(result, watch)
     for line in said(results, "collecting"):
         say(line)
-    show(results, json, lambda: [table(("collected", ""), list(asdict(result).items()))])
+    show(results, json, lambda: [table(("collected", ""), _rows(result, opened.spec))])
+
+
+def _rows(result: CollectResult, spec: ArmSpec) -> list[tuple[str, str]]:
+    peaks = spec.bar(result.peak_pressure).ravel()
+    return [
+        ("transitions", f"{result.transitions:,}"),
+        ("sequences", f"{result.sequences:,}"),
+        ("time of the arm [s]", f"{result.seconds:,.1f}"),
+        ("time of this call [s]", f"{result.wall_seconds:,.1f}"),
+        ("highest pressures [bar]", ", ".join(f"{peak:.2f}" for peak in peaks)),
+        ("the guard", str(result.interventions)),
+        ("missed deadlines", f"{result.missed_deadlines:,}"),
+        *((LINK.get(name, name), f"{count:,}") for name, count in result.link.items()),
+        *((f"rows marked: {reason}", f"{rows:,}") for reason, rows in result.marked.items()),
+    ]

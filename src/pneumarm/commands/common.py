@@ -8,3 +8,5 @@ Json = Annotated[bool, Parameter(name="--json", negative="")]
 """The flag that every command has: print one JSON object on stdout and nothing else there."""
 Settings = Parameter(name="*")
 """Marks a dataclass of settings whose fields become options."""
+COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
+"""Figures of movements that tables show."""

@@ -1,8 +1,10 @@
 """``pneumarm fit``."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+from pneumarm.arm.seam import unit_of
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
 from pneumarm.files import require_folder
@@ -29,6 +31,19 @@ def fit_(
         fitted = fit_store(store, settings, progress=report)
     fitted.simulation.save(out)
     result = fitted.results()
-    header = ("one-step error on held-out sequences", *result["std"])
-    rows = [("std [counts, counts/ms]", *result["std"].values()), ("relative", *result["relative_error"].values())]
+    further, relative = fitted.simulation.window.further, result["relative_error"]
+    header = ("one-step error on held-out sequences", "std", "in", "relative")
+    rows = [(name, _short(std), _unit(name, further), _short(relative[name])) for name, std in result["std"].items()]
     show(result, json, lambda: [table(header, rows)])
+
+
+def _short(value: float | list[float]) -> str:
+    """Return a number, or those of several joints."""
+    return ", ".join(f"{one:.4g}" for one in (value if isinstance(value, list) else [value]))
+
+
+def _unit(name: str, further: Sequence[str]) -> str:
+    """Return the unit of a quantity, or of what the further sensor called ``name`` says."""
+    if name in further:
+        return unit_of(name)
+    return "counts/ms" if name == "velocity" else "counts"

@@ -3,13 +3,11 @@
 from pathlib import Path
 from typing import Annotated
 
-from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.common import COLUMNS, Json, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.control.found import said
 from pneumarm.run import Run, RunSettings
-
-COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
 
 
 def run_(

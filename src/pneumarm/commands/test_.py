@@ -2,15 +2,13 @@
 
 from pathlib import Path
 
-from pneumarm.commands.common import Json
+from pneumarm.commands.common import COLUMNS, Json
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
 from pneumarm.learning import LOOKING_AHEAD, begin_states, results_with_lookahead, test_ahead
 from pneumarm.learning import test as test_agent
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
-
-COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
 
 
 def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: int = 0, json: Json = False) -> None:

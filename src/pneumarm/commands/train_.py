@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.common import COLUMNS, Json, Settings
 from pneumarm.console import progress, show, table
 from pneumarm.files import require_folder
 from pneumarm.learning import LearnSettings, begin_states, train
@@ -49,4 +49,9 @@ def train_(
         training = train(simulation, begin, chosen, seed, progress=lambda now: report(round(1000 * now.share), 1000))
     training.agent.save(out)
     result = training.results()
-    show(result, json, lambda: [table(("trained", ""), list(result.items()))])
+    figures = [(name, value) for name, value in result.items() if name != _EACH]
+    each = [(i + 1, *(one[column] for column in COLUMNS)) for i, one in enumerate(result[_EACH])]
+    show(result, json, lambda: [table(("trained", ""), figures), table(("agent, validated", *COLUMNS), each)])
+
+
+_EACH = "validation"  # figures of every agent, in the results

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.common import COLUMNS, Json, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
@@ -28,7 +28,7 @@ def transfer_(
     agent
         The agent, from ``pneumarm train``.
     arm
-        virtual, virtual:seed=N, simulation:FILE or python:module:callable.
+        virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
         Of the begin states, the goals and the exploration, and of a virtual arm's noise.
     out
@@ -46,5 +46,5 @@ def transfer_(
     show(
         result,
         json,
-        lambda: [table(("phase", *result["before"]), [(p, *result[p].values()) for p in ("before", "after")])],
+        lambda: [table(("phase", *COLUMNS), [(p, *(result[p][c] for c in COLUMNS)) for p in ("before", "after")])],
     )

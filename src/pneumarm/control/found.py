@@ -28,7 +28,6 @@ LINK = {
 """What a link counts, in plain words."""
 COLLECTING = "collecting"
 """The phase in which transitions are collected."""
-_DECISIONS = ("nonsense", "raised", "late")
 
 
 @dataclass(frozen=True)
@@ -72,10 +71,10 @@ def said(results: Mapping[str, Any], doing: str) -> list[str]:
     findings = (one for one in results.get("findings", []) if isinstance(one, Mapping))  # text in older results
     lines = [f"found while {doing}: {one['text']}{_rows(one, marked)}" for one in findings]
     total = sum((Counts.of(counts) for counts in results.get("counts", {}).values()), Counts())
-    if any(getattr(total.interventions, name) for name in (*_DECISIONS, "inflation", "angle")):
+    if total.interventions.replaced or total.interventions.limited:
         lines.append(f"guard while {doing}: {total.interventions}")
     if total.missed_deadlines:
-        lines.append(f"late while {doing}: {total.missed_deadlines} control periods")
+        lines.append(f"late while {doing}: {total.missed_deadlines:,} control periods")
     return lines
 
 

@@ -11,6 +11,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, Reading, guarded
+from pneumarm.arm.cycle import missed_turns
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.spaces import action_space, observation_space, scaled_goal, sensor_ranges
@@ -98,8 +99,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self.arm.watchdog.end()
         applied = self._turn(to_valves(actions.reshape(-1)))
         self._reading = reading = self.arm.read()
-        if reading.time - self._due > self.arm.spec.period / 2:
-            self._due = reading.time  # as the control cycle does after a lost period
+        self._due += missed_turns(reading.time - self._due, self.arm.spec.period) * self.arm.spec.period
         switched = 0 if self._applied is None else int((applied != self._applied).any(axis=1).sum())
         self._applied = applied
         self._tracker.commanded(applied)

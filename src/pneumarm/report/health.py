@@ -100,8 +100,7 @@ def _guard(counts: Mapping[str, Counts]) -> str:
     if not counts:
         return "what the guard did was not recorded"
     total = sum(counts.values(), Counts())
-    replaced = sum(getattr(total.interventions, name) for name in ("nonsense", "raised", "late"))
-    limits = total.interventions.inflation + total.interventions.angle
+    replaced, limits = total.interventions.replaced, total.interventions.limited
     guard = [f"{replaced:,} decisions had to be replaced" if replaced else "no decision had to be replaced"]
     if limits:
         guard.append(f"{limits:,} valves were kept closed at limits of angle or time")

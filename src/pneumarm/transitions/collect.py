@@ -101,7 +101,7 @@ class CollectResult:
     interventions: Interventions
     """How often the guard did what."""
     missed_deadlines: int
-    """Number of control periods that began more than half a period late."""
+    """Points of the grid of control periods that passed without a turn within half a period."""
     link: dict[str, int] = field(default_factory=dict)
     """What happened on the link to the arm, by name; empty for an arm without one."""
     marked: dict[str, int] = field(default_factory=dict)

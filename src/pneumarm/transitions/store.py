@@ -13,10 +13,9 @@ import math
 import os
 import sqlite3
 import time as wall_clock
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
-from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -28,7 +27,9 @@ import pneumarm
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.files import written_whole
+from pneumarm.transitions.blocks import Blocks, Predicate
 from pneumarm.transitions.lock import WriterLock
+from pneumarm.transitions.possible import row_values
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.rows import Mark, Recorded, Rows, joinable, unmarked
 from pneumarm.transitions.schema import (
@@ -38,14 +39,10 @@ from pneumarm.transitions.schema import (
     damaged,
     further_columns,
     read_settings,
-    row_columns,
     translated,
     upgrade,
     version_of,
 )
-
-Predicate = Callable[[NDArray[np.int64]], NDArray[np.bool_]]
-"""Maps numbers of sequences (n,) to which of them are meant (n,)."""
 
 BLOCK = 200_000
 """Rows of a block, about; with one joint a block takes 20 MB."""
@@ -376,7 +373,7 @@ class Store:
         )
 
     def _insert(self, connection: sqlite3.Connection, number: int, one: Recorded) -> None:
-        values = _row_values(one, self.spec, self.further, self.valves)
+        values = row_values(one, self.spec, self.further, self.valves)
         connection.execute(
             "INSERT INTO sequences VALUES (?, ?, ?, ?, ?, ?, ?)",
             (
@@ -465,120 +462,6 @@ def lock_vacant(path: Path) -> WriterLock:
     return lock
 
 
-class Blocks:
-    """Rows of a store as blocks of whole sequences; every iteration reads them anew."""
-
-    def __init__(
-        self, store: Store, rows: int, sequences: Predicate | None, kinds: Collection[str] | None, marked: bool
-    ) -> None:
-        self._store, self._rows, self._sequences, self._kinds = store, rows, sequences, kinds
-        self._marked = marked
-
-    def __iter__(self) -> Iterator[Rows]:
-        number, length, at_rest = self._chosen()
-        before = np.concatenate([[0], np.cumsum(length)])  # rows before each sequence, and all at the end
-        begin = 0
-        while begin < len(number):
-            end = int(np.searchsorted(before, before[begin] + self._rows, "right")) - 1
-            part = slice(begin, max(end, begin + 1))
-            if len(block := self._read(number[part], length[part], at_rest[part])):
-                yield block
-            begin = part.stop
-
-    def _chosen(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Return number, rows and at_rest of the sequences to read."""
-        query = "SELECT number, rows, at_rest FROM sequences"
-        kinds = list(self._kinds) if self._kinds is not None else []
-        if self._kinds is not None:
-            query += f" WHERE kind IN ({', '.join('?' * len(kinds))})"
-        with translated(self._store.path):
-            found = self._store._connection.execute(query + " ORDER BY number", kinds)
-            table = np.fromiter(chain.from_iterable(found), np.int64).reshape(-1, 3)
-        if self._sequences is not None:
-            table = table[self._sequences(table[:, 0])]
-        return table[:, 0], table[:, 1], table[:, 2].astype(bool)
-
-    def _read(self, number: NDArray[np.int64], length: NDArray[np.int64], at_rest: NDArray[np.bool_]) -> Rows:
-        store, joints = self._store, self._store.joints
-        columns = ["step", *row_columns(joints, store.further)]
-        query = f"SELECT {', '.join(columns)} FROM rows WHERE sequence = ? ORDER BY step LIMIT {LONGEST_SEQUENCE + 1}"
-        execute = store._connection.execute
-        total = int(length.sum())
-        with translated(store.path):
-            values = chain.from_iterable(chain.from_iterable(execute(query, (n,)) for n in number.tolist()))
-            try:
-                table = np.fromiter(values, np.float64, count=total * len(columns)).reshape(total, -1)
-            except (ValueError, TypeError) as error:
-                raise damaged(store.path, f"rows are missing or no numbers: {error}") from error
-            surplus = next(values, None) is not None
-        per_joint = table[:, 2 : 2 + 5 * joints].reshape(total, joints, 5)
-        rows = Rows(
-            sequence=np.repeat(number, length),
-            step=np.nan_to_num(table[:, 0]).astype(np.int64),
-            time=table[:, 1].copy(),
-            angle=per_joint[:, :, 0].copy(),
-            pressure=per_joint[:, :, 1:3].copy(),
-            command=per_joint[:, :, 3:5].copy(),
-            at_rest=np.repeat(at_rest, length),
-            measured=dict(zip(store.further, table[:, 2 + 5 * joints :].T.copy(), strict=True)),
-        )
-        first = np.concatenate([[0], np.cumsum(length)[:-1]])
-        if surplus or not _is_sound(rows, first, store.spec, store.valves):
-            raise damaged(store.path, f"impossible values in sequences {number[0]} to {number[-1]}")
-        return rows if self._marked else self._without_marked(rows)
-
-    def _without_marked(self, rows: Rows) -> Rows:
-        """Return the rows that are not marked."""
-        first, last = int(rows.sequence[0]), int(rows.sequence[-1])
-        marks = self._store._marks("sequence BETWEEN ? AND ?", (first, last))
-        if not marks:
-            return rows
-        kept = np.ones(len(rows), bool)
-        for sequence, mark in marks:
-            kept &= (rows.sequence != sequence) | unmarked(rows.step, [mark])
-        return rows.where(kept)
-
-
-def _is_sound(rows: Rows, first: NDArray[np.int64], spec: ArmSpec, valves: bool) -> bool:
-    """Return whether the rows of whole sequences that begin at the rows ``first`` are possible."""
-    begins = np.zeros(len(rows), bool)
-    begins[first] = True
-    ends = np.append(begins[1:], True)
-    rising = begins[1:] | ((np.diff(rows.step) > 0) & (np.diff(rows.time) > 0))
-    return bool(
-        (rows.step[first] == 0).all()
-        and rising.all()
-        and np.isfinite(rows.time).all()
-        and far_outside(rows.angle, rows.pressure, spec) is None
-        and np.isnan(rows.command[ends]).all()
-        and _commands_possible(rows.command[~ends], valves)
-        and all(np.isfinite(values).all() for values in rows.measured.values())
-    )
-
-
-def _commands_possible(command: NDArray[np.float64], valves: bool) -> bool:
-    if valves:
-        return bool(((command == 0) | (np.abs(command) == 1)).all())
-    return bool(np.isfinite(command).all())
-
-
-def far_outside(angle: NDArray[np.float64], pressure: NDArray[np.float64], spec: ArmSpec) -> str | None:
-    """Return what is wrong with angles and pressures [counts] that no sensor of this arm can have given.
-
-    Generous, because sensors do go past their nominal ranges: half a range of the angle, and three times the
-    largest pressure. What it catches is a wrong unit.
-    """
-    low, high = spec.angle_range
-    margin = (high - low) / 2
-    limit = 3 * spec.max_pressure_counts
-    # Written so that NaN counts as outside.
-    if not ((angle >= low - margin) & (angle <= high + margin)).all():
-        return f"an angle is far outside {low:g}..{high:g} counts or no number"
-    if not ((pressure >= -limit) & (pressure <= limit)).all():
-        return f"a pressure is over three times the limit of {spec.max_pressure_counts:g} counts or no number"
-    return None
-
-
 def _as_json(info: Mapping[str, Any]) -> str:
     try:
         return json.dumps(dict(info), allow_nan=False)
@@ -586,35 +469,3 @@ def _as_json(info: Mapping[str, Any]) -> str:
         raise UnusableInput(
             f"a sequence's or a run's info must be of JSON's types, with finite numbers: {error}"
         ) from error
-
-
-def _row_values(one: Recorded, spec: ArmSpec, further: Sequence[str], valves: bool) -> NDArray[np.float64]:
-    """Return the rows (n, columns) of a sequence, checked; what ``further`` does not name is left out."""
-    n, joints = len(one), spec.joints
-    shapes = {"angle": (n, joints), "pressure": (n, joints, 2), "command": (n, joints, 2), "step": (n,)}
-    for name, shape in shapes.items():
-        if getattr(one, name).shape != shape:
-            raise UnusableInput(f"a sequence's {name} must have shape {shape}, got {getattr(one, name).shape}")
-    if not 2 <= n <= LONGEST_SEQUENCE:
-        raise UnusableInput(f"a sequence must have 2 to {LONGEST_SEQUENCE} rows, this has {n}; cut it")
-    if one.step[0] != 0 or not (np.diff(one.step) > 0).all():
-        raise UnusableInput("a sequence's steps must begin at 0 and rise")
-    if not (math.isfinite(one.time[0]) and (np.diff(one.time) > 0).all() and math.isfinite(one.time[-1])):
-        raise UnusableInput("a sequence's times must be finite and rise")
-    problem = far_outside(one.angle, one.pressure, spec)
-    if problem:
-        raise UnusableInput(f"{problem}; does the arm's spec have the right counts?")
-    if not np.isnan(one.command[-1]).all() or not _commands_possible(one.command[:-1], valves):
-        wanted = "-1, 0 or +1" if valves else "finite"
-        raise UnusableInput(f"a sequence's commands must be {wanted}, and NaN after the last reading")
-    per_joint = np.concatenate([one.angle[:, :, None], one.pressure, one.command], axis=2)
-    values = np.concatenate([one.time[:, None], per_joint.reshape(n, -1)], axis=1)
-    return np.concatenate([values, *(_further_values(one, name) for name in further)], axis=1)
-
-
-def _further_values(one: Recorded, name: str) -> NDArray[np.float64]:
-    """Return what the sensor ``name`` said (n, 1), checked."""
-    values = one.measured.get(name)
-    if values is None or values.shape != (len(one),) or not np.isfinite(values).all():
-        raise UnusableInput(f"a sequence of this arm needs {len(one)} finite readings of its sensor {name}")
-    return values[:, None]

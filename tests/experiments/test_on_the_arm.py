@@ -14,19 +14,27 @@ from pneumarm.control.playing import Player
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments import displacement, goal_area, on_the_arm_only, overnight, transfer, transferability
 from pneumarm.experiments.claims import keys_of
+from pneumarm.experiments.evidence import (
+    blocks,
+    difference,
+    from_series,
+    mean,
+    over_arms,
+    plain,
+    series,
+    values,
+)
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, run_seed, sorted_rows
 from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,
     Material,
+    Tested,
     agent_of,
     draws,
-    from_series,
     from_visits,
     material,
-    series,
 )
-from pneumarm.experiments.on_arms import blocks, difference, mean, over_arms, plain, values
 from pneumarm.experiments.page import write_page
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.learning import Reward, Shaping, begin_states
@@ -41,8 +49,8 @@ SMALL_ONES: dict[str, Any] = {
     "transfer": replace(
         transfer.EXPERIMENT, agent=AGENT, sizes=transfer.Sizes(learning=40, block=10, test=10, warming=10)
     ),
-    "transferability": replace(transferability.EXPERIMENT, agents=2, sizes=transferability.Sizes(test=10)),
-    "goal-area": replace(goal_area.EXPERIMENT, agent=AGENT, sizes=goal_area.Sizes(test=10)),
+    "transferability": replace(transferability.EXPERIMENT, agent=AGENT, sizes=Tested(test=10)),
+    "goal-area": replace(goal_area.EXPERIMENT, agent=AGENT, sizes=Tested(test=10)),
     "overnight": replace(
         overnight.EXPERIMENT, agent=AGENT, sizes=overnight.Sizes(first=20, second=20, block=10, hours=2.0)
     ),

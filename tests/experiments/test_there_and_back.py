@@ -11,9 +11,9 @@ import pytest
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.control_frequency import ControlFrequency, at_frequency
-from pneumarm.experiments.differences import Interval
+from pneumarm.experiments.differences import Interval, within
 from pneumarm.experiments.enough_data import EnoughData
-from pneumarm.experiments.evidence import change, difference, mean, plain, samples, signed, within
+from pneumarm.experiments.evidence import change, difference, mean, plain, samples, signed
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, sorted_rows
 from pneumarm.experiments.noise_for_transfer import NoiseForTransfer
 from pneumarm.experiments.page import write_page

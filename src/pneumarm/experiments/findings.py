@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.experiments.design.anova import Source, anova
-from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best
-from pneumarm.experiments.evidence import within
+from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best, within
 from pneumarm.experiments.experiment import Claim, Rows
 from pneumarm.experiments.factorial import Analyses, Factorial
 from pneumarm.experiments.trainings import LEARNING

@@ -25,9 +25,18 @@ from matplotlib.figure import Figure
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.differences import above, interval
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.experiment import (
+    ARMS,
+    Analysis,
+    Claim,
+    Experiment,
+    Figures,
+    LaboratorySettings,
+    Report,
+    Rows,
+)
 from pneumarm.experiments.factorial import Factorial
-from pneumarm.experiments.forest import forest_figure
+from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.experiments.trainings import CRITERIA, train_and_test
 from pneumarm.learning import TrainSettings
@@ -47,7 +56,7 @@ class FineTuning(Experiment):
     question: str = "Do levels that lie closer together find better settings than those of trial 10?"
     source: str = "Thesis sections 5.3 and 5.4.2"
     runs: int = 4
-    arms: tuple[str, ...] = tuple(f"virtual:seed={seed}" for seed in range(1, 6))
+    arms: tuple[str, ...] = ARMS
     array: Factorial = field(
         default_factory=lambda: Factorial(
             name="fine-tuning",
@@ -100,10 +109,11 @@ class FineTuning(Experiment):
             "Trials",
             [self.array.labels],
             figures=[
-                Picture(
-                    forest_figure(list(self.trials.values()), shown, reference=-1),
+                dots(
+                    list(self.trials.values()),
+                    shown,
                     "Results of the trials, means with their 95 % intervals; the line through all is trial 10's.",
-                    "; ".join(f"trial {n}: reward {v.mean():.1f}" for n, v in zip(self.trials, reward, strict=True)),
+                    reference=-1,
                 )
             ],
         )

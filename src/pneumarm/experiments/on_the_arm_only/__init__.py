@@ -21,52 +21,29 @@ On arms 1 to 5, an agent each, all meet the criterium after 22.8 ± 2.2 h and 16
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, replace
 
-import msgspec
 import numpy as np
 
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control.playing import Played, Player
 from pneumarm.control.transfer import BEGIN
 from pneumarm.experiments.differences import Interval, Verdict, above
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-    run_seed,
-)
+from pneumarm.experiments.evidence import Column, mean, number, of_trial, plain, series, table, thesis
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows, run_seed
 from pneumarm.experiments.moving import (
-    ARMS,
     MOVEMENTS,
     THESIS,
     Material,
+    OneAgent,
     agent_of,
     draws,
     greedy_test,
-    material,
     means,
     new_arm,
-    series,
-)
-from pneumarm.experiments.on_arms import (
-    Column,
-    dots_alt,
-    dots_figure,
-    mean,
-    number,
-    of_trial,
-    plain,
-    table,
-    thesis,
 )
 from pneumarm.experiments.on_the_arm_only.figures import progress_alt, progress_figure
+from pneumarm.experiments.pictures import dots
 from pneumarm.learning import Agent, TrainSettings
 from pneumarm.learning.shaping import adjusted, initial_deviation, stage
 from pneumarm.learning.values import draw_networks
@@ -109,7 +86,7 @@ class Learned:
 
 
 @dataclass(frozen=True)
-class OnTheArmOnly(Experiment):
+class OnTheArmOnly(OneAgent):
     """Learning from scratch on the arm."""
 
     name: str = "on-the-arm-only"
@@ -117,22 +94,13 @@ class OnTheArmOnly(Experiment):
     question: str = "How long must an agent learn on the arm itself, without a simulation, and how good is it then?"
     source: str = "Thesis sections 4.3.3 and 5.5"
     runs: int = 1
-    arms: tuple[str, ...] = ARMS
     agent: TrainSettings = ONE
-    sizes: Sizes = field(default_factory=Sizes)
+    sizes: Sizes = Sizes()
 
     @property
     def trials(self) -> Mapping[int, str]:
         """Where the agent learned."""
         return {ON_ARM: "learned on the arm", IN_SIMULATION: "learned in the simulation"}
-
-    def settings(self) -> Any:
-        """Return the settings of the agent and the sizes."""
-        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-        """Return the arm and its simulation, which only trial 2 uses."""
-        return material(arm, folder, settings, progress)
 
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Learn, and move greedily on the arm in another morning."""
@@ -195,7 +163,7 @@ class OnTheArmOnly(Experiment):
                 "movements": number(movements),
                 "seconds of a movement": number(seconds),
                 "met": won / len(learned),
-                "reward": {words: number(mean(rows, "reward", t)) for t, words in self.trials.items()},
+                "reward": self.number(rows, "reward"),
             },
             sections=[
                 Section(
@@ -219,13 +187,7 @@ class OnTheArmOnly(Experiment):
                         "those that succeed. The time of the simulation's agent is that of collecting transitions."
                     ],
                     tables=[table(rows, self.trials, columns, "Means over arms with 95 % intervals.")],
-                    figures=[
-                        Picture(
-                            dots_figure(names, shown),
-                            "Reward on the arm, and arm time that it took to learn.",
-                            dots_alt(names, shown),
-                        )
-                    ],
+                    figures=[dots(names, shown, "Reward on the arm, and arm time that it took to learn.")],
                 ),
             ],
             claims=[

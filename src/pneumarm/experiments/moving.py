@@ -100,7 +100,7 @@ class OneAgent(Experiment):
 
 
 @dataclass(frozen=True)
-class Tested:
+class Sizes:
     """How much agents are tested in a row."""
 
     test: int = 300
@@ -111,7 +111,7 @@ class Tested:
 class AgentsByTrial(OneAgent):
     """An experiment in which every trial has an agent of its own, tested in the simulation and on the arm."""
 
-    sizes: Tested = Tested()
+    sizes: Sizes = Sizes()
 
     @abstractmethod
     def train_settings(self, trial: int) -> TrainSettings:

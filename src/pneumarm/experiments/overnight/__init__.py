@@ -8,8 +8,8 @@ without a night, because what a learning agent earns goes up and down anyway.
     pneumarm experiment overnight
 
 On arms 1 to 5, four runs each, there is no hitch: the agent that never learns loses -0.1 ± 2.6 of its reward after 14
-h, and the one that learns -1.2 ± 5.1 against the same agent without a night. There is nothing to win back, by warming
-up or by learning.
+h, and the one that learns -1.2 ± 5.1 against the same agent without a night. There is nothing to be seen that warming
+up or learning would bring back.
 """
 
 from collections.abc import Mapping
@@ -96,15 +96,16 @@ class Overnight(OneAgent):
         found = {trial: _hitch(reward, place) for trial, reward in rewards.items()}
         lost = over_arms((rewards[NO_NIGHT] - rewards[LEARNING])[:, :, place])
         adapted = over_arms(_gain(rewards[LEARNING], place) - _gain(rewards[NO_NIGHT], place))
-        names = ["trial", "drop after the night", "gained on the second day"]
+        names = ["trial", "drop to the second day", "gained on the second day"]
         lines = [[days.words, *(plain(one) for one in found[trial])] for trial, days in DAYS.items()]
         return Analysis(
             summary=[
                 self.question,
-                f"The night costs the agent that learns {plain(lost)} of its reward, against the same agent without "
-                f"one, and the one that never learns {plain(found[FROZEN][0])}. On the second day the latter gains "
-                f"{plain(found[FROZEN][1])}, while the arm warms up; learning after a night gains {plain(adapted)} "
-                "more than learning without one.",
+                answer(lost, found[FROZEN][0]),
+                f"Reward lost by the night: {plain(lost)} of an agent that learns, against the same agent without "
+                f"one, and {plain(found[FROZEN][0])} of one that never learns. Gained on the second day: "
+                f"{plain(found[FROZEN][1])} by the latter, while the arm warms up; and by learning after a night "
+                f"{plain(adapted)} more than by learning without one.",
                 "Intervals are over arms, each the mean of its runs.",
             ],
             figures={
@@ -142,6 +143,15 @@ class Overnight(OneAgent):
         marks = {float(self.sizes.first): f"{self.sizes.hours:g} h of rest"}
         caption = "Reward, actions and switches before and after a night (thesis figures 5.13 and 5.14)."
         return courses(shown, self.sizes.block, caption, marks)
+
+
+def answer(lost: Interval, frozen: Interval) -> str:
+    """Return in words for whom the night surely costs reward."""
+    agents = {"an agent that learns": lost, "one that never learns": frozen}
+    costs = [words for words, found in agents.items() if above(found) == "holds"]
+    if costs:
+        return f"The night costs {' and '.join(costs)} reward."
+    return "No drop is shown, so that it cannot be seen what would bring the reward back."
 
 
 _SPAN = 3  # blocks before the night, and at the end, that are the level of a day

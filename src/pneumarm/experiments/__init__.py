@@ -21,7 +21,7 @@ To add an experiment, make a folder (a package) here and name it in :mod:`.regis
 
 What experiments have in common is in the class that theirs are of: trainings in an arm's simulation
 (:class:`~.trainings.Trainings`), an agent that moves the arm or agents that are compared on it
-(:class:`~.moving.OneAgent`, :class:`~.moving.AgentsByTrial`), and all the way from an arm, however it is collected
+(:class:`~.moving.OnTheArm`, :class:`~.moving.AgentsByTrial`), and all the way from an arm, however it is collected
 from, back to it (:class:`~.there_and_back.ThereAndBack`). What rows say over arms, with intervals and tables, is
 :mod:`.evidence`, and :mod:`.pictures` draws it.
 

@@ -3,7 +3,6 @@
 The same class does all of them; what they are is data, in the folder of each.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
@@ -17,6 +16,7 @@ from pneumarm.experiments.design.assignment import Design, Factor
 from pneumarm.experiments.design.effects import effects
 from pneumarm.experiments.design.loss import loss
 from pneumarm.experiments.differences import Interval, above, below, interval
+from pneumarm.experiments.evidence import plain
 from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, Trainings, train_and_test, with_settings
@@ -206,14 +206,15 @@ class Factorial(Trainings):
         return [*text, self._best(ours.get("reward", analysis))] if judged_alike else text
 
     def _averages(self, rows: Rows, ours: Analyses) -> str:
-        """Return in words the means over all trials, and beside them the thesis'."""
+        """Return in words the means over all trials, and beside them the thesis' where it has some."""
         said = []
-        for name, table in ((name, analysis.results) for name, analysis in ours.items() if name in self.thesis):
-            found = interval(rows.samples(table.mean(axis=0)))
+        for name in [name for name in ours if name in self.thesis or not self.thesis]:
+            found = interval(rows.samples(ours[name].results.mean(axis=0)))
             digits = 0 if abs(found.mean) >= _THOUSANDS else 2
-            half = f" ± {found.half:.{digits}f}" if math.isfinite(found.half) else ""
-            said.append(f"{self.words[name]} {found.mean:.{digits}f}{half} ({self.thesis[name].mean():.{digits}f})")
-        return f"Means over all trials, in brackets the thesis': {'; '.join(said)}."
+            theirs = f" ({self.thesis[name].mean():.{digits}f})" if self.thesis else ""
+            said.append(f"{self.words[name]} {plain(found, digits)}{theirs}")
+        beside = ", in brackets the thesis'" if self.thesis else ""
+        return f"Means over all trials{beside}: {'; '.join(said)}."
 
     def _met(self, rows: Rows) -> str:
         """Return in words how many agents met the criterium; of training on, how those ended that were slow to."""

@@ -76,8 +76,8 @@ def material(arm: str, folder: Path, settings: LaboratorySettings, progress: Rep
 
 
 @dataclass(frozen=True)
-class OneAgent(Experiment):
-    """An experiment in which the agent of a run, the same in all trials, moves the arm."""
+class OnTheArm(Experiment):
+    """An experiment in which agents move the arm, by default that of a run in all its trials."""
 
     runs: int = 4
     arms: tuple[str, ...] = ARMS
@@ -94,7 +94,7 @@ class OneAgent(Experiment):
         """Return the arm and its simulation."""
         return material(arm, folder, settings, progress)
 
-    def number(self, rows: Rows, figure: str) -> dict[str, Any]:
+    def by_trial(self, rows: Rows, figure: str) -> dict[str, Any]:
         """Return ``figure`` by trial, for programs."""
         return {words: number(mean(rows, figure, trial)) for trial, words in self.trials.items()}
 
@@ -108,7 +108,7 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class AgentsByTrial(OneAgent):
+class AgentsByTrial(OnTheArm):
     """An experiment in which every trial has an agent of its own, tested in the simulation and on the arm."""
 
     sizes: Sizes = Sizes()

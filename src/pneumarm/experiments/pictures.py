@@ -15,7 +15,8 @@ from pneumarm.report.page import Picture
 from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, key, legend_below, panels, styled
 
 _INKS = ((DARK, "-", "o"), (MIDDLE, "--", "s"), (GREY, "-.", "^"), (LIGHT, ":", "D"), (INK, (0, (1, 1)), "v"))
-_LABEL = 60  # letters of the labels of all axes side by side
+_LABEL = 66  # letters of the labels of all axes side by side
+_TICKS, _FEWEST_TICKS = 9, 4  # numbers on the axes of all panels side by side, and on one at least
 _TITLE = 28  # letters of a panel's title in a line
 _WIDE = 3  # panels side by side
 
@@ -123,6 +124,7 @@ def _dots(
         axis.errorbar(means, places, xerr=_halves(found), fmt="o", color=DARK, capsize=3, lw=1.2)
         axis.set_xlabel(label if "\n" in label else textwrap.fill(label, _LABEL // len(quantities)))
         axis.grid(visible=False, axis="y")
+        axis.locator_params(axis="x", nbins=max(_FEWEST_TICKS, _TICKS // len(quantities)))
     axes[0, 0].set_yticks(places, names)
     axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
     return figure

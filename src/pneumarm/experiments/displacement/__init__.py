@@ -39,7 +39,7 @@ from pneumarm.experiments.evidence import (
     values,
 )
 from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows, run_seed
-from pneumarm.experiments.moving import MOVEMENTS, Material, OneAgent, agent_of, draws, new_arm
+from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, draws, new_arm
 from pneumarm.learning import Agent
 from pneumarm.report.figures import against_displacement, against_displacement_alt, movement, movement_alt
 from pneumarm.report.page import Picture, Section, Table
@@ -102,7 +102,7 @@ class Typical:
 
 
 @dataclass(frozen=True)
-class Displacement(OneAgent):
+class Displacement(OnTheArm):
     """What movements look like, short and long."""
 
     name: str = "displacement"

@@ -93,8 +93,8 @@ class GoalArea(AgentsByTrial):
                 "the mean of its runs.",
             ],
             figures={
-                "reward": self.number(rows, "reward"),
-                "success_rate": self.number(rows, "success_rate"),
+                "reward": self.by_trial(rows, "reward"),
+                "success_rate": self.by_trial(rows, "success_rate"),
                 "cost": {self.trials[t]: number(found) for t, found in costs.items()},
             },
             sections=[

@@ -48,7 +48,7 @@ from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,
     Material,
-    OneAgent,
+    OnTheArm,
     agent_of,
     draws,
     greedy_test,
@@ -99,7 +99,7 @@ class Learned:
 
 
 @dataclass(frozen=True)
-class OnTheArmOnly(OneAgent):
+class OnTheArmOnly(OnTheArm):
     """Learning from scratch on the arm."""
 
     name: str = "on-the-arm-only"
@@ -180,7 +180,7 @@ class OnTheArmOnly(OneAgent):
                 "movements": number(movements),
                 "seconds of a movement": number(seconds),
                 "met": won / len(learned),
-                "reward": self.number(rows, "reward"),
+                "reward": self.by_trial(rows, "reward"),
             },
             sections=[
                 Section(

@@ -33,6 +33,7 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.differences import Interval, Verdict, above, below, interval
+from pneumarm.experiments.evidence import signed
 from pneumarm.experiments.experiment import (
     ARMS,
     Analysis,
@@ -312,9 +313,7 @@ def _share(met: NDArray[np.float64]) -> str:
 
 
 def _whole(found: Interval | None) -> str:
-    if found is None:
-        return "reference"
-    return f"{found.mean:+.0f}" + (f" ± {found.half:.0f}" if np.isfinite(found.half) else "")
+    return "reference" if found is None else signed(found, 0)
 
 
 @styled

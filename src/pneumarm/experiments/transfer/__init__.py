@@ -33,6 +33,7 @@ from pneumarm.experiments.evidence import (
     number,
     over_arms,
     plain,
+    signed,
     table,
     thesis,
     values,
@@ -43,7 +44,7 @@ from pneumarm.experiments.moving import (
     SIMULATION,
     TEST_MOVEMENTS,
     Material,
-    OneAgent,
+    OnTheArm,
     agent_of,
     course,
     draws,
@@ -89,7 +90,7 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class Transfer(OneAgent):
+class Transfer(OnTheArm):
     """The three agents of section 5.5.1, and the causes of the drop."""
 
     name: str = "transfer"
@@ -150,12 +151,17 @@ class Transfer(OneAgent):
         drop = over_arms(_arrival(rows, 1, "reward"))
         single = {name: found for name, found in causes.items() if name != _ALL_THREE}
         largest = max(single, key=lambda name: single[name].mean)
+        learned = ", ".join(
+            f"{signed(_better(rows, trial))} with {RATES[trial]:g}" for trial in RATES if RATES[trial]
+        )
         return Analysis(
             summary=[
                 self.question,
                 f"On arrival the agent that does not learn loses {plain(drop)} of its reward in the simulation, "
                 f"where it explores as much (thesis: more than {thesis(__name__)['drop']:g}). Of the "
                 f"causes, measured with greedy movements, the largest is: {largest} ({plain(causes[largest])}).",
+                "Against the agent that does not learn, the last quarter of the movements of those that do earns "
+                f"{learned}.",
                 "Intervals are over arms, each the mean of its runs.",
             ],
             figures={
@@ -244,7 +250,7 @@ class Transfer(OneAgent):
             )
         )
         for trial in (2, 3):
-            better = over_arms(_last(blocks(rows, "reward", trial)) - _last(course_1))
+            better = _better(rows, trial)
             claims.append(
                 Claim(
                     f"The agent that learns with {RATES[trial]:g} ends better than the one that does not learn",
@@ -288,6 +294,11 @@ def _arrival(rows: Rows, trial: int, figure: str) -> Any:
 def _last(course_: Any) -> Any:
     """Return the mean of the last quarter of courses (arms, runs, blocks)."""
     return course_[:, :, -max(1, course_.shape[-1] // 4) :].mean(axis=-1)
+
+
+def _better(rows: Rows, trial: int) -> Interval:
+    """Return by how much ``trial`` earns more in the end than the agent that does not learn."""
+    return over_arms(_last(blocks(rows, "reward", trial)) - _last(blocks(rows, "reward", 1)))
 
 
 def _causes(rows: Rows) -> dict[str, Interval]:

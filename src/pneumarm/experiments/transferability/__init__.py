@@ -96,7 +96,7 @@ class Transferability(AgentsByTrial):
             ],
             figures={
                 "lost": {words: number(over_arms(lost[trial])) for trial, words in self.trials.items()},
-                "reward": self.number(rows, "reward"),
+                "reward": self.by_trial(rows, "reward"),
             },
             sections=[
                 Section(

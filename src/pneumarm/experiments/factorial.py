@@ -203,7 +203,8 @@ class Factorial(Trainings):
                 f"alone makes {share:.2f} of every effect and interaction."
             )
         text.insert(0, self._averages(rows, ours) + self._met(rows))
-        return [*text, self._best(ours.get("reward", analysis))] if judged_alike else text
+        best = "reward" if "reward" in ours else name
+        return [*text, self._best(ours[best], self.words[best])] if judged_alike else text
 
     def _averages(self, rows: Rows, ours: Analyses) -> str:
         """Return in words the means over all trials, and beside them the thesis' where it has some."""
@@ -236,11 +237,11 @@ class Factorial(Trainings):
             f"of these episodes with the last reward is {found} within arms."
         )
 
-    def _best(self, first: TableAnalysis) -> str:
+    def _best(self, first: TableAnalysis, words: str) -> str:
         settings = ", ".join(
             f"{self.design.factor(f).name} {_level(level)}" for f, level in first.best.settings.items()
         )
-        return f"Best settings by the ranked effects here, sure or not: {settings}" + (
+        return f"Best settings for the {words} by the ranked effects here, sure or not: {settings}" + (
             f" (trial {first.best.trial})." if first.best.trial else " (not among the trials)."
         )
 

@@ -280,7 +280,7 @@ def test_the_commands_and_the_program_of_the_readme_run(tmp_path: Path) -> None:
     assert len(commands) >= 7
     for command in commands:
         done = subprocess.run(
-            [sys.executable, "-m", "pneumarm.cli", *command[1:]], cwd=tmp_path, capture_output=True, text=True
+            [sys.executable, "-m", "pneumarm", *command[1:]], cwd=tmp_path, capture_output=True, text=True
         )
         assert done.returncode == 0, (command, done.stderr)
     (program,) = blocks("python")

@@ -14,19 +14,21 @@ from pneumarm.control.playing import Player
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments import displacement, goal_area, on_the_arm_only, overnight, transfer, transferability
 from pneumarm.experiments.claims import keys_of
+from pneumarm.experiments.evidence import (
+    blocks,
+    values,
+)
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, run_seed, sorted_rows
 from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,
     Material,
+    Sizes,
     agent_of,
     draws,
-    from_series,
     from_visits,
     material,
-    series,
 )
-from pneumarm.experiments.on_arms import blocks, difference, mean, over_arms, plain, values
 from pneumarm.experiments.page import write_page
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.learning import Reward, Shaping, begin_states
@@ -41,8 +43,8 @@ SMALL_ONES: dict[str, Any] = {
     "transfer": replace(
         transfer.EXPERIMENT, agent=AGENT, sizes=transfer.Sizes(learning=40, block=10, test=10, warming=10)
     ),
-    "transferability": replace(transferability.EXPERIMENT, agents=2, sizes=transferability.Sizes(test=10)),
-    "goal-area": replace(goal_area.EXPERIMENT, agent=AGENT, sizes=goal_area.Sizes(test=10)),
+    "transferability": replace(transferability.EXPERIMENT, agent=AGENT, sizes=Sizes(test=10)),
+    "goal-area": replace(goal_area.EXPERIMENT, agent=AGENT, sizes=Sizes(test=10)),
     "overnight": replace(
         overnight.EXPERIMENT, agent=AGENT, sizes=overnight.Sizes(first=20, second=20, block=10, hours=2.0)
     ),
@@ -194,28 +196,6 @@ def test_thirds_and_relations_by_hand() -> None:
     assert related["correlation of actions"] == pytest.approx(1.0)
     assert "correlation of switches" not in related  # they do not vary
     assert related["few switches"] == 1.0
-
-
-def test_what_is_a_sample() -> None:
-    """Means of arms where there are several, else runs; what is missing in a row does not count."""
-
-    def row(arm: str, run: int, **figures: float) -> Row:
-        return Row(arm, 1, run, figures, 0.0)
-
-    two = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0), row("b", 1, x=8.0), row("b", 2)))
-    assert mean(two, "x", 1)[::2] == (5.0, 2)
-    one = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0)))
-    assert mean(one, "x", 1)[::2] == (2.0, 2)
-    assert mean(one, "y", 1).samples == 0
-    assert plain(mean(one, "y", 1)) == "none"
-    assert plain(mean(two, "x", 1), 0, factor=-1) == "-5 ± 38"  # half is t(0.975, 1) 12.7 times 3
-    assert difference(one, "x", 1, 1).half == 0
-    assert over_arms([[1.0, np.nan], [3.0, 3.0]])[::2] == (2.0, 2)
-
-
-def test_series_of_figures() -> None:
-    assert from_series(series("a", [3, 1, 2]) | series("ab", [5]), "a").tolist() == [3, 1, 2]
-    assert from_series({}, "a").size == 0
 
 
 def test_draws_go_on(small_material: Material) -> None:

@@ -11,9 +11,7 @@ import pytest
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.control_frequency import ControlFrequency, at_frequency
-from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.enough_data import EnoughData
-from pneumarm.experiments.evidence import change, difference, mean, plain, samples, signed, within
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, sorted_rows
 from pneumarm.experiments.noise_for_transfer import NoiseForTransfer
 from pneumarm.experiments.page import write_page
@@ -140,30 +138,6 @@ def test_fewest_minutes() -> None:
         assert f"from {fewest} on" in ours
     assert verdict(chosen, said, reward=1.5) == "does not hold"
     assert verdict(chosen, said, reward=5.0) == "open"
-
-
-def test_arms_are_the_sample_and_runs_where_there_is_one() -> None:
-    values = {("a", 1): (1.0, 3.0), ("a", 2): (2.0, 6.0), ("b", 1): (5.0, 5.0), ("b", 2): (8.0, 10.0)}
-    every = [
-        Row(arm, trial, run + 1, {"x": x}, 0.0) for (arm, trial), xs in values.items() for run, x in enumerate(xs)
-    ]
-    rows = sorted_rows(every)
-    assert samples(rows, "x", 1).tolist() == [2.0, 5.0]
-    assert mean(rows, "x", 1).mean == 3.5
-    found = difference(rows, "x", 2, 1)  # 2 on arm a, 4 on arm b
-    assert (found.mean, found.samples) == (3.0, 2)
-    assert found.half == pytest.approx(12.7062, abs=1e-3)  # Student's t for one degree of freedom, times 1
-    assert change(rows, "x", 2, 1).mean == pytest.approx((100 + 80) / 2)
-    alone = sorted_rows(row for row in every if row.arm == "a")
-    assert samples(alone, "x", 1).tolist() == [1.0, 3.0]
-
-
-def test_within_a_margin() -> None:
-    assert within(Interval(0.5, 0.4, 5), 1.0) == "holds"
-    assert within(Interval(0.5, 0.6, 5), 1.0) == "open"
-    assert within(Interval(-3.0, 1.0, 5), 1.0) == "does not hold"
-    assert (plain(Interval(1.25, 0.5, 3), 1), signed(Interval(1.25, 0.5, 3))) == ("1.2 ± 0.5", "+1.25 ± 0.50")
-    assert signed(Interval(-1.0, float("inf"), 1)) == "-1.00"
 
 
 # Parts ----------------------------------------------------------------------------------------------------------

@@ -19,8 +19,11 @@ To add an experiment, make a folder (a package) here and name it in :mod:`.regis
 - its settings as data: a ``design.toml`` where there is an orthogonal array;
 - the thesis' results as ``thesis_*.csv``, trials by runs.
 
-Experiments that vary how an arm is collected from, or judge agents back on it, share :mod:`.there_and_back`; what
-their rows say over arms, with intervals, tables and pictures of trials, is :mod:`.evidence`.
+What experiments have in common is in the class that theirs are of: trainings in an arm's simulation
+(:class:`~.trainings.Trainings`), an agent that moves the arm or agents that are compared on it
+(:class:`~.moving.OnTheArm`, :class:`~.moving.AgentsByTrial`), and all the way from an arm, however it is collected
+from, back to it (:class:`~.there_and_back.ThereAndBack`). What rows say over arms, with intervals and tables, is
+:mod:`.evidence`, and :mod:`.pictures` draws it.
 
 Trainings of the thesis' agent by an orthogonal array need no code: :class:`~.factorial.Factorial` is such an
 experiment. :mod:`.design` is of use for tables from anywhere (``pneumarm taguchi analyse``).

@@ -69,6 +69,13 @@ def below(found: Interval, threshold: float = 0.0) -> Verdict:
     return above(Interval(-found.mean, found.half, found.samples), -threshold)
 
 
+def within(found: Interval, margin: float) -> Verdict:
+    """Return whether what is estimated lies within ``margin`` of 0; open while the interval includes an end."""
+    if max(abs(found.low), abs(found.high)) <= margin:
+        return "holds"
+    return "does not hold" if found.low > margin or found.high < -margin else "open"
+
+
 def all_hold(verdicts: Iterable[Verdict]) -> Verdict:
     """Return whether something holds of all: it does not where it does not of one, and is open where one is."""
     found = set(verdicts)

@@ -1,11 +1,10 @@
-"""What rows of several arms and runs say: means and differences by arm, tables and pictures of trials.
+"""What rows of several arms and runs say: means and differences over arms, courses, tables of trials.
 
-Runs on one arm share its simulation, so arms are the sample: values are averaged over the runs of each arm first.
-Where there is one arm alone, its runs are the sample, and what is found is true of that arm.
+Runs on one arm share its simulation, so the arms are the sample: figures are averaged over the runs of each arm
+first. Where there is one arm alone its runs are the sample, and what is found is true of that arm.
 """
 
 import math
-import textwrap
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,19 +12,14 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.experiments.differences import Interval, Verdict, interval
-from pneumarm.experiments.experiment import Rows
+from pneumarm.experiments.differences import Interval, interval
+from pneumarm.experiments.experiment import Row, Rows
 from pneumarm.report.page import Table
-from pneumarm.report.style import DARK, GREY, MIDDLE, key, legend_below, panels, styled
 
 Array = NDArray[np.float64]
-
 _SHORT = 12  # letters that are not broken over lines
-_TITLE = 28  # letters of a panel's title in a line
-_WIDE = 3  # panels side by side
 
 
 def thesis(package: str) -> dict[str, Any]:
@@ -33,21 +27,84 @@ def thesis(package: str) -> dict[str, Any]:
     return tomllib.loads((resources.files(package) / "thesis.toml").read_text(encoding="utf-8"))
 
 
+# Rows -----------------------------------------------------------------------------------------------------------
+
+
+def of_trial(rows: Rows, trial: int) -> list[list[Row]]:
+    """Return the rows of ``trial`` arm by arm."""
+    return [[row for row in rows.rows if (row.arm, row.trial) == (arm, trial)] for arm in rows.arms]
+
+
+def values(rows: Rows, figure: str, trial: int) -> Array:
+    """Return ``figure`` of ``trial``, shape (arms, runs); NaN in rows that have none, as no successes no actions."""
+    found = [[row.figures.get(figure, math.nan) for row in runs] for runs in of_trial(rows, trial)]
+    return np.array(found, np.float64)
+
+
+def blocks(rows: Rows, figure: str, trial: int) -> Array:
+    """Return the course of ``figure`` in ``trial`` as of :func:`~.moving.course`, shape (arms, runs, blocks).
+
+    A block in which nothing succeeded has no actions; there are as many blocks as there are of rewards.
+    """
+    count = 0
+    while any(f"reward @{count + 1}" in row.figures for row in rows.rows):
+        count += 1
+    return np.stack([values(rows, f"{figure} @{k + 1}", trial) for k in range(count)], axis=-1)
+
+
+def series(name: str, values: Any) -> dict[str, float]:
+    """Return an array of one dimension as figures of a row."""
+    return {f"{name} #{i}": float(value) for i, value in enumerate(np.asarray(values, np.float64))}
+
+
+def from_series(figures: Mapping[str, float], name: str) -> Array:
+    """Return what :func:`series` put into the ``figures`` of a row."""
+    found: list[float] = []
+    while (key := f"{name} #{len(found)}") in figures:
+        found.append(figures[key])
+    return np.array(found)
+
+
+def series_of(rows: Rows, name: str, trial: int) -> Array:
+    """Return what :func:`series` put into all rows of ``trial``, one after the other."""
+    return np.concatenate([from_series(row.figures, name) for runs in of_trial(rows, trial) for row in runs])
+
+
+# Means and differences ------------------------------------------------------------------------------------------
+
+
+def by_arm(table: ArrayLike) -> Array:
+    """Return the samples of ``table`` (arms, runs): its means by arm, or of one arm its runs.
+
+    NaN entries do not count; NaN where nothing else is left.
+    """
+    found = np.atleast_2d(np.asarray(table, np.float64))
+    if len(found) == 1:
+        return found[0]
+    known = [runs[~np.isnan(runs)] for runs in found]
+    return np.array([runs.mean() if len(runs) else math.nan for runs in known])
+
+
 def samples(rows: Rows, figure: str, trial: int) -> Array:
     """Return ``figure`` of ``trial``: its means by arm, shape (arms,), or by run where there is one arm."""
-    rows = Rows(tuple(row for row in rows.rows if row.trial == trial))  # others may not have the figure
-    by_arm = [rows.table(figure, [trial], arm)[0] for arm in rows.arms]
-    return by_arm[0] if len(by_arm) == 1 else np.array([runs.mean() for runs in by_arm])
+    return by_arm(values(rows, figure, trial))
+
+
+def over_arms(table: ArrayLike) -> Interval:
+    """Return the mean of ``table`` (arms, runs) with its interval; NaN entries do not count."""
+    found = by_arm(table)
+    known = found[~np.isnan(found)]
+    return interval(known) if len(known) else Interval(math.nan, math.inf, 0)
 
 
 def mean(rows: Rows, figure: str, trial: int) -> Interval:
-    """Return the mean of ``figure`` over arms, with its interval."""
-    return interval(samples(rows, figure, trial))
+    """Return the mean of ``figure`` in ``trial`` over arms."""
+    return over_arms(values(rows, figure, trial))
 
 
 def difference(rows: Rows, figure: str, trial: int, reference: int) -> Interval:
-    """Return by how much ``figure`` is larger in ``trial`` than in ``reference``, arm by arm."""
-    return interval(samples(rows, figure, trial) - samples(rows, figure, reference))
+    """Return by how much ``figure`` is more in ``trial`` than in ``reference``, within runs."""
+    return over_arms(values(rows, figure, trial) - values(rows, figure, reference))
 
 
 def change(rows: Rows, figure: str, trial: int, reference: int) -> Interval:
@@ -55,22 +112,25 @@ def change(rows: Rows, figure: str, trial: int, reference: int) -> Interval:
     return interval(100 * (samples(rows, figure, trial) / samples(rows, figure, reference) - 1))
 
 
-def within(found: Interval, margin: float) -> Verdict:
-    """Return whether what is estimated lies within ``margin`` of 0; open while the interval includes an end."""
-    if max(abs(found.low), abs(found.high)) <= margin:
-        return "holds"
-    return "does not hold" if found.low > margin or found.high < -margin else "open"
+# For people and programs ----------------------------------------------------------------------------------------
 
 
-def plain(found: Interval, digits: int = 2) -> str:
-    """Return a value, not a difference, for people: without a sign where it is positive."""
-    half = f" ± {found.half:.{digits}f}" if math.isfinite(found.half) else ""
-    return f"{found.mean:.{digits}f}{half}"
+def plain(found: Interval, digits: int = 2, factor: float = 1.0) -> str:
+    """Return ``factor`` times a mean and its interval for people; "none" of no samples."""
+    if found.samples == 0:
+        return "none"
+    half = f" ± {abs(factor) * found.half:.{digits}f}" if math.isfinite(found.half) else ""
+    return f"{factor * found.mean:.{digits}f}{half}"
 
 
 def signed(found: Interval, digits: int = 2) -> str:
     """Return a difference for people, always with a sign."""
     return f"{'+' if found.mean >= 0 else ''}{plain(found, digits)}"
+
+
+def number(found: Interval) -> dict[str, Any]:
+    """Return an interval for programs."""
+    return found._asdict()
 
 
 @dataclass(frozen=True)
@@ -87,6 +147,14 @@ class Column:
     thesis: Mapping[int, float] | None = None
     """What the thesis has, by trial."""
 
+    def interval(self, rows: Rows, trial: int) -> Interval:
+        """Return the mean in ``trial`` as it is shown."""
+        return over_arms(self.factor * values(rows, self.figure, trial))
+
+    def text(self, rows: Rows, trial: int) -> str:
+        """Return the mean in ``trial`` for people."""
+        return plain(self.interval(rows, trial), self.digits)
+
 
 def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], caption: str) -> Table:
     """Return the means of ``columns`` by trial with their intervals, and beside them what the thesis has."""
@@ -97,8 +165,7 @@ def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], capt
     for trial, words in trials.items():
         line = [words.replace(" ", "\N{NO-BREAK SPACE}") if len(words) < _SHORT else words]
         for column in columns:
-            found = interval(column.factor * samples(rows, column.figure, trial))
-            line.append(plain(found, column.digits))
+            line.append(column.text(rows, trial))
             if column.thesis:
                 line.append(f"{column.thesis[trial]:.{column.digits}f}" if trial in column.thesis else "")
         lines.append(line)
@@ -109,77 +176,10 @@ def numbers(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column]) ->
     """Return for programs what :func:`table` shows."""
     found = {
         column.figure: {
-            words: {"mean": one.mean, "half": one.half if math.isfinite(one.half) else None}
+            words: {"mean": one.mean, "half": one.half}
             for trial, words in trials.items()
             for one in [mean(rows, column.figure, trial)]
         }
         for column in columns
     }
     return {"ours": found}
-
-
-@styled
-def picture(
-    rows: Rows,
-    trials: Sequence[int],
-    places: Sequence[float],
-    ticks: Sequence[str],
-    label: str,
-    columns: Sequence[Column],
-    log: bool = False,
-) -> Figure:
-    """Draw ``columns`` against the trials, a panel each: every arm thin, the mean with its interval, the thesis' own.
-
-    Args:
-        rows: of all arms.
-        trials: to draw, from left to right.
-        places: where they are on the axis, shape as ``trials``.
-        ticks: what is written there.
-        label: of the axis, with its unit.
-        columns: at least one.
-        log: whether the axis is logarithmic.
-
-    """
-    height = -(-len(columns) // _WIDE)
-    width = -(-len(columns) // height)
-    figure, axes = panels(height, width, 0.4 + 2.5 * height)
-    compared = False
-    for axis in axes.flat[len(columns) :]:
-        axis.set_visible(False)
-    for axis, column in zip(axes.flat, columns, strict=False):
-        found = column.factor * np.array([samples(rows, column.figure, trial) for trial in trials])
-        axis.plot(places, found, color=GREY, lw=0.7)
-        intervals = [interval(one) for one in found]
-        half = [one.half if math.isfinite(one.half) else 0.0 for one in intervals]
-        axis.errorbar(places, [one.mean for one in intervals], half, color=DARK, marker="o", lw=1.6, capsize=3)
-        if column.thesis:
-            compared = True
-            there = [(places[i], column.thesis[t]) for i, t in enumerate(trials) if t in column.thesis]
-            axis.plot(*zip(*there, strict=True), color=MIDDLE, marker="s", ls="none")  # not of one arm: no line
-        axis.set_title(textwrap.fill(column.words, _TITLE))
-        axis.set_xlabel(label)
-        if log:
-            axis.set_xscale("log")
-        axis.set_xticks(places, ticks)
-        axis.set_xticks([], minor=True)
-        axis.margins(x=0.08)
-    single = "one arm" if len(rows.arms) > 1 else "one run"
-    handles = [key(DARK, marker="o"), key(GREY, lw=0.7)]
-    names = ["mean; bars: its 95 % interval", single]
-    if compared:
-        handles.append(key(MIDDLE, "none", marker="s"))
-        names.append("thesis")
-    legend_below(figure, handles, names)
-    return figure
-
-
-def seen(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column]) -> str:
-    """Say in words what :func:`picture` shows."""
-    said = []
-    for column in columns:
-        values = [
-            f"{plain(interval(column.factor * samples(rows, column.figure, trial)), column.digits)} ({words})"
-            for trial, words in trials.items()
-        ]
-        said.append(f"{column.words}: {', '.join(values)}")
-    return ". ".join(said) + "."

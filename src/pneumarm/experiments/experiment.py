@@ -20,6 +20,8 @@ Figures = Mapping[str, float]
 """What was measured, by name."""
 Report = Callable[[float, float], None]
 """Told what is done and the total."""
+ARMS = tuple(f"virtual:seed={number}" for number in range(1, 6))
+"""Five different arms to develop on; those to judge on are ``virtual:seed=1001`` to ``1010``."""
 
 
 @dataclass(frozen=True)

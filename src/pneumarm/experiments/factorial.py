@@ -3,13 +3,10 @@
 The same class does all of them; what they are is data, in the folder of each.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,9 +16,10 @@ from pneumarm.experiments.design.assignment import Design, Factor
 from pneumarm.experiments.design.effects import effects
 from pneumarm.experiments.design.loss import loss
 from pneumarm.experiments.differences import Interval, above, below, interval
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
-from pneumarm.experiments.preparation import Simulated, simulated
-from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, train_and_test, with_settings
+from pneumarm.experiments.evidence import plain
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows
+from pneumarm.experiments.preparation import Simulated
+from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, Trainings, train_and_test, with_settings
 from pneumarm.learning import TrainSettings
 
 Array = NDArray[Any]
@@ -57,7 +55,7 @@ class Said(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Factorial(Experiment):
+class Factorial(Trainings):
     """Trainings by an orthogonal array, each tested; all criteria of section 5.2."""
 
     name: str
@@ -91,20 +89,12 @@ class Factorial(Experiment):
 
     def settings(self) -> Any:
         """Return the settings of every trial, the goal, and how long training goes on."""
-        return {
-            "trials": {str(trial): msgspec.to_builtins(self.train_settings(trial)) for trial in self.trials},
-            "goal": self.goal,
-            "continued": self.continued,
-        }
+        return {"trials": super().settings(), "goal": self.goal, "continued": self.continued}
 
     def train_settings(self, trial: int) -> TrainSettings:
         """Return the settings of the training of ``trial``."""
         levels = self.design.settings(trial)
         return with_settings(self.base, {factor.setting: levels[factor.label] for factor in self.design.factors})
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
-        """Return the arm's simulation."""
-        return simulated(arm, folder, settings, progress)
 
     def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train and test one agent."""
@@ -212,29 +202,62 @@ class Factorial(Experiment):
                 f"Trial {far + 1} is farthest from the others ({means[far]:.2f}, median {np.median(means):.2f}): it "
                 f"alone makes {share:.2f} of every effect and interaction."
             )
-        text.insert(0, self._averages(rows, ours))
-        return [*text, self._best(ours.get("reward", analysis))] if judged_alike else text
+        text.insert(0, self._averages(rows, ours) + self._met(rows))
+        best = "reward" if "reward" in ours else name
+        return [*text, self._best(ours[best], self.words[best])] if judged_alike else text
 
     def _averages(self, rows: Rows, ours: Analyses) -> str:
-        """Return in words the means over all trials, and beside them the thesis'."""
+        """Return in words the means over all trials, and beside them the thesis' where it has some."""
         said = []
-        for name, table in ((name, analysis.results) for name, analysis in ours.items() if name in self.thesis):
-            found = interval(rows.samples(table.mean(axis=0)))
+        for name in [name for name in ours if name in self.thesis or not self.thesis]:
+            found = interval(rows.samples(ours[name].results.mean(axis=0)))
             digits = 0 if abs(found.mean) >= _THOUSANDS else 2
-            half = f" ± {found.half:.{digits}f}" if math.isfinite(found.half) else ""
-            said.append(f"{self.words[name]} {found.mean:.{digits}f}{half} ({self.thesis[name].mean():.{digits}f})")
-        return f"Means over all trials, in brackets the thesis': {'; '.join(said)}."
+            theirs = f" ({self.thesis[name].mean():.{digits}f})" if self.thesis else ""
+            said.append(f"{self.words[name]} {plain(found, digits)}{theirs}")
+        beside = ", in brackets the thesis'" if self.thesis else ""
+        return f"Means over all trials{beside}: {'; '.join(said)}."
 
-    def _best(self, first: TableAnalysis) -> str:
+    def _met(self, rows: Rows) -> str:
+        """Return in words how many agents met the criterium; of training on, how those ended that were slow to."""
+        if "met" not in rows.figures:
+            return ""
+        if self.continued is None:
+            met = rows.table("met", list(self.trials))
+            return f" {int(met.sum())} of {met.size} agents met the criterium."
+        trials = list(self.trials)
+        found = interval(
+            [
+                rank_correlation(rows.table("episodes", trials, arm), rows.table("reward", trials, arm))
+                for arm in rows.arms
+            ]
+        )
+        ended = "better" if found.low > 0 else "worse" if found.high < 0 else "neither surely better nor worse"
+        return (
+            f" Agents that needed more episodes to meet the criterium are {ended} in the end: the rank correlation "
+            f"of these episodes with the last reward is {found} within arms."
+        )
+
+    def _best(self, first: TableAnalysis, words: str) -> str:
         settings = ", ".join(
             f"{self.design.factor(f).name} {_level(level)}" for f, level in first.best.settings.items()
         )
-        return f"Best settings by the ranked effects here: {settings}" + (
+        return f"Best settings for the {words} by the ranked effects here, sure or not: {settings}" + (
             f" (trial {first.best.trial})." if first.best.trial else " (not among the trials)."
         )
 
 
 _TWO, _THOUSANDS = 2, 1000
+
+
+def rank_correlation(first: Array, second: Array) -> float:
+    """Return Spearman's rank correlation, alike values sharing their mean rank; 0 where all are alike."""
+
+    def ranks(values: Array) -> Array:
+        _, place, counts = np.unique(values.ravel(), return_inverse=True, return_counts=True)
+        return np.asarray((np.cumsum(counts) - (counts - 1) / 2)[place])
+
+    x, y = ranks(first), ranks(second)
+    return float(np.corrcoef(x, y)[0, 1]) if x.std() > 0 and y.std() > 0 else 0.0
 
 
 def _step(factor: Factor) -> str:

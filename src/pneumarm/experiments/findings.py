@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.experiments.design.anova import Source, anova
-from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best
-from pneumarm.experiments.evidence import within
+from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best, within
+from pneumarm.experiments.evidence import plain
 from pneumarm.experiments.experiment import Claim, Rows
 from pneumarm.experiments.factorial import Analyses, Factorial
 from pneumarm.experiments.trainings import LEARNING
@@ -125,7 +125,7 @@ def fewest_switches(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyse
     return Claim(
         text,
         f"at least {their:.2f} (table C.9)",
-        f"the fewest of any agent, mean over arms: {_value(found)}",
+        f"the fewest of any agent, mean over arms: {plain(found)}",
         above(found, _FEWEST),
         "fewest-switches",
     )
@@ -218,7 +218,7 @@ def punishment_halves_switches(made: Factorial, rows: Rows, ours: Analyses, thei
     return Claim(
         "Without the punishment there are more than twice as many switches",
         f"{interval(their).mean:.2f} times (appendix C.1)",
-        f"{_value(found)} times",
+        f"{plain(found)} times",
         above(found, 2.0),
         "punishment",
     )
@@ -229,10 +229,5 @@ def _ratio(switches: NDArray[np.float64], level: NDArray[np.int64]) -> NDArray[n
     return np.asarray(switches[level == level.max()].mean(axis=0) / switches[level == level.min()].mean(axis=0))
 
 
-def _value(found: Interval) -> str:
-    return f"{found.mean:.2f}" + (f" ± {found.half:.2f}" if np.isfinite(found.half) else "")
-
-
 def _percent(found: Interval) -> str:
-    half = f" ± {100 * found.half:.1f}" if np.isfinite(found.half) else ""
-    return f"{100 * found.mean:.1f}{half} %"
+    return f"{plain(found, 1, 100)} %"

@@ -1,12 +1,13 @@
-"""What experiments on the arm share: agents trained in its simulation, and their movements on it."""
+"""What experiments on the arm share: agents trained in its simulation, their movements on it, their settings."""
 
 import functools
 import threading
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from abc import abstractmethod
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +16,8 @@ from pneumarm.arm.virtual import ArmParameters, VirtualArm
 from pneumarm.control.playing import Played, Player, part_of
 from pneumarm.control.transfer import BEGIN, draw_movement
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import LaboratorySettings, Report, run_seed
+from pneumarm.experiments.evidence import Column, mean, number
+from pneumarm.experiments.experiment import ARMS, Experiment, LaboratorySettings, Report, Rows, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import Agent, BeginStates, Exploration, TrainSettings
 from pneumarm.learning.environment import environment
@@ -27,8 +29,6 @@ from pneumarm.simulation.noise import NoiseSettings
 
 Array = NDArray[np.float64]
 
-ARMS = tuple(f"virtual:seed={n}" for n in range(1, 6))
-"""Five different arms."""
 THESIS = TrainSettings(learning_rate=0.10, agents=8, validation_episodes=1000)
 """Trial 10 of table 5.3, whose agent was transferred (section 5.5); of eight agents the best.
 
@@ -37,6 +37,8 @@ The thesis took the best of 128 agents, which it had anyway.
 _TEST_SEED = 0  # the same begin states and goals for every agent in the simulation
 TEST_MOVEMENTS, MOVEMENTS = 0, 1
 """Streams of random numbers of goals and begin states on the arm."""
+SIMULATION = "simulation: "
+"""Prefix of the figures of a test in the simulation; those on the arm have none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,62 @@ def material(arm: str, folder: Path, settings: LaboratorySettings, progress: Rep
     """
     _parameters(arm)
     return Material(arm, simulated(arm, folder, settings, progress))
+
+
+@dataclass(frozen=True)
+class OnTheArm(Experiment):
+    """An experiment in which agents move the arm, by default that of a run in all its trials."""
+
+    runs: int = 4
+    arms: tuple[str, ...] = ARMS
+    agent: TrainSettings = THESIS
+    """How it learned."""
+    sizes: Any = None
+    """How much is moved in a row: a dataclass of each experiment's own."""
+
+    def settings(self) -> Any:
+        """Return the trials in words, the settings of the agent and the sizes."""
+        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
+        """Return the arm and its simulation."""
+        return material(arm, folder, settings, progress)
+
+    def by_trial(self, rows: Rows, figure: str) -> dict[str, Any]:
+        """Return ``figure`` by trial, for programs."""
+        return {words: number(mean(rows, figure, trial)) for trial, words in self.trials.items()}
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much agents are tested in a row."""
+
+    test: int = 300
+    """Movements on the arm."""
+
+
+@dataclass(frozen=True)
+class AgentsByTrial(OnTheArm):
+    """An experiment in which every trial has an agent of its own, tested in the simulation and on the arm."""
+
+    sizes: Sizes = Sizes()
+
+    @abstractmethod
+    def train_settings(self, trial: int) -> TrainSettings:
+        """Return how the agents of ``trial`` learn."""
+
+    def settings(self) -> Any:
+        """Return the settings of all agents and the sizes."""
+        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
+        return {"agents": agents, "sizes": asdict(self.sizes)}
+
+
+def in_both(figure: str, unit: str = "", digits: int = 2, factor: float = 1.0) -> tuple[Column, Column]:
+    """Return the columns of ``figure`` in the simulation and on the arm."""
+    name = figure.removesuffix("_rate")
+    places = ((SIMULATION, "simulation"), ("", "arm"))
+    first, second = (Column(prefix + figure, f"{name}, {place}{unit}", digits, factor) for prefix, place in places)
+    return first, second
 
 
 def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Any:
@@ -127,12 +185,16 @@ def simulated_test(
     *,
     exploration: Exploration = GREEDY,
     noise: NoiseSettings | None = None,
+    prefix: str = "",
 ) -> dict[str, float]:
-    """Return the means of a test in the simulation, by default with the noise that the agent was trained with."""
+    """Return the means of a test in the simulation, by default with the noise that the agent was trained with.
+
+    Their names are preceded by ``prefix``.
+    """
     settings = agent.settings if noise is None else replace(agent.settings, noise=noise)
     env = environment(of.simulated.simulation, of.simulated.begin, settings)
     tested = run_test(env, agent.weights(), agent.settings, episodes, (_TEST_SEED, TEST), exploration)
-    return means(Movements(**{name: getattr(tested, name) for name in Movements._fields}))
+    return means(Movements(**{name: getattr(tested, name) for name in Movements._fields}), prefix)
 
 
 def greedy_test(
@@ -176,19 +238,6 @@ def course(made: Movements, block: int) -> dict[str, float]:
         part = means(part_of(made, k * block, (k + 1) * block))
         found |= {f"{name} @{k + 1}": value for name, value in part.items()}
     return found
-
-
-def series(name: str, values: Any) -> dict[str, float]:
-    """Return an array of one dimension as figures of a row."""
-    return {f"{name} #{i}": float(value) for i, value in enumerate(np.asarray(values, np.float64))}
-
-
-def from_series(figures: Mapping[str, float], name: str) -> Array:
-    """Return what :func:`series` put into the ``figures`` of a row."""
-    found: list[float] = []
-    while (key := f"{name} #{len(found)}") in figures:
-        found.append(figures[key])
-    return np.array(found)
 
 
 def joined(parts: list[Played]) -> Movements:

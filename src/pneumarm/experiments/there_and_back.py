@@ -1,6 +1,7 @@
 """From an arm and back to it: collect, fit, train, move; with what an experiment varies on the way.
 
 Collecting and fitting belong to an arm (:func:`prepared`), training and moving to a row (:func:`trained_and_moved`).
+What such experiments have in common is :class:`ThereAndBack`.
 """
 
 import hashlib
@@ -8,7 +9,9 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +19,8 @@ from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
 from pneumarm.control import BEGIN, AgentController, Movement, move
 from pneumarm.control.transfer import draw_movement
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.evidence import Column
+from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
 from pneumarm.files import write_json
 from pneumarm.learning import AnyAgent, BeginStates, TrainSettings, begin_states, test
@@ -26,8 +30,6 @@ from pneumarm.simulation.quality import propagation
 from pneumarm.transitions import KINDS, QUANTITIES, CollectSettings, Store, collect
 from pneumarm.transitions.choice import joined
 
-ARMS = tuple(f"virtual:seed={number}" for number in range(1, 6))
-"""Arms by default: five to develop on; those to judge on are ``virtual:seed=1001`` to ``1010``."""
 TRANSITIONS = 40_000
 """Transitions of a simulation, at most as many as the laboratory's: 22 minutes on the arm."""
 MOVEMENTS = 200
@@ -43,6 +45,34 @@ The first weights decide most (section 5.4.2): with a single agent a row the int
 _FEWEST = 2_000  # transitions that can be fitted
 _FIGURES = "figures.json"
 _SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class ThereAndBack(Experiment):
+    """An experiment that goes from an arm back to it."""
+
+    runs: int = 4
+    arms: tuple[str, ...] = ARMS
+
+    def settings(self) -> Any:
+        """Return the training of a row, and the transitions and movements that it rests on."""
+        return {"transitions": TRANSITIONS, "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
+
+
+def agent_columns(*others: str) -> list[Column]:
+    """Return what :func:`trained_and_moved` finds as columns, ``others`` of the arm after reward and success."""
+    words = {
+        "actions": "actions on the arm [-]",
+        "switches": "switches on the arm [-]",
+        "seconds": "time of a movement [s]",
+    }
+    return [
+        Column("reward", "reward on the arm [-]"),
+        Column("success_rate", "success on the arm [%]", 1, 100.0),
+        *(Column(name, words[name]) for name in others),
+        Column(BEFORE + "reward", "reward in simulation [-]"),
+        Column("episodes", "episodes of training [-]", 0),
+    ]
 
 
 def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:
@@ -75,6 +105,11 @@ class Recipe:
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting."""
     fit: FitSettings = field(default_factory=FitSettings)
+
+
+def usual(settings: LaboratorySettings, **varied: Any) -> Recipe:
+    """Return the recipe of most experiments, with what is ``varied``."""
+    return Recipe(min(TRANSITIONS, settings.transitions), **varied)
 
 
 def collected(

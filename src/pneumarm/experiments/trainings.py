@@ -1,15 +1,18 @@
-"""One training of the thesis' agent and its test, as an experiment measures them."""
+"""One training of the thesis' agent and its test, as experiments measure them."""
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
-from pneumarm.experiments.preparation import Simulated
+from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import TrainSettings, test
 from pneumarm.learning.environment import Environment, environment, episode
 from pneumarm.learning.loop import Schedule, room, train_episodes
@@ -43,6 +46,26 @@ CRITERIA[LEARNING] = "share of successful episodes, learning on"
 _LEARNING, _LEARNING_EPISODES = 6, 2000  # stream of random numbers, and for how long
 _NEWEST = 0.002  # weight of the newest episode in the performance
 _TEST_SEED = 0  # the same begin states and goals for every agent of every experiment
+
+
+class Trainings(Experiment):
+    """An experiment in which every trial is a training in the arm's simulation, and a test there."""
+
+    @abstractmethod
+    def train_settings(self, trial: int) -> TrainSettings:
+        """Return the settings of the training of ``trial``."""
+
+    def settings(self) -> Any:
+        """Return the settings of every trial."""
+        return {str(trial): msgspec.to_builtins(self.train_settings(trial)) for trial in self.trials}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
+        """Return the arm's simulation."""
+        return simulated(arm, folder, settings, progress)
+
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Train and test one agent."""
+        return train_and_test(material, self.train_settings(trial), run, settings)
 
 
 def with_setting(settings: Any, place: str, value: Any) -> Any:

@@ -19,42 +19,32 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import Interval, above, all_hold, below, interval
+from pneumarm.experiments.differences import Interval, above, all_hold, below, interval, within
 from pneumarm.experiments.evidence import (
     Column,
     change,
     difference,
     mean,
     numbers,
-    picture,
     plain,
     samples,
-    seen,
     signed,
     table,
     thesis,
-    within,
 )
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-)
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.pictures import Axis, against
 from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
-    ARMS,
-    BEFORE,
     MOVEMENTS,
     TRAINING,
     TRANSITIONS,
     Prepared,
-    Recipe,
+    ThereAndBack,
+    agent_columns,
     prepared,
     trained_and_moved,
+    usual,
 )
 from pneumarm.learning import TrainSettings
 from pneumarm.report.page import Picture, Section
@@ -79,7 +69,7 @@ def at_frequency(settings: TrainSettings, frequency: float) -> TrainSettings:
 
 
 @dataclass(frozen=True)
-class ControlFrequency(Experiment):
+class ControlFrequency(ThereAndBack):
     """The whole job at several frequencies."""
 
     frequencies: tuple[float, ...] = _FREQUENCIES
@@ -88,8 +78,6 @@ class ControlFrequency(Experiment):
     title: str = "At which frequency to control the arm"
     question: str = "What do 20, 30, 40 and 60 Hz do to the simulation, and to the agent on the arm?"
     source: str = "Thesis section 5.1, tables 5.1 and 5.2"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -112,8 +100,7 @@ class ControlFrequency(Experiment):
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of every frequency."""
-        count = min(TRANSITIONS, settings.transitions)
-        recipes = [Recipe(count, frequency=frequency) for frequency in self.frequencies]
+        recipes = [usual(settings, frequency=frequency) for frequency in self.frequencies]
         return [prepared(arm, folder, recipe, settings, progress) for recipe in recipes]
 
     def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:
@@ -151,20 +138,11 @@ class ControlFrequency(Experiment):
             for name in lasting
             for kind, other in (("expected", printed("second", name)), ("measured", None))
         ]
-        agent = [
-            Column("reward", "reward on the arm [-]"),
-            Column("success_rate", "success on the arm [%]", 1, 100.0),
-            Column("seconds", "time of a movement [s]"),
-            Column("switches", "switches of a movement [-]"),
-            Column(BEFORE + "reward", "reward in simulation [-]"),
-            Column("episodes", "episodes of training [-]", 0),
-        ]
-        trials, places = self.trials, list(self.frequencies)
-        ticks = [f"{frequency:g}" for frequency in self.frequencies]
+        agent = agent_columns("seconds", "switches")
+        trials, axis = self.trials, Axis("control frequency [Hz]", self.frequencies)
 
         def shown(columns: list[Column], caption: str) -> Picture:
-            figure = picture(rows, list(trials), places, ticks, "control frequency [Hz]", columns)
-            return Picture(figure, caption, seen(rows, trials, columns))
+            return against(rows, trials, axis, columns, caption)
 
         return Analysis(
             summary=[
@@ -236,9 +214,9 @@ class ControlFrequency(Experiment):
         ratio, pressures = grown("angle"), {name: grown(name) for name in ("pressure_1", "pressure_2")}
         poor = interval(100 * (samples(rows, "relative velocity", middle) - samples(rows, "relative angle", middle)))
         others = [trial for trial in self.trials if trial != middle]
-        against = {trial: difference(rows, "reward", trial, middle) for trial in others}
-        better = [trial for trial, found in against.items() if found.low > 0]
-        worse = [trial for trial, found in against.items() if found.high < 0]
+        gains = {trial: difference(rows, "reward", trial, middle) for trial in others}
+        better = [trial for trial, found in gains.items() if found.low > 0]
+        worse = [trial for trial, found in gains.items() if found.high < 0]
         return [
             Claim(
                 "The angle is predicted better at 40 Hz than at 20 Hz",
@@ -286,7 +264,7 @@ class ControlFrequency(Experiment):
                 "30 Hz is a nice trade-off: no other frequency gives more reward on the arm",
                 "chosen by the errors alone",
                 "reward less that of 30 Hz: "
-                + "; ".join(f"{self.trials[trial]} {found}" for trial, found in against.items()),
+                + "; ".join(f"{self.trials[trial]} {found}" for trial, found in gains.items()),
                 "does not hold" if better else "holds" if len(worse) == len(others) else "open",
                 "frequency",
             ),

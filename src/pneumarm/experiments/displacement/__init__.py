@@ -15,11 +15,8 @@ as long ones. A quarter of the movements of this learning agent switch more than
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,31 +27,20 @@ from pneumarm.control.movement import move
 from pneumarm.control.playing import Player
 from pneumarm.control.transfer import BEGIN
 from pneumarm.experiments.differences import Interval, above
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-    run_seed,
-)
-from pneumarm.experiments.moving import (
-    ARMS,
-    MOVEMENTS,
-    THESIS,
-    Material,
-    agent_of,
-    draws,
+from pneumarm.experiments.evidence import (
     from_series,
-    material,
-    new_arm,
+    mean,
+    number,
+    over_arms,
+    plain,
     series,
+    series_of,
+    thesis,
+    values,
 )
-from pneumarm.experiments.on_arms import mean, number, plain, series_of, thesis, values
-from pneumarm.experiments.on_arms import over_arms as over
-from pneumarm.learning import Agent, TrainSettings
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows, run_seed
+from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, draws, new_arm
+from pneumarm.learning import Agent
 from pneumarm.report.figures import against_displacement, against_displacement_alt, movement, movement_alt
 from pneumarm.report.page import Picture, Section, Table
 
@@ -116,30 +102,19 @@ class Typical:
 
 
 @dataclass(frozen=True)
-class Displacement(Experiment):
+class Displacement(OnTheArm):
     """What movements look like, short and long."""
 
     name: str = "displacement"
     title: str = "Movements by displacement"
     question: str = "How do actions and switches depend on the displacement, and why are small displacements hard?"
     source: str = "Thesis section 5.5.2, figures 5.15 to 5.19"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
-    agent: TrainSettings = THESIS
-    sizes: Sizes = field(default_factory=Sizes)
+    sizes: Sizes = Sizes()
 
     @property
     def trials(self) -> Mapping[int, str]:
         """The one agent."""
         return {1: f"learning rate {self.sizes.learning_rate:g}"}
-
-    def settings(self) -> Any:
-        """Return the settings of the agent and the sizes."""
-        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-        """Return the arm and its simulation."""
-        return material(arm, folder, settings, progress)
 
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Adapt, move, and make the typical movements."""
@@ -166,8 +141,8 @@ class Displacement(Experiment):
         spec = ArmSpec()
         points = [series_of(rows, name, 1) for name in ("distance", "actions", "switches")]
         distance, actions, switches = points[0][:, None], points[1], points[2]
-        ratio = over(values(rows, "ratio, short", 1) - values(rows, "ratio, long", 1))
-        failed = over(values(rows, "success, short", 1) - values(rows, "success, long", 1))
+        ratio = over_arms(values(rows, "ratio, short", 1) - values(rows, "ratio, long", 1))
+        failed = over_arms(values(rows, "success, short", 1) - values(rows, "success, long", 1))
         return Analysis(
             summary=[
                 self.question,
@@ -338,9 +313,9 @@ def _claims(rows: Rows, ratio: Interval, displacements: tuple[float, float, floa
     said = thesis(__name__)
     small, middle, large = (f"{degrees:g}°" for degrees in displacements)
     of_actions, few = mean(rows, "correlation of actions", 1), mean(rows, "few switches", 1)
-    less = over(values(rows, "correlation of actions", 1) - values(rows, "correlation of switches", 1))
+    less = over_arms(values(rows, "correlation of actions", 1) - values(rows, "correlation of switches", 1))
     short, long = (mean(rows, f"{which}: out of the way", 1) for which in (small, large))
-    harder = over(values(rows, f"{small}: out of the way", 1) - values(rows, f"{large}: out of the way", 1))
+    harder = over_arms(values(rows, f"{small}: out of the way", 1) - values(rows, f"{large}: out of the way", 1))
     ringing = mean(rows, f"{middle}: ringing", 1)
     return [
         Claim(

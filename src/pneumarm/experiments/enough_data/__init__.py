@@ -22,36 +22,18 @@ import msgspec
 import numpy as np
 
 from pneumarm.experiments.differences import above, below
-from pneumarm.experiments.evidence import (
-    Column,
-    difference,
-    mean,
-    numbers,
-    picture,
-    plain,
-    seen,
-    signed,
-    table,
-    thesis,
-)
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-)
+from pneumarm.experiments.evidence import Column, difference, mean, numbers, plain, signed, table, thesis
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.pictures import Axis, against
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
-    ARMS,
-    BEFORE,
     MOVEMENTS,
     TRAINING,
     Prepared,
     Recipe,
+    ThereAndBack,
+    agent_columns,
     collected,
     place,
     quality,
@@ -59,7 +41,7 @@ from pneumarm.experiments.there_and_back import (
 )
 from pneumarm.files import write_json
 from pneumarm.learning import begin_states
-from pneumarm.report.page import Picture, Section
+from pneumarm.report.page import Section
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import KINDS, Store, enough_data
 
@@ -69,7 +51,7 @@ _MUCH = 0.1  # share of cells filled anew from which on the distribution has imp
 
 
 @dataclass(frozen=True)
-class EnoughData(Experiment):
+class EnoughData(ThereAndBack):
     """The whole job after more and more minutes of collecting."""
 
     minutes: tuple[float, ...] = _MINUTES
@@ -78,8 +60,6 @@ class EnoughData(Experiment):
     title: str = "How much data is enough"
     question: str = "From how many minutes of collecting on do more of them not matter to the agent on the arm?"
     source: str = "Thesis sections 3.2.2, 3.2.3 and 6.1.4"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -144,21 +124,11 @@ class EnoughData(Experiment):
             Column("std pressure_2", "of pressure 2 [counts]"),
             Column(f"measured angle{AFTER_A_SECOND}", "of the angle after a second [counts]"),
         ]
-        agent = [
-            Column("reward", "reward on the arm [-]"),
-            Column("success_rate", "success on the arm [%]", 1, 100.0),
-            Column("actions", "actions on the arm [-]"),
-            Column("switches", "switches on the arm [-]"),
-            Column(BEFORE + "reward", "reward in simulation [-]"),
-            Column("episodes", "episodes of training [-]", 0),
-        ]
-        trials = self.trials
-        places, ticks = list(self.minutes), [f"{minutes:g}" for minutes in self.minutes]
+        agent = agent_columns("actions", "switches")
+        trials, axis = self.trials, Axis("collecting [min]", self.minutes, log=True)
 
         def section(title: str, columns: list[Column], caption: str) -> Section:
-            label = "collecting [min]"
-            figure = picture(rows, list(trials), places, ticks, label, columns, log=True)
-            shown = Picture(figure, f"{caption} against the minutes of collecting.", seen(rows, trials, columns))
+            shown = against(rows, trials, axis, columns, f"{caption} against the minutes of collecting.")
             return Section(title, tables=[table(rows, trials, columns, f"{caption}.")], figures=[shown])
 
         enough = self._enough(rows)
@@ -223,7 +193,7 @@ class EnoughData(Experiment):
             Claim(
                 f"As much again fills few more cells: fewer than {100 * _MUCH:g} % are new in the second half",
                 "a way to check it (section 3.2.3); no number",
-                f"of {self.trials[last]}: {plain(new._replace(mean=100 * new.mean, half=100 * new.half), 1)} %",
+                f"of {self.trials[last]}: {plain(new, 1, 100)} %",
                 below(new, _MUCH),
                 "coverage",
             ),

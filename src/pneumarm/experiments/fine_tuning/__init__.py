@@ -15,21 +15,17 @@ On arms 1 to 5, four runs each, the settings so chosen (learning rate 0.05, 5 ne
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any
 
-import msgspec
 import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.differences import above, interval
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.experiment import ARMS, Analysis, Claim, Rows
 from pneumarm.experiments.factorial import Factorial
-from pneumarm.experiments.forest import forest_figure
-from pneumarm.experiments.preparation import Simulated, simulated
-from pneumarm.experiments.trainings import CRITERIA, train_and_test
+from pneumarm.experiments.pictures import dots
+from pneumarm.experiments.trainings import CRITERIA, Trainings
 from pneumarm.learning import TrainSettings
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
@@ -39,7 +35,7 @@ _GAMMAS = (0.95, 0.98, 0.99)  # of figure_returns: the thesis' levels, and the h
 
 
 @dataclass(frozen=True)
-class FineTuning(Experiment):
+class FineTuning(Trainings):
     """An orthogonal array of three levels, and the settings to beat."""
 
     name: str = "fine-tuning"
@@ -47,7 +43,7 @@ class FineTuning(Experiment):
     question: str = "Do levels that lie closer together find better settings than those of trial 10?"
     source: str = "Thesis sections 5.3 and 5.4.2"
     runs: int = 4
-    arms: tuple[str, ...] = tuple(f"virtual:seed={seed}" for seed in range(1, 6))
+    arms: tuple[str, ...] = ARMS
     array: Factorial = field(
         default_factory=lambda: Factorial(
             name="fine-tuning",
@@ -76,18 +72,6 @@ class FineTuning(Experiment):
         """Return the settings of the training of ``trial``."""
         return _TRIAL_10 if trial == self.reference else self.array.train_settings(trial)
 
-    def settings(self) -> Any:
-        """Return the settings of every trial."""
-        return {str(trial): msgspec.to_builtins(self.train_settings(trial)) for trial in self.trials}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
-        """Return the arm's simulation."""
-        return simulated(arm, folder, settings, progress)
-
-    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
-        """Train and test one agent."""
-        return train_and_test(material, self.train_settings(trial), run, settings)
-
     def analyse(self, rows: Rows) -> Analysis:
         """Return the analysis of the array, and what the settings chosen by odd runs make of the even ones."""
         found = self.array.analyse(rows.of(self.array.trials))
@@ -100,10 +84,11 @@ class FineTuning(Experiment):
             "Trials",
             [self.array.labels],
             figures=[
-                Picture(
-                    forest_figure(list(self.trials.values()), shown, reference=-1),
+                dots(
+                    list(self.trials.values()),
+                    shown,
                     "Results of the trials, means with their 95 % intervals; the line through all is trial 10's.",
-                    "; ".join(f"trial {n}: reward {v.mean():.1f}" for n, v in zip(self.trials, reward, strict=True)),
+                    reference=-1,
                 )
             ],
         )

@@ -12,57 +12,41 @@ at less than half the speed that is allowed.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, replace
 
-import msgspec
 import numpy as np
 
 from pneumarm.experiments.differences import above, below
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
-from pneumarm.experiments.moving import ARMS, THESIS, Material, agent_of, greedy_test, material, means, simulated_test
-from pneumarm.experiments.on_arms import (
-    Column,
-    difference,
-    dots_alt,
-    dots_figure,
-    mean,
-    number,
-    plain,
-    table,
-    thesis,
+from pneumarm.experiments.evidence import Column, difference, mean, number, plain, table, thesis
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows
+from pneumarm.experiments.moving import (
+    SIMULATION,
+    AgentsByTrial,
+    Material,
+    agent_of,
+    greedy_test,
+    in_both,
+    means,
+    simulated_test,
 )
+from pneumarm.experiments.pictures import dots
 from pneumarm.learning import Reward, TrainSettings
-from pneumarm.report.page import Picture, Section
+from pneumarm.report.page import Section
 
 AREAS = {1: (25.0, 1.0), 2: (25.0, 0.5), 3: (12.0, 1.0), 4: (12.0, 0.5)}
 """Tolerances of angle [counts] and velocity [counts/ms] by trial."""
-_SIMULATION = "simulation: "
 _NEAR_ALL = 0.97
 _AS_GOOD = 0.03  # success that may be lost
 
 
 @dataclass(frozen=True)
-class Sizes:
-    """How much is moved in a row."""
-
-    test: int = 300
-    """Movements on the arm."""
-
-
-@dataclass(frozen=True)
-class GoalArea(Experiment):
+class GoalArea(AgentsByTrial):
     """Four goal areas, each learned and tested."""
 
     name: str = "goal-area"
     title: str = "The goal area"
     question: str = "What does a smaller goal area cost, in the simulation and on the arm?"
     source: str = "Thesis section 5.1, eq. 5.1 and 5.2"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
-    agent: TrainSettings = THESIS
-    sizes: Sizes = field(default_factory=Sizes)
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -74,39 +58,27 @@ class GoalArea(Experiment):
         angle, velocity = AREAS[trial]
         return replace(self.agent, reward=Reward(angle_tolerance=angle, velocity_tolerance=velocity))
 
-    def settings(self) -> Any:
-        """Return the settings of all agents and the sizes."""
-        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
-        return {"agents": agents, "sizes": asdict(self.sizes)}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-        """Return the arm and its simulation."""
-        return material(arm, folder, settings, progress)
-
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train, and move in the simulation and on the arm."""
         agent = agent_of(material, self.train_settings(trial), run, settings)
-        before = simulated_test(material, agent, settings.test_episodes)
+        before = simulated_test(material, agent, settings.test_episodes, prefix=SIMULATION)
         made = greedy_test(material, agent, self.sizes.test, run, settings).movements
         speed = np.abs(made.velocity_end).max(axis=1)[made.success]
         slow = {"half as fast at the end": float((speed <= AREAS[trial][1] / 2).mean())} if made.success.any() else {}
-        return {**{_SIMULATION + name: value for name, value in before.items()}, **means(made), **slow}
+        return {**before, **means(made), **slow}
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return what each goal area costs."""
         names, base = list(self.trials.values()), 1
         shown = {
-            "success on the arm [%]": [_percent(mean(rows, "success_rate", t)) for t in AREAS],
+            "success on the arm [%]": [Column("success_rate", "", factor=100.0).interval(rows, t) for t in AREAS],
             "actions of successes\non the arm [-]": [mean(rows, "actions", t) for t in AREAS],
             "reward on the arm [-]": [mean(rows, "reward", t) for t in AREAS],
         }
         columns = [
-            Column(_SIMULATION + "reward", "reward, simulation"),
-            Column("reward", "reward, arm"),
-            Column(_SIMULATION + "success_rate", "success, simulation [%]", 1, 100.0),
-            Column("success_rate", "success, arm [%]", 1, 100.0),
-            Column(_SIMULATION + "actions", "actions, simulation"),
-            Column("actions", "actions, arm"),
+            *in_both("reward"),
+            *in_both("success_rate", " [%]", 1, 100.0),
+            *in_both("actions"),
             Column("switches", "switches, arm"),
             Column("half as fast at the end", "end at half the speed allowed [%]", 1, 100.0),
         ]
@@ -121,8 +93,8 @@ class GoalArea(Experiment):
                 "the mean of its runs.",
             ],
             figures={
-                "reward": {words: number(mean(rows, "reward", t)) for t, words in self.trials.items()},
-                "success_rate": {words: number(mean(rows, "success_rate", t)) for t, words in self.trials.items()},
+                "reward": self.by_trial(rows, "reward"),
+                "success_rate": self.by_trial(rows, "success_rate"),
                 "cost": {self.trials[t]: number(found) for t, found in costs.items()},
             },
             sections=[
@@ -130,13 +102,7 @@ class GoalArea(Experiment):
                     "Goal areas",
                     ["Actions and switches are those of successful movements."],
                     tables=[table(rows, self.trials, columns, "Means over arms with 95 % intervals.")],
-                    figures=[
-                        Picture(
-                            dots_figure(names, shown),
-                            "Success, actions and reward on the arm by goal area.",
-                            dots_alt(names, shown),
-                        )
-                    ],
+                    figures=[dots(names, shown, "Success, actions and reward on the arm by goal area.")],
                 )
             ],
             claims=[
@@ -170,10 +136,6 @@ class GoalArea(Experiment):
                 ),
             ],
         )
-
-
-def _percent(found: Any) -> Any:
-    return found._replace(mean=100 * found.mean, half=100 * found.half)
 
 
 EXPERIMENT = GoalArea()

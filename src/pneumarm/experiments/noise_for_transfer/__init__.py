@@ -11,56 +11,35 @@ better than the thesis'. Four times the noise costs some 13 of reward, and far m
 fast one. More noise shortens the training instead of lengthening it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
-from pneumarm.experiments.differences import above, all_hold, interval
-from pneumarm.experiments.evidence import (
-    Column,
-    difference,
-    mean,
-    numbers,
-    picture,
-    plain,
-    samples,
-    seen,
-    signed,
-    table,
-    thesis,
-    within,
-)
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-)
+from pneumarm.experiments.differences import Interval, above, all_hold, within
+from pneumarm.experiments.evidence import difference, mean, numbers, over_arms, plain, signed, table, thesis, values
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Report, Rows
+from pneumarm.experiments.pictures import Axis, against
 from pneumarm.experiments.there_and_back import (
-    ARMS,
-    BEFORE,
-    MOVEMENTS,
     TRAINING,
-    TRANSITIONS,
     Prepared,
-    Recipe,
+    ThereAndBack,
+    agent_columns,
     prepared,
     trained_and_moved,
+    usual,
 )
-from pneumarm.report.page import Picture, Section
+from pneumarm.report.page import Section
 from pneumarm.simulation.noise import NoiseSettings
 
 _MARGIN = 1.0  # reward that does not matter: one action
 
 
 @dataclass(frozen=True)
-class NoiseForTransfer(Experiment):
+class NoiseForTransfer(ThereAndBack):
     """Agents trained with noises, on the arm."""
 
     factors: tuple[float, ...] = (1.0, 2.0, 4.0)
@@ -69,8 +48,6 @@ class NoiseForTransfer(Experiment):
     title: str = "Noise for the transfer"
     question: str = "Which noise on the simulation's predictions, and how much, makes an agent good on the arm?"
     source: str = "Thesis section 3.4, eq. 3.8 and 3.9"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
 
     @property
     def noises(self) -> Mapping[str, NoiseSettings]:
@@ -91,16 +68,11 @@ class NoiseForTransfer(Experiment):
     def settings(self) -> Any:
         """Return the noises and the training."""
         noises = {words: msgspec.to_builtins(noise) for words, noise in self.noises.items()}
-        return {
-            "noises": noises,
-            "transitions": TRANSITIONS,
-            "movements": MOVEMENTS,
-            "training": msgspec.to_builtins(TRAINING),
-        }
+        return {**super().settings(), "noises": noises}
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Prepared:
         """Return the arm's simulation."""
-        return prepared(arm, folder, Recipe(min(TRANSITIONS, settings.transitions)), settings, progress)
+        return prepared(arm, folder, usual(settings), settings, progress)
 
     def measure(self, material: Prepared, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train an agent with the noise of ``trial``, and move the arm with it."""
@@ -114,30 +86,15 @@ class NoiseForTransfer(Experiment):
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return what becomes of each noise on the arm."""
-        columns = [
-            Column("reward", "reward on the arm [-]"),
-            Column("success_rate", "success on the arm [%]", 1, 100.0),
-            Column("actions", "actions on the arm [-]"),
-            Column("switches", "switches on the arm [-]"),
-            Column(BEFORE + "reward", "reward in simulation [-]"),
-            Column("episodes", "episodes of training [-]", 0),
-        ]
-        trials = self.trials
-        pictures = []
+        columns = agent_columns("actions", "switches")
+        trials, pictures = self.trials, []
+        axis = Axis("deviation of the noise [of the error]", (0.0, *self.factors))
         for kind in ("correlated", "white"):
             for by_velocity in (True, False):
                 chosen = [1, *(self.trial(kind, by_velocity, factor) for factor in self.factors)]
-                places = [0.0, *self.factors]
-                ticks = [f"{place:g}" for place in places]
-                label = "deviation of the noise [of the error]"
                 called = f"{kind} noise, {'less for a slow arm' if by_velocity else 'the same at all speeds'}"
-                pictures.append(
-                    Picture(
-                        picture(rows, chosen, places, ticks, label, columns),
-                        f"{called[0].upper()}{called[1:]}: what agents trained with it do.",
-                        seen(rows, {trial: trials[trial] for trial in chosen}, columns),
-                    )
-                )
+                caption = f"{called[0].upper()}{called[1:]}: what agents trained with it do."
+                pictures.append(against(rows, {trial: trials[trial] for trial in chosen}, axis, columns, caption))
         return Analysis(
             summary=[
                 self.question,
@@ -173,22 +130,15 @@ class NoiseForTransfer(Experiment):
         gain = difference(rows, "reward", usual, 1)
         much = difference(rows, "reward", most, usual)
         longer = difference(rows, "episodes", most, usual)
-        kind = interval(
-            sum(
-                samples(rows, "reward", self.trial("correlated", slow, said["factor"]))
-                - samples(rows, "reward", self.trial("white", slow, said["factor"]))
-                for slow in (False, True)
-            )
-            / 2
-        )
-        speed = interval(
-            sum(
-                samples(rows, "reward", self.trial(one, True, said["factor"]))
-                - samples(rows, "reward", self.trial(one, False, said["factor"]))
-                for one in ("white", "correlated")
-            )
-            / 2
-        )
+        trial, once = self.trial, said["factor"]
+
+        def gained(pairs: Iterable[tuple[int, int]]) -> Interval:
+            """Return by how much the first of each pair of trials earns more, on average over the pairs."""
+            gains = [values(rows, "reward", first) - values(rows, "reward", second) for first, second in pairs]
+            return over_arms(np.mean(gains, axis=0))
+
+        kind = gained((trial("correlated", slow, once), trial("white", slow, once)) for slow in (False, True))
+        speed = gained((trial(one, True, once), trial(one, False, once)) for one in ("white", "correlated"))
         return [
             Claim(
                 "Noise makes an agent better on the arm",

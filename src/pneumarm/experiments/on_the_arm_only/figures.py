@@ -4,19 +4,18 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
-from pneumarm.experiments.moving import from_series
+from pneumarm.experiments.evidence import from_series
 from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
 
 _STYLES = ((DARK, "-"), (MIDDLE, "--"), (GREY, "-."), (LIGHT, "-"), (DARK, ":"))
 
 
 @styled
-def progress_figure(rows: Sequence[Mapping[str, float]]) -> Figure:
-    """Draw deviation and performance of the agents in ``rows``, their figures, over the time on the arm."""
+def progress_figure(arms: Sequence[Sequence[Mapping[str, float]]]) -> Figure:
+    """Draw deviation and performance of agents over the time on the arm: figures of rows, arm by arm."""
     figure, axes = panels(2, 1, 4.2, sharex=True)
     above, below = axes[:, 0]
-    for i, row in enumerate(rows):
-        color, style = _STYLES[i % len(_STYLES)]
+    for (color, style), row in [(_STYLES[i % len(_STYLES)], row) for i, runs in enumerate(arms) for row in runs]:
         hours = from_series(row, "hours so far")
         above.plot(hours, from_series(row, "deviation"), color=color, ls=style, lw=1)
         below.plot(hours, 100 * from_series(row, "performance"), color=color, ls=style, lw=1)

@@ -11,18 +11,14 @@ On arms 1 to 5, four runs each, the printed settings are better by 28 ± 16, in 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
-
-import msgspec
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.differences import above, interval
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
-from pneumarm.experiments.preparation import Simulated, simulated
-from pneumarm.experiments.trainings import CRITERIA, train_and_test
+from pneumarm.experiments.experiment import Analysis, Claim, Rows
+from pneumarm.experiments.trainings import CRITERIA, Trainings
 from pneumarm.learning import TrainSettings
 
 _CRITERIA = ("reward", "actions", "switches", "episodes")
@@ -31,7 +27,7 @@ _BEST = replace(BASE, method="sarsa", hidden=5, trace_decay=0.0, discount=0.98)
 
 
 @dataclass(frozen=True)
-class Confirmation(Experiment):
+class Confirmation(Trainings):
     """Two settings that differ in the learning rate, from the same weights."""
 
     name: str = "optimal-settings"
@@ -51,18 +47,6 @@ class Confirmation(Experiment):
     def train_settings(self, trial: int) -> TrainSettings:
         """Return the settings of ``trial``."""
         return replace(_BEST, learning_rate={1: 0.05, 2: 0.10}[trial])
-
-    def settings(self) -> Any:
-        """Return the settings of both trainings."""
-        return {str(trial): msgspec.to_builtins(self.train_settings(trial)) for trial in self.trials}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
-        """Return the arm's simulation."""
-        return simulated(arm, folder, settings, progress)
-
-    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
-        """Train and test one agent."""
-        return train_and_test(material, self.train_settings(trial), run, settings)
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return both settings beside the thesis', and the difference within the runs."""

@@ -8,43 +8,20 @@ without a night, because what a learning agent earns goes up and down anyway.
     pneumarm experiment overnight
 
 On arms 1 to 5, four runs each, there is no hitch: the agent that never learns loses -0.1 ± 2.6 of its reward after 14
-h, and the one that learns -1.2 ± 5.1 against the same agent without a night. There is nothing to win back, by warming
-up or by learning.
+h, and the one that learns -1.2 ± 5.1 against the same agent without a night. There is nothing to be seen that warming
+up or learning would bring back.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, NamedTuple
-
-import msgspec
 
 from pneumarm.control.playing import Player
 from pneumarm.experiments.differences import Interval, above
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-    run_seed,
-)
-from pneumarm.experiments.moving import (
-    ARMS,
-    MOVEMENTS,
-    THESIS,
-    Material,
-    agent_of,
-    course,
-    draws,
-    joined,
-    material,
-    new_arm,
-)
-from pneumarm.experiments.on_arms import Curve, blocks, courses_alt, courses_figure, number, over_arms, plain, thesis
-from pneumarm.learning import TrainSettings
+from pneumarm.experiments.evidence import blocks, number, over_arms, plain, thesis
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows, run_seed
+from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, course, draws, joined, new_arm
+from pneumarm.experiments.pictures import Curve, courses
 from pneumarm.report.page import Picture, Section, Table
 
 
@@ -85,30 +62,19 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class Overnight(Experiment):
+class Overnight(OnTheArm):
     """Two days with a night between."""
 
     name: str = "overnight"
     title: str = "After a night of rest"
     question: str = "Is it the agent that adapts after a night, or the arm that warms up?"
     source: str = "Thesis section 5.5.1, figures 5.13 and 5.14"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
-    agent: TrainSettings = THESIS
-    sizes: Sizes = field(default_factory=Sizes)
+    sizes: Sizes = Sizes()
 
     @property
     def trials(self) -> Mapping[int, str]:
         """Who learns when."""
         return {trial: days.words for trial, days in DAYS.items()}
-
-    def settings(self) -> Any:
-        """Return the settings of the agent and the sizes."""
-        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-        """Return the arm and its simulation."""
-        return material(arm, folder, settings, progress)
 
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Move for two days, exploring as at the end of training on both."""
@@ -125,20 +91,21 @@ class Overnight(Experiment):
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return the drop after the night and what brings the reward back."""
-        courses = {trial: blocks(rows, "reward", trial) for trial in DAYS}
+        rewards = {trial: blocks(rows, "reward", trial) for trial in DAYS}
         place = self.sizes.first // self.sizes.block
-        found = {trial: _hitch(course_, place) for trial, course_ in courses.items()}
-        lost = over_arms((courses[NO_NIGHT] - courses[LEARNING])[:, :, place])
-        adapted = over_arms(_gain(courses[LEARNING], place) - _gain(courses[NO_NIGHT], place))
-        names = ["trial", "drop after the night", "gained on the second day"]
+        found = {trial: _hitch(reward, place) for trial, reward in rewards.items()}
+        lost = over_arms((rewards[NO_NIGHT] - rewards[LEARNING])[:, :, place])
+        adapted = over_arms(_gain(rewards[LEARNING], place) - _gain(rewards[NO_NIGHT], place))
+        names = ["trial", "drop to the second day", "gained on the second day"]
         lines = [[days.words, *(plain(one) for one in found[trial])] for trial, days in DAYS.items()]
         return Analysis(
             summary=[
                 self.question,
-                f"The night costs the agent that learns {plain(lost)} of its reward, against the same agent without "
-                f"one, and the one that never learns {plain(found[FROZEN][0])}. On the second day the latter gains "
-                f"{plain(found[FROZEN][1])}, while the arm warms up; learning after a night gains {plain(adapted)} "
-                "more than learning without one.",
+                answer(lost, found[FROZEN][0]),
+                f"Reward lost by the night: {plain(lost)} of an agent that learns, against the same agent without "
+                f"one, and {plain(found[FROZEN][0])} of one that never learns. Gained on the second day: "
+                f"{plain(found[FROZEN][1])} by the latter, while the arm warms up; and by learning after a night "
+                f"{plain(adapted)} more than by learning without one.",
                 "Intervals are over arms, each the mean of its runs.",
             ],
             figures={
@@ -174,11 +141,17 @@ class Overnight(Experiment):
             )
         }
         marks = {float(self.sizes.first): f"{self.sizes.hours:g} h of rest"}
-        return Picture(
-            courses_figure(shown, self.sizes.block, marks),
-            "Reward, actions and switches before and after a night (thesis figures 5.13 and 5.14).",
-            courses_alt(shown),
-        )
+        caption = "Reward, actions and switches before and after a night (thesis figures 5.13 and 5.14)."
+        return courses(shown, self.sizes.block, caption, marks)
+
+
+def answer(lost: Interval, frozen: Interval) -> str:
+    """Return in words for whom the night surely costs reward."""
+    agents = {"an agent that learns": lost, "one that never learns": frozen}
+    costs = [words for words, found in agents.items() if above(found) == "holds"]
+    if costs:
+        return f"The night costs {' and '.join(costs)} reward."
+    return "No drop is shown, so that it cannot be seen what would bring the reward back."
 
 
 _SPAN = 3  # blocks before the night, and at the end, that are the level of a day

@@ -33,8 +33,18 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.differences import Interval, Verdict, above, below, interval
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
-from pneumarm.experiments.forest import forest_figure
+from pneumarm.experiments.evidence import signed
+from pneumarm.experiments.experiment import (
+    ARMS,
+    Analysis,
+    Claim,
+    Experiment,
+    Figures,
+    LaboratorySettings,
+    Report,
+    Rows,
+)
+from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.experiments.trainings import CRITERIA, LEARNING, train_and_test, with_settings
 from pneumarm.learning import Exploration, TrainSettings
@@ -89,7 +99,7 @@ class ShapingSettings(Experiment):
     question: str = "Which settings of shaping matter, and is shaping indispensable where the potentiometer is worn?"
     source: str = "Thesis sections 4.3.2, 5.2 and 5.4.4"
     runs: int = 4
-    arms: tuple[str, ...] = tuple(f"virtual:seed={seed}" for seed in range(1, 6))
+    arms: tuple[str, ...] = ARMS
     plan: tuple[Trial, ...] = field(
         default_factory=lambda: msgspec.convert(tomllib.loads(_packaged("trials.toml")), _Trials).trials
     )
@@ -192,10 +202,11 @@ class ShapingSettings(Experiment):
             )
         table = Table(header, rows, "Mean ± standard deviation over runs; differences with 95 % intervals.")
         shown = {name: [interval(values) for values in samples[name]] for name in _SHOWN}
-        picture = Picture(
-            forest_figure(list(self.trials.values()), {_WORDS[name]: found for name, found in shown.items()}),
+        picture = dots(
+            list(self.trials.values()),
+            {_WORDS[name]: found for name, found in shown.items()},
             "Results by settings of shaping, means with their 95 % intervals; the line is the thesis' settings.",
-            "; ".join(f"{self.trials[n]}: reward {v.mean():.1f}" for n, v in enumerate(tables["reward"], 1)),
+            reference=0,
         )
         return Section("Results", figures=[picture], tables=[table])
 
@@ -302,9 +313,7 @@ def _share(met: NDArray[np.float64]) -> str:
 
 
 def _whole(found: Interval | None) -> str:
-    if found is None:
-        return "reference"
-    return f"{found.mean:+.0f}" + (f" ± {found.half:.0f}" if np.isfinite(found.half) else "")
+    return "reference" if found is None else signed(found, 0)
 
 
 @styled

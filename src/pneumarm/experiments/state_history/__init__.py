@@ -22,42 +22,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
-from pneumarm.experiments.differences import Interval, above, all_hold, below
-from pneumarm.experiments.evidence import (
-    Column,
-    change,
-    difference,
-    numbers,
-    picture,
-    seen,
-    signed,
-    table,
-    thesis,
-    within,
-)
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-    run_seed,
-)
+from pneumarm.experiments.differences import Interval, above, all_hold, below, within
+from pneumarm.experiments.evidence import Column, change, difference, numbers, signed, table, thesis
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Report, Rows, run_seed
+from pneumarm.experiments.pictures import Axis, against
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
-    ARMS,
-    BEFORE,
-    MOVEMENTS,
     TRAINING,
-    TRANSITIONS,
     Prepared,
-    Recipe,
+    ThereAndBack,
+    agent_columns,
     over_joints,
     prepared,
     trained_and_moved,
+    usual,
 )
 from pneumarm.learning import BeginStates, begin_states
 from pneumarm.networks import LevenbergMarquardt, levenberg_marquardt, nguyen_widrow
@@ -149,7 +128,7 @@ def errors_with_period(
 
 
 @dataclass(frozen=True)
-class StateHistory(Experiment):
+class StateHistory(ThereAndBack):
     """Fits and agents by history."""
 
     histories: tuple[int, ...] = _HISTORIES
@@ -159,8 +138,6 @@ class StateHistory(Experiment):
     title: str = "Which history the state needs"
     question: str = "How many observations must the state hold, and does the length of the step help to predict it?"
     source: str = "Thesis section 3.3, eq. 3.5; appendix A"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -170,17 +147,12 @@ class StateHistory(Experiment):
 
     def settings(self) -> Any:
         """Return histories, fit and training."""
-        return {
-            "histories": list(self.histories),
-            "transitions": TRANSITIONS,
-            "movements": MOVEMENTS,
-            "fit": msgspec.to_builtins(self.fit),
-            "training": msgspec.to_builtins(TRAINING),
-        }
+        fits = {"histories": list(self.histories), "fit": msgspec.to_builtins(self.fit)}
+        return {**super().settings(), **fits}
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
         """Return the arm's filtered transitions."""
-        base = prepared(arm, folder, Recipe(min(TRANSITIONS, settings.transitions)), settings, progress)
+        base = prepared(arm, folder, usual(settings), settings, progress)
         longest = Window(base.simulation.spec.joints, max(self.histories))
         with Store.open(base.folder / STORE) as store:
             held_out = share_held_out([entry.number for entry in store.catalogue()], self.fit.held_out, settings.seed)
@@ -231,21 +203,16 @@ class StateHistory(Experiment):
         ]
         agent = [
             Column(f"angle{AFTER_A_SECOND}", "error of the angle after a second [counts]"),
-            Column("reward", "reward on the arm [-]"),
-            Column("success_rate", "success on the arm [%]", 1, 100.0),
-            Column("switches", "switches on the arm [-]"),
-            Column(BEFORE + "reward", "reward in simulation [-]"),
-            Column("episodes", "episodes of training [-]", 0),
+            *agent_columns("switches"),
         ]
         trials, count = self.trials, len(self.histories)
         without = {trial: words for trial, words in trials.items() if trial <= count}
         with_period = {trial: words for trial, words in trials.items() if trial > count}
-        ticks = [str(history) for history in self.histories]
+        axis = Axis("observations in the state [-]", self.histories)
 
         def shown(which: Mapping[int, str], columns: list[Column], caption: str) -> Picture:
             columns = [replace(column, thesis=None) for column in columns]  # another arm, out of scale
-            figure = picture(rows, list(which), self.histories, ticks, "observations in the state [-]", columns)
-            return Picture(figure, caption, seen(rows, which, columns))
+            return against(rows, which, axis, columns, caption)
 
         nested = [
             [

@@ -16,62 +16,46 @@ agent's reward. Learning on the arm does not help: with 0.10 agents end 22 ± 9 
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from pneumarm.arm.virtual import ArmParameters
 from pneumarm.arm.virtual.parameters import without_noise
 from pneumarm.control.playing import Player
 from pneumarm.experiments.differences import Interval, above
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-    run_seed,
+from pneumarm.experiments.evidence import (
+    Column,
+    blocks,
+    difference,
+    mean,
+    number,
+    over_arms,
+    plain,
+    signed,
+    table,
+    thesis,
+    values,
 )
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows, run_seed
 from pneumarm.experiments.moving import (
-    ARMS,
     MOVEMENTS,
+    SIMULATION,
     TEST_MOVEMENTS,
-    THESIS,
     Material,
+    OnTheArm,
     agent_of,
     course,
     draws,
     from_visits,
     greedy_test,
-    material,
     means,
     new_arm,
     simulated_test,
 )
-from pneumarm.experiments.on_arms import (
-    Column,
-    Curve,
-    blocks,
-    courses_alt,
-    courses_figure,
-    difference,
-    dots_alt,
-    dots_figure,
-    mean,
-    number,
-    over_arms,
-    plain,
-    table,
-    thesis,
-    values,
-)
-from pneumarm.learning import TrainSettings
-from pneumarm.report.page import Picture, Section
+from pneumarm.experiments.pictures import Curve, courses, dots
+from pneumarm.report.page import Section
 from pneumarm.simulation.noise import NoiseSettings
 
 RATES = {1: 0.0, 2: 0.05, 3: 0.10}
@@ -84,7 +68,7 @@ CONDITIONS = {
     WARM: "arm that has moved for an hour",
     ALL: "all three",
 }
-_SIMULATION, _SIMULATION_EXPLORING = "simulation: ", "simulation, exploring: "
+_EXPLORING = "simulation, exploring: "
 _FROM_ARM, _WITHOUT_NOISE = "simulation from the arm's begin states: ", "the same without noise: "
 _ALL_THREE = "noise, lateness and cold together"
 _MODEL, _COLD, _DROP = "error of the model", "cold arm", "drop-causes"
@@ -106,7 +90,7 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class Transfer(Experiment):
+class Transfer(OnTheArm):
     """The three agents of section 5.5.1, and the causes of the drop."""
 
     name: str = "transfer"
@@ -115,23 +99,12 @@ class Transfer(Experiment):
         "What does an agent lose on its way from the simulation to the arm, why, and does learning bring it back?"
     )
     source: str = "Thesis section 5.5.1, figures 5.9 to 5.12"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
-    agent: TrainSettings = THESIS
-    sizes: Sizes = field(default_factory=Sizes)
+    sizes: Sizes = Sizes()
 
     @property
     def trials(self) -> Mapping[int, str]:
         """Learning rates, then conditions of the arm."""
         return {trial: f"learning rate {rate:.2f}" for trial, rate in RATES.items()} | CONDITIONS
-
-    def settings(self) -> Any:
-        """Return the settings of the agent and the sizes."""
-        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-        """Return the arm and its simulation."""
-        return material(arm, folder, settings, progress)
 
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Move on the arm, learning or under a condition."""
@@ -144,9 +117,8 @@ class Transfer(Experiment):
         explores = self.agent.exploration
         player = Player(agent, new_arm(of, run, laboratory), rate, explores, seed)
         played = player.play(*draws(agent, seed, self.sizes.learning, MOVEMENTS))
-        before = simulated_test(of, agent, laboratory.test_episodes, exploration=explores)
         return {
-            **{_SIMULATION_EXPLORING + name: value for name, value in before.items()},
+            **simulated_test(of, agent, laboratory.test_episodes, exploration=explores, prefix=_EXPLORING),
             **course(played.movements, self.sizes.block),
             "hours": float(played.time_end[-1] / 3600),
         }
@@ -165,13 +137,12 @@ class Transfer(Experiment):
         begin = from_visits(agent, *Player(agent, new_arm(of, run, laboratory)).visit(durations))
         there = replace(of, simulated=replace(of.simulated, begin=begin))
         quiet = NoiseSettings(kind="none")
-        for prefix, figures in (
-            (_SIMULATION, simulated_test(of, agent, count)),
-            (_FROM_ARM, simulated_test(there, agent, count)),
-            (_WITHOUT_NOISE, simulated_test(there, agent, count, noise=quiet)),
-        ):
-            found |= {prefix + name: value for name, value in figures.items()}
-        return found
+        return {
+            **found,
+            **simulated_test(of, agent, count, prefix=SIMULATION),
+            **simulated_test(there, agent, count, prefix=_FROM_ARM),
+            **simulated_test(there, agent, count, noise=quiet, prefix=_WITHOUT_NOISE),
+        }
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return the courses beside the thesis', the causes, and what holds of section 5.5.1."""
@@ -180,12 +151,17 @@ class Transfer(Experiment):
         drop = over_arms(_arrival(rows, 1, "reward"))
         single = {name: found for name, found in causes.items() if name != _ALL_THREE}
         largest = max(single, key=lambda name: single[name].mean)
+        learned = ", ".join(
+            f"{signed(_better(rows, trial))} with {RATES[trial]:g}" for trial in RATES if RATES[trial]
+        )
         return Analysis(
             summary=[
                 self.question,
                 f"On arrival the agent that does not learn loses {plain(drop)} of its reward in the simulation, "
                 f"where it explores as much (thesis: more than {thesis(__name__)['drop']:g}). Of the "
                 f"causes, measured with greedy movements, the largest is: {largest} ({plain(causes[largest])}).",
+                "Against the agent that does not learn, the last quarter of the movements of those that do earns "
+                f"{learned}.",
                 "Intervals are over arms, each the mean of its runs.",
             ],
             figures={
@@ -205,7 +181,7 @@ class Transfer(Experiment):
             ("actions", "actions of\nsuccesses [-]", 1.0),
             ("switches", "switches of\nsuccesses [-]", 1.0),
         ):
-            level = factor * mean(rows, _SIMULATION_EXPLORING + figure, 1).mean
+            level = factor * mean(rows, _EXPLORING + figure, 1).mean
             shown[label] = [
                 Curve(f"learning rate {rate:.2f}", factor * blocks(rows, figure, trial), level)
                 for trial, rate in RATES.items()
@@ -217,11 +193,11 @@ class Transfer(Experiment):
                 "Lines without markers are the test in the simulation, exploring too."
             ],
             figures=[
-                Picture(
-                    courses_figure(shown, self.sizes.block),
+                courses(
+                    shown,
+                    self.sizes.block,
                     "Reward, success, actions and switches over the movements since the arrival; means over arms, "
                     f"{self.sizes.block} movements a point (thesis figures 5.9 to 5.12).",
-                    courses_alt(shown),
                 )
             ],
         )
@@ -274,7 +250,7 @@ class Transfer(Experiment):
             )
         )
         for trial in (2, 3):
-            better = over_arms(_last(blocks(rows, "reward", trial)) - _last(course_1))
+            better = _better(rows, trial)
             claims.append(
                 Claim(
                     f"The agent that learns with {RATES[trial]:g} ends better than the one that does not learn",
@@ -312,7 +288,7 @@ def changed(parameters: ArmParameters, trial: int) -> ArmParameters:
 
 def _arrival(rows: Rows, trial: int, figure: str) -> Any:
     """Return by how much ``figure`` is lower in the first block than in the simulation, shape (arms, runs)."""
-    return values(rows, _SIMULATION_EXPLORING + figure, trial) - values(rows, f"{figure} @1", trial)
+    return values(rows, _EXPLORING + figure, trial) - values(rows, f"{figure} @1", trial)
 
 
 def _last(course_: Any) -> Any:
@@ -320,11 +296,16 @@ def _last(course_: Any) -> Any:
     return course_[:, :, -max(1, course_.shape[-1] // 4) :].mean(axis=-1)
 
 
+def _better(rows: Rows, trial: int) -> Interval:
+    """Return by how much ``trial`` earns more in the end than the agent that does not learn."""
+    return over_arms(_last(blocks(rows, "reward", trial)) - _last(blocks(rows, "reward", 1)))
+
+
 def _causes(rows: Rows) -> dict[str, Interval]:
     """Return what each cause takes from the reward of a greedy agent."""
     from_arm, quiet = (values(rows, prefix + "reward", AS_IT_IS) for prefix in (_FROM_ARM, _WITHOUT_NOISE))
     return {
-        "begin states of movements on the arm": over_arms(values(rows, _SIMULATION + "reward", AS_IT_IS) - from_arm),
+        "begin states of movements on the arm": over_arms(values(rows, SIMULATION + "reward", AS_IT_IS) - from_arm),
         "noise of the sensors": difference(rows, "reward", NO_NOISE, AS_IT_IS),
         "control that is late": difference(rows, "reward", PUNCTUAL, AS_IT_IS),
         _COLD: difference(rows, "reward", WARM, AS_IT_IS),
@@ -363,9 +344,9 @@ def _causes_section(rows: Rows, causes: Mapping[str, Interval]) -> Section:
         Column("switches", "switches of successes"),
     ]
     simulations = [
-        [words, *(plain(mean(rows, prefix + c.figure, AS_IT_IS), c.digits, c.factor) for c in columns)]
+        [words, *(replace(c, figure=prefix + c.figure).text(rows, AS_IT_IS) for c in columns)]
         for words, prefix in (
-            ("simulation", _SIMULATION),
+            ("simulation", SIMULATION),
             ("simulation, from the arm's begin states", _FROM_ARM),
             ("the same without noise", _WITHOUT_NOISE),
         )
@@ -381,10 +362,11 @@ def _causes_section(rows: Rows, causes: Mapping[str, Interval]) -> Section:
         ],
         tables=[both],
         figures=[
-            Picture(
-                dots_figure(list(causes), shown, zero=True),
+            dots(
+                list(causes),
+                shown,
                 "Reward that each cause takes from a greedy agent, with 95 % intervals over arms.",
-                dots_alt(list(causes), shown),
+                zero=True,
             )
         ],
     )

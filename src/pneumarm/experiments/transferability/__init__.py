@@ -14,66 +14,48 @@ punishment a third of the movements fail, so that no more is lost by the transfe
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
-import msgspec
-
-from pneumarm.experiments.differences import above
-from pneumarm.experiments.evidence import within
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, Figures, LaboratorySettings, Report, Rows
-from pneumarm.experiments.moving import ARMS, THESIS, Material, agent_of, greedy_test, material, means, simulated_test
-from pneumarm.experiments.on_arms import (
-    Column,
-    difference,
-    dots_alt,
-    dots_figure,
-    mean,
-    number,
-    over_arms,
-    plain,
-    table,
-    thesis,
-    values,
+from pneumarm.experiments.differences import above, within
+from pneumarm.experiments.evidence import difference, mean, number, over_arms, plain, table, thesis, values
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows
+from pneumarm.experiments.moving import (
+    SIMULATION,
+    AgentsByTrial,
+    Material,
+    agent_of,
+    greedy_test,
+    in_both,
+    means,
+    simulated_test,
 )
+from pneumarm.experiments.pictures import dots
 from pneumarm.learning import Exploration, Reward, TrainSettings
-from pneumarm.report.page import Picture, Section
+from pneumarm.report.page import Section
 from pneumarm.simulation.noise import NoiseSettings
 
 BASE, NO_SHAPING, NO_PUNISHMENT, NO_NOISE, WHITE, TWICE = range(1, 7)
-KINDS: Mapping[int, tuple[str, TrainSettings]] = {
-    BASE: ("trial 10 of table 5.3", THESIS),
-    NO_SHAPING: ("without shaping", replace(THESIS, shaping=None, exploration=Exploration(0.09, 10.0))),
-    NO_PUNISHMENT: ("switches not punished", replace(THESIS, reward=Reward(switch=0.0))),
-    NO_NOISE: ("without noise", replace(THESIS, noise=NoiseSettings(kind="none"))),
-    WHITE: ("white noise", replace(THESIS, noise=NoiseSettings(kind="white"))),
-    TWICE: ("twice the noise", replace(THESIS, noise=NoiseSettings(factor=2.0))),
+KINDS: Mapping[int, tuple[str, dict[str, Any]]] = {
+    BASE: ("trial 10 of table 5.3", {}),
+    NO_SHAPING: ("without shaping", {"shaping": None, "exploration": Exploration(0.09, 10.0)}),
+    NO_PUNISHMENT: ("switches not punished", {"reward": Reward(switch=0.0)}),
+    NO_NOISE: ("without noise", {"noise": NoiseSettings(kind="none")}),
+    WHITE: ("white noise", {"noise": NoiseSettings(kind="white")}),
+    TWICE: ("twice the noise", {"noise": NoiseSettings(factor=2.0)}),
 }
-_SIMULATION = "simulation: "
+"""Kinds of agents by trial: in words, and what is changed in the settings of their training."""
 _MARGIN = 3.0  # reward that is marginal
 
 
 @dataclass(frozen=True)
-class Sizes:
-    """How much is moved in a row."""
-
-    test: int = 300
-    """Movements on the arm."""
-
-
-@dataclass(frozen=True)
-class Transferability(Experiment):
+class Transferability(AgentsByTrial):
     """Agents that learned in different ways, in the simulation and on the arm."""
 
     name: str = "transferability"
     title: str = "Transferability"
     question: str = "How much of what an agent earns in the simulation is left on the arm, by how it learned?"
     source: str = "Thesis sections 3.4, 5.4.1, 5.4.2 and 5.4.4"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
-    agents: int = THESIS.agents
-    sizes: Sizes = field(default_factory=Sizes)
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -82,42 +64,26 @@ class Transferability(Experiment):
 
     def train_settings(self, trial: int) -> TrainSettings:
         """Return how the agents of ``trial`` learn."""
-        return replace(KINDS[trial][1], agents=self.agents)
-
-    def settings(self) -> Any:
-        """Return the settings of all agents and the sizes."""
-        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
-        return {"agents": agents, "sizes": asdict(self.sizes)}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-        """Return the arm and its simulation."""
-        return material(arm, folder, settings, progress)
+        return replace(self.agent, **KINDS[trial][1])
 
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train, and move in the simulation and on the arm."""
         found = agent_of(material, self.train_settings(trial), run, settings)
         judged = replace(found, settings=replace(found.settings, reward=Reward()))  # all by the same reward
-        before = simulated_test(material, judged, settings.test_episodes, noise=NoiseSettings())
+        before = simulated_test(material, judged, settings.test_episodes, noise=NoiseSettings(), prefix=SIMULATION)
         played = greedy_test(material, judged, self.sizes.test, run, settings)
-        return {**{_SIMULATION + name: value for name, value in before.items()}, **means(played.movements)}
+        return {**before, **means(played.movements)}
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return what every kind of agent earns, and what it loses on the arm."""
         names = list(self.trials.values())
-        lost = {trial: values(rows, _SIMULATION + "reward", trial) - values(rows, "reward", trial) for trial in KINDS}
+        lost = {trial: values(rows, SIMULATION + "reward", trial) - values(rows, "reward", trial) for trial in KINDS}
         shown = {
             "reward on the arm [-]": [mean(rows, "reward", trial) for trial in KINDS],
             "lost on the way [-]": [over_arms(lost[trial]) for trial in KINDS],
             "switches of successes\non the arm [-]": [mean(rows, "switches", trial) for trial in KINDS],
         }
-        columns = [
-            Column(_SIMULATION + "reward", "reward, simulation"),
-            Column("reward", "reward, arm"),
-            Column(_SIMULATION + "success_rate", "success, simulation [%]", 1, 100.0),
-            Column("success_rate", "success, arm [%]", 1, 100.0),
-            Column(_SIMULATION + "switches", "switches, simulation"),
-            Column("switches", "switches, arm"),
-        ]
+        columns = [*in_both("reward"), *in_both("success_rate", " [%]", 1, 100.0), *in_both("switches")]
         said = thesis(__name__)
         unpunished, unshaped = (over_arms(lost[t] - lost[BASE]) for t in (NO_PUNISHMENT, NO_SHAPING))
         noiseless, louder = (difference(rows, "reward", BASE, NO_NOISE), difference(rows, "reward", TWICE, BASE))
@@ -130,7 +96,7 @@ class Transferability(Experiment):
             ],
             figures={
                 "lost": {words: number(over_arms(lost[trial])) for trial, words in self.trials.items()},
-                "reward": {words: number(mean(rows, "reward", trial)) for trial, words in self.trials.items()},
+                "reward": self.by_trial(rows, "reward"),
             },
             sections=[
                 Section(
@@ -138,10 +104,10 @@ class Transferability(Experiment):
                     ["All are judged by the thesis' reward: 50 at the goal, -1 an action, -8 a switch."],
                     tables=[table(rows, self.trials, columns, "Means over arms; switches of successful movements.")],
                     figures=[
-                        Picture(
-                            dots_figure(names, shown),
+                        dots(
+                            names,
+                            shown,
                             "What agents earn on the arm, what they lose on the way there, how often they switch.",
-                            dots_alt(names, shown),
                         )
                     ],
                 )

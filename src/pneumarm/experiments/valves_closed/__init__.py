@@ -14,9 +14,7 @@ reward, five arms do not show.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -24,40 +22,18 @@ from numpy.typing import NDArray
 from pneumarm.arm import guarded
 from pneumarm.control import BEGIN
 from pneumarm.experiments.differences import above, below
-from pneumarm.experiments.evidence import (
-    Column,
-    change,
-    difference,
-    mean,
-    numbers,
-    picture,
-    samples,
-    seen,
-    signed,
-    table,
-    thesis,
-)
-from pneumarm.experiments.experiment import (
-    Analysis,
-    Claim,
-    Experiment,
-    Figures,
-    LaboratorySettings,
-    Report,
-    Rows,
-    run_seed,
-)
+from pneumarm.experiments.evidence import Column, change, difference, mean, numbers, samples, signed, table, thesis
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Report, Rows, run_seed
+from pneumarm.experiments.pictures import Axis, against
 from pneumarm.experiments.there_and_back import (
-    ARMS,
-    BEFORE,
-    MOVEMENTS,
     TRAINING,
-    TRANSITIONS,
     Prepared,
-    Recipe,
+    ThereAndBack,
+    agent_columns,
     opened,
     prepared,
     trained_and_moved,
+    usual,
 )
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import DARK, MIDDLE, panels, styled
@@ -104,29 +80,22 @@ def inflation(
 
 
 @dataclass(frozen=True)
-class ValvesClosed(Experiment):
+class ValvesClosed(ThereAndBack):
     """The whole job with valves left open and closed while computing."""
 
     name: str = "valves-closed"
     title: str = "Valves left as they are, or closed, while computing"
     question: str = "What does it do to the simulation, and to the agent, to close the valves while computing?"
     source: str = "Thesis section 2.4.3, figure 2.8; section 3.3; appendix A"
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
 
     @property
     def trials(self) -> Mapping[int, str]:
         """The two ways."""
         return {_OPEN: "left as they are", _CLOSED: "closed while computing"}
 
-    def settings(self) -> Any:
-        """Return the training."""
-        return {"transitions": TRANSITIONS, "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
-
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of each way."""
-        count = min(TRANSITIONS, settings.transitions)
-        recipes = [Recipe(count, close_while_computing=closed) for closed in (False, True)]
+        recipes = [usual(settings, close_while_computing=closed) for closed in (False, True)]
         return [prepared(arm, folder, recipe, settings, progress) for recipe in recipes]
 
     def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:
@@ -158,21 +127,12 @@ class ValvesClosed(Experiment):
             Column("std pressure_2", "error of pressure 2 [counts]", thesis={_OPEN: printed["pressure_2"]}),
             Column("change velocity", "change of the velocity in a step [counts/ms]", 3),
         ]
-        agent = [
-            Column("reward", "reward on the arm [-]"),
-            Column("success_rate", "success on the arm [%]", 1, 100.0),
-            Column("seconds", "time of a movement [s]"),
-            Column("switches", "switches of a movement [-]"),
-            Column(BEFORE + "reward", "reward in simulation [-]"),
-            Column("episodes", "episodes of training [-]", 0),
-        ]
-        trials = self.trials
-        ticks = ["left", "closed"]
+        agent = agent_columns("seconds", "switches")
+        trials, axis = self.trials, Axis("valves while computing", (0.0, 1.0), ("left", "closed"))
 
         def shown(columns: list[Column], caption: str) -> Picture:
             columns = [replace(column, thesis=None) for column in columns]  # another arm, out of scale
-            figure = picture(rows, list(trials), [0.0, 1.0], ticks, "valves while computing", columns)
-            return Picture(figure, caption, seen(rows, trials, columns))
+            return against(rows, trials, axis, columns, caption)
 
         times = sorted(
             int(name.split()[1])

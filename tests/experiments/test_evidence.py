@@ -1,0 +1,141 @@
+"""What rows say of arms, and how it is said: samples, differences, verdicts, tables and pictures."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.stats import spearmanr
+
+from pneumarm.experiments import overnight
+from pneumarm.experiments.differences import Interval, interval, within
+from pneumarm.experiments.evidence import (
+    Column,
+    change,
+    difference,
+    from_series,
+    mean,
+    numbers,
+    over_arms,
+    plain,
+    samples,
+    series,
+    signed,
+    table,
+)
+from pneumarm.experiments.experiment import Row, Rows, sorted_rows
+from pneumarm.experiments.factorial import rank_correlation
+from pneumarm.experiments.moving import SIMULATION, in_both
+from pneumarm.experiments.pictures import Axis, Curve, against, courses, dots
+
+TRIALS = {1: "one", 2: "the second of them"}
+VALUES = {("a", 1): (1.0, 3.0), ("a", 2): (2.0, 6.0), ("b", 1): (5.0, 5.0), ("b", 2): (8.0, 10.0)}
+ROWS = sorted_rows(
+    Row(arm, trial, run, {"x": x}, 0.0) for (arm, trial), xs in VALUES.items() for run, x in enumerate(xs, 1)
+)
+TABLES = arrays(
+    np.float64,
+    st.tuples(st.integers(2, 5), st.integers(1, 4)),
+    elements=st.floats(-100, 100, width=32),
+)
+
+
+def test_arms_are_the_sample_and_runs_where_there_is_one() -> None:
+    assert samples(ROWS, "x", 1).tolist() == [2.0, 5.0]
+    assert mean(ROWS, "x", 1).mean == 3.5
+    found = difference(ROWS, "x", 2, 1)  # 2 on arm a, 4 on arm b
+    assert (found.mean, found.samples) == (3.0, 2)
+    assert found.half == pytest.approx(12.7062, abs=1e-3)  # Student's t for one degree of freedom, times 1
+    assert change(ROWS, "x", 2, 1).mean == pytest.approx((100 + 80) / 2)
+    alone = sorted_rows(row for row in ROWS.rows if row.arm == "a")
+    assert samples(alone, "x", 1).tolist() == [1.0, 3.0]
+    assert mean(alone, "x", 1).samples == 2
+
+
+def test_what_is_missing_in_a_row_does_not_count() -> None:
+    def row(arm: str, run: int, **figures: float) -> Row:
+        return Row(arm, 1, run, figures, 0.0)
+
+    two = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0), row("b", 1, x=8.0), row("b", 2)))
+    assert mean(two, "x", 1)[::2] == (5.0, 2)
+    assert plain(mean(two, "x", 1), 0, factor=-1) == "-5 ± 38"  # half is t(0.975, 1) 12.7 times 3
+    one = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0)))
+    assert plain(mean(one, "y", 1)) == "none"
+    assert difference(one, "x", 1, 1).half == 0
+
+
+@given(TABLES)
+def test_an_arm_of_which_nothing_is_known_is_none(values: np.ndarray) -> None:
+    """Nor is a run, where its arm has others: what is left has the mean and interval that it had alone."""
+    assert over_arms(values) == pytest.approx(interval(values.mean(axis=1)), nan_ok=True)
+    unknown = np.full((1, values.shape[1]), math.nan)
+    assert over_arms(np.vstack([values, unknown])) == over_arms(values)
+    assert over_arms(np.hstack([values, unknown[:, :1].repeat(len(values), 0)])) == over_arms(values)
+    assert over_arms(np.vstack([unknown, unknown])).samples == 0
+
+
+def test_series_of_figures() -> None:
+    assert from_series(series("a", [3, 1, 2]) | series("ab", [5]), "a").tolist() == [3, 1, 2]
+    assert from_series({}, "a").size == 0
+
+
+def test_values_and_differences_in_words() -> None:
+    assert (plain(Interval(1.25, 0.5, 3), 1), signed(Interval(1.25, 0.5, 3))) == ("1.2 ± 0.5", "+1.25 ± 0.50")
+    assert signed(Interval(-1.0, math.inf, 1)) == "-1.00"
+
+
+def test_within_a_margin() -> None:
+    assert within(Interval(0.5, 0.4, 5), 1.0) == "holds"
+    assert within(Interval(0.5, 0.6, 5), 1.0) == "open"
+    assert within(Interval(-3.0, 1.0, 5), 1.0) == "does not hold"
+
+
+def test_a_table_says_what_programs_are_told() -> None:
+    columns = [Column("x", "x [%]", 1, 100.0, thesis={2: 0.5}), Column("x", "x")]
+    made = table(ROWS, TRIALS, columns, "Means.")
+    assert made.header == ["trial", "x [%]", "thesis", "x"]
+    told = numbers(ROWS, TRIALS, columns)["ours"]["x"]
+    for line, words, thesis in zip(made.rows, TRIALS.values(), ("", "0.5"), strict=True):
+        found = Interval(told[words]["mean"], told[words]["half"], 2)
+        assert line[1:] == [plain(found, 1, 100.0), thesis, plain(found)]
+        assert line[0].replace("\N{NO-BREAK SPACE}", " ") == words
+
+
+def test_a_figure_in_the_simulation_and_on_the_arm() -> None:
+    there, here = in_both("success_rate", " [%]", 1, 100.0)
+    assert (there.figure, there.words) == (SIMULATION + "success_rate", "success, simulation [%]")
+    assert (here.figure, here.words, here.digits, here.factor) == ("success_rate", "success, arm [%]", 1, 100.0)
+
+
+def test_pictures_say_in_words_what_they_draw() -> None:
+    column = Column("x", "the x [-]", 1)
+    made = against(ROWS, TRIALS, Axis("place [-]", (0.5, 2.0)), [column], "X by place.")
+    assert made.alt == f"the x [-]: {column.text(ROWS, 1)} (one), {column.text(ROWS, 2)} (the second of them)."
+    ticks = made.figure.axes[0].get_xticklabels()
+    assert [tick.get_text() for tick in ticks] == ["0.5", "2"]
+    found = [mean(ROWS, "x", trial) for trial in TRIALS]
+    lines = dots(list(TRIALS.values()), {"x\n[-]": found}, "X.", zero=True, reference=1)
+    assert lines.alt == f"x [-]: one {plain(found[0])}, the second of them {plain(found[1])}."
+    drawn = [line.get_xdata()[0] for line in lines.figure.axes[0].lines[:2]]
+    assert drawn == [0, found[1].mean]
+    course = courses({"x [-]": [Curve("agent", np.arange(12.0).reshape(2, 2, 3))]}, 10, "X.", {15.0: "rest"})
+    assert course.alt.startswith("x [-]: agent from 4.50 ± ")
+    assert course.figure.axes[0].lines[0].get_xdata().tolist() == [5, 15, 25]
+
+
+@given(arrays(np.float64, 12, elements=st.integers(0, 6)), arrays(np.float64, 12, elements=st.integers(0, 6)))
+def test_rank_correlation(first: np.ndarray, second: np.ndarray) -> None:
+    if np.ptp(first) == 0 or np.ptp(second) == 0:
+        assert rank_correlation(first, second) == 0
+    else:
+        assert rank_correlation(first, second) == pytest.approx(spearmanr(first, second).statistic, abs=1e-9)
+    assert rank_correlation(np.exp(first), second.reshape(3, 4)) == rank_correlation(first, second)
+
+
+def test_the_answer_about_the_night() -> None:
+    nothing, much, by_chance = Interval(0.1, 1.0, 5), Interval(9.0, 2.0, 5), Interval(9.0, 20.0, 5)
+    assert overnight.answer(much, by_chance) == "The night costs an agent that learns reward."
+    assert "one that never learns reward" in overnight.answer(nothing, much)
+    assert overnight.answer(nothing, by_chance).startswith("No drop is shown")

@@ -150,7 +150,7 @@ def test_plans_keep_to_the_pressure_limit() -> None:
     begin, before = arm.get_state(), guard.interventions
     assert before.pressure > 0
     for goal in (350.0, 650.0):
-        arm.set_state(begin)
+        guard.set_state(begin)
         planner = open_loop(arm)
         planned = move(ControlCycle(guard), planner, np.array([goal]), REWARD)
         assert guard.interventions == before

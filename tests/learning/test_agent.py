@@ -108,4 +108,4 @@ def test_weights_are_a_copy() -> None:
     agent = an_agent()
     agent.weights()[:] = 0
     assert (agent.weights() != 0).any()
-    assert replace(agent, settings=agent.settings).weights().shape == (1, 22, 48)
+    assert replace(agent, settings=agent.settings).weights().shape == (1, 22, 80)  # 9 networks of 5, 8 wide

@@ -35,11 +35,11 @@ _CHANGES = (*_DISAGREEMENTS, "leak")
 class MonitorSettings:
     """How much evidence a monitor wants."""
 
-    alarm: float = 10.0
+    alarm: float = 11.0
     """Log-likelihood ratio from which on a fault of the valves or the air counts as found by a simulation."""
     alarm_by_rules: float = 9.0
     """... by the rules, which take more for possible and so give less evidence for the same."""
-    supply: float = 3.0
+    supply: float = 4.0
     """Evidence that a low supply needs less: all inlets speak for it or against it, so that by chance it has little."""
     lead: float = 4.0
     """By how much that of another fault must exceed it for what was found to be called by the name of the other."""
@@ -53,7 +53,7 @@ class MonitorSettings:
     """Part of the highest pressure over which an open inlet tells nothing: the supply is not much higher."""
     empty: float = 0.04
     """A muscle below this is empty, and how much air it takes until its pressure rises is uncertain [bar] ..."""
-    clear: float = 0.03
+    clear: float = 0.04
     """... so that expected pressures which differ by less tell nothing [bar]."""
     unsure: float = 0.2
     """Standard deviation of a filling or emptying as a part of it."""
@@ -189,7 +189,9 @@ class Monitor:
         self._earlier = 0  # so many findings are told on a clock of the arm that has ended
         self._open: dict[_Key, int] = {}  # places in findings of what is not over
         self._hypotheses, self._readings = hypotheses(spec.joints)
-        self._prior = np.array([self.settings.supply if one.kind == "low-supply" else 0.0 for one in self._hypotheses])
+        self._prior = np.array(
+            [self.settings.supply if one.kind == "low-supply" else 0.0 for one in self._hypotheses]
+        )
         history = 2 if simulation is None else max(2, simulation.window.history)
         self._memory = new_memory(spec.joints, history, len(self._hypotheses))
         self._simulation = simulation

@@ -350,7 +350,10 @@ def false_alarms(what: str, found: list[Finding], hours: float) -> str:
     )
 
 
-HEADER = f"{'fault':27}{'found':>9}{'since begin':>13}{'contradiction':>16}{'in time':>26}{'in 10 s':>9}{'unmarked':>10}{'early':>6}  as"
+HEADER = (
+    f"{'fault':27}{'found':>9}{'since begin':>13}{'contradiction':>16}{'in time':>26}{'in 10 s':>9}{'unmarked':>10}"
+    f"{'early':>6}  as"
+)
 
 
 def line(kind: Kind, cases: Sequence[Case]) -> str:

@@ -40,7 +40,7 @@ class MonitorSettings:
     alarm_by_rules: float = 9.0
     """... by the rules, which take more for possible and so give less evidence for the same."""
     supply: float = 4.0
-    """Evidence that a low supply needs less: all inlets speak for it or against it, so that by chance it has little."""
+    """Evidence that a low supply needs less: every inlet speaks for or against it, so by chance it has little."""
     lead: float = 4.0
     """By how much that of another fault must exceed it for what was found to be called by the name of the other."""
     most: float = 5.0

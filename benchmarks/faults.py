@@ -18,7 +18,7 @@ import math
 import os
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -396,7 +396,7 @@ def fitted(folder: Path, arm: int) -> Simulation:
 
 
 def healthy_collecting(
-    arms: list[int], simulations: dict[int, Simulation | None], hours: float
+    arms: list[int], simulations: Mapping[int, Simulation | None], hours: float
 ) -> tuple[list[Finding], float]:
     """Return what was found wrong with healthy arms that collect from a cold morning on, and the hours watched."""
     found: list[Finding] = []

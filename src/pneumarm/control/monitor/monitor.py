@@ -40,7 +40,8 @@ class MonitorSettings:
     alarm_by_rules: float = 9.0
     """... by the rules, which take more for possible and so give less evidence for the same."""
     supply: float = 4.0
-    """Evidence that a low supply needs less: every inlet speaks for or against it, so by chance it has little."""
+    """Evidence that a low supply needs less: every inlet speaks for or against it, so by chance it has little.
+    Of a simulation only: what the rules do not know looks like a low supply."""
     lead: float = 4.0
     """By how much that of another fault must exceed it for what was found to be called by the name of the other."""
     most: float = 5.0
@@ -88,7 +89,7 @@ class MonitorSettings:
         checks = {
             "alarm": 0 < self.alarm < math.inf,
             "alarm_by_rules": 0 < self.alarm_by_rules < math.inf,
-            "supply": 0 <= self.supply < min(self.alarm, self.alarm_by_rules),
+            "supply": 0 <= self.supply < self.alarm,
             "lead": 0 <= self.lead < math.inf,
             "most": 0 < self.most < math.inf,
             "telling": 0 <= self.telling < math.inf,

@@ -18,7 +18,7 @@ import math
 import os
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -65,6 +65,8 @@ PATIENCE = 60.0
 """Watched time after which a fault counts as not found [s]."""
 AFTERWARDS = 20.0
 """Watched time after a contradiction in which the monitor may go on to say more [s]."""
+LATER = 10.0
+"""A fault that is not found in time may be found within this of its contradiction [s]."""
 CONTRADICTS = (0.5, 0.02)
 """A reading contradicts that differs by more than this from that of a sound arm [degrees], [bar]."""
 
@@ -349,7 +351,8 @@ def false_alarms(what: str, found: list[Finding], hours: float) -> str:
 
 
 HEADER = (
-    f"{'fault':27}{'found':>9}{'since begin':>13}{'contradiction':>16}{'in time':>26}{'unmarked':>10}{'early':>6}  as"
+    f"{'fault':27}{'found':>9}{'since begin':>13}{'contradiction':>16}{'in time':>26}{'in 10 s':>9}{'unmarked':>10}"
+    f"{'early':>6}  as"
 )
 
 
@@ -364,7 +367,8 @@ def line(kind: Kind, cases: Sequence[Case]) -> str:
     names = Counter(" then ".join(one.kinds) or "nothing" for one in cases)
     return (
         f"{kind.name:27}{f'{sum(bool(one.kinds) for one in cases)}/{len(cases)}':>9}{begin:>13}{contradiction:>16}"
-        f"{f'{np.mean(soon):.0%} ({low:.0%}-{high:.0%}) in {kind.within:.2g} s':>26}{unmarked:>10}"
+        f"{f'{np.mean(soon):.0%} ({low:.0%}-{high:.0%}) in {kind.within:.2g} s':>26}"
+        f"{np.mean([one.since_contradiction <= LATER for one in cases]):>9.0%}{unmarked:>10}"
         f"{sum(one.early for one in cases):>6}  "
         + ", ".join(f"{name} {count}" for name, count in names.most_common())
     )
@@ -392,7 +396,7 @@ def fitted(folder: Path, arm: int) -> Simulation:
 
 
 def healthy_collecting(
-    arms: list[int], simulations: dict[int, Simulation | None], hours: float
+    arms: list[int], simulations: Mapping[int, Simulation | None], hours: float
 ) -> tuple[list[Finding], float]:
     """Return what was found wrong with healthy arms that collect from a cold morning on, and the hours watched."""
     found: list[Finding] = []

@@ -48,7 +48,7 @@ def by_name():
         ("outlet stuck closed", 4.0),
         ("inlet and outlet swapped", 2.0),
         ("muscles swapped", 2.0),
-        ("supply lost", 1.0),
+        ("supply lost", 0.5),
         ("potentiometer dead", 0.07),
         ("potentiometer frozen", 0.5),
     ],
@@ -83,12 +83,23 @@ def test_a_worn_potentiometer_is_told_with_the_angle(simulation):
     assert abs(float(found.detail.split()[-2]) - 10.0) < 4.0
 
 
-@pytest.mark.parametrize("name", ["inlet stuck closed", "muscles swapped", "supply lost", "potentiometer dead"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "inlet stuck closed",
+        "inlet stuck open",
+        "outlet stuck closed",
+        "muscles swapped",
+        "supply lost",
+        "potentiometer dead",
+    ],
+)
 def test_finds_faults_before_there_is_a_simulation(name):
     for arm in (1, 2):
         case = judged(play(by_name()[name], arm, arm), None)
-        assert case.kinds
+        assert case.kinds[0] in by_name()[name].found_as
         assert case.early == 0
+        assert case.since_contradiction <= 10.0
 
 
 def test_leaves_healthy_arms_alone(simulation):

@@ -39,6 +39,9 @@ class MonitorSettings:
     """Log-likelihood ratio from which on a fault of the valves or the air counts as found by a simulation."""
     alarm_by_rules: float = 9.0
     """... by the rules, which take more for possible and so give less evidence for the same."""
+    supply: float = 4.0
+    """Evidence that a low supply needs less: every inlet speaks for or against it, so by chance it has little.
+    Of a simulation only: what the rules do not know looks like a low supply."""
     lead: float = 4.0
     """By how much that of another fault must exceed it for what was found to be called by the name of the other."""
     most: float = 5.0
@@ -86,6 +89,7 @@ class MonitorSettings:
         checks = {
             "alarm": 0 < self.alarm < math.inf,
             "alarm_by_rules": 0 < self.alarm_by_rules < math.inf,
+            "supply": 0 <= self.supply < self.alarm,
             "lead": 0 <= self.lead < math.inf,
             "most": 0 < self.most < math.inf,
             "telling": 0 <= self.telling < math.inf,
@@ -186,6 +190,9 @@ class Monitor:
         self._earlier = 0  # so many findings are told on a clock of the arm that has ended
         self._open: dict[_Key, int] = {}  # places in findings of what is not over
         self._hypotheses, self._readings = hypotheses(spec.joints)
+        self._prior = np.array(
+            [self.settings.supply if one.kind == "low-supply" else 0.0 for one in self._hypotheses]
+        )
         history = 2 if simulation is None else max(2, simulation.window.history)
         self._memory = new_memory(spec.joints, history, len(self._hypotheses))
         self._simulation = simulation
@@ -306,7 +313,7 @@ class Monitor:
         memory, settings = self._memory, self.settings
         return bool(
             self._open
-            or memory.score.max() >= self._thresholds.alarm
+            or (memory.score + self._prior).max() >= self._thresholds.alarm
             or memory.same[:, 0].max() >= settings.frozen
             or memory.rail[:, 0].max() >= settings.rail
             or memory.disagreement.max() >= settings.changed
@@ -362,17 +369,18 @@ class Monitor:
     def _judge_valves(self) -> dict[_Key, float]:
         """What was found stays until nothing speaks for it, or is renamed where another fault explains more."""
         memory = self._memory
-        order = np.argsort(memory.score)[::-1]
+        weighed = np.where(memory.score > 0, memory.score + self._prior, 0.0)
+        order = np.argsort(weighed)[::-1]
         best = int(order[0])
         keys = [(one.kind, one.detail, one.joint, one.muscle) for one in self._hypotheses]
         known = [h for h in order.tolist() if keys[h] in self._open]
-        if known and memory.score[best] - memory.score[known[0]] >= self.settings.lead:
+        if known and weighed[best] - weighed[known[0]] >= self.settings.lead:
             self._rename(keys[known[0]], keys[best])
             known = [best, *known[1:]]
         found = {keys[h]: float(memory.since[h]) for h in known if memory.score[h] > 0}
         if found:
             return found
-        if memory.score[best] >= self._thresholds.alarm:
+        if weighed[best] >= self._thresholds.alarm:
             found[keys[best]] = float(memory.since[best])
         return found
 

@@ -139,7 +139,8 @@ def _run(arguments: list[str]) -> int:
     except KeyboardInterrupt as error:
         told = f" ({error})" if str(error) else ""
         complain(
-            f"interrupted{told}; the arm is closed; run, collect and transfer go on where they were, called again"
+            f"interrupted{told}; the arm is closed; run, collect, transfer and experiment go on where they were when "
+            "called again"
         )
         return getattr(error, "exit_code", 128 + signal.SIGINT)
     except BrokenPipeError:

@@ -73,7 +73,8 @@ def sweep(
     settings, runs = settings or LaboratorySettings(), experiment.runs if runs is None else runs
     if runs < 1 or (workers is not None and workers < 1) or not arms:
         raise UnusableInput(
-            f"a sweep needs at least 1 run, 1 worker and 1 arm, got {runs}, {workers} and {list(arms)}"
+            f"a sweep needs at least 1 run, 1 worker and 1 arm; got {runs} run(s), "
+            f"{'as many workers as cores' if workers is None else f'{workers} worker(s)'} and {len(arms)} arm(s)"
         )
     require_folder(laboratory)
     laboratory.mkdir(exist_ok=True)

@@ -39,17 +39,19 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from benchmarks.agents import prepared
+from pneumarm.adaptation import AdaptationSettings, TrialSettings, WatchSettings
+from pneumarm.adaptation.change import Watch
+from pneumarm.adaptation.trial import lower_by
 from pneumarm.arm import guarded
 from pneumarm.arm.virtual import ArmParameters, VirtualArm, draw_parameters
 from pneumarm.arm.virtual.parameters import JointParameters, MuscleParameters
 from pneumarm.control import BEGIN, TransferSettings, transfer
 from pneumarm.files import write_json
-from pneumarm.learning import AdaptationSettings, PolicyAgent, TrialSettings, WatchSettings, begin_states, train
-from pneumarm.learning.fleet.trial import lower_by
-from pneumarm.learning.fleet.watch import Watch
+from pneumarm.learning import PolicyAgent, train
 from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, key, legend_below, panels, styled
 from pneumarm.simulation import FitSettings, fit_store
 from pneumarm.statistics import moving_mean
+from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, Store, collect
 
 Floats = NDArray[np.float64]

@@ -14,9 +14,9 @@ import numpy as np
 
 import pneumarm.gym
 from pneumarm.arm import ArmSpec
-from pneumarm.learning.begin import BeginStates
 from pneumarm.networks.network import Network
 from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.task.begin import BeginStates
 from pneumarm.transitions.window import Window
 
 STEPS = 1_000_000

@@ -48,10 +48,10 @@ from pneumarm.control.monitor import Finding, Monitor, marks_of
 from pneumarm.control.movement import move
 from pneumarm.control.transfer import BEGIN, draw_movement
 from pneumarm.learning import AnyAgent, load_agent, train
-from pneumarm.learning.begin import begin_states
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.fit import FitSettings, fit_store
 from pneumarm.statistics import wilson
+from pneumarm.task.begin import begin_states
 from pneumarm.transitions import CollectSettings, Store, collect
 from pneumarm.transitions.collect import random_actions
 from pneumarm.transitions.rows import Mark, Recorded

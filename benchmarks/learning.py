@@ -19,10 +19,10 @@ from pneumarm.arm import Reading
 from pneumarm.control import AgentController
 from pneumarm.kernels import kernel
 from pneumarm.learning import TrainSettings, test, train
-from pneumarm.learning.environment import Environment, environment, episode
-from pneumarm.learning.loop import Schedule, room, train_episode
-from pneumarm.learning.values import Networks, draw_networks, learner, pack, unpack
+from pneumarm.learning.online.loop import Schedule, room, train_episode
+from pneumarm.learning.online.values import Networks, draw_networks, learner, pack, unpack
 from pneumarm.random import normal, random_state, uniform
+from pneumarm.task.environment import Environment, environment, episode
 
 STEPS = 200_000
 EPSILON, TEMPERATURE = 0.05, 1.0

@@ -19,8 +19,8 @@ from pneumarm.control.movement import move
 from pneumarm.control.playing import Player
 from pneumarm.control.transfer import draw_movement
 from pneumarm.learning import Agent, Exploration, TrainSettings
-from pneumarm.learning.online import OnlineLearner
-from pneumarm.learning.values import draw_networks
+from pneumarm.learning.online.learner import OnlineLearner
+from pneumarm.learning.online.values import draw_networks
 
 MOVEMENTS, REPEATS, SEED = 100, 3, 7
 RANGE = np.array([[150.0, 850.0]])

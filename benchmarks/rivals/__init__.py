@@ -41,11 +41,14 @@ from benchmarks.rivals.table import HEADER, Row, curves, floor, line, pooled, wr
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.console import jsonable, peak_memory
-from pneumarm.control import BEGIN, BoundSettings, Movement, PlanAgent, Planned, measure_bound, move
+from pneumarm.control import BEGIN, Movement, move
 from pneumarm.control.transfer import begin_and_goal
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import AnyAgent, BeginStates, PolicyAgent, load_agent, test, test_ahead
+from pneumarm.learning import AnyAgent, PolicyAgent, load_agent, test, test_ahead
+from pneumarm.planning import PlanAgent
+from pneumarm.planning.bound import BoundSettings, Planned, measure_bound
 from pneumarm.simulation import Simulation
+from pneumarm.task import BeginStates
 
 BOUNDS = {"open loop": "open_loop", "closed loop": "closed_loop"}
 METHODS = (*BOUNDS, PLANNING, *OURS, *STABLE)

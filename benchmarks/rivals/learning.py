@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pneumarm.control import PlanAgent
-from pneumarm.learning import AnyAgent, BeginStates, LearnSettings, Settings, TrainSettings, test, train
+from pneumarm.learning import AnyAgent, LearnSettings, Settings, TrainSettings, test, train
+from pneumarm.planning import PlanAgent
 from pneumarm.simulation import Simulation
+from pneumarm.task import BeginStates
 
 PLANNING = "planning"
 """In the learned simulation: needs no training."""

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.control import Movement as Moved
-from pneumarm.learning import AnyAgent, FleetTraining, TestResult, Trained
+from pneumarm.learning import AnyAgent, FleetTraining, Trained
 from pneumarm.report.data import Episodes, LearningData, MarkedData, Movement, TrainingData
+from pneumarm.task import TestResult
 from pneumarm.transitions import Store
 
 DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large displacement": 70.0}

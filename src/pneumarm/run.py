@@ -17,34 +17,18 @@ from typing import Any
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
-from pneumarm.control import (
-    BoundSettings,
-    Monitor,
-    PlanSettings,
-    TransferSettings,
-    known_bound,
-    save_history,
-    transfer,
-    version_keeper,
-    write_episodes,
-)
+from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper, write_episodes
 from pneumarm.control.found import collected_results
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
-from pneumarm.learning import (
-    LOOKING_AHEAD,
-    BeginStates,
-    LearnSettings,
-    begin_states,
-    load_agent,
-    results_with_lookahead,
-    test_ahead,
-    train,
-)
+from pneumarm.learning import LOOKING_AHEAD, LearnSettings, load_agent, results_with_lookahead, test_ahead, train
 from pneumarm.learning import test as test_agent
+from pneumarm.planning import PlanSettings
+from pneumarm.planning.bound import BoundSettings, known_bound
 from pneumarm.records import demonstrate, marked_record, test_record, training_record
 from pneumarm.report import read_episodes, save_movement, save_spec, write_report
 from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import KINDS, CollectSettings, Store, collect, require_enough
 
 Progress = Callable[[str], AbstractContextManager[Report]]

@@ -13,9 +13,9 @@ from pneumarm.arm import GuardedArm
 from pneumarm.arm.cycle import BeginState, ControlCycle
 from pneumarm.checkup.measure import _Bench
 from pneumarm.cli import main
-from pneumarm.control.bound import BoundSettings, measure_bound
 from pneumarm.control.open_agent import open_agent
 from pneumarm.gym import register
+from pneumarm.planning.bound import BoundSettings, measure_bound
 from pneumarm.records import demonstrate
 
 SOURCE = Path(pneumarm.__file__).parent
@@ -97,7 +97,7 @@ def test_environments_and_the_bound_move_their_arm_through_the_guard(log, monkey
         environment.step(environment.action_space.sample())
     environment.close()
     check(log, more_than=5)
-    monkeypatch.setattr("pneumarm.control.bound.VirtualArm", Logged)
+    monkeypatch.setattr("pneumarm.planning.bound.VirtualArm", Logged)
     measure_bound(Logged(), np.array([[400.0, 600.0]]), BoundSettings(episodes=2))
     check(log, more_than=10)
 

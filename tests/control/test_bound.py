@@ -9,8 +9,9 @@ from synthetic_arm import synthetic_simulation
 
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.cli import main
-from pneumarm.control import BoundSettings, PlanSettings, known_bound, measure_bound
 from pneumarm.errors import UnusableInput
+from pneumarm.planning import PlanSettings
+from pneumarm.planning.bound import BoundSettings, known_bound, measure_bound
 from pneumarm.simulation import SimulationArm
 
 GOALS = np.array([[250.0, 780.0]])

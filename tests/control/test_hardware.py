@@ -9,21 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pneumarm.adaptation import AdaptationSettings, RefitSettings
 from pneumarm.arm import Reading
 from pneumarm.arm.serial import BoardLine, EmulatedBoard, FaultyLine, SerialArm
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.control import Monitor, TransferSettings, transfer, transfer_into
 from pneumarm.errors import ArmFailure
-from pneumarm.learning import (
-    AdaptationSettings,
-    Agent,
-    AnyAgent,
-    PolicySettings,
-    RefitSettings,
-    begin_states,
-    train,
-)
+from pneumarm.learning import Agent, AnyAgent, PolicySettings, train
 from pneumarm.simulation import Simulation
+from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, CollectBegin, CollectSettings, Store, collect
 
 QUICK = CollectSettings(actions=150, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.3))

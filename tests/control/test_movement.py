@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, Reading, guarded
 from pneumarm.control import LearningController, move
 from pneumarm.errors import ControllerFailure
-from pneumarm.learning import Reward
 from pneumarm.simulation import SimulationArm
+from pneumarm.task import Reward
 from simple_simulation import QUIET, simulation
 
 GOAL = np.array([500.0])

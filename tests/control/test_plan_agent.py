@@ -9,13 +9,16 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.arm import ControlCycle, Reading, guarded
 from pneumarm.arm.valves import VALVES, to_valves
-from pneumarm.control import PlanAgent, move, simulated_planner
+from pneumarm.control import move
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Agent, Reward, StateTracker, TrainSettings, train
-from pneumarm.learning.acting import test_acting
-from pneumarm.learning.environment import environment
-from pneumarm.learning.testing import TEST, run_test
+from pneumarm.learning import Agent, TrainSettings, train
+from pneumarm.learning.online.testing import run_test
+from pneumarm.planning import PlanAgent, simulated_planner
 from pneumarm.simulation import SimulationArm
+from pneumarm.task import Reward, StateTracker
+from pneumarm.task.acting import test_acting
+from pneumarm.task.environment import environment
+from pneumarm.task.movements import TEST
 
 SIMULATION = synthetic_simulation()
 BEGIN = synthetic_begin_states(SIMULATION)

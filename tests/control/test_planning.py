@@ -12,21 +12,13 @@ from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.arm.valves import VALVES
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, without_noise
 from pneumarm.arm.virtual.rollout import advance_physics
-from pneumarm.control import (
-    Movement,
-    PhysicsModel,
-    Planner,
-    PlanSettings,
-    SimulationModel,
-    move,
-    physics_planner,
-    simulated_planner,
-)
-from pneumarm.control.search import Uncertainty, find, problem, room_of, tree, within
+from pneumarm.control import Movement, move
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Reward
+from pneumarm.planning import PhysicsModel, Planner, PlanSettings, SimulationModel, physics_planner, simulated_planner
+from pneumarm.planning.search import Uncertainty, find, problem, room_of, tree, within
 from pneumarm.simulation import NoiseSettings, SimulationArm
 from pneumarm.simulation.rollout import advance_simulated, copy_simulated, simulated_states, simulated_world
+from pneumarm.task import Reward
 
 BEGIN = BeginState(deflate=0.5, inflate=0.8, settle=0.5)
 REWARD = Reward()

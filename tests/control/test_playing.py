@@ -14,9 +14,9 @@ from pneumarm.control.playing import Player
 from pneumarm.control.transfer import draw_movement
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Agent, Exploration, TrainSettings
-from pneumarm.learning.loop import Schedule
-from pneumarm.learning.online import OnlineLearner
-from pneumarm.learning.values import draw_networks
+from pneumarm.learning.online.learner import OnlineLearner
+from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.values import draw_networks
 
 COUNT = 12
 RANGE = np.array([[150.0, 850.0]])

@@ -12,21 +12,14 @@ import pytest
 from numpy.typing import NDArray
 
 import pneumarm
+from pneumarm.adaptation import AdaptationSettings, RefitSettings
 from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import TransferSettings, put_back, read_history, transfer, transfer_into
 from pneumarm.errors import ArmFailure, UnusableInput
-from pneumarm.learning import (
-    AdaptationSettings,
-    Agent,
-    AnyAgent,
-    PolicyAgent,
-    PolicySettings,
-    RefitSettings,
-    begin_states,
-    train,
-)
+from pneumarm.learning import Agent, AnyAgent, PolicyAgent, PolicySettings, train
 from pneumarm.simulation import Simulation
+from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, Store
 
 SHORT = TransferSettings(episodes=12, test_episodes=6)
@@ -206,7 +199,7 @@ def test_a_version_that_is_taken_back_moves_the_arm_no_more(
 ) -> None:
     # Whatever was earned: this is about what happens after the verdict, which tests of its own are about.
     monkeypatch.setattr(
-        "pneumarm.learning.fleet.adaptation.verdict", lambda old, new, settings: "worse" if len(new) == 3 else "open"
+        "pneumarm.adaptation.adaptation.verdict", lambda old, new, settings: "worse" if len(new) == 3 else "open"
     )
     settings = replace(POLICY, episodes=16, test_episodes=10, adaptation=replace(POLICY.adaptation, growth=3.0))
     result = transfer_into(tmp_path / "t", policy, VirtualArm(seed=4), settings, seed=1)

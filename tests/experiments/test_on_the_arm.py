@@ -31,9 +31,10 @@ from pneumarm.experiments.moving import (
 )
 from pneumarm.experiments.page import write_page
 from pneumarm.experiments.preparation import Simulated
-from pneumarm.learning import Reward, Shaping, begin_states
+from pneumarm.learning import Shaping
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.kernel import raw_observation
+from pneumarm.task import Reward, begin_states
 from pneumarm.transitions import Store
 from small import SMALL
 

@@ -16,7 +16,7 @@ from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.registry import PLACES, experiment
 from pneumarm.experiments.trainings import LEARNING, train_and_test, with_setting, with_settings
 from pneumarm.learning import Exploration, TrainSettings
-from pneumarm.learning.training import train
+from pneumarm.learning.online.training import train
 
 SHORT = LaboratorySettings(test_episodes=200, max_episodes=1000, exploring=True)
 FACTORIALS = [name for name in PLACES if isinstance(experiment(name), Factorial)]

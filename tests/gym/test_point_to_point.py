@@ -21,8 +21,8 @@ from pneumarm.control import move
 from pneumarm.errors import UnusableInput
 from pneumarm.gym import ENVIRONMENT, ArmPointToPoint, PointToPointVector
 from pneumarm.gym.spaces import nominal_goals, nominal_scaling
-from pneumarm.learning import Reward, StateTracker
 from pneumarm.simulation import NoiseSettings
+from pneumarm.task import Reward, StateTracker
 from pneumarm.transitions.window import Window
 
 SIMULATIONS = {joints: synthetic_simulation(joints) for joints in (1, 2)}

@@ -7,7 +7,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.errors import UnusableInput
 from pneumarm.gym import PointToPointVector, point_to_point
-from pneumarm.learning.testing import TEST
+from pneumarm.task.movements import TEST
 
 stable_baselines3 = pytest.importorskip("stable_baselines3")
 sb3_contrib = pytest.importorskip("sb3_contrib")

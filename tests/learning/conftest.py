@@ -7,8 +7,8 @@ sys.path.insert(0, str(Path(__file__).parent))  # for the synthetic arm, which i
 
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
-from pneumarm.learning import BeginStates
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task import BeginStates
 
 
 @pytest.fixture(scope="session")

@@ -3,9 +3,9 @@
 import numpy as np
 
 from pneumarm.arm import ArmSpec
-from pneumarm.learning.begin import BeginStates, begin_states
 from pneumarm.networks.network import Network
 from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.task.begin import BeginStates, begin_states
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import Window
 

@@ -8,24 +8,22 @@ import numpy as np
 import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
-from pneumarm.arm import BeginState, ControlCycle, Reading, guarded
-from pneumarm.arm.valves import VALVES
-from pneumarm.control import PlanAgent
-from pneumarm.errors import UnusableInput
-from pneumarm.learning import (
+from pneumarm.adaptation import (
     Adaptation,
     AdaptationSettings,
-    PolicyAgent,
-    PolicySettings,
     RefitSettings,
     TrialSettings,
     WatchSettings,
     adaptation,
-    fingerprint,
     told,
 )
+from pneumarm.adaptation.refit import _outputs_fitted, refit, rehearse
+from pneumarm.arm import BeginState, ControlCycle, Reading, guarded
+from pneumarm.arm.valves import VALVES
+from pneumarm.errors import UnusableInput
+from pneumarm.learning import PolicyAgent, PolicySettings, fingerprint
 from pneumarm.learning import train as train_any
-from pneumarm.learning.fleet.refit import _outputs_fitted, refit, rehearse
+from pneumarm.planning import PlanAgent
 from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.quality import residue

@@ -10,7 +10,7 @@ from synthetic_arm import synthetic_simulation
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning import Agent, Shaping, TrainSettings
-from pneumarm.learning.values import draw_networks
+from pneumarm.learning.online.values import draw_networks
 from pneumarm.simulation.noise import NoiseSettings
 
 

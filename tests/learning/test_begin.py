@@ -7,11 +7,12 @@ import pytest
 from synthetic_arm import resting_rows, synthetic_begin_states, synthetic_simulation
 
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import BeginStates, Shaping, begin_states
-from pneumarm.learning.begin import begin_parameters, draw_begin, draw_interval, side_probability
+from pneumarm.learning import Shaping
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import scaled_state
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task import BeginStates, begin_states
+from pneumarm.task.begin import begin_parameters, draw_begin, draw_interval, side_probability
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import transitions
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel
-from pneumarm.learning.exploration import choose, greedy
+from pneumarm.learning.online.exploration import choose, greedy
 from pneumarm.random import random_state
 
 DRAWS = 200_000

@@ -6,9 +6,9 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.kernels import kernel
 from pneumarm.learning import PolicySettings
-from pneumarm.learning.environment import begin_episode, environment, episode, take
-from pneumarm.learning.fleet.arms import begin_all, fleet, is_useful, limits, note_still, take_alive, take_all
 from pneumarm.random import random_states
+from pneumarm.task.environment import begin_episode, environment, episode, take
+from pneumarm.task.fleet import begin_all, fleet, is_useful, limits, note_still, take_alive, take_all
 
 ARMS = 5
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pneumarm.kernels import kernel
-from pneumarm.learning.fleet.layers import adam, backward, forward, initial_weights, room, split, trainable
-from pneumarm.learning.fleet.policy import exponential, log_softmax
+from pneumarm.learning.policy.proximal import exponential, log_softmax
+from pneumarm.networks.layers import adam, backward, forward, initial_weights, room, split, trainable
 
 SIZES = (7, 6, 5, 9)
 SAMPLES = 37  # no multiple of anything

@@ -13,7 +13,6 @@ from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning import (
     BatchedSettings,
-    BeginStates,
     FleetTraining,
     PolicyAgent,
     PolicySettings,
@@ -25,9 +24,10 @@ from pneumarm.learning import (
     test_ahead,
     train,
 )
-from pneumarm.learning.fleet.agent import KIND
+from pneumarm.learning.policy.agent import KIND
 from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task import BeginStates
 
 POLICY = PolicySettings(updates=30, arms=32, steps=16, hidden=(8,), validation_episodes=50, lookahead=18)
 BATCHED = BatchedSettings(updates=100, arms=32, steps=16, hidden=4, validation_episodes=50)
@@ -80,7 +80,7 @@ def test_a_killed_training_goes_on_bit_for_bit(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("pneumarm.learning.fleet.side_by_side._CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr("pneumarm.learning.side_by_side._CHECKPOINT_EVERY", 0.0)
     checkpoint = tmp_path / "checkpoint"
 
     def kill(now: object) -> None:

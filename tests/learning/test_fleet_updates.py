@@ -5,11 +5,11 @@ import pytest
 from synthetic_arm import synthetic_simulation
 
 from pneumarm.learning import PolicySettings, TrainSettings
-from pneumarm.learning.fleet.layers import initial_weights, room, trainable
-from pneumarm.learning.fleet.policy import advantages, batch, policy_errors
-from pneumarm.learning.fleet.training import rule
-from pneumarm.learning.fleet.values import connections, lambda_returns, network_sizes, to_networks
-from pneumarm.learning.values import draw_networks
+from pneumarm.learning.batched.values import connections, lambda_returns, network_sizes, to_networks
+from pneumarm.learning.online.values import draw_networks
+from pneumarm.learning.policy.proximal import advantages, batch, policy_errors
+from pneumarm.learning.policy.training import rule
+from pneumarm.networks.layers import initial_weights, room, trainable
 
 
 def test_advantages_by_hand() -> None:
@@ -94,7 +94,7 @@ def test_nine_networks_as_one_are_the_networks_of_an_agent() -> None:
     networks = to_networks(flat, window, hidden)
     assert [part.shape for part in networks] == [part.shape for part in like]
     x = np.random.default_rng(2).normal(0, 1, (sizes[0], 1)).astype(np.float32)
-    from pneumarm.learning.fleet.layers import forward, split
+    from pneumarm.networks.layers import forward, split
 
     units = room(sizes, 1)
     forward(split(flat, sizes), x, units)

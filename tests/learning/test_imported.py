@@ -8,10 +8,10 @@ from synthetic_arm import synthetic_simulation
 
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
-from pneumarm.learning import BeginStates
 from pneumarm.learning.imported import KIND, ImportedPolicy
-from pneumarm.learning.testing import TEST
 from pneumarm.simulation import Simulation
+from pneumarm.task import BeginStates
+from pneumarm.task.movements import TEST
 
 
 def policy(joints: int = 1, sizes: tuple[int, ...] = (8, 5), activation: str = "tanh") -> ImportedPolicy:

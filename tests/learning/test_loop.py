@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
-from pneumarm.learning import BeginStates, TrainSettings
-from pneumarm.learning.environment import environment, episode
-from pneumarm.learning.loop import Schedule, room, train_episode, train_episodes
-from pneumarm.learning.values import draw_networks, learner, network_shapes, pack, unpack
+from pneumarm.learning import TrainSettings
+from pneumarm.learning.online.loop import Schedule, room, train_episode, train_episodes
+from pneumarm.learning.online.values import draw_networks, learner, network_shapes, pack, unpack
 from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task import BeginStates
+from pneumarm.task.environment import environment, episode
 
 QUIET = NoiseSettings(kind="none")
 GREEDY = Schedule(np.inf, 0.0, 1.0, 0.002)

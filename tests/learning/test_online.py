@@ -5,13 +5,14 @@ import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.learning import Agent, BeginStates, Exploration, OnlineLearner, TrainSettings
-from pneumarm.learning.environment import begin_episode, environment, episode, reached, reward, take
-from pneumarm.learning.loop import Schedule, room, train_episode
-from pneumarm.learning.values import draw_networks, learner
+from pneumarm.learning import Agent, Exploration, OnlineLearner, TrainSettings
+from pneumarm.learning.online.loop import Schedule, room, train_episode
+from pneumarm.learning.online.values import draw_networks, learner
 from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task import BeginStates
+from pneumarm.task.environment import begin_episode, environment, episode, reached, reward, take
 
 
 def an_agent(simulation: Simulation, **settings: object) -> Agent:

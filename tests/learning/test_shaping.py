@@ -6,8 +6,9 @@ import pytest
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Exploration, Reward, Shaping, TrainSettings
-from pneumarm.learning.shaping import adjusted, initial_deviation, stage
+from pneumarm.learning import Exploration, Shaping, TrainSettings
+from pneumarm.learning.online.shaping import adjusted, initial_deviation, stage
+from pneumarm.task import Reward
 
 SPEC, SETTINGS = ArmSpec(), TrainSettings()
 

@@ -5,8 +5,8 @@ import pytest
 from synthetic_arm import synthetic_simulation
 
 from pneumarm.arm.seam import Reading
-from pneumarm.learning import StateTracker
 from pneumarm.simulation.kernel import scaled_state
+from pneumarm.task import StateTracker
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import transitions
 

@@ -14,8 +14,9 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
-from pneumarm.learning import CURVES, BeginStates, Shaping, Training, TrainSettings, test, train
+from pneumarm.learning import CURVES, Shaping, Training, TrainSettings, test, train
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task import BeginStates
 
 SHORT = TrainSettings(agents=3, max_episodes=2_250, validation_episodes=50)
 
@@ -117,7 +118,7 @@ def stop_after(rounds: int):  # type: ignore[no-untyped-def]
 def test_resumed_training_is_the_same(
     simulation: Simulation, begin: BeginStates, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pneumarm.learning.training._CHECKPOINT_EVERY", -1.0)
+    monkeypatch.setattr("pneumarm.learning.online.training._CHECKPOINT_EVERY", -1.0)
     path, whole = tmp_path / "training", train(simulation, begin, SHORT, seed=5)
     for _ in range(3):
         with pytest.raises(Killed):
@@ -133,7 +134,7 @@ def test_killed_process_resumes(simulation: Simulation, begin: BeginStates, tmp_
     folder, path = Path(__file__).parent, tmp_path / "training"
     code = (
         "import sys; from pathlib import Path; from synthetic_arm import *; from pneumarm.learning import *\n"
-        "import pneumarm.learning.training as module; module._CHECKPOINT_EVERY = 0.0\n"
+        "import pneumarm.learning.online.training as module; module._CHECKPOINT_EVERY = 0.0\n"
         "simulation = synthetic_simulation()\n"
         "settings = TrainSettings(agents=2, max_episodes=20_000, validation_episodes=50,\n"
         "    shaping=Shaping(criterium=1.0))\n"

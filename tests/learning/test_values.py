@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pneumarm.learning.settings import TrainSettings
-from pneumarm.learning.values import (
+from pneumarm.learning.online.settings import TrainSettings
+from pneumarm.learning.online.values import (
     Networks,
     action_values,
     backpropagate,

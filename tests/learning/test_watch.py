@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from pneumarm.adaptation import TrialSettings, WatchSettings
+from pneumarm.adaptation.change import Watch
+from pneumarm.adaptation.trial import lower_by, verdict
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import TrialSettings, WatchSettings
-from pneumarm.learning.fleet.trial import lower_by, verdict
-from pneumarm.learning.fleet.watch import Watch
 
 
 def test_sums_are_those_of_page() -> None:

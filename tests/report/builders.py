@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from pneumarm.adaptation import Event
 from pneumarm.arm.counts import Counts
 from pneumarm.arm.guard import Interventions
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control import Adapted, Finding
 from pneumarm.control.found import Found
-from pneumarm.learning import Event
 from pneumarm.report import (
     CoverageData,
     Episodes,

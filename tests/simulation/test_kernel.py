@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
 from pneumarm.networks.network import Network
+from pneumarm.networks.tansig import tansig
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
     begin,
@@ -19,7 +20,6 @@ from pneumarm.simulation.kernel import (
     simulation_parameters,
     simulation_state,
     step,
-    tansig,
 )
 from pneumarm.simulation.noise import NoiseSettings, noise_parameters
 from pneumarm.simulation.simulation import Scaling, Simulation

@@ -7,8 +7,8 @@ from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
-from pneumarm.control.bound import BoundSettings, bound_results, measure_bound, measured_goal_range
 from pneumarm.errors import UnusableInput
+from pneumarm.planning.bound import BoundSettings, bound_results, measure_bound, measured_goal_range
 from pneumarm.simulation import Simulation
 
 

@@ -5,9 +5,10 @@ from pathlib import Path
 from pneumarm.commands.common import COLUMNS, Json
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
-from pneumarm.learning import LOOKING_AHEAD, begin_states, results_with_lookahead, test_ahead
+from pneumarm.learning import LOOKING_AHEAD, results_with_lookahead, test_ahead
 from pneumarm.learning import test as test_agent
 from pneumarm.simulation import Simulation
+from pneumarm.task import begin_states
 from pneumarm.transitions import Store
 
 

@@ -7,8 +7,9 @@ from typing import Annotated
 from pneumarm.commands.common import COLUMNS, Json, Settings
 from pneumarm.console import progress, show, table
 from pneumarm.files import require_folder
-from pneumarm.learning import LearnSettings, begin_states, train
+from pneumarm.learning import LearnSettings, train
 from pneumarm.simulation import Simulation
+from pneumarm.task import begin_states
 from pneumarm.transitions import Store
 
 

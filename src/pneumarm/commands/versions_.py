@@ -4,11 +4,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+from pneumarm.adaptation import Event
 from pneumarm.commands.common import Json
 from pneumarm.console import say, show, table
 from pneumarm.control import put_back, read_history
 from pneumarm.control.versions import ADAPTED, HISTORY, kept_versions
-from pneumarm.learning import Event
 
 
 def versions_(folder: Path, /, *, to: int | None = None, json: Json = False) -> None:

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Actor, AnyAgent, StateTracker
+from pneumarm.learning import Actor, AnyAgent
+from pneumarm.task import StateTracker
 from pneumarm.transitions.watch import made_up_readings
 
 

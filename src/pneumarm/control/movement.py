@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, Controller, Reading, Step
 from pneumarm.errors import ArmFailure
-from pneumarm.learning import Reward
+from pneumarm.task import Reward
 from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.watch import Watch, watched
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from pneumarm.control.plan_agent import PlanAgent
 from pneumarm.files import kind_of
 from pneumarm.learning import AnyAgent, load_agent
+from pneumarm.planning.agent import PlanAgent
 from pneumarm.simulation.simulation import KIND as SIMULATION
 
 

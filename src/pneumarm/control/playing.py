@@ -21,14 +21,15 @@ from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
-from pneumarm.learning.agent import Agent
-from pneumarm.learning.begin import BeginParameters, draw_interval
-from pneumarm.learning.loop import Movements, Room, Schedule, movements, room_of
-from pneumarm.learning.online import begin_acting, learn_and_act
-from pneumarm.learning.settings import Exploration
-from pneumarm.learning.values import Learner, learner
+from pneumarm.learning.online.agent import Agent
+from pneumarm.learning.online.learner import begin_acting, learn_and_act
+from pneumarm.learning.online.loop import Room, Schedule, room_of
+from pneumarm.learning.online.settings import Exploration
+from pneumarm.learning.online.values import Learner, learner
 from pneumarm.random import random_state, uniform
 from pneumarm.simulation.kernel import Places, places
+from pneumarm.task.begin import BeginParameters, draw_interval
+from pneumarm.task.movements import Movements, movements
 
 Array = NDArray[np.float64]
 
@@ -349,7 +350,7 @@ def _reach(live: Live, watched: _Watched, rules: _Rules, durations: Array) -> No
 
 @kernel
 def _push(mind: _Mind, watched: _Watched, velocity: Array, first: bool) -> None:
-    """Put what was read into the state window, as :class:`~pneumarm.learning.tracker.StateTracker` does."""
+    """Put what was read into the state window, as :class:`~pneumarm.task.tracker.StateTracker` does."""
     sigma, observed, commanded = mind.sigma, 4 * velocity.size, 2 * velocity.size
     oldest = mind.history * observed
     if first:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.adaptation import AdaptationSettings, adaptation
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.arm.counts import Counts
 from pneumarm.control.agent import AgentController, warm_up
@@ -21,7 +22,7 @@ from pneumarm.control.movement import MOVEMENT, Movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder, write_text
-from pneumarm.learning import AdaptationSettings, AnyAgent, adaptation, fingerprint
+from pneumarm.learning import AnyAgent, fingerprint
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of

@@ -16,9 +16,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.adaptation import Event, told
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_json
-from pneumarm.learning import AnyAgent, Event, load_agent, told
+from pneumarm.learning import AnyAgent, load_agent
 
 AGENTS, HISTORY, ADAPTED = "agents", "adaptation.json", "adapted.safetensors"
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.settings import check
+from pneumarm.settings import check
 
 if TYPE_CHECKING:
     from pneumarm.report.page import Section

@@ -19,13 +19,14 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.evidence import Column, mean, number
 from pneumarm.experiments.experiment import ARMS, Experiment, LaboratorySettings, Report, Rows, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
-from pneumarm.learning import Agent, BeginStates, Exploration, TrainSettings
-from pneumarm.learning.environment import environment
-from pneumarm.learning.loop import Movements
-from pneumarm.learning.testing import GREEDY, TEST, run_test
-from pneumarm.learning.training import train
+from pneumarm.learning import Agent, Exploration, TrainSettings
+from pneumarm.learning.online.testing import GREEDY, run_test
+from pneumarm.learning.online.training import train
 from pneumarm.simulation.kernel import scaled_state
 from pneumarm.simulation.noise import NoiseSettings
+from pneumarm.task import BeginStates
+from pneumarm.task.environment import environment
+from pneumarm.task.movements import TEST, Movements
 
 Array = NDArray[np.float64]
 

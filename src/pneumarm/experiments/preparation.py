@@ -8,8 +8,8 @@ from pneumarm.arm import open_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings, Report
 from pneumarm.files import write_json, write_text
-from pneumarm.learning import BeginStates, begin_states
 from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import Store, collect
 
 STORE = "transitions.db"

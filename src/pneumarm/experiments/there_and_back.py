@@ -23,10 +23,11 @@ from pneumarm.experiments.evidence import Column
 from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
 from pneumarm.files import write_json
-from pneumarm.learning import AnyAgent, BeginStates, TrainSettings, begin_states, test
-from pneumarm.learning.training import train
+from pneumarm.learning import AnyAgent, TrainSettings, test
+from pneumarm.learning.online.training import train
 from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
 from pneumarm.simulation.quality import propagation
+from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import KINDS, QUANTITIES, CollectSettings, Store, collect
 from pneumarm.transitions.choice import joined
 

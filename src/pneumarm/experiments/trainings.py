@@ -14,12 +14,13 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import TrainSettings, test
-from pneumarm.learning.environment import Environment, environment, episode
-from pneumarm.learning.loop import Schedule, room, train_episodes
-from pneumarm.learning.testing import TEST, TestResult, run_test
-from pneumarm.learning.training import train
-from pneumarm.learning.values import learner
+from pneumarm.learning.online.loop import Schedule, room, train_episodes
+from pneumarm.learning.online.testing import run_test
+from pneumarm.learning.online.training import train
+from pneumarm.learning.online.values import learner
 from pneumarm.random import random_state
+from pneumarm.task.environment import Environment, environment, episode
+from pneumarm.task.movements import TEST, TestResult
 
 CRITERIA = {
     "reward": "average cumulative reward per episode",

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel, part
-from pneumarm.learning.environment import Environment, Episode, begin_episode, episode, take
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import SimulationState
+from pneumarm.task.environment import Environment, Episode, begin_episode, episode, take
 
 
 class Batch(NamedTuple):

@@ -15,10 +15,11 @@ from pneumarm.gym.on_arm import ArmPointToPoint
 from pneumarm.gym.simulated import SimulatedPointToPoint
 from pneumarm.gym.spaces import nominal_goals, nominal_scaling
 from pneumarm.gym.vector import PointToPointVector
-from pneumarm.learning.begin import BeginStates, begin_states
-from pneumarm.learning.settings import Reward, TrainSettings
+from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.begin import BeginStates, begin_states
+from pneumarm.task.reward import Reward
 from pneumarm.transitions import Store
 from pneumarm.transitions.window import Window
 

@@ -15,9 +15,9 @@ from pneumarm.arm.cycle import missed_turns
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.spaces import action_space, observation_space, scaled_goal, sensor_ranges
-from pneumarm.learning.settings import Reward
-from pneumarm.learning.tracker import StateTracker
 from pneumarm.simulation.simulation import Scaling
+from pneumarm.task.reward import Reward
+from pneumarm.task.tracker import StateTracker
 from pneumarm.transitions.window import Window
 
 Observation = NDArray[np.float32]

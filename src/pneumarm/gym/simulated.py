@@ -15,11 +15,11 @@ from pneumarm.errors import UnusableInput
 from pneumarm.gym.batch import act, batch, begin_movement, observe, outcome
 from pneumarm.gym.spaces import action_space, observation_space, sensor_ranges
 from pneumarm.kernels import kernel
-from pneumarm.learning.begin import BeginStates
-from pneumarm.learning.environment import environment
-from pneumarm.learning.settings import TrainSettings
+from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.begin import BeginStates
+from pneumarm.task.environment import environment
 
 Observation = NDArray[np.float32]
 

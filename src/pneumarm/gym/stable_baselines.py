@@ -21,7 +21,7 @@ from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.vector import PointToPointVector
 from pneumarm.learning.imported import Activation, ImportedPolicy
-from pneumarm.learning.settings import TrainSettings
+from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.simulation.simulation import Simulation
 
 try:

@@ -16,12 +16,12 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
-from pneumarm.learning.acting import test_acting
-from pneumarm.learning.begin import BeginStates
-from pneumarm.learning.environment import environment
-from pneumarm.learning.settings import TrainSettings
-from pneumarm.learning.testing import TestResult
+from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.task.acting import test_acting
+from pneumarm.task.begin import BeginStates
+from pneumarm.task.environment import environment
+from pneumarm.task.movements import TestResult
 from pneumarm.transitions.window import QUANTITIES, Window
 
 KIND = "pneumarm imported policy"

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.adaptation import WatchSettings
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
 from pneumarm.control.transfer import running_time
 from pneumarm.control.versions import Adapted
-from pneumarm.learning import WatchSettings
 from pneumarm.report import figures
 from pneumarm.report.data import (
     CoverageData,

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.kernels import part
+from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.random import RandomState
 from pneumarm.simulation.noise import add_noise, begin_noise
 from pneumarm.simulation.simulation import Scaling, Simulation
@@ -24,10 +25,6 @@ from pneumarm.vectors import weighted_sums
 
 UNIT_BLOCK = 16
 INPUT_BLOCK = 4
-FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
-"""What a compiler may assume of sums here; not-a-number and infinity stay what they are."""
-
-_CLIP = np.float32(6.29701)  # where the ratio in tansig reaches 1; tanh is 1 - 6.8e-6 there
 
 
 class SimulationParameters(NamedTuple):
@@ -167,27 +164,6 @@ def raw_observations(sigma: ArrayLike, scaling: Scaling) -> NDArray[np.float64]:
 
 def _float32(array: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.ascontiguousarray(array, np.float32)
-
-
-@part(fastmath=FASTMATH)
-def tansig(hidden):  # type: ignore[no-untyped-def]
-    """Replace ``hidden`` (units,) by its hyperbolic tangent, within 7e-6.
-
-    Source: J. H. Lambert's continued fraction x/(1 + x^2/(3 + x^2/(5 + ...))), cut after eight fractions; a ratio of
-    polynomials needs neither tables nor branches, so eight or sixteen units are done at once.
-    """
-    for u in range(hidden.shape[0]):
-        z = hidden[u]
-        z = z if z < _CLIP else _CLIP
-        z = z if z > -_CLIP else -_CLIP
-        s = z * z
-        above = np.float32(34459425) + s * (
-            np.float32(4729725) + s * (np.float32(135135) + s * (np.float32(990) + s))
-        )
-        below = np.float32(34459425) + s * (
-            np.float32(16216200) + s * (np.float32(945945) + s * (np.float32(13860) + s * np.float32(45)))
-        )
-        hidden[u] = z * above / below
 
 
 @part

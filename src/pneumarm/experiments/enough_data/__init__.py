@@ -40,9 +40,9 @@ from pneumarm.experiments.there_and_back import (
     trained_and_moved,
 )
 from pneumarm.files import write_json
-from pneumarm.learning import begin_states
 from pneumarm.report.page import Section
 from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, Store, enough_data
 
 _MINUTES = (1.7, 5.0, 10.0, 20.0, 50.0, 110.0, 220.0)

@@ -30,8 +30,9 @@ from pneumarm.experiments.moving import (
     simulated_test,
 )
 from pneumarm.experiments.pictures import dots
-from pneumarm.learning import Reward, TrainSettings
+from pneumarm.learning import TrainSettings
 from pneumarm.report.page import Section
+from pneumarm.task import Reward
 
 AREAS = {1: (25.0, 1.0), 2: (25.0, 0.5), 3: (12.0, 1.0), 4: (12.0, 0.5)}
 """Tolerances of angle [counts] and velocity [counts/ms] by trial."""

@@ -58,8 +58,8 @@ from pneumarm.experiments.moving import (
 from pneumarm.experiments.on_the_arm_only.figures import progress_alt, progress_figure
 from pneumarm.experiments.pictures import dots
 from pneumarm.learning import Agent, TrainSettings
-from pneumarm.learning.shaping import adjusted, initial_deviation, stage
-from pneumarm.learning.values import draw_networks
+from pneumarm.learning.online.shaping import adjusted, initial_deviation, stage
+from pneumarm.learning.online.values import draw_networks
 from pneumarm.report.page import Picture, Section
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.statistics import wilson

@@ -48,7 +48,7 @@ from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.experiments.trainings import CRITERIA, LEARNING, train_and_test, with_settings
 from pneumarm.learning import Exploration, TrainSettings
-from pneumarm.learning.shaping import initial_deviation, stage
+from pneumarm.learning.online.shaping import initial_deviation, stage
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
 

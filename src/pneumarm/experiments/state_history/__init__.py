@@ -38,12 +38,12 @@ from pneumarm.experiments.there_and_back import (
     trained_and_moved,
     usual,
 )
-from pneumarm.learning import BeginStates, begin_states
 from pneumarm.networks import LevenbergMarquardt, levenberg_marquardt, nguyen_widrow
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.simulation import FitSettings, fit
 from pneumarm.simulation.quality import propagation
 from pneumarm.simulation.simulation import Scaling
+from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import KINDS, QUANTITIES, Store, Transitions, Window, filter_transitions
 from pneumarm.transitions.choice import joined, share_held_out
 

@@ -31,9 +31,10 @@ from pneumarm.experiments.moving import (
     simulated_test,
 )
 from pneumarm.experiments.pictures import dots
-from pneumarm.learning import Exploration, Reward, TrainSettings
+from pneumarm.learning import Exploration, TrainSettings
 from pneumarm.report.page import Section
 from pneumarm.simulation.noise import NoiseSettings
+from pneumarm.task import Reward
 
 BASE, NO_SHAPING, NO_PUNISHMENT, NO_NOISE, WHITE, TWICE = range(1, 7)
 KINDS: Mapping[int, tuple[str, dict[str, Any]]] = {

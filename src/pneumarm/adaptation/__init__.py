@@ -1,0 +1,17 @@
+"""Adaptation: an agent goes on learning from the arm that it moves."""
+
+from pneumarm.adaptation.adaptation import Adaptation, AdaptationSettings, Event, adaptation, told
+from pneumarm.adaptation.change import WatchSettings
+from pneumarm.adaptation.refit import RefitSettings
+from pneumarm.adaptation.trial import TrialSettings
+
+__all__ = [
+    "Adaptation",
+    "AdaptationSettings",
+    "Event",
+    "RefitSettings",
+    "TrialSettings",
+    "WatchSettings",
+    "adaptation",
+    "told",
+]

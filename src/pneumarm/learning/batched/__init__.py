@@ -1,0 +1,1 @@
+"""The thesis' nine networks a joint, learned in many simulated arms at once."""

@@ -1,0 +1,1 @@
+"""The thesis' agents: nine networks a joint, learned step by step (chapter 4)."""

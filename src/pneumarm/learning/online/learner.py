@@ -1,0 +1,174 @@
+"""An agent that acts and learns step by step, from Python: on a real arm, or wherever the environment is not ours.
+
+It runs the same kernels as training does, so it learns the same.
+"""
+
+import json
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.arm.valves import ACTIONS, VALVES
+from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.kernels import part
+from pneumarm.learning.online.agent import Agent
+from pneumarm.learning.online.loop import Schedule, look_ahead, room_of
+from pneumarm.learning.online.settings import Exploration
+from pneumarm.learning.online.values import action_values, forget_traces, learner, td_target, update
+from pneumarm.random import random_state
+from pneumarm.simulation.kernel import places
+
+_SAVED = ("weights", "traces", "traced", "random", "x", "actions", "next_actions", "next_values", "cut")
+
+
+class OnlineLearner:
+    """``agent`` acting step by step, and learning if ``learning_rate`` is not 0.
+
+    ::
+
+        learner.begin(state, goal)
+        while True:
+            actions = learner.act()
+            ...  # set the valves, let the period pass, read
+            learner.observe(reward, next_state, terminal)
+
+    States are scaled windows as of :class:`~pneumarm.task.tracker.StateTracker`. Without ``exploration`` it is
+    greedy; with a learning rate of 0 as well it is a controller and nothing else. An episode that is cut off just
+    begins the next one.
+    """
+
+    def __init__(
+        self, agent: Agent, learning_rate: float = 0.0, exploration: Exploration | None = None, seed: int = 0
+    ) -> None:
+        if not 0 <= learning_rate < np.inf:
+            raise UnusableInput(f"the learning rate must be 0 or more, got {learning_rate!r}")
+        self._agent = agent
+        self.learning_rate = learning_rate
+        chosen = exploration or Exploration(0.0, 1.0)
+        self._schedule = Schedule(np.inf, float(chosen.epsilon), float(chosen.temperature), 0.0)
+        self._learner = learner(agent.weights(), agent.settings, learning_rate)
+        self._random = random_state(seed)
+        joints = agent.window.joints
+        self._places = places(agent.window)
+        self._x = np.zeros(self._places.size, np.float32)
+        self._x[self._places.one] = 1
+        self._room = room_of(joints, self._places.size)
+
+    def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
+        """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
+        window, scaling = self._agent.window, self._agent.scaling
+        offset = window.of_joints(scaling.observation_offset)[:, 0]
+        scale = window.of_joints(scaling.observation_scale)[:, 0]
+        goal = (np.asarray(goal, np.float64).reshape(window.joints) - offset) / scale
+        self._x[self._places.goal : self._places.one] = goal
+        self._x[: self._places.command] = self._checked(state)
+        begin_acting(self._learner, self._schedule, self._x, self._room, self._random)
+
+    def act(self) -> NDArray[np.int64]:
+        """Return the actions (joints,) of the current state; they stay the same until :meth:`observe`."""
+        if self._room.next_actions[0] < 0:
+            raise PneumarmError("begin an episode before acting")
+        return self._room.next_actions.copy()
+
+    def greedy(self) -> NDArray[np.int64]:
+        """Return the actions (joints,) of highest value in the current state; changes nothing."""
+        best: NDArray[np.int64] = self.values().argmax(axis=1)
+        return best
+
+    def valves(self) -> NDArray[np.int8]:
+        """Return the valves (joints, 2) of :meth:`act`."""
+        valves: NDArray[np.int8] = VALVES[self.act()]
+        return valves
+
+    def values(self) -> NDArray[np.float32]:
+        """Return the action values in the current state, shape (joints, 9), in units of reward."""
+        values = np.zeros((self._agent.window.joints, ACTIONS), np.float32)
+        for joint in range(len(values)):
+            action_values(self._learner, joint, self._x, values[joint])
+        return values
+
+    def follow(self, next_state: ArrayLike) -> None:
+        """Go on in ``next_state`` without learning, as if an episode began there."""
+        self._x[: self._places.command] = self._checked(next_state)
+        begin_acting(self._learner, self._schedule, self._x, self._room, self._random)
+
+    def weights(self) -> NDArray[np.float32]:
+        """Return a copy of the weights as they are now."""
+        return self._learner.weights.copy()
+
+    def observe(self, reward: ArrayLike, next_state: ArrayLike, terminal: bool) -> None:
+        """Learn from what the actions of :meth:`act` led to.
+
+        ``reward`` is a number or one a joint (joints,), ``next_state`` (state_size,) scaled, and ``terminal`` says
+        whether the goals are reached: the value of a terminal state is 0, a cut-off is not terminal.
+        """
+        self.act()
+        paid = np.broadcast_to(np.asarray(reward, np.float64), self._room.actions.shape).copy()
+        next_state = self._checked(next_state)
+        seen = paid, next_state
+        learn_and_act(self._learner, self._schedule, self._x, self._room, self._random, seen, bool(terminal))
+
+    @property
+    def agent(self) -> Agent:
+        """The agent with the weights as they are now."""
+        return self._agent.with_weights(self._learner.weights)
+
+    def get_state(self) -> bytes:
+        """Return everything that the future depends on, besides what the learner was made with."""
+        return json.dumps({name: array.tolist() for name, array in self._arrays().items()}).encode()
+
+    def set_state(self, state: bytes) -> None:
+        """Take up a state of :meth:`get_state`, bit for bit.
+
+        Raises:
+            UnusableInput: it is none, or one of a learner of another kind.
+
+        """
+        try:
+            saved = json.loads(state)
+            like = self._arrays()
+            arrays = {name: np.array(saved[name], array.dtype).reshape(array.shape) for name, array in like.items()}
+        except (ValueError, KeyError, TypeError, OverflowError) as error:
+            raise UnusableInput(f"expected the state of a learner like this one, got another ({error})") from error
+        for name, array in like.items():
+            array[...] = arrays[name]
+
+    def _arrays(self) -> dict[str, NDArray[np.generic]]:
+        holders = (self._learner, self._room)
+        found = {name: getattr(holder, name) for holder in holders for name in _SAVED if hasattr(holder, name)}
+        return found | {"random": self._random, "x": self._x}
+
+    def _checked(self, state: ArrayLike) -> NDArray[np.float32]:
+        checked = np.asarray(state, np.float32)
+        if checked.shape != (self._places.command,):
+            raise PneumarmError(f"a state must have the shape ({self._places.command},), got {checked.shape}")
+        return checked
+
+
+@part
+def begin_acting(learner, schedule, x, room, random):  # type: ignore[no-untyped-def]
+    """Begin an episode in the state and goal ``x``: choose its first actions."""
+    for joint in range(room.actions.shape[0]):
+        forget_traces(learner, joint)
+    look_ahead(learner, schedule, x, room, random)
+
+
+@part
+def learn_and_act(learner, schedule, x, room, random, seen, terminal):  # type: ignore[no-untyped-def]
+    """Do what the training loop does after an action; ``seen`` are the rewards (joints,) and the next state."""
+    paid, next_state = seen
+    for i in range(x.shape[0]):
+        room.before[i] = x[i]
+    for i in range(next_state.shape[0]):
+        x[i] = next_state[i]
+    for joint in range(room.actions.shape[0]):
+        room.actions[joint] = room.next_actions[joint]
+    if not terminal:
+        look_ahead(learner, schedule, x, room, random)
+    if learner.rate == 0.0:
+        return
+    for joint in range(room.actions.shape[0]):
+        target = td_target(paid[joint], learner.discount, room.next_values[joint], terminal)
+        update(learner, joint, room.before, room.actions[joint], target)
+        if room.cut[joint]:
+            forget_traces(learner, joint)

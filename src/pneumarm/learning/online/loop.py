@@ -1,0 +1,160 @@
+"""The training loop and the test, compiled as one but made of parts.
+
+The environment's step (:mod:`.environment`), the choice of the action (:mod:`.exploration`) and the learner's update
+(:mod:`.values`) are functions of their own; another learner writes another loop of this size and copies nothing.
+
+    begin an episode; choose a
+    repeat: take a, see r and s'; choose a' in s'; update Q(s, a); s, a = s', a'
+    until s' is a goal or the episode is cut off
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.valves import ACTIONS
+from pneumarm.kernels import part
+from pneumarm.learning.online.exploration import choose, greedy
+from pneumarm.learning.online.values import action_values, forget_traces, td_target, update
+from pneumarm.task.environment import Episode, angle, begin_episode, reward, take, velocity
+
+
+class Room(NamedTuple):
+    """What a loop needs to remember from one step to the next. Made by :func:`room`."""
+
+    before: NDArray[np.float32]
+    """State vector before the action, shape (inputs,)."""
+    values: NDArray[np.float32]
+    """Action values, shape (9,)."""
+    odds: NDArray[np.float32]
+    """For exploring, shape (9,)."""
+    actions: NDArray[np.int64]
+    """Actions to take, shape (joints,)."""
+    next_values: NDArray[np.float64]
+    """Value that the target looks ahead to, shape (joints,)."""
+    cut: NDArray[np.int64]
+    """Whether the traces are cut, shape (joints,)."""
+    next_actions: NDArray[np.int64]
+    """Shape (joints,)."""
+
+
+def room(episode: Episode) -> Room:
+    """Return room for a loop on ``episode``."""
+    return room_of(episode.goal.size, episode.state.x.size)
+
+
+def room_of(joints: int, inputs: int) -> Room:
+    """Return room for so many joints and inputs."""
+    return Room(
+        before=np.zeros(inputs, np.float32),
+        values=np.zeros(ACTIONS, np.float32),
+        odds=np.zeros(ACTIONS, np.float32),
+        actions=np.full(joints, -1, np.int64),
+        next_values=np.zeros(joints),
+        cut=np.zeros(joints, np.int64),
+        next_actions=np.full(joints, -1, np.int64),
+    )
+
+
+class Schedule(NamedTuple):
+    """What shaping decides for the next episodes."""
+
+    deviation: float
+    """[counts]; infinite for all begin states alike."""
+    epsilon: float
+    temperature: float
+    performance_rate: float
+    """Weight of the newest episode in the performance."""
+    enough: float = np.inf
+    """Performance at which training episodes end early, looked at after every one of them."""
+
+
+@part
+def look_ahead(learner, schedule, x, room, random):  # type: ignore[no-untyped-def]
+    """Choose the next actions in ``x`` and find the values that the targets look ahead to."""
+    for joint in range(room.actions.shape[0]):
+        action_values(learner, joint, x, room.values)
+        chosen = choose(room.values, schedule.epsilon, schedule.temperature, room.odds, random)
+        room.next_actions[joint] = chosen
+        room.next_values[joint] = room.values[chosen]
+        room.cut[joint] = 0
+        if learner.off_policy:
+            best = greedy(room.values)
+            room.next_values[joint] = room.values[best]
+            room.cut[joint] = 1 if chosen != best else 0
+
+
+@part
+def train_episode(environment, learner, schedule, episode, room):  # type: ignore[no-untyped-def]
+    """Run one episode, learning; return actions taken, sum of rewards, and whether the goal was reached."""
+    x, random, total = episode.state.x, episode.state.random, 0.0
+    begin_episode(environment, episode, schedule.deviation, random)
+    for joint in range(room.actions.shape[0]):
+        forget_traces(learner, joint)
+    look_ahead(learner, schedule, x, room, random)
+    for k in range(environment.task.cutoff):
+        for i in range(x.shape[0]):
+            room.before[i] = x[i]
+        for joint in range(room.actions.shape[0]):
+            room.actions[joint] = room.next_actions[joint]
+        is_reached = take(environment, episode, room.actions)
+        if not is_reached:
+            look_ahead(learner, schedule, x, room, random)
+        total += environment.task.reward_goal if is_reached else environment.task.reward_action
+        for joint in range(room.actions.shape[0]):
+            paid = reward(environment.task, is_reached, episode.switched[joint])
+            total += environment.task.reward_switch * episode.switched[joint]
+            target = td_target(paid, learner.discount, room.next_values[joint], is_reached)
+            update(learner, joint, room.before, room.actions[joint], target)
+            if room.cut[joint]:
+                forget_traces(learner, joint)
+        if is_reached:
+            return k + 1, total, True
+    return environment.task.cutoff, total, False
+
+
+@part
+def train_episodes(environment, learner, schedule, episode, room, count, performance):  # type: ignore[no-untyped-def]
+    """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes."""
+    steps = 0
+    for e in range(count):
+        actions, _, success = train_episode(environment, learner, schedule, episode, room)
+        steps += actions
+        performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
+        if performance >= schedule.enough:
+            return performance, steps, e + 1
+    return performance, steps, count
+
+
+@part
+def test_episodes(environment, learner, schedule, episode, room, random, record):  # type: ignore[no-untyped-def]
+    """Fill ``record`` with episodes over all begin states and goals, drawn from ``random``.
+
+    Actions are greedy where the epsilon of ``schedule`` is 0; else they explore, by random numbers of the episode.
+    """
+    task, x = environment.task, episode.state.x
+    for e in range(record.actions.shape[0]):
+        begin_episode(environment, episode, np.inf, random)
+        for joint in range(episode.goal.shape[0]):
+            record.goal[e, joint] = episode.goal[joint]
+            record.angle_begin[e, joint] = angle(task, episode, joint)
+        is_reached = False
+        while not is_reached and record.actions[e] < task.cutoff:
+            for joint in range(episode.goal.shape[0]):
+                action_values(learner, joint, x, room.values)
+                if schedule.epsilon == 0.0:
+                    room.actions[joint] = greedy(room.values)
+                else:
+                    epsilon, temperature = schedule.epsilon, schedule.temperature
+                    room.actions[joint] = choose(room.values, epsilon, temperature, room.odds, episode.state.random)
+            is_reached = take(environment, episode, room.actions)
+            record.actions[e] += 1
+            record.reward[e] += task.reward_goal if is_reached else task.reward_action
+            for joint in range(episode.goal.shape[0]):
+                record.switches[e, joint] += episode.switched[joint]
+                record.reward[e] += task.reward_switch * episode.switched[joint]
+        record.success[e] = is_reached
+        for joint in range(episode.goal.shape[0]):
+            record.angle_end[e, joint] = angle(task, episode, joint)
+            record.velocity_end[e, joint] = velocity(task, episode, joint)

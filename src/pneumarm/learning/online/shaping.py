@@ -1,0 +1,73 @@
+"""Shaping: how far begin states are from the goal, what is demanded there, and how much is explored (section 4.3.2).
+
+    deviation    +10 % if the performance exceeds the criterium, else -3 %, every 500 episodes
+    criterium    0.5 -> 0.95     epsilon    0.5 -> 0.05     temperature    20 -> 1
+
+linear in the deviation, from the initial one to the whole range of angles. The performance is the moving average of
+the successes (thesis eq. 4.14), kept by the loop. Without shaping the criterium is looked at after every episode, as
+the numbers of episodes in table C.22 show.
+
+Difference from the thesis: the deviation does not shrink below the initial one, where exploration would be
+extrapolated.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.settings import TrainSettings
+
+
+class Stage(NamedTuple):
+    """Where shaping stands."""
+
+    schedule: Schedule
+    criterium: float
+    """Performance demanded."""
+    whole: bool
+    """Whether the deviation is the whole range of angles."""
+
+
+def initial_deviation(settings: TrainSettings, spec: ArmSpec) -> float:
+    """Return the deviation of the first episode [counts], at most the whole range; without shaping that."""
+    low, high = spec.angle_range
+    if settings.shaping is None:
+        return high - low
+    return min(settings.shaping.initial_deviation * spec.counts_per_degree, high - low)
+
+
+def stage(deviation: float, settings: TrainSettings, spec: ArmSpec) -> Stage:
+    """Return what holds at ``deviation`` [counts]."""
+    shaping, last = settings.shaping, settings.exploration
+    if shaping is None:
+        rate, demanded = _NO_SHAPING
+        enough = demanded if settings.stops else np.inf
+        return Stage(Schedule(np.inf, float(last.epsilon), float(last.temperature), rate, enough), demanded, True)
+    low, high = spec.angle_range
+    first, whole = initial_deviation(settings, spec), high - low
+    share = (deviation - first) / (whole - first) if whole > first else 1.0
+
+    def between(start: float, end: float) -> float:
+        return start + share * (end - start)
+
+    epsilon = between(shaping.exploration.epsilon, last.epsilon)
+    temperature = between(shaping.exploration.temperature, last.temperature)
+    criterium = between(shaping.initial_criterium, shaping.criterium)
+    return Stage(
+        Schedule(float(deviation), epsilon, temperature, shaping.performance_rate), criterium, deviation >= whole
+    )
+
+
+def adjusted(deviation: float, performance: float, settings: TrainSettings, spec: ArmSpec) -> float:
+    """Return the deviation [counts] after another 500 episodes at whose end the ``performance`` was this."""
+    if settings.shaping is None:
+        return deviation
+    low, high = spec.angle_range
+    if performance > stage(deviation, settings, spec).criterium:
+        return min(deviation * (1 + settings.shaping.grow), high - low)
+    return max(deviation * (1 - settings.shaping.shrink), initial_deviation(settings, spec))
+
+
+_NO_SHAPING = 0.002, 0.95  # the same average of successes and the same demand as at the end of shaping

@@ -1,0 +1,1 @@
+"""A policy over valves, learned in many simulated arms at once."""

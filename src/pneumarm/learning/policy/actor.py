@@ -1,0 +1,88 @@
+"""A policy that acts step by step, from Python: on a real arm, or wherever the environment is not ours."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.errors import PneumarmError
+from pneumarm.kernels import kernel
+from pneumarm.learning.fleet_settings import PolicySettings
+from pneumarm.learning.policy.acting import Mind, decide, lanes
+from pneumarm.random import random_states
+from pneumarm.task.fleet import look, note_still
+
+
+class PolicyActor:
+    """A policy acting greedily, looking ahead where its settings say so; see :class:`~.OnlineLearner` for its use.
+
+    It does not learn.
+    """
+
+    def __init__(
+        self, policy: NDArray[np.float32], mind: Mind, sizes: tuple[int, ...], settings: PolicySettings
+    ) -> None:
+        self._policy = policy
+        self._mind, self._horizon, self._clear = mind, settings.horizon, settings.clear
+        self._single = lanes(mind, sizes, random_states(0, 1))
+        self._lanes = lanes(mind, sizes, np.zeros((settings.lookahead, 4), np.uint64))
+        self._samples = np.zeros(settings.lookahead, np.int64)
+        self._decided = False
+        self._state_size = mind.inputs.state_size
+
+    def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
+        """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
+        arm, task = self._single.fleet, self._mind.environment.task
+        goal = np.asarray(goal, np.float64).reshape(arm.goal.shape[1])
+        arm.goal[0] = goal
+        arm.x[task.goal_place : task.goal_place + goal.size, 0] = (goal - task.unit[:, 0]) / task.unit[:, 1]
+        arm.actions[...] = -1
+        arm.still[...] = 0
+        arm.x[: self._state_size, 0] = self._checked(state)
+        self._decided = False
+
+    def act(self) -> NDArray[np.int64]:
+        """Return the actions (joints,) of the current state; they stay the same until the next state."""
+        single = self._single
+        if not self._decided:
+            decide(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
+            arm = single.fleet
+            arm.switched[...] = (arm.actions >= 0) & (arm.actions != single.actions)
+            arm.actions[...] = single.actions
+            self._decided = True
+        return single.actions[0].copy()
+
+    def follow(self, next_state: ArrayLike) -> None:
+        """Go on in the scaled ``next_state`` (state_size,), to which the actions of :meth:`act` led."""
+        if not self._decided:
+            raise PneumarmError("begin an episode and act before going on")
+        _follow(self._mind, self._single, self._checked(next_state))
+        self._decided = False
+
+    def observe(self, reward: ArrayLike, next_state: ArrayLike, terminal: bool) -> None:
+        """Go on in ``next_state``; nothing is learned."""
+        self.follow(next_state)
+
+    def weights(self) -> NDArray[np.float32]:
+        """Return a copy of the policy's weights."""
+        return self._policy.copy()
+
+    def get_state(self) -> bytes:
+        """Return nothing: between episodes there is nothing to remember."""
+        return b""
+
+    def set_state(self, state: bytes) -> None:
+        """Take up what :meth:`get_state` returned."""
+
+    def _checked(self, state: ArrayLike) -> NDArray[np.float32]:
+        checked = np.asarray(state, np.float32)
+        if checked.shape != (self._state_size,):
+            raise PneumarmError(f"a state must have the shape ({self._state_size},), got {checked.shape}")
+        return checked
+
+
+@kernel
+def _follow(mind, single, state):  # type: ignore[no-untyped-def]
+    arm = single.fleet
+    look(arm.x[:, 0], arm.before[0])
+    for i in range(state.shape[0]):
+        arm.x[i, 0] = state[i]
+    note_still(mind.limits, arm.x[:, 0], arm.before[0], arm.switched[0], arm.still[0])

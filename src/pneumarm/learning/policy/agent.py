@@ -1,0 +1,160 @@
+"""A trained policy and its file, which holds all it needs to act: the policy, and the simulation to look ahead in."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.valves import ACTIONS
+from pneumarm.errors import UnusableInput
+from pneumarm.files import read_arrays, write_arrays
+from pneumarm.learning.fleet_settings import PolicySettings
+from pneumarm.learning.policy.acting import Mind
+from pneumarm.learning.policy.actor import PolicyActor
+from pneumarm.learning.policy.inputs import input_parameters, input_size
+from pneumarm.learning.policy.testing import run_policy
+from pneumarm.networks.layers import split, weight_count
+from pneumarm.random import random_states
+from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.task.acting import test_acting
+from pneumarm.task.begin import BeginStates
+from pneumarm.task.environment import environment
+from pneumarm.task.fleet import limits
+from pneumarm.task.movements import TestResult
+from pneumarm.transitions.window import Window
+
+KIND = "pneumarm policy"
+_WEIGHTS = "policy_weights"
+_LOOKAHEAD = 5  # seed of the noise in which it looks ahead
+
+
+@dataclass(frozen=True)
+class PolicyAgent:
+    """A policy by state and goal, the simulation that it was trained in, and how it was trained."""
+
+    simulation: Simulation
+    policy: NDArray[np.float32]
+    """Weights of its network, layer after layer, shape (size,)."""
+    settings: PolicySettings
+
+    @property
+    def spec(self) -> ArmSpec:
+        """The arm that it was trained for."""
+        return self.simulation.spec
+
+    @property
+    def window(self) -> Window:
+        """Of its state."""
+        return self.simulation.window
+
+    @property
+    def scaling(self) -> Scaling:
+        """Of its state."""
+        return self.simulation.scaling
+
+    @property
+    def goal_range(self) -> NDArray[np.float64]:
+        """Goals that it has learned to reach, shape (joints, 2) [counts]."""
+        return self.simulation.goal_range
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Units of each layer of the policy, inputs first."""
+        return policy_sizes(self.window, self.settings)
+
+    def weights(self) -> NDArray[np.float32]:
+        """Return a copy of the policy's weights."""
+        return self.policy.copy()
+
+    def with_weights(self, weights: NDArray[np.float32]) -> Self:
+        """Return the agent with other ``weights``, as of :meth:`weights`."""
+        return replace(self, policy=weights)
+
+    def mind(self, begin: BeginStates | None = None) -> Mind:
+        """Return what decides, for kernels; with ``begin`` states its simulated arms can begin episodes, too."""
+        return mind(self.simulation, begin, self.settings, self.policy)
+
+    @property
+    def learns(self) -> bool:
+        """It does not learn while it moves an arm; between movements it can adapt."""
+        return False
+
+    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> PolicyActor:
+        """Return the policy acting greedily; it neither learns nor explores, so the arguments change nothing."""
+        return PolicyActor(self.policy.copy(), self.mind(), self.sizes, self.settings)
+
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> TestResult:
+        """Let the policy move greedily in ``simulation``, without lookahead."""
+        decider = mind(simulation, begin, self.settings, self.policy)
+        return run_policy(decider, self.sizes, episodes, seed)
+
+    def test_ahead(
+        self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]
+    ) -> TestResult | None:
+        """Let it move in ``simulation`` as on an arm, looking ahead; None where its settings have no lookahead.
+
+        A decision takes a hundred times as long as in :meth:`test`, whose first movements these are.
+        """
+        if self.settings.lookahead == 0:
+            return None
+        return test_acting(self.actor(), environment(simulation, begin, self.settings), episodes, seed)
+
+    def save(self, path: Path) -> None:
+        """Write the agent to ``path``, whole or not at all.
+
+        Raises:
+            UnusableInput: ``path`` cannot be written.
+
+        """
+        header, arrays = self.simulation.parts()
+        settings = {"simulation": header, "settings": msgspec.to_builtins(self.settings)}
+        write_arrays(path, KIND, settings, arrays | {_WEIGHTS: self.policy})
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Return the agent in ``path``.
+
+        Raises:
+            UnusableInput: ``path`` is no such agent, is damaged, or does not fit together.
+
+        """
+        read, arrays = read_arrays(path, KIND)
+        try:
+            settings = msgspec.convert(read["settings"], PolicySettings)
+            policy = arrays.pop(_WEIGHTS)
+            simulation = Simulation.of_parts(read["simulation"], arrays)
+        except (msgspec.ValidationError, UnusableInput, ValueError, KeyError, TypeError) as error:
+            raise UnusableInput(f"{path}: is no usable agent ({error}); train it again") from error
+        size = weight_count(policy_sizes(simulation.window, settings))
+        if policy.shape != (size,) or policy.dtype != np.float32:
+            raise UnusableInput(
+                f"{path}: expected {size} policy weights of type float32, got {policy.shape} of {policy.dtype}"
+            )
+        return cls(simulation, policy, settings)
+
+
+def policy_sizes(window: Window, settings: PolicySettings) -> tuple[int, ...]:
+    """Return the units of each layer of a policy, inputs first."""
+    return (input_size(window, settings.squash), *settings.hidden, ACTIONS * window.joints)
+
+
+def mind(
+    simulation: Simulation, begin: BeginStates | None, settings: PolicySettings, policy: NDArray[np.float32]
+) -> Mind:
+    """Return what decides by the weights ``policy``; changes of them take effect at once."""
+    window, scaling = simulation.window, simulation.scaling
+    nowhere = BeginStates(window, np.zeros((0, window.state_size), np.float32), np.zeros((0, window.joints)))
+    return Mind(
+        environment=environment(simulation, begin or nowhere, settings),
+        limits=limits(
+            window, scaling, simulation.spec, settings.reward.angle_tolerance, settings.still, settings.patience
+        ),
+        inputs=input_parameters(window, scaling, settings.squash),
+        layers=split(policy, policy_sizes(window, settings)),
+        hold=float(settings.hold),
+        seeds=random_states(_LOOKAHEAD, max(settings.lookahead, 1)),
+    )

@@ -1,0 +1,223 @@
+"""Layers of networks over many samples at once, with gradients, and Adam.
+
+Everything is ``[unit][sample]``: the inner loop runs over the samples, so that it becomes vector instructions
+whatever the sizes of the layers are. A layer's weights are (inputs + 1, outputs), its last row the biases; hidden
+units are tansig, outputs linear.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.kernels import kernel
+from pneumarm.networks.tansig import FASTMATH, tansig
+
+Layers = tuple[NDArray[np.float32], ...]
+
+
+class Trainable(NamedTuple):
+    """A network that is being trained: its weights and Adam's averages, and room. Made by :func:`trainable`."""
+
+    flat: NDArray[np.float32]
+    """All weights, shape (size,)."""
+    layers: Layers
+    """The same memory by layer, shapes (inputs + 1, outputs)."""
+    gradient: NDArray[np.float32]
+    """Shape (size,)."""
+    slopes: Layers
+    """The gradient's memory by layer."""
+    mask: NDArray[np.float32]
+    """0 where a weight stays 0, otherwise 1, shape (size,)."""
+    mean: NDArray[np.float32]
+    """Adam's average of the gradient, shape (size,)."""
+    square: NDArray[np.float32]
+    """Adam's average of its square, shape (size,)."""
+    units: Layers
+    """Room for the units of each layer, (outputs, samples)."""
+    errors: Layers
+    """Room for the derivatives by them, same shapes."""
+
+
+def layer_sizes(sizes: tuple[int, ...]) -> list[tuple[int, int]]:
+    """Return the shapes of the weights of a network with layers of so many ``sizes``, inputs first."""
+    return [(n + 1, m) for n, m in pairwise(sizes)]
+
+
+def split(flat: NDArray[np.float32], sizes: tuple[int, ...]) -> Layers:
+    """Return the layers that lie in ``flat``, as views."""
+    shapes = layer_sizes(sizes)
+    ends = np.cumsum([n * m for n, m in shapes])
+    return tuple(flat[end - n * m : end].reshape(n, m) for end, (n, m) in zip(ends, shapes, strict=True))
+
+
+def weight_count(sizes: tuple[int, ...]) -> int:
+    """Return how many weights a network of ``sizes`` has."""
+    return sum(n * m for n, m in layer_sizes(sizes))
+
+
+def initial_weights(sizes: tuple[int, ...], last: float, random: np.random.Generator) -> NDArray[np.float32]:
+    """Return random weights (size,): outputs keep the variance of the inputs; the last layer's times ``last``."""
+    flat = np.zeros(weight_count(sizes), np.float32)
+    layers = split(flat, sizes)
+    for number, layer in enumerate(layers):
+        gain = last if number == len(layers) - 1 else 1.0
+        inputs = layer.shape[0] - 1
+        layer[:-1] = random.normal(0.0, gain / np.sqrt(inputs), layer[:-1].shape)
+    return flat
+
+
+def trainable(
+    flat: NDArray[np.float32], sizes: tuple[int, ...], samples: int, mask: NDArray[np.float32] | None = None
+) -> Trainable:
+    """Return a network with the weights ``flat`` (changed in place) and room for so many ``samples``."""
+    gradient = np.zeros_like(flat)
+    return Trainable(
+        flat=flat,
+        layers=split(flat, sizes),
+        gradient=gradient,
+        slopes=split(gradient, sizes),
+        mask=np.ones_like(flat) if mask is None else mask,
+        mean=np.zeros_like(flat),
+        square=np.zeros_like(flat),
+        units=room(sizes, samples),
+        errors=room(sizes, samples),
+    )
+
+
+def room(sizes: tuple[int, ...], samples: int) -> Layers:
+    """Return room for the units of every layer but the inputs, (outputs, samples)."""
+    return tuple(np.zeros((size, samples), np.float32) for size in sizes[1:])
+
+
+@kernel(fastmath=FASTMATH)
+def weighted_sums(weights, x, out):  # type: ignore[no-untyped-def]
+    """Set ``out`` (outputs, n) to W^T x, ``weights`` (at least inputs, outputs), ``x`` (inputs, n); no biases."""
+    inputs, n = np.uint64(x.shape[0]), np.uint64(x.shape[1])
+    blocks = inputs - inputs % np.uint64(4)
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    for o in range(np.uint64(out.shape[0])):
+        for e in range(n):
+            out[o, e] = np.float32(0.0)
+        for i in range(np.uint64(0), blocks, np.uint64(4)):
+            j, k, m = i + one, i + two, i + three
+            a, b, c, d = weights[i, o], weights[j, o], weights[k, o], weights[m, o]
+            for e in range(n):
+                out[o, e] += a * x[i, e] + b * x[j, e] + (c * x[k, e] + d * x[m, e])
+        for i in range(blocks, inputs):
+            a = weights[i, o]
+            for e in range(n):
+                out[o, e] += a * x[i, e]
+
+
+@kernel(fastmath=FASTMATH)
+def forward(layers, x, units):  # type: ignore[no-untyped-def]
+    """Set ``units`` to those of a network of ``layers`` over ``x`` (inputs, n); the last are its outputs."""
+    below = x
+    for number in range(len(layers)):
+        weights, above = layers[number], units[number]
+        weighted_sums(weights, below, above)
+        row = below.shape[0]
+        for o in range(above.shape[0]):
+            bias = weights[row, o]
+            unit = above[o]
+            for e in range(unit.shape[0]):
+                unit[e] += bias
+            if number < len(layers) - 1:
+                tansig(unit)
+        below = above
+
+
+@kernel(fastmath=FASTMATH)
+def add_slopes(x, error, slope):  # type: ignore[no-untyped-def]
+    """Add the derivatives by the weights to ``slope`` (inputs + 1, outputs): the sums of x error over the samples."""
+    row = x.shape[0]
+    n = np.uint64(x.shape[1])
+    for o in range(np.uint64(error.shape[0])):
+        total = np.float32(0.0)
+        for e in range(n):
+            total += error[o, e]
+        slope[row, o] += total
+    for i in range(np.uint64(row)):
+        pairs = np.uint64(error.shape[0] - error.shape[0] % 2)
+        for o in range(np.uint64(0), pairs, np.uint64(2)):
+            p = o + np.uint64(1)
+            first, second = np.float32(0.0), np.float32(0.0)
+            for e in range(n):
+                first += x[i, e] * error[o, e]
+                second += x[i, e] * error[p, e]
+            slope[i, o] += first
+            slope[i, p] += second
+        for o in range(pairs, np.uint64(error.shape[0])):
+            first = np.float32(0.0)
+            for e in range(n):
+                first += x[i, e] * error[o, e]
+            slope[i, o] += first
+
+
+@kernel(fastmath=FASTMATH)
+def through_layer(weights, error, units, below):  # type: ignore[no-untyped-def]
+    """Set ``below`` (inputs, n) to the derivatives by what enters the tansig ``units`` (inputs, n)."""
+    outputs, n = np.uint64(error.shape[0]), np.uint64(error.shape[1])
+    blocks = outputs - outputs % np.uint64(4)
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    for i in range(np.uint64(units.shape[0])):
+        for e in range(n):
+            below[i, e] = np.float32(0.0)
+        for o in range(np.uint64(0), blocks, np.uint64(4)):
+            p, q, r = o + one, o + two, o + three
+            a, b, c, d = weights[i, o], weights[i, p], weights[i, q], weights[i, r]
+            for e in range(n):
+                below[i, e] += a * error[o, e] + b * error[p, e] + (c * error[q, e] + d * error[r, e])
+        for o in range(blocks, outputs):
+            a = weights[i, o]
+            for e in range(n):
+                below[i, e] += a * error[o, e]
+        for e in range(n):
+            below[i, e] *= np.float32(1.0) - units[i, e] * units[i, e]
+
+
+@kernel(fastmath=FASTMATH)
+def backward(net, x):  # type: ignore[no-untyped-def]
+    """Add to ``net.gradient`` what the derivatives by the outputs, in ``net.errors[-1]``, make of it.
+
+    ``net.units`` must be those of :func:`forward` over the same ``x`` (inputs, n).
+    """
+    last = len(net.layers) - 1
+    for back in range(last + 1):
+        number = last - back
+        if number > 0:
+            below = net.units[number - 1]
+            add_slopes(below, net.errors[number], net.slopes[number])
+            through_layer(net.layers[number], net.errors[number], below, net.errors[number - 1])
+        else:
+            add_slopes(x, net.errors[0], net.slopes[0])
+
+
+_MEAN, _SQUARE, _TINY = np.float32(0.9), np.float32(0.999), np.float32(1e-7)
+
+
+@kernel(fastmath=FASTMATH)
+def adam(net, rate, largest, count):  # type: ignore[no-untyped-def]
+    """Move the weights along the gradient, which is cut to the length ``largest``, and set the gradient to 0.
+
+    ``count`` is the number of this update, from 1. Source: D. P. Kingma and J. Ba, "Adam: a method for stochastic
+    optimization", ICLR 2015, algorithm 1.
+    """
+    flat, gradient, mean, square = net.flat, net.gradient, net.mean, net.square
+    length = np.float32(0.0)
+    for i in range(flat.shape[0]):
+        gradient[i] *= net.mask[i]
+        length += gradient[i] * gradient[i]
+    length = np.sqrt(length)
+    cut = np.float32(largest) / length if length > largest else np.float32(1.0)
+    unbias_square = np.sqrt(1.0 - float(_SQUARE) ** count)
+    step = np.float32(rate * unbias_square / (1.0 - float(_MEAN) ** count))
+    tiny = np.float32(_TINY * unbias_square)
+    for i in range(flat.shape[0]):
+        g = gradient[i] * cut
+        mean[i] = _MEAN * mean[i] + (np.float32(1.0) - _MEAN) * g
+        square[i] = _SQUARE * square[i] + (np.float32(1.0) - _SQUARE) * g * g
+        flat[i] -= step * mean[i] / (np.sqrt(square[i]) + tiny)
+        gradient[i] = np.float32(0.0)

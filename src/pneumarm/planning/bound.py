@@ -1,0 +1,204 @@
+"""What can be achieved on a virtual arm at all: movements of planners, on the begin states and goals of a transfer.
+
+Thesis section 5.5.1: "We do not know what an optimal controller can achieve." With the true physics it can be
+computed, see :mod:`pneumarm.planning.planner`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import Arm, ControlCycle, guarded
+from pneumarm.arm.virtual import VirtualArm, without_noise
+from pneumarm.control.movement import move
+from pneumarm.control.transfer import BEGIN, Episode, draw_movement, summary
+from pneumarm.errors import UnusableInput
+from pneumarm.planning.planner import Planner, physics_planner, simulated_planner
+from pneumarm.planning.search import PlanSettings
+from pneumarm.simulation.simulation import Simulation
+from pneumarm.statistics import FEWEST, mean_estimate
+from pneumarm.task import Reward
+from pneumarm.transitions import Store, collect
+
+Rival = Literal["open_loop", "closed_loop", "simulated"]
+"""True physics planned once without noise, true physics planned every turn, learned simulation planned every turn."""
+RANGE_TRANSITIONS = 20_000
+"""How many transitions the range of goals is measured from where no simulation tells it (11 min of arm time)."""
+
+
+@dataclass(frozen=True)
+class BoundSettings:
+    """How the bound of an arm is measured."""
+
+    episodes: int = 500
+    """Movements of each planner; at least 500 for figures to be compared."""
+    plan: PlanSettings = field(default_factory=PlanSettings)
+    """Which plans are considered."""
+
+    def __post_init__(self) -> None:
+        if self.episodes < 1:
+            raise UnusableInput(f"a bound needs at least 1 movement, got {self.episodes}")
+
+
+@dataclass(frozen=True)
+class Planned:
+    """Movements of a planner on an arm."""
+
+    episodes: list[Episode]
+    seconds: NDArray[np.float64]
+    """How long each decision took, shape (decisions,) [s]."""
+    unproven: int
+    """Plans of which it is not proven that none is better."""
+
+    def results(self) -> dict[str, Any]:
+        """Return the figures as of a transfer, with the times of a decision [ms]."""
+        milliseconds = 1e3 * self.seconds
+        times = {"median": float(np.median(milliseconds)), "p99": float(np.quantile(milliseconds, 0.99))}
+        return {**summary(self.episodes), "decision_ms": times, "unproven_plans": self.unproven}
+
+    def distance(self, reward: NDArray[np.float64]) -> dict[str, Any]:
+        """Return how far another controller stays below, by its ``reward`` (n,) in the first of the same movements.
+
+        The movements are paired, so that easy goals and hard ones do not blur the difference. Their goals are the
+        same, and so are the begin states but for the arm's noise: 2.5 counts on arm 1 of the distribution.
+
+        Raises:
+            UnusableInput: there is no movement to compare.
+
+        """
+        n = min(len(reward), len(self.episodes))
+        if n == 0:
+            raise UnusableInput("a distance to the bound needs at least 1 movement, got none")
+        lost = np.array([episode.reward for episode in self.episodes[:n]]) - reward[:n]
+        estimate = mean_estimate(lost)
+        return {
+            "episodes": n,
+            "reward": estimate.mean,
+            "interval": [estimate.low, estimate.high] if n >= FEWEST else None,
+        }
+
+
+def measured_goal_range(arm: Arm, seed: int = 0) -> NDArray[np.float64]:
+    """Return the range of goals (joints, 2) [counts] that a short collecting on ``arm`` finds."""
+    with TemporaryDirectory() as folder, Store.for_arm(Path(folder) / "range.db", arm.spec) as store:
+        collect(arm, store, RANGE_TRANSITIONS, seed)
+        found: NDArray[np.float64] = store.percentiles()
+    return found
+
+
+def measure_bound(
+    parameters_of: VirtualArm,
+    goal_range: NDArray[np.float64],
+    settings: BoundSettings = BoundSettings(),
+    *,
+    seed: int = 0,
+    reward: Reward = Reward(),
+    simulation: Simulation | None = None,
+    progress: Callable[[float, float], None] | None = None,
+) -> dict[Rival, Planned]:
+    """Return what the planners achieve on fresh arms like ``parameters_of``.
+
+    Args:
+        parameters_of: the arm whose parameters are taken; it is not moved.
+        goal_range: goals are drawn from it, shape (joints, 2) [counts].
+        settings: how many movements, and which plans.
+        seed: of begin states, goals and noise; begin states and goals are those of a transfer with the same seed.
+        reward: what is paid.
+        simulation: of this arm, to plan with as well.
+        progress: called with what is done and the total.
+
+    """
+    rivals: list[Rival] = ["open_loop", "closed_loop"]
+    if simulation is not None:
+        rivals.append("simulated")
+    total, results = len(rivals) * settings.episodes, {}
+    for number, rival in enumerate(rivals):
+        parameters = parameters_of.parameters
+        if rival == "open_loop":
+            parameters = without_noise(parameters)
+        with VirtualArm(parameters, seed=seed, name=parameters_of.spec.name) as arm:
+            if simulation is not None and rival == "simulated":
+                planner = simulated_planner(simulation, reward)
+            else:
+                planner = physics_planner(arm, reward, settings.plan, open_loop=rival == "open_loop")
+
+            def report(done: int, before: int = number * settings.episodes) -> None:
+                if progress is not None:
+                    progress(before + done, total)
+
+            results[rival] = _movements(arm, planner, goal_range, settings, seed, report)
+    return results
+
+
+def _movements(
+    arm: Arm,
+    planner: Planner,
+    goal_range: NDArray[np.float64],
+    settings: BoundSettings,
+    seed: int,
+    report: Callable[[int], None],
+) -> Planned:
+    cycle, episodes = ControlCycle(guarded(arm)), []
+    for number in range(settings.episodes):
+        random, goal = draw_movement(goal_range, seed, True, number)
+        BEGIN.reach(cycle.arm, random)
+        movement = move(cycle, planner, goal, planner.reward, settings.plan.cutoff)
+        episodes.append(Episode.of("bound", movement))
+        report(number + 1)
+    return Planned(episodes, np.array(planner.seconds), planner.unproven)
+
+
+def known_bound(
+    arm: Arm,
+    goal_range: NDArray[np.float64],
+    rewards: Mapping[str, NDArray[np.float64]],
+    settings: BoundSettings,
+    *,
+    seed: int = 0,
+    reward: Reward = Reward(),
+    progress: Callable[[float, float], None] | None = None,
+) -> dict[str, Any]:
+    """Return the bound of ``arm`` where its true physics is known, and how far a controller stays below it.
+
+    Args:
+        arm: any; the true physics is known of a virtual one only. It is not moved.
+        goal_range: goals are drawn from it, shape (joints, 2) [counts].
+        rewards: of the controller's tests on the arm by their names, each shape (n,), in the order of the movements.
+        settings: how many movements, and which plans.
+        seed: of the transfer in which the tests were made.
+        reward: what is paid.
+        progress: called with what is done and the total.
+
+    Returns:
+        ``open_loop`` and ``closed_loop`` with their figures, and ``distance`` from a test's name to the distances
+        to both; ``missing`` says instead why there is none.
+
+    """
+    if not isinstance(arm, VirtualArm):
+        return {"missing": f"{arm.spec.name} is no virtual arm: its true physics is not known"}
+    planned = measure_bound(arm, goal_range, settings, seed=seed, reward=reward, progress=progress)
+    figures: dict[str, Any] = {rival: movements.results() for rival, movements in planned.items()}
+    for found in figures.values():
+        del found["decision_ms"]  # of the machine, not of the arm
+    figures["distance"] = {
+        test: {rival: movements.distance(paid) for rival, movements in planned.items()}
+        for test, paid in rewards.items()
+    }
+    return figures
+
+
+def bound_results(
+    arm: VirtualArm, goal_range: NDArray[np.float64], settings: BoundSettings, planned: dict[Rival, Planned]
+) -> dict[str, Any]:
+    """Return all figures for the command line and for programs."""
+    return {
+        "arm": arm.spec.name,
+        "goal_range": goal_range.tolist(),
+        "settings": asdict(settings),
+        **{rival: movements.results() for rival, movements in planned.items()},
+    }

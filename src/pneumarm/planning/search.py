@@ -1,0 +1,367 @@
+"""The best plan: valve sequences with few switches, cheapest first, on any world that can be rolled out.
+
+Every action costs, and every switch costs more (thesis eq. 4.2, section 5.4.1), so the plan of the highest reward is
+the shortest path to the goal, found by uniform-cost search (Dijkstra):
+
+    take the cheapest entry from the queue
+        hold:    repeat the last action for one period                        (cost of an action)
+        branch:  change to each of the other actions                          (cost of an action and of switches)
+    until an entry costs as much as the best plan that reached the goal
+
+A node is simulated once, from its parent's state, so that plans with the same beginning share it; the branches of a
+node wait in the queue until they are due, as one entry and one copy of its state. No plan of at most ``switches``
+switches is better than one that is found ``proven``.
+
+Only what the guard would let through is planned: an action with an inlet into a muscle that reads over its limit is
+not taken. So what is planned is what is applied, and switches are counted as they are on an arm.
+"""
+
+import heapq
+import math
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from pneumarm.arm.valves import ACTIONS, VALVES
+from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
+from pneumarm.errors import UnusableInput
+from pneumarm.kernels import kernel, part
+from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
+from pneumarm.task.reward import Reward
+
+_ADVANCE = {PhysicsStates: advance_physics, SimulatedStates: advance_simulated}
+_COPY = {PhysicsStates: copy_physics, SimulatedStates: copy_simulated}
+_UNLIKELY = 0.05
+"""A plan that is less likely to succeed is none."""
+_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": True}  # as a kernel's part
+
+
+def advance(world: Any, states: Any, i: int, valves: NDArray[np.int8]) -> None:
+    """Let one control period pass in state ``i`` of any kind of ``states``, with ``valves`` (joints, 2)."""
+    _ADVANCE[type(states)](world, states, i, valves)
+
+
+def copy(states: Any, to: int, source: int) -> None:
+    """Copy state ``source`` to the place ``to``, in any kind of ``states``."""
+    _COPY[type(states)](states, to, source)
+
+
+# Compiled code picks by type as well: kernels handed over as arguments could not be cached.
+@overload(advance, jit_options=_OPTIONS)
+def _advance(world, states, i, valves):  # type: ignore[no-untyped-def]
+    if states.instance_class is PhysicsStates:
+        return lambda world, states, i, valves: advance_physics(world, states, i, valves)
+    if states.instance_class is SimulatedStates:
+        return lambda world, states, i, valves: advance_simulated(world, states, i, valves)
+    return None
+
+
+@overload(copy, jit_options=_OPTIONS)
+def _copy(states, to, source):  # type: ignore[no-untyped-def]
+    if states.instance_class is PhysicsStates:
+        return lambda states, to, source: copy_physics(states, to, source)
+    if states.instance_class is SimulatedStates:
+        return lambda states, to, source: copy_simulated(states, to, source)
+    return None
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """Which plans are considered, and how long they are sought."""
+
+    switches: int = 3
+    """Most switches of a plan, the first action being none."""
+    cutoff: int = 100
+    """Most actions of a plan (thesis section 5.4.2: 100)."""
+    nodes: int = 100_000
+    """Most states kept at a time; when they do not suffice, the best plan is not proven to be so."""
+    failure_cost: float = 12.0
+    """What it costs to miss the goal at the end of a plan and to plan again, in units of reward; where the model is
+    uncertain, plans end where the odds are better."""
+
+    def __post_init__(self) -> None:
+        valid = {
+            "switches": self.switches >= 0,
+            "cutoff": self.cutoff >= 1,
+            "nodes": self.nodes >= 1,
+            "failure_cost": 0 <= self.failure_cost < math.inf,
+        }
+        for name, is_valid in valid.items():
+            if not is_valid:
+                raise UnusableInput(f"PlanSettings: {name} cannot be {getattr(self, name)!r}; see its documentation")
+
+
+class Uncertainty(NamedTuple):
+    """Standard deviation of what is read at the end of a plan from what was planned."""
+
+    angle: float
+    """[counts]"""
+    velocity: float
+    """[counts/ms]"""
+
+
+CERTAIN = Uncertainty(0.0, 0.0)
+
+
+class Problem(NamedTuple):
+    """What is sought. Made by :func:`problem`."""
+
+    commands: NDArray[np.int8]
+    """Valves by action of the whole arm, shape (9**joints, joints, 2)."""
+    switched: NDArray[np.int64]
+    """Joints that switch between two actions, shape (9**joints + 1, 9**joints); none from the last row: the begin."""
+    goal: NDArray[np.float64]
+    """Shape (joints,) [counts]."""
+    angle_tolerance: float
+    """[counts]"""
+    velocity_tolerance: float
+    """[counts/ms]"""
+    angle_std: float
+    """[counts]"""
+    velocity_std: float
+    """[counts/ms]"""
+    failure_cost: float
+    action_cost: float
+    switch_cost: float
+    switches: int
+    cutoff: int
+
+
+class Tree(NamedTuple):
+    """Room for a search. Made by :func:`tree`."""
+
+    depth: NDArray[np.int64]
+    """Actions to each node, shape (nodes,)."""
+    switches: NDArray[np.int64]
+    """Switches to each node, shape (nodes,)."""
+    cost: NDArray[np.float64]
+    """Shape (nodes,)."""
+    held: NDArray[np.int64]
+    """What was done from which step on, shape (nodes, holds, 2): action, first step."""
+    holds: NDArray[np.int64]
+    """How many of these there are, shape (nodes,)."""
+    free: NDArray[np.int64]
+    """Nodes that are not used, shape (nodes,)."""
+    plan: NDArray[np.int64]
+    """The plan that was found, shape (cutoff,)."""
+
+
+class Found(NamedTuple):
+    """What a search found."""
+
+    actions: NDArray[np.int64]
+    """Actions of the whole arm, one a period; where the goal cannot be reached, those that lead nearest to it."""
+    cost: float
+    """Cost of the actions and switches, infinite where the goal is not reached."""
+    reached: bool
+    proven: bool
+    """Whether no plan within the settings is cheaper."""
+    simulated: int
+    """Control periods that were simulated."""
+
+
+def problem(
+    goal: NDArray[np.float64], reward: Reward, settings: PlanSettings, uncertainty: Uncertainty = CERTAIN
+) -> Problem:
+    """Return the problem of moving to ``goal`` (joints,) [counts] for ``reward``.
+
+    Raises:
+        UnusableInput: an action or a switch is rewarded.
+
+    """
+    if reward.action >= 0 or reward.switch > 0:
+        raise UnusableInput("planning needs actions that cost something and switches that are not rewarded")
+    actions = np.array(list(product(range(ACTIONS), repeat=len(goal))))
+    switched = (actions[:, None] != actions[None]).sum(axis=2)
+    begin = np.zeros((1, len(actions)), np.int64)
+    return Problem(
+        commands=np.ascontiguousarray(VALVES[actions]),
+        switched=np.concatenate([switched, begin]),
+        goal=np.array(goal, np.float64),
+        angle_tolerance=float(reward.angle_tolerance),
+        velocity_tolerance=float(reward.velocity_tolerance),
+        angle_std=uncertainty.angle,
+        velocity_std=uncertainty.velocity,
+        failure_cost=float(settings.failure_cost),
+        action_cost=-float(reward.action),
+        switch_cost=-float(reward.switch),
+        switches=settings.switches,
+        cutoff=settings.cutoff,
+    )
+
+
+def tree(settings: PlanSettings, joints: int) -> Tree:
+    """Return room for searches; ``settings.nodes`` and one expansion more."""
+    n, holds = room_of(settings, joints), settings.switches + 2
+    return Tree(
+        depth=np.empty(n, np.int64),
+        switches=np.empty(n, np.int64),
+        cost=np.empty(n),
+        held=np.empty((n, holds, 2), np.int64),
+        holds=np.empty(n, np.int64),
+        free=np.empty(n, np.int64),
+        plan=np.empty(settings.cutoff, np.int64),
+    )
+
+
+def room_of(settings: PlanSettings, joints: int) -> int:
+    """Return how many states a search needs room for."""
+    return settings.nodes + int(ACTIONS**joints) + 1
+
+
+def find(world: Any, states: Any, sought: Problem, room: Tree, last: int = -1, may_hold: bool = True) -> Found:
+    """Return the best plan from state 0 of ``states``, after the action ``last`` (-1 at the begin of a movement).
+
+    Unless it ``may_hold``, the plan begins with another action than ``last``.
+    """
+    begin = len(sought.commands) if last < 0 else last
+    length, cost, proven, simulated = search(world, states, sought, room, begin, may_hold)
+    return Found(room.plan[:length].copy(), cost, math.isfinite(cost), proven, simulated)
+
+
+@part
+def permitted(world, states, i, sought, action):  # type: ignore[no-untyped-def]
+    """Return whether the guard would set the valves of ``action`` as they are in state ``i``."""
+    for j in range(sought.commands.shape[1]):
+        for m in range(2):
+            if sought.commands[action, j, m] > 0 and states.pressure[i, j, m] > world.limit:
+                return False
+    return True
+
+
+@part
+def misses(states, i, sought):  # type: ignore[no-untyped-def]
+    """Return by how much state ``i`` misses the goal, in tolerances; 1 or less is success (thesis eq. 5.1, 5.2)."""
+    worst = 0.0
+    for j in range(sought.goal.shape[0]):
+        worst = max(worst, abs(states.angle[i, j] - sought.goal[j]) / sought.angle_tolerance)
+        worst = max(worst, abs(states.velocity[i, j]) / sought.velocity_tolerance)
+    return worst
+
+
+@part
+def within(value, tolerance, std):  # type: ignore[no-untyped-def]
+    """Return the probability that a normal deviate around ``value`` is not farther from 0 than ``tolerance``."""
+    if std == 0.0:
+        return 1.0 if abs(value) <= tolerance else 0.0
+    scale = 1.0 / (math.sqrt(2.0) * std)
+    return 0.5 * (math.erf((tolerance - value) * scale) + math.erf((tolerance + value) * scale))
+
+
+@part
+def success(states, i, sought):  # type: ignore[no-untyped-def]
+    """Return the probability that the goal is reached in state ``i``."""
+    probability = 1.0
+    for j in range(sought.goal.shape[0]):
+        away = states.angle[i, j] - sought.goal[j]
+        probability *= within(away, sought.angle_tolerance, sought.angle_std)
+        probability *= within(states.velocity[i, j], sought.velocity_tolerance, sought.velocity_std)
+    return probability
+
+
+@part
+def last_action(room, i):  # type: ignore[no-untyped-def]
+    """Return the action that led to node ``i``."""
+    return room.held[i, room.holds[i] - 1, 0]
+
+
+@part
+def descend(world, states, sought, room, i, parent, action):  # type: ignore[no-untyped-def]
+    """Make node ``i`` what ``action`` makes of ``parent``, which may be the same; return by how much it misses."""
+    if i != parent:
+        copy(states, i, parent)
+        for k in range(room.holds[parent]):
+            room.held[i, k, 0], room.held[i, k, 1] = room.held[parent, k, 0], room.held[parent, k, 1]
+        room.holds[i] = room.holds[parent]
+    before = last_action(room, parent)
+    switched = sought.switched[before, action]
+    if action != before:
+        room.held[i, room.holds[i], 0], room.held[i, room.holds[i], 1] = action, room.depth[parent]
+        room.holds[i] += 1
+    room.depth[i] = room.depth[parent] + 1
+    room.switches[i] = room.switches[parent] + switched
+    room.cost[i] = room.cost[parent] + sought.action_cost + sought.switch_cost * switched
+    advance(world, states, i, sought.commands[action])
+    return misses(states, i, sought)
+
+
+@part
+def write_plan(room, i):  # type: ignore[no-untyped-def]
+    """Write the actions that led to node ``i`` into the plan; return how many they are."""
+    for k in range(1, room.holds[i]):
+        end = room.held[i, k + 1, 1] if k + 1 < room.holds[i] else room.depth[i]
+        for n in range(room.held[i, k, 1], end):
+            room.plan[n] = room.held[i, k, 0]
+    # The first hold is what was done before the plan; it goes on until the first switch.
+    end = room.held[i, 1, 1] if room.holds[i] > 1 else room.depth[i]
+    for n in range(end):
+        room.plan[n] = room.held[i, 0, 0]
+    return room.depth[i]
+
+
+@kernel
+def search(world, states, sought, room, begin, may_hold):  # type: ignore[no-untyped-def]
+    """Seek the best plan from state 0 after the action ``begin``, which goes on only if it ``may_hold``.
+
+    Returns the length of the plan in ``room.plan``, its cost, whether it is proven, and the periods simulated.
+    """
+    count = room.free.shape[0]
+    actions = sought.commands.shape[0]
+    for k in range(count):
+        room.free[k] = count - 1 - k
+    left = count - 1  # node 0 is the begin
+    room.depth[0], room.switches[0], room.cost[0], room.holds[0] = 0, 0, 0.0, 1
+    room.held[0, 0, 0], room.held[0, 0, 1] = begin, 0
+    # Entries are cost, a number that settles ties, and 2 * node + 1 to branch or + 0 to hold.
+    queue = [(sought.action_cost, 0, 0 if may_hold and begin < actions else 1)]
+    order, simulated, proven, length = 1, 0, True, 0
+    best, nearest = math.inf, math.inf
+    while len(queue) > 0:
+        cost, _, entry = heapq.heappop(queue)
+        if cost >= best:
+            break
+        if left < actions:
+            proven = False
+            break
+        i, branches = entry // 2, entry % 2 == 1
+        may_branch = room.switches[i] < sought.switches
+        first, last = 0, actions
+        if not branches:
+            if may_branch:
+                heapq.heappush(queue, (cost + sought.switch_cost, order, entry + 1))
+                order += 1
+            first = last_action(room, i)
+            last = first + 1
+        for action in range(first, last):
+            if branches and action == last_action(room, i):
+                continue
+            if not permitted(world, states, i, sought, action):
+                continue
+            if room.switches[i] + sought.switched[last_action(room, i), action] > sought.switches:
+                continue
+            left -= 1
+            child = room.free[left]
+            miss = descend(world, states, sought, room, child, i, action)
+            simulated += 1
+            probability = success(states, child, sought)
+            expected = room.cost[child] + sought.failure_cost * (1.0 - probability)
+            if probability > _UNLIKELY and expected < best:
+                best = expected
+                length = write_plan(room, child)
+            elif best == math.inf and miss < nearest:
+                nearest = miss
+                length = write_plan(room, child)
+            if expected <= room.cost[child] or room.depth[child] == sought.cutoff:
+                room.free[left] = child
+                left += 1
+            else:
+                heapq.heappush(queue, (room.cost[child] + sought.action_cost, order, 2 * child))
+                order += 1
+        if branches or not may_branch:
+            room.free[left] = i
+            left += 1
+    return length, best, proven, simulated

@@ -1,0 +1,203 @@
+"""The simulated task that an agent learns: begin states, goals, the effect of actions, and when a goal is reached.
+
+Any learner can be run on it: it knows nothing of action values. ``begin_episode`` and ``take`` are all that a
+learner calls; both work on one :class:`Episode`, of which there can be as many as one wants.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.valves import VALVES
+from pneumarm.errors import UnusableInput
+from pneumarm.kernels import part
+from pneumarm.random import RandomState, uniform
+from pneumarm.simulation.kernel import (
+    SimulationParameters,
+    SimulationState,
+    begin,
+    places,
+    simulation_parameters,
+    simulation_state,
+    step,
+)
+from pneumarm.simulation.noise import NoiseParameters, NoiseSettings, noise_parameters
+from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.begin import BeginParameters, BeginStates, begin_parameters, draw_begin
+from pneumarm.task.reward import Reward
+
+
+class TaskSettings(Protocol):
+    """What of a learner's settings decides its task."""
+
+    @property
+    def reward(self) -> Reward:
+        """What is paid for an action."""
+
+    @property
+    def cutoff(self) -> int:
+        """Actions after which an episode is cut off."""
+
+    @property
+    def noise(self) -> NoiseSettings:
+        """Noise on the simulation's predictions."""
+
+    @property
+    def begin_weights(self) -> tuple[float, ...]:
+        """Weights of the sub-intervals of begin states on each side of the goal, the farthest first."""
+
+
+class Task(NamedTuple):
+    """What is asked of the arm, in sensor units unless it says scaled."""
+
+    goal_range: NDArray[np.float64]
+    """Goals are uniform between these, shape (joints, 2) [counts]."""
+    unit: NDArray[np.float64]
+    """Offset and scale of angle and velocity, shape (joints, 4): angle, angle, velocity, velocity."""
+    commands: NDArray[np.float32]
+    """Scaled commands by action, shape (joints, 9, 2)."""
+    goal_place: int
+    """Place of the goals in the state vector."""
+    angle_tolerance: float
+    """[counts]"""
+    velocity_tolerance: float
+    """[counts/ms]"""
+    reward_goal: float
+    reward_action: float
+    reward_switch: float
+    cutoff: int
+
+
+class Environment(NamedTuple):
+    """Everything about the simulated arm and the task that does not change."""
+
+    simulation: SimulationParameters
+    noise: NoiseParameters
+    begin: BeginParameters
+    task: Task
+
+
+class Episode(NamedTuple):
+    """What changes during an episode."""
+
+    state: SimulationState
+    goal: NDArray[np.float64]
+    """Shape (joints,) [counts]."""
+    actions: NDArray[np.int64]
+    """The last actions, -1 before the first, shape (joints,)."""
+    switched: NDArray[np.int64]
+    """Whether the last action of each joint was a switch, shape (joints,)."""
+    command: NDArray[np.float32]
+    """Room, shape (2 joints,)."""
+
+
+def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettings) -> Environment:
+    """Return the task of ``settings`` on ``simulation``.
+
+    Raises:
+        UnusableInput: the begin states are not of this simulation, or it has no valves.
+
+    """
+    if not simulation.valves:
+        raise UnusableInput(
+            "the simulation was fitted to continuous commands; an agent needs one fitted to valves (-1, 0, +1)"
+        )
+    if begin.window != simulation.window:
+        raise UnusableInput(f"begin states of {begin.window} cannot be used with a simulation of {simulation.window}")
+    window, scaling, reward = simulation.window, simulation.scaling, settings.reward
+    offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+    commands = VALVES[None] / scaling.command_scale.reshape(window.joints, 1, 2)
+    task = Task(
+        goal_range=np.ascontiguousarray(simulation.goal_range, np.float64),
+        unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
+        commands=np.ascontiguousarray(commands, np.float32),
+        goal_place=places(simulation.window).goal,
+        angle_tolerance=float(reward.angle_tolerance),
+        velocity_tolerance=float(reward.velocity_tolerance),
+        reward_goal=float(reward.goal),
+        reward_action=float(reward.action),
+        reward_switch=float(reward.switch),
+        cutoff=int(settings.cutoff),
+    )
+    return Environment(
+        simulation=simulation_parameters(simulation),
+        noise=noise_parameters(settings.noise, simulation),
+        begin=begin_parameters(begin, simulation.spec.angle_range, settings.begin_weights),
+        task=task,
+    )
+
+
+def episode(environment: Environment, random: RandomState) -> Episode:
+    """Return room for episodes in ``environment`` that draw from ``random``."""
+    joints = environment.simulation.joints
+    return Episode(
+        state=simulation_state(environment.simulation, random),
+        goal=np.zeros(joints),
+        actions=np.full(joints, -1, np.int64),
+        switched=np.zeros(joints, np.int64),
+        command=np.zeros(2 * joints, np.float32),
+    )
+
+
+@part
+def begin_episode(environment, episode, deviation, random):  # type: ignore[no-untyped-def]
+    """Draw goals and a begin state within ``deviation`` [counts] of them from ``random``, and put the arm there."""
+    task = environment.task
+    for joint in range(episode.goal.shape[0]):
+        low, high = task.goal_range[joint, 0], task.goal_range[joint, 1]
+        goal = low + (high - low) * uniform(random)
+        episode.goal[joint] = goal
+        episode.actions[joint] = -1
+        scaled = (goal - task.unit[joint, 0]) / task.unit[joint, 1]
+        episode.state.x[task.goal_place + joint] = np.float32(scaled)
+    index = draw_begin(environment.begin, episode.goal, deviation, random)
+    begin(environment.simulation, environment.noise, episode.state, environment.begin.states[index])
+
+
+@part
+def order(task, episode, actions):  # type: ignore[no-untyped-def]
+    """Make ``actions`` (joints,) the command of ``episode``. Notes who switched."""
+    for joint in range(actions.shape[0]):
+        action, before = actions[joint], episode.actions[joint]
+        episode.switched[joint] = 1 if before >= 0 and before != action else 0
+        episode.actions[joint] = action
+        episode.command[2 * joint] = task.commands[joint, action, 0]
+        episode.command[2 * joint + 1] = task.commands[joint, action, 1]
+
+
+@part
+def take(environment, episode, actions):  # type: ignore[no-untyped-def]
+    """Take ``actions`` (joints,) for a period; return whether the goals are reached."""
+    order(environment.task, episode, actions)
+    step(environment.simulation, environment.noise, episode.state, episode.command)
+    return reached(environment.task, episode)
+
+
+@part
+def angle(task, episode, joint):  # type: ignore[no-untyped-def]
+    """Return the angle of ``joint`` [counts]."""
+    return task.unit[joint, 0] + task.unit[joint, 1] * episode.state.x[4 * joint]
+
+
+@part
+def velocity(task, episode, joint):  # type: ignore[no-untyped-def]
+    """Return the velocity of ``joint`` [counts/ms]."""
+    return task.unit[joint, 2] + task.unit[joint, 3] * episode.state.x[4 * joint + 1]
+
+
+@part
+def reached(task, episode):  # type: ignore[no-untyped-def]
+    """Return whether every joint is at its goal and slow (thesis eq. 5.1, 5.2)."""
+    for joint in range(episode.goal.shape[0]):
+        if abs(angle(task, episode, joint) - episode.goal[joint]) > task.angle_tolerance:
+            return False
+        if abs(velocity(task, episode, joint)) > task.velocity_tolerance:
+            return False
+    return True
+
+
+@part
+def reward(task, is_reached, switched):  # type: ignore[no-untyped-def]
+    """Return what a joint is paid for an action (thesis eq. 4.2, with the price of a switch of section 5.4.1)."""
+    return (task.reward_goal if is_reached else task.reward_action) + task.reward_switch * switched

@@ -1,0 +1,237 @@
+"""Many simulated arms in one compiled step: the environment of :mod:`pneumarm.task.environment`, side by side.
+
+Each arm has its column in arrays ``[quantity][arm]``, random numbers of its own, and goes on bit for bit the same
+whatever its neighbours do. What is decided arm by arm (begin states, noise, the window, when a goal is reached) is
+done by the functions of the single environment on views of a column; only the networks, which take nearly all of the
+time, are evaluated over all columns together.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.valves import VALVES
+from pneumarm.kernels import kernel, part
+from pneumarm.networks.layers import weighted_sums
+from pneumarm.networks.tansig import FASTMATH, tansig
+from pneumarm.random import RandomState
+from pneumarm.simulation.kernel import SimulationState, places, put_command, settle
+from pneumarm.simulation.simulation import Scaling
+from pneumarm.task.environment import (
+    Environment,
+    Episode,
+    begin_episode,
+    order,
+    reached,
+)
+from pneumarm.transitions.window import Window
+
+
+class Fleet(NamedTuple):
+    """What changes of ``n`` simulated arms. Made by :func:`fleet`."""
+
+    x: NDArray[np.float32]
+    """State vectors, shape (inputs, n), see :mod:`pneumarm.simulation.kernel`."""
+    average: NDArray[np.float32]
+    """Moving averages of the noise, shape (outputs, n)."""
+    random: RandomState
+    """Shape (n, 4)."""
+    hidden: NDArray[np.float32]
+    """Room, shape (units, n)."""
+    change: NDArray[np.float32]
+    """Room, shape (outputs, n)."""
+    goal: NDArray[np.float64]
+    """Shape (n, joints) [counts]."""
+    actions: NDArray[np.int64]
+    """The last actions, -1 before the first, shape (n, joints)."""
+    switched: NDArray[np.int64]
+    """Whether the last action was a switch, shape (n, joints)."""
+    command: NDArray[np.float32]
+    """Room, shape (n, 2 joints)."""
+    still: NDArray[np.int64]
+    """How many steps in a row the last action has changed nothing, shape (n, joints)."""
+    before: NDArray[np.float32]
+    """Angle and pressures before the last action, shape (n, joints, 3) [scaled]."""
+    taken: NDArray[np.int64]
+    """Actions in this episode, shape (n,)."""
+
+
+def fleet(environment: Environment, random: RandomState) -> Fleet:
+    """Return room for as many arms in ``environment`` as there are random states in ``random`` (n, 4)."""
+    inputs, units = environment.simulation.hidden.shape
+    outputs, joints, n = environment.simulation.output_bias.size, environment.simulation.joints, len(random)
+    x = np.zeros((inputs, n), np.float32)
+    x[environment.task.goal_place + joints] = 1
+    return Fleet(
+        x=x,
+        average=np.zeros((outputs, n), np.float32),
+        random=random,
+        hidden=np.zeros((units, n), np.float32),
+        change=np.zeros((outputs, n), np.float32),
+        goal=np.zeros((n, joints)),
+        actions=np.full((n, joints), -1, np.int64),
+        switched=np.zeros((n, joints), np.int64),
+        command=np.zeros((n, 2 * joints), np.float32),
+        still=np.zeros((n, joints), np.int64),
+        before=np.zeros((n, joints, 3), np.float32),
+        taken=np.zeros(n, np.int64),
+    )
+
+
+class Limits(NamedTuple):
+    """Which actions are of no use. Made by :func:`limits`."""
+
+    inlet: NDArray[np.float32]
+    """Pressure over which an inlet stays closed, shape (joints, 2) [scaled]."""
+    still: NDArray[np.float32]
+    """Largest change of angle and of pressures that counts as none, shape (joints, 3) [scaled]."""
+    tolerance: NDArray[np.float32]
+    """Distance from the goal within which a joint may stand still, shape (joints,) [scaled]."""
+    goal_place: int
+    """Place of the goals in the state vector."""
+    patience: int
+    """Steps without change after which an action is not taken again; 0: it always may."""
+
+
+def limits(
+    window: Window, scaling: Scaling, spec: ArmSpec, tolerance: float, still: float = 2.5, patience: int = 2
+) -> Limits:
+    """Return the limits of an arm.
+
+    ``still`` is the largest change that counts as none, ``tolerance`` the distance from the goal within which a joint
+    may stand still [both counts], ``patience`` the steps without change after which another action is taken.
+    """
+    offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+    return Limits(
+        inlet=np.ascontiguousarray((spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:], np.float32),
+        still=np.ascontiguousarray(still / scale[:, [0, 2, 3]], np.float32),
+        tolerance=(tolerance / scale[:, 0]).astype(np.float32),
+        goal_place=places(window).goal,
+        patience=patience,
+    )
+
+
+@part
+def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-untyped-def]
+    """Return whether ``joint`` may take ``action`` in the state ``x`` (inputs,).
+
+    Not useful is an action that would open the inlet of a muscle over its limit (the guard would keep it closed),
+    and one that has changed nothing for some steps: an arm that sticks near its goal would stick for ever.
+    """
+    is_stuck = limits.patience > 0 and action == actions[joint] and still[joint] >= limits.patience
+    if is_stuck and abs(x[limits.goal_place + joint] - x[4 * joint]) > limits.tolerance[joint]:
+        return False
+    for muscle in range(2):
+        if VALVES[action, muscle] > 0 and x[4 * joint + 2 + muscle] > limits.inlet[joint, muscle]:
+            return False
+    return True
+
+
+@kernel
+def one(fleet, e):  # type: ignore[no-untyped-def]
+    """Return arm ``e`` as a single episode; it is a view."""
+    state = SimulationState(
+        fleet.x[:, e], fleet.average[:, e], fleet.random[e], fleet.hidden[:, e], fleet.change[:, e]
+    )
+    return Episode(state, fleet.goal[e], fleet.actions[e], fleet.switched[e], fleet.command[e])
+
+
+@kernel
+def begin_one(environment, fleet, e):  # type: ignore[no-untyped-def]
+    """Let arm ``e`` begin an episode anywhere."""
+    begin_episode(environment, one(fleet, e), np.inf, fleet.random[e])
+    fleet.taken[e] = 0
+    for joint in range(fleet.still.shape[1]):
+        fleet.still[e, joint] = 0
+
+
+@kernel
+def begin_all(environment, fleet):  # type: ignore[no-untyped-def]
+    """Let all arms begin episodes anywhere."""
+    for e in range(fleet.taken.shape[0]):
+        begin_one(environment, fleet, e)
+
+
+@kernel
+def take_all(environment, limits, fleet, actions, is_reached):  # type: ignore[no-untyped-def]
+    """Take ``actions`` (n, joints) for a period; set ``is_reached`` (n,) to whether the goals are reached."""
+    simulation = environment.simulation
+    for e in range(actions.shape[0]):
+        arm = one(fleet, e)
+        order(environment.task, arm, actions[e])
+        put_command(simulation, arm.state.x, arm.command)
+    predict_changes(simulation, fleet)
+    for e in range(actions.shape[0]):
+        advance(environment, limits, fleet, e)
+        is_reached[e] = reached(environment.task, one(fleet, e))
+
+
+@kernel
+def take_alive(environment, limits, fleet, actions, alive, is_reached):  # type: ignore[no-untyped-def]
+    """Do what :func:`take_all` does, in the arms that are ``alive`` (n,) alone."""
+    simulation = environment.simulation
+    for e in range(actions.shape[0]):
+        if alive[e]:
+            arm = one(fleet, e)
+            order(environment.task, arm, actions[e])
+            put_command(simulation, arm.state.x, arm.command)
+    predict_changes(simulation, fleet)
+    for e in range(actions.shape[0]):
+        if alive[e]:
+            advance(environment, limits, fleet, e)
+            is_reached[e] = reached(environment.task, one(fleet, e))
+
+
+@kernel(fastmath=FASTMATH)
+def predict_changes(simulation, fleet):  # type: ignore[no-untyped-def]
+    """Set ``fleet.change`` to what the networks predict for the states and commands in ``fleet.x``."""
+    x, hidden, change = fleet.x, fleet.hidden, fleet.change
+    weighted_sums(simulation.hidden, x, hidden)
+    for u in range(hidden.shape[0]):
+        tansig(hidden[u])
+    for o in range(change.shape[0]):
+        for e in range(change.shape[1]):
+            change[o, e] = simulation.output_bias[o]
+        for u in range(hidden.shape[0]):
+            weight = simulation.output[o, u]
+            if weight != np.float32(0.0):  # the unit of another network
+                for e in range(change.shape[1]):
+                    change[o, e] += weight * hidden[u, e]
+    for o in range(simulation.direct.shape[0]):
+        for i in range(x.shape[0]):
+            weight = simulation.direct[o, i]
+            for e in range(change.shape[1]):
+                change[o, e] += weight * x[i, e]
+
+
+@kernel
+def advance(environment, limits, fleet, e):  # type: ignore[no-untyped-def]
+    """Let arm ``e`` go to what is predicted, and note where that changes nothing."""
+    arm, before = one(fleet, e), fleet.before[e]
+    look(arm.state.x, before)
+    settle(environment.simulation, environment.noise, arm.state, arm.command)
+    note_still(limits, arm.state.x, before, arm.switched, fleet.still[e])
+    fleet.taken[e] += 1
+
+
+@part
+def look(x, before):  # type: ignore[no-untyped-def]
+    """Set ``before`` (joints, 3) to the angle and the pressures in the state ``x`` (inputs,)."""
+    for joint in range(before.shape[0]):
+        before[joint, 0] = x[4 * joint]
+        before[joint, 1] = x[4 * joint + 2]
+        before[joint, 2] = x[4 * joint + 3]
+
+
+@part
+def note_still(limits, x, before, switched, still):  # type: ignore[no-untyped-def]
+    """Count in ``still`` (joints,) the steps in which the same action has changed nothing."""
+    for joint in range(still.shape[0]):
+        count = still[joint] + 1 if switched[joint] == 0 else 1
+        for quantity in range(3):
+            now = x[4 * joint + quantity + (1 if quantity > 0 else 0)]
+            if abs(now - before[joint, quantity]) > limits.still[joint, quantity]:
+                count = 0
+        still[joint] = count

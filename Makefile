@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup run test lint bench judge rivals soak clean
+.PHONY: setup run test lint bench held-out baselines soak clean
 
 setup: $(READY)
 
@@ -28,12 +28,12 @@ lint: setup
 bench: setup
 	$(BIN)/python -m benchmarks
 
-judge: setup  ## the whole job on the ten judging arms; takes about ten minutes
-	$(BIN)/python -m benchmarks judging
+held-out: setup  ## the whole job on the ten held-out arms; takes about ten minutes
+	$(BIN)/python -m benchmarks held_out
 
-rivals: setup  ## the table of rivals on the judging arms, into runs/rivals; takes hours, a second call goes on
+baselines: setup  ## the table of baselines on the held-out arms, into runs/baselines; takes hours, a second call goes on
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,stable-baselines]'
-	$(BIN)/python -m benchmarks rivals
+	$(BIN)/python -m benchmarks baselines
 
 soak: setup  ## fault injection that takes minutes: kills, power cuts, full disks
 	$(BIN)/python -m pytest -m soak -s

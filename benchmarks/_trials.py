@@ -17,7 +17,7 @@ from pneumarm.learning import AnyAgent
 from pneumarm.simulation import FitSettings, StoreFit
 from pneumarm.task import BeginStates
 
-JUDGING = ",".join(str(seed) for seed in range(1001, 1011))
+HELD_OUT = ",".join(str(seed) for seed in range(1001, 1011))
 """The arms to judge on; nothing is developed on them."""
 SEED_OF_MOVEMENTS = 0
 

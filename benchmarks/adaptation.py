@@ -1,7 +1,7 @@
 """How fast a policy adapts to an arm that has changed, against no adaptation and against an agent trained afresh.
 
 For every seed an arm is drawn, and an agent collects, fits and trains on it. Then the arm changes (CHANGES), and
-three rivals make the same movements, from the same begin states (by seed) to the same goals, on arms in the same
+three baselines make the same movements, from the same begin states (by seed) to the same goals, on arms in the same
 state:
 
     fresh     an agent that collected, fitted and trained anew on the changed arm: the reference; of an arm that has
@@ -17,9 +17,9 @@ made again.
 what the fresh agent gets in those same movements; its time is that of the arm, the ways to the begin states included.
 Settings come from the environment:
 
-PNEUMARM_ADAPTATION_SEEDS      seeds of virtual arms, "1,2,3,4,5"; the judging arms are 1001 to 1010
+PNEUMARM_ADAPTATION_SEEDS      seeds of virtual arms, "1,2,3,4,5"; the held-out arms are 1001 to 1010
 PNEUMARM_ADAPTATION_CHANGES    names from CHANGES; all by default
-PNEUMARM_ADAPTATION_MOVEMENTS  movements of each rival, 300
+PNEUMARM_ADAPTATION_MOVEMENTS  movements of each baseline, 300
 PNEUMARM_ADAPTATION_COLLECTED  transitions that the fresh agent collects, 200000
 PNEUMARM_ADAPTATION_FOLDER     where stores, simulations, agents, rows and the picture are kept; a temporary folder
                                by default
@@ -63,7 +63,7 @@ TORN = 300
 """How much more than a sound one a torn muscle leaks: 7.5 % of its pressure a second."""
 WINDOW, SHARE = 100, 0.95
 """Of the definition of *recovered*."""
-RIVALS = ("fresh", "without", "adapting")
+BASELINES = ("fresh", "without", "adapting")
 
 
 # What changes -----------------------------------------------------------------------------------------------------
@@ -132,7 +132,7 @@ def changed_arm(change: str, seed: int, noise: int) -> VirtualArm:
     return arm
 
 
-# The rivals -------------------------------------------------------------------------------------------------------
+# The baselines -----------------------------------------------------------------------------------------------------
 
 
 class Bench:
@@ -141,23 +141,23 @@ class Bench:
     def __init__(self, folder: Path, movements: int, collected: int) -> None:
         self.folder, self.movements, self.collected = folder, movements, collected
 
-    def row(self, change: str, seed: int, rival: str) -> dict[str, Any]:
-        """Return what a rival did; let it move where that is not done yet."""
-        file = self.folder / f"{change}-{seed}-{rival}-{self.movements}-{self.collected}.json"
+    def row(self, change: str, seed: int, baseline: str) -> dict[str, Any]:
+        """Return what a baseline did; let it move where that is not done yet."""
+        file = self.folder / f"{change}-{seed}-{baseline}-{self.movements}-{self.collected}.json"
         if not file.exists():
-            write_json(file, self.moved(change, seed, rival))
+            write_json(file, self.moved(change, seed, baseline))
         found: dict[str, Any] = json.loads(file.read_text())
         return found
 
-    def moved(self, change: str, seed: int, rival: str) -> dict[str, Any]:
+    def moved(self, change: str, seed: int, baseline: str) -> dict[str, Any]:
         old = self.trained(seed, None)
         fresh = old if change == "unchanged" else self.trained(seed, change)
         low = np.maximum(old.goal_range[:, 0], fresh.goal_range[:, 0])
         high = np.minimum(old.goal_range[:, 1], fresh.goal_range[:, 1])
-        agent = fresh if rival == "fresh" else old
+        agent = fresh if baseline == "fresh" else old
         agent = replace(agent, simulation=replace(agent.simulation, goal_range=np.stack([low, high], axis=1)))
         settings = TransferSettings(
-            episodes=self.movements, test_episodes=1, learning_rate=0.01 if rival == "adapting" else 0.0
+            episodes=self.movements, test_episodes=1, learning_rate=0.01 if baseline == "adapting" else 0.0
         )
         arm = changed_arm(change, seed, 2000 + seed)
         with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", arm.spec) as store:
@@ -167,7 +167,7 @@ class Bench:
         return {
             "change": change,
             "seed": seed,
-            "rival": rival,
+            "baseline": baseline,
             "reward": [episode.reward for episode in made],
             "success": [episode.success for episode in made],
             "time": [episode.time_end - made[0].time_start for episode in made],
@@ -215,7 +215,9 @@ def measure() -> Iterator[str]:
         bench, found = Bench(folder, movements, collected), {}
         yield HEADER
         for change in changes:
-            found[change] = [{rival: bench.row(change, seed, rival) for rival in RIVALS} for seed in seeds]
+            found[change] = [
+                {baseline: bench.row(change, seed, baseline) for baseline in BASELINES} for seed in seeds
+            ]
             yield line(change, found[change])
         yield from rates(found)
         if kept:
@@ -225,11 +227,13 @@ def measure() -> Iterator[str]:
 
 def line(change: str, rows: list[dict[str, dict[str, Any]]]) -> str:
     """Return the line of a change: means over seeds; movements and minutes of each seed."""
-    rewards = {rival: np.array([row[rival]["reward"] for row in rows]) for rival in RIVALS}
+    rewards = {baseline: np.array([row[baseline]["reward"] for row in rows]) for baseline in BASELINES}
     without, adapting = rewards["without"], rewards["adapting"]
     gain, half = over_seeds((adapting - without)[:, :100].mean(axis=1))
-    last = {rival: reward[:, -100:].mean() for rival, reward in rewards.items()}
-    recovered = {rival: [recovery(row[rival], row["fresh"]) for row in rows] for rival in ("without", "adapting")}
+    last = {baseline: reward[:, -100:].mean() for baseline, reward in rewards.items()}
+    recovered = {
+        baseline: [recovery(row[baseline], row["fresh"]) for row in rows] for baseline in ("without", "adapting")
+    }
     noticed = [
         next((e["movement"] for e in row["without"]["events"] if e["what"] == "noticed"), None) for row in rows
     ]
@@ -291,17 +295,17 @@ def rates(found: Mapping[str, list[dict[str, dict[str, Any]]]]) -> Iterator[str]
 
 @styled
 def curves(found: Mapping[str, list[dict[str, dict[str, Any]]]]) -> Figure:
-    """Draw the reward of the rivals over the movements, one panel for each change."""
+    """Draw the reward of the baselines over the movements, one panel for each change."""
     rows = -(-len(found) // 2)
     figure, axes = panels(rows, 2, 0.6 + 2.0 * rows, sharex=True)
     looks = {"fresh": (GREY, ":"), "without": (MIDDLE, "--"), "adapting": (DARK, "-")}
     for place, (change, each) in zip(axes.ravel(), found.items(), strict=False):
         lowest = np.inf
-        for rival, (color, dashes) in looks.items():
-            smooth = np.array([moving_mean(row[rival]["reward"], 50).mean for row in each])
+        for baseline, (color, dashes) in looks.items():
+            smooth = np.array([moving_mean(row[baseline]["reward"], 50).mean for row in each])
             mean = smooth.mean(axis=0)
             lowest = min(lowest, mean.min())
-            if rival == "adapting" and len(each) > 1:
+            if baseline == "adapting" and len(each) > 1:
                 half = np.array([over_seeds(column)[1] for column in smooth.T])
                 place.fill_between(np.arange(len(mean)), mean - half, mean + half, color=LIGHT, alpha=0.5, lw=0)
             place.plot(mean, color=color, ls=dashes)

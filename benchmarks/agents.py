@@ -1,8 +1,8 @@
 """All methods side by side on arms of the distribution: collect, fit, train, then move on the arm, learning nothing.
 
-All rivals get the same begin states and goals. Settings come from the environment:
+All baselines get the same begin states and goals. Settings come from the environment:
 
-PNEUMARM_AGENTS_ARMS       seeds of virtual arms, "1,2,3" by default; the judging arms are 1001 to 1010
+PNEUMARM_AGENTS_ARMS       seeds of virtual arms, "1,2,3" by default; the held-out arms are 1001 to 1010
 PNEUMARM_AGENTS_SEEDS      seeds of the training, "1,2"
 PNEUMARM_AGENTS_METHODS    "policy,batched,sarsa"; "policy-greedy" is the policy without lookahead
 PNEUMARM_AGENTS_MOVEMENTS  greedy movements on the arm for each agent, 500

@@ -26,11 +26,11 @@ def measure() -> Iterator[str]:
         began = perf_counter()
         planned = measure_bound(VirtualArm(draw_parameters(seed)), GOALS, BoundSettings(episodes=EPISODES))
         elapsed = perf_counter() - began
-        results = {rival: movements.results() for rival, movements in planned.items()}
-        for rival, figures in results.items():
+        results = {planner: movements.results() for planner, movements in planned.items()}
+        for planner, figures in results.items():
             low, high = figures["intervals"]["reward"]
             yield (
-                f"arm {seed}, {rival.replace('_', ' ')}: reward {figures['reward']:.2f} ({low:.2f} to {high:.2f}), "
+                f"arm {seed}, {planner.replace('_', ' ')}: reward {figures['reward']:.2f} ({low:.2f} to {high:.2f}), "
                 f"success {figures['success_rate']:.3f}, {figures['actions']:.2f} actions, "
                 f"{figures['switches']:.2f} switches, decisions {figures['decision_ms']['median']:.3f} ms, "
                 f"p99 {figures['decision_ms']['p99']:.1f} ms"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pneumarm.arm.corrected import CorrectedArm
-from pneumarm.arm.spec_file import Baseline
+from pneumarm.arm.spec_file import SoundState
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.arm.virtual.faults import (
     DeadPotentiometer,
@@ -90,16 +90,16 @@ OF_MUSCLES = (
 """What is said of one muscle of a joint, not of all of it."""
 
 
-def played(case: Case, arm: int) -> tuple[Checkup, Baseline | None]:
-    """Return the check-up of ``arm`` with a fault, on muscle 1 of even and 2 of odd arms, and its baseline."""
+def played(case: Case, arm: int) -> tuple[Checkup, SoundState | None]:
+    """Return the check-up of ``arm`` with a fault, on muscle 1 of even and 2 of odd arms, and its sound state."""
     opened = VirtualArm(draw_parameters(arm), seed=arm)
-    seen, baseline = opened, None
+    seen, sound = opened, None
     if case.calibrated:
         known = calibrate(check_up(opened)).file
-        seen, baseline = CorrectedArm(opened, known), known.baseline
+        seen, sound = CorrectedArm(opened, known), known.sound
     opened.faults = (case.fault(1 + arm % 2),)
     opened.wait(case.before)
-    return check_up(seen), baseline
+    return check_up(seen), sound
 
 
 def said(case: Case, arm: int) -> set[str]:
@@ -122,8 +122,8 @@ def measure() -> Iterator[str]:
             figures.append(_extremes(checkup))
             opened.wait(noise * NIGHT)
             again = check_up(CorrectedArm(opened, known))
-            later += bool(diagnose(again, known.baseline))
-            moved = (ends(again.joints[0]) - known.baseline.ends[0]) / known.spec.counts_per_degree
+            later += bool(diagnose(again, known.sound))
+            moved = (ends(again.joints[0]) - known.sound.ends[0]) / known.spec.counts_per_degree
             figures[-1]["ends moved [degrees]"] = float(np.abs(moved).max())
     count = len(arms) * NOISES
     yield f"arms {first} to {last}, healthy: {complaints} of {count} complained of, calibrated {later} of {count}"

@@ -8,7 +8,7 @@ is not watched while it is brought to a begin state), from the begin of the faul
 Healthy hours are collecting from a cold morning on, and movements by a policy before, while and after it adapts.
 Settings come from the environment:
 
-PNEUMARM_FAULTS_ARMS     seeds of virtual arms, 1 to 20 by default; the judging arms are 1001 to 1010
+PNEUMARM_FAULTS_ARMS     seeds of virtual arms, 1 to 20 by default; the held-out arms are 1001 to 1010
 PNEUMARM_FAULTS_CASES    cases of each fault, 40
 PNEUMARM_FAULTS_HOURS    healthy hours of collecting, 10; and a fifth of that of movements
 PNEUMARM_FAULTS_FOLDER   where stores, simulations and agents are kept; a temporary folder by default

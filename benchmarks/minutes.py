@@ -7,7 +7,7 @@ fitted and an agent trained from nothing else, by the defaults. The movements ar
 begin states by their numbers, goals within the range of the angles of the longest collection. Nothing is learned on
 the arm. Settings come from the environment:
 
-PNEUMARM_MINUTES_ARMS       seeds of virtual arms; the ten judging arms by default
+PNEUMARM_MINUTES_ARMS       seeds of virtual arms; the ten held-out arms by default
 PNEUMARM_MINUTES_SEEDS      of collecting, fitting and training, "0"
 PNEUMARM_MINUTES_MINUTES    "1.7,5,10,20,60,110"; the first are the fewest transitions that are allowed, 2,000
 PNEUMARM_MINUTES_MOVEMENTS  of each agent, 500
@@ -29,7 +29,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from benchmarks._trials import JUDGING, Rows, collected, fitted, moved
+from benchmarks._trials import HELD_OUT, Rows, collected, fitted, moved
 from pneumarm.learning import test, train
 from pneumarm.report.style import DARK, GREY, MIDDLE, key, legend_below, panels, styled
 from pneumarm.statistics import rate_estimate
@@ -44,7 +44,7 @@ HEADER = (
 def measure() -> Iterator[str]:
     folder = Path(os.environ.get("PNEUMARM_MINUTES_FOLDER", "runs/minutes"))
     folder.mkdir(parents=True, exist_ok=True)
-    arms = [int(arm) for arm in os.environ.get("PNEUMARM_MINUTES_ARMS", JUDGING).split(",")]
+    arms = [int(arm) for arm in os.environ.get("PNEUMARM_MINUTES_ARMS", HELD_OUT).split(",")]
     seeds = [int(seed) for seed in os.environ.get("PNEUMARM_MINUTES_SEEDS", "0").split(",")]
     chosen = os.environ.get("PNEUMARM_MINUTES_MINUTES", "1.7,5,10,20,60,110")
     minutes = sorted((float(one) for one in chosen.split(",")), reverse=True)

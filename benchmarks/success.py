@@ -6,7 +6,7 @@ The agent is made as ``pneumarm run`` makes it, by its defaults; it moves greedi
 made in blocks, each on the arm as it is when newly opened, so that they can be made at once and in any order; the
 begin state and the goal of a movement depend on its number alone. Settings come from the environment:
 
-PNEUMARM_SUCCESS_ARMS       seeds of virtual arms; the ten judging arms by default
+PNEUMARM_SUCCESS_ARMS       seeds of virtual arms; the ten held-out arms by default
 PNEUMARM_SUCCESS_MOVEMENTS  on each arm, 5000
 PNEUMARM_SUCCESS_PROCESSES  1
 PNEUMARM_SUCCESS_FOLDER     where agents and rows are kept; a call with the same folder goes on where another ended.
@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._trials import JUDGING, Rows, collected, fitted, moved
+from benchmarks._trials import HELD_OUT, Rows, collected, fitted, moved
 from benchmarks.agents import kind
 from pneumarm.control import Movement
 from pneumarm.learning import load_agent, train
@@ -45,7 +45,7 @@ HEADER = f"{'arm':8}{'movements':>10}{'failed':>8}{'success':>28}{'reward':>17}{
 def measure() -> Iterator[str]:
     folder = Path(os.environ.get("PNEUMARM_SUCCESS_FOLDER", "runs/success"))
     folder.mkdir(parents=True, exist_ok=True)
-    arms = [int(arm) for arm in os.environ.get("PNEUMARM_SUCCESS_ARMS", JUDGING).split(",")]
+    arms = [int(arm) for arm in os.environ.get("PNEUMARM_SUCCESS_ARMS", HELD_OUT).split(",")]
     blocks = -(-int(os.environ.get("PNEUMARM_SUCCESS_MOVEMENTS", "5000")) // BLOCK)
     rows = Rows(folder / "blocks.jsonl", "arm", "block")
     failures = Rows(folder / "failures.jsonl", "arm", "number")

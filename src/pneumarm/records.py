@@ -38,7 +38,7 @@ def training_record(training: Trained) -> TrainingData | LearningData:
     return TrainingData(
         episodes=longest[:, 0],
         deviation=curves[1],
-        criterium=curves[2],
+        criterion=curves[2],
         performance=curves[3],
         epsilon=curves[4],
         temperature=curves[5],

@@ -127,16 +127,16 @@ def test_a_beginning_is_found_between_readings_and_not_from_too_few():
     assert np.isnan(onset([(time[::5], time[::5])]))
 
 
-def test_a_leak_is_told_by_the_baseline_of_the_calibration(tmp_path, capsys):
+def test_a_leak_is_told_by_the_sound_state_of_the_calibration(tmp_path, capsys):
     file, plan = tmp_path / "arm.toml", tmp_path / "leak.toml"
     assert run(capsys, "arm", "calibrate", "virtual:seed=6", "--out", file)[0] == 0
     code, out, _ = run(capsys, "arm", "check", f"virtual:seed=6,spec={file}", "--seed", 9, "--json")
     told = json.loads(out)
     assert (code, told["healthy"]) == (0, True)
-    assert told["baseline"]["leak"] == [list(pair) for pair in load_arm_file(file).baseline.leak]
+    assert told["sound"]["leak"] == [list(pair) for pair in load_arm_file(file).sound.leak]
     plan.write_text('[[fault]]\nkind = "leak"\nmuscle = 2\nfactor = 3.0\n')
     _, out, _ = run(capsys, "arm", "check", f"virtual:seed=6,faults={plan}", "--json")
-    assert json.loads(out)["healthy"]  # without a baseline nobody knows
+    assert json.loads(out)["healthy"]  # without a calibration nobody knows
     _, out, _ = run(capsys, "arm", "check", f"virtual:seed=6,faults={plan},spec={file}")
     assert "joint, muscle 2: leak: it leaks 2." in out
     assert "times as much as when calibrated" in " ".join(out.split())
@@ -146,7 +146,7 @@ def test_an_arm_that_is_not_as_calibrated_is_told():
     known = calibrate(measure(FaultyArm(5))).file
     slipped, shifted = FaultyArm(5, angle=lambda a: a + 90), FaultyArm(5, pressure=lambda p: p + np.array([0, 15]))
     for arm, where in ((slipped, "joint"), (shifted, "joint, muscle 2")):
-        found = diagnose(measure(CorrectedArm(arm, known)), known.baseline)
+        found = diagnose(measure(CorrectedArm(arm, known)), known.sound)
         assert [(f.kind, f.where) for f in found] == [("not as calibrated", where)]
 
 
@@ -165,7 +165,7 @@ def test_a_logarithmic_potentiometer_is_linearised(bent):
     slope, offset = np.polyfit(true, fitted, 1)
     assert np.abs(fitted - slope * true - offset).max() < 40  # of 550; raw it is over 100
     corrected = CorrectedArm(arm, calibration.file)
-    assert "angle logarithmic" not in [f.kind for f in diagnose(measure(corrected), calibration.file.baseline)]
+    assert "angle logarithmic" not in [f.kind for f in diagnose(measure(corrected), calibration.file.sound)]
 
 
 @pytest.mark.parametrize("angle", [-15.0, 0.0, 12.0])

@@ -25,7 +25,7 @@ def planned():  # type: ignore[no-untyped-def]
 
 def test_planners_reach_the_same_goals_and_none_beats_the_bound_by_far(planned) -> None:  # type: ignore[no-untyped-def]
     assert list(planned) == ["open_loop", "closed_loop"]
-    open_, closed = (planned[rival].episodes for rival in planned)
+    open_, closed = (planned[baseline].episodes for baseline in planned)
     assert [e.goal for e in open_] == [e.goal for e in closed]
     assert all(e.success for e in open_)
     assert all(abs(a.angle_begin[0] - b.angle_begin[0]) < 60 for a, b in zip(open_, closed, strict=True))
@@ -42,8 +42,8 @@ def test_planners_reach_the_same_goals_and_none_beats_the_bound_by_far(planned) 
 
 def test_the_same_seed_gives_the_same_movements(planned) -> None:  # type: ignore[no-untyped-def]
     again = measure_bound(VirtualArm(draw_parameters(9), name="ninth"), GOALS, FEW, seed=3)
-    for rival in planned:
-        assert again[rival].episodes == planned[rival].episodes
+    for baseline in planned:
+        assert again[baseline].episodes == planned[baseline].episodes
     other = measure_bound(VirtualArm(draw_parameters(9)), GOALS, FEW, seed=4)
     assert other["open_loop"].episodes != planned["open_loop"].episodes
 
@@ -66,9 +66,9 @@ def test_command(capsys: pytest.CaptureFixture[str], small_run: Path) -> None:
     printed = capsys.readouterr()
     result = json.loads(printed.out)
     assert result["arm"] == "virtual:seed=3"
-    for rival in ("open_loop", "closed_loop", "simulated"):
-        assert result[rival]["episodes"] == 3
-        assert set(result[rival]["intervals"]) == {"reward", "success_rate", "actions", "switches"}
+    for baseline in ("open_loop", "closed_loop", "simulated"):
+        assert result[baseline]["episodes"] == 3
+        assert set(result[baseline]["intervals"]) == {"reward", "success_rate", "actions", "switches"}
 
 
 def test_the_distance_is_taken_movement_by_movement(planned) -> None:  # type: ignore[no-untyped-def]
@@ -85,11 +85,11 @@ def test_a_bound_is_known_of_virtual_arms_only(planned) -> None:  # type: ignore
     arm = VirtualArm(draw_parameters(9), name="ninth")
     rewards = {"before": np.full(20, 10.0), "after": np.full(20, 30.0)}
     known = known_bound(arm, GOALS, rewards, FEW, seed=3)
-    for rival in ("open_loop", "closed_loop"):
-        mean = planned[rival].results()["reward"]
-        assert known[rival]["reward"] == mean
-        assert known["distance"]["before"][rival]["reward"] == pytest.approx(mean - 10)
-        assert known["distance"]["after"][rival]["reward"] == pytest.approx(mean - 30)
+    for baseline in ("open_loop", "closed_loop"):
+        mean = planned[baseline].results()["reward"]
+        assert known[baseline]["reward"] == mean
+        assert known["distance"]["before"][baseline]["reward"] == pytest.approx(mean - 10)
+        assert known["distance"]["after"][baseline]["reward"] == pytest.approx(mean - 30)
     opened = SimulationArm(synthetic_simulation())
     assert "true physics is not known" in known_bound(opened, GOALS, rewards, FEW)["missing"]
 

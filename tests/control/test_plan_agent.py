@@ -66,9 +66,11 @@ def test_it_is_tested_with_everybodys_begin_states_and_goals() -> None:
     )
     again = agent.test(SIMULATION, BEGIN, 60, (7, TEST))
     np.testing.assert_array_equal(again.reward, tested.reward)
-    rival = train(SIMULATION, BEGIN, TrainSettings(agents=1, max_episodes=100, validation_episodes=10), seed=0).agent
-    env = environment(SIMULATION, BEGIN, rival.settings)
-    other = run_test(env, rival.weights(), rival.settings, 60, (7, TEST))
+    baseline = train(
+        SIMULATION, BEGIN, TrainSettings(agents=1, max_episodes=100, validation_episodes=10), seed=0
+    ).agent
+    env = environment(SIMULATION, BEGIN, baseline.settings)
+    other = run_test(env, baseline.weights(), baseline.settings, 60, (7, TEST))
     np.testing.assert_array_equal(other.goal, tested.goal)
     np.testing.assert_array_equal(other.angle_begin, tested.angle_begin)
     assert other.reward.mean() < tested.reward.mean()

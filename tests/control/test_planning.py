@@ -15,7 +15,7 @@ from pneumarm.arm.virtual.rollout import advance_physics
 from pneumarm.control import Movement, move
 from pneumarm.errors import UnusableInput
 from pneumarm.planning import PhysicsModel, Planner, PlanSettings, SimulationModel, physics_planner, simulated_planner
-from pneumarm.planning.search import Uncertainty, find, problem, room_of, tree, within
+from pneumarm.planning.search import Uncertainty, find, problem, tree, within, workspace_of
 from pneumarm.simulation import NoiseSettings, SimulationArm
 from pneumarm.simulation.rollout import advance_simulated, copy_simulated, simulated_states, simulated_world
 from pneumarm.task import Reward
@@ -243,8 +243,8 @@ def test_two_joints_are_planned_together() -> None:
     begin = synthetic_begin_states(simulation)
     settings = PlanSettings(switches=2, cutoff=2)
     world = simulated_world(simulation)
-    states = simulated_states(world, room_of(settings, 2))
-    room = tree(settings, 2)
+    states = simulated_states(world, workspace_of(settings, 2))
+    workspace = tree(settings, 2)
     reached = 0
     for number in (100, 700, 1300):
         start = states.x[0].copy()
@@ -252,7 +252,7 @@ def test_two_joints_are_planned_together() -> None:
         for distance in ([0.0, 0.0], [30.0, -30.0], [50.0, 20.0]):
             goal = begin.angle[number] + distance
             states.x[0] = start
-            found = find(world, states, problem(goal, REWARD, settings), room)
+            found = find(world, states, problem(goal, REWARD, settings), workspace)
             assert found.proven
             assert found.cost == simulated_best(start, goal, settings)
             reached += found.reached

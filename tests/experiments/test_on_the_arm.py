@@ -140,7 +140,7 @@ def test_looking_tells_goals_and_scales() -> None:
     assert (raw[..., 1] == 0).all()
 
 
-def test_learning_on_the_arm_ends_when_the_criterium_is_met() -> None:
+def test_learning_on_the_arm_ends_when_the_criterion_is_met() -> None:
     """With a goal area as wide as the range every movement succeeds, so shaping grows the deviation every time."""
     wide = Reward(angle_tolerance=1e4, velocity_tolerance=1e4)
     shaping = Shaping(initial_deviation=30.0, episodes=10, performance_rate=0.2, grow=0.5)

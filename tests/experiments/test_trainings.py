@@ -89,7 +89,7 @@ def test_exploring_tests_are_made_when_asked_for(material: Simulated) -> None:
 
 
 def test_success_while_learning_on_is_that_of_the_training(material: Simulated) -> None:
-    """An agent that met the criterium of 95 % goes on meeting it; one that learns nothing does as in the test."""
+    """An agent that met the criterion of 95 % goes on meeting it; one that learns nothing does as in the test."""
     laboratory = LaboratorySettings(test_episodes=2000, exploring=True)
     settings = replace(TrainSettings(), max_episodes=40_000)
     trained = train_and_test(material, settings, 3, laboratory)
@@ -124,7 +124,7 @@ def test_training_on_begins_as_training(material: Simulated) -> None:
     assert row["episodes"] == before["episodes"]
 
 
-def test_training_that_does_not_stop_meets_the_criterium_for_good(material: Simulated) -> None:
+def test_training_that_does_not_stop_meets_the_criterion_for_good(material: Simulated) -> None:
     settings = replace(TrainSettings(), agents=1, validation_episodes=1, max_episodes=40_000)
     stopped = train(material.simulation, material.begin, settings, 3)
     assert stopped.met[0]
@@ -135,7 +135,7 @@ def test_training_that_does_not_stop_meets_the_criterium_for_good(material: Simu
 
 
 def test_without_shaping_the_end_is_looked_for_after_every_episode(material: Simulated) -> None:
-    """As in table C.22. The performance (eq. 4.14) has met the criterium just then."""
+    """As in table C.22. The performance (eq. 4.14) has met the criterion just then."""
     settings = experiment("no-shaping").train_settings(2)  # type: ignore[attr-defined]
     assert (settings.exploration.epsilon, settings.exploration.temperature, settings.shaping) == (0.09, 10.0, None)
     one = replace(settings, agents=1, validation_episodes=1, max_episodes=40_000)

@@ -5,7 +5,7 @@ import pytest
 
 from pneumarm.kernels import kernel
 from pneumarm.learning.policy.proximal import exponential, log_softmax
-from pneumarm.networks.layers import adam, backward, forward, initial_weights, room, split, trainable
+from pneumarm.networks.layers import adam, backward, forward, initial_weights, split, trainable, workspace
 
 SIZES = (7, 6, 5, 9)
 SAMPLES = 37  # no multiple of anything
@@ -29,7 +29,7 @@ def inputs() -> np.ndarray:
 
 
 def test_forward(weights: np.ndarray) -> None:
-    units = room(SIZES, SAMPLES)
+    units = workspace(SIZES, SAMPLES)
     net = trainable(weights, SIZES, SAMPLES)
     forward(net.layers, inputs(), units)
     np.testing.assert_allclose(units[-1], reference(weights.astype(float), inputs().astype(float)), atol=2e-5)

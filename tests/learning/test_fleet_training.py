@@ -102,7 +102,7 @@ def test_a_killed_training_goes_on_bit_for_bit(
         train(simulation, begin, SETTINGS[method], seed=1, checkpoint=checkpoint)
 
 
-def test_rivals_are_tested_on_the_same_movements(
+def test_baselines_are_tested_on_the_same_movements(
     trained: dict[str, FleetTraining], simulation: Simulation, begin: BeginStates
 ) -> None:
     one, other = (test(t.agent, simulation, begin, 300, seed=3) for t in trained.values())

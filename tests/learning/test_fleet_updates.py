@@ -9,7 +9,7 @@ from pneumarm.learning.batched.values import connections, lambda_returns, networ
 from pneumarm.learning.online.values import draw_networks
 from pneumarm.learning.policy.proximal import advantages, batch, policy_errors
 from pneumarm.learning.policy.training import rule
-from pneumarm.networks.layers import initial_weights, room, trainable
+from pneumarm.networks.layers import initial_weights, trainable, workspace
 
 
 def test_advantages_by_hand() -> None:
@@ -96,7 +96,7 @@ def test_nine_networks_as_one_are_the_networks_of_an_agent() -> None:
     x = np.random.default_rng(2).normal(0, 1, (sizes[0], 1)).astype(np.float32)
     from pneumarm.networks.layers import forward, split
 
-    units = room(sizes, 1)
+    units = workspace(sizes, 1)
     forward(split(flat, sizes), x, units)
     for joint in range(joints):
         for action in range(9):

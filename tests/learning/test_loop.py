@@ -12,7 +12,7 @@ import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.learning import TrainSettings
-from pneumarm.learning.online.loop import Schedule, room, train_episode, train_episodes
+from pneumarm.learning.online.loop import Schedule, train_episode, train_episodes, workspace
 from pneumarm.learning.online.values import draw_networks, learner, network_shapes, pack, unpack
 from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings
@@ -37,7 +37,7 @@ def one_episode(
     weights = pack(networks, simulation.window)
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
-    outcome = train_episode(env, learner(weights, settings), GREEDY, one, room(one))
+    outcome = train_episode(env, learner(weights, settings), GREEDY, one, workspace(one))
     return outcome, 50 * unpack(weights, simulation.window, settings.hidden).output_bias[0]
 
 
@@ -77,7 +77,7 @@ def _chunk(joints: int, count: int, method: str = "q-learning") -> dict[str, lis
     weights = pack(draw_networks(simulation.window, settings, np.random.default_rng(0)), simulation.window)
     one = episode(env, random_state(4))
     performance, steps, _ = train_episodes(
-        env, learner(weights, settings), Schedule(150.0, 0.5, 20.0, 0.002), one, room(one), count, 0.5
+        env, learner(weights, settings), Schedule(150.0, 0.5, 20.0, 0.002), one, workspace(one), count, 0.5
     )
     return {
         "weights": weights.ravel().tolist(),
@@ -115,7 +115,7 @@ def test_performance_is_the_moving_average_of_successes(simulation: Simulation, 
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     work = learner(pack(networks, simulation.window), settings)
-    performance, steps, _ = train_episodes(env, work, GREEDY, one, room(one), 500, 0.2)
+    performance, steps, _ = train_episodes(env, work, GREEDY, one, workspace(one), 500, 0.2)
     assert steps == 500
     assert performance == pytest.approx(1 - 0.8 * 0.998**500, rel=1e-9)
 
@@ -133,6 +133,6 @@ def test_training_ends_with_the_episode_in_which_the_performance_is_enough(
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     work = learner(pack(networks, simulation.window), settings)
-    performance, steps, count = train_episodes(env, work, GREEDY._replace(enough=0.5), one, room(one), 500, 0.2)
+    performance, steps, count = train_episodes(env, work, GREEDY._replace(enough=0.5), one, workspace(one), 500, 0.2)
     assert (steps, count) == (235, 235)
     assert 0.5 <= performance < 0.5 + 0.002

@@ -27,16 +27,16 @@ def test_stages_are_linear_in_the_deviation() -> None:
         ((first + last) / 2, (0.725, 0.275, 10.5)),
     ]:
         now = stage(deviation, SETTINGS, SPEC)
-        assert (now.criterium, now.schedule.epsilon, now.schedule.temperature) == pytest.approx(expected)
+        assert (now.criterion, now.schedule.epsilon, now.schedule.temperature) == pytest.approx(expected)
         assert now.schedule.deviation == deviation
         assert now.whole == (deviation == last)
 
 
 def test_deviation_follows_the_performance() -> None:
     d = 200.0
-    demanded = stage(d, SETTINGS, SPEC).criterium
+    demanded = stage(d, SETTINGS, SPEC).criterion
     assert adjusted(d, demanded + 1e-9, SETTINGS, SPEC) == pytest.approx(220)
-    assert adjusted(d, demanded, SETTINGS, SPEC) == pytest.approx(194)  # it has to exceed the criterium
+    assert adjusted(d, demanded, SETTINGS, SPEC) == pytest.approx(194)  # it has to exceed the criterion
     assert adjusted(1000.0, 1.0, SETTINGS, SPEC) == 1023
     first = initial_deviation(SETTINGS, SPEC)
     assert adjusted(first, 0.0, SETTINGS, SPEC) == first
@@ -55,7 +55,7 @@ def test_without_shaping_everything_is_as_at_the_end() -> None:
     now = stage(initial_deviation(settings, SPEC), settings, SPEC)
     assert now.whole
     assert math.isinf(now.schedule.deviation)
-    assert (now.criterium, now.schedule.epsilon, now.schedule.temperature) == (0.95, 0.05, 1.0)
+    assert (now.criterion, now.schedule.epsilon, now.schedule.temperature) == (0.95, 0.05, 1.0)
     assert adjusted(1023.0, 0.0, settings, SPEC) == 1023.0
 
 

@@ -52,7 +52,7 @@ def test_curves_tell_the_story_of_shaping(full: Training) -> None:
         assert rows["episodes"].tolist() == (500 * np.arange(1, len(curve) + 1)).tolist()
         assert rows["episodes"][-1] == episodes
         growth = rows["deviation"][1:] / rows["deviation"][:-1]
-        exceeded = rows["performance"][:-1] > rows["criterium"][:-1]
+        exceeded = rows["performance"][:-1] > rows["criterion"][:-1]
         inside = (rows["deviation"][1:] < 1023) & (rows["deviation"][1:] > rows["deviation"][0])
         np.testing.assert_allclose(growth[inside], np.where(exceeded, 1.1, 0.97)[inside])
         if met:
@@ -65,7 +65,7 @@ def test_best_is_chosen_by_validation(full: Training) -> None:
     rewards = [result.reward.mean() for result in full.validation]
     assert full.best == int(np.argmax(rewards))
     begins = [result.angle_begin for result in full.validation]
-    assert all(np.array_equal(begins[0], other) for other in begins)  # rivals move alike
+    assert all(np.array_equal(begins[0], other) for other in begins)  # baselines move alike
 
 
 def test_results_count_what_was_done(full: Training) -> None:
@@ -130,14 +130,14 @@ def test_resumed_training_is_the_same(
 
 def test_killed_process_resumes(simulation: Simulation, begin: BeginStates, tmp_path: Path) -> None:
     """Kill -9 in the middle; what is then on disk leads to the results of an uninterrupted training."""
-    settings = TrainSettings(agents=2, max_episodes=20_000, validation_episodes=50, shaping=Shaping(criterium=1.0))
+    settings = TrainSettings(agents=2, max_episodes=20_000, validation_episodes=50, shaping=Shaping(criterion=1.0))
     folder, path = Path(__file__).parent, tmp_path / "training"
     code = (
         "import sys; from pathlib import Path; from synthetic_arm import *; from pneumarm.learning import *\n"
         "import pneumarm.learning.online.training as module; module._CHECKPOINT_EVERY = 0.0\n"
         "simulation = synthetic_simulation()\n"
         "settings = TrainSettings(agents=2, max_episodes=20_000, validation_episodes=50,\n"
-        "    shaping=Shaping(criterium=1.0))\n"
+        "    shaping=Shaping(criterion=1.0))\n"
         "train(simulation, synthetic_begin_states(simulation), settings, seed=8, checkpoint=Path(sys.argv[1]))\n"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *sys.path])}

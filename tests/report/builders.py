@@ -20,7 +20,7 @@ from pneumarm.report import (
     TrainingData,
     TransferData,
 )
-from pneumarm.report.figures import Rival
+from pneumarm.report.figures import Baseline
 from pneumarm.statistics import Estimate
 from pneumarm.transitions.window import QUANTITIES, Window
 
@@ -96,7 +96,7 @@ def training(agents=16, evaluations=44, seed=0):
     return TrainingData(
         episodes=500.0 * np.arange(1, evaluations + 1),
         deviation=deviation,
-        criterium=0.5 + 0.45 * share,
+        criterion=0.5 + 0.45 * share,
         performance=performance,
         epsilon=0.5 - 0.45 * share,
         temperature=20 - 19 * share,
@@ -232,7 +232,7 @@ def below(by):
     return {"episodes": 150, "reward": by, "interval": [by - 0.5, by + 0.5]}
 
 
-def rivals(agents=3, seed=0):
+def baselines(agents=3, seed=0):
     """Methods that were trained, each with some agents, and levels that need no training."""
     random = np.random.default_rng(seed)
     trained = []
@@ -240,7 +240,7 @@ def rivals(agents=3, seed=0):
         means = reward + random.normal(0, 2, agents)
         spent = seconds * random.uniform(0.8, 1.2, agents)
         mean = Estimate(float(means.mean()), float(means.mean()) - 0.6, float(means.mean()) + 0.6, 500 * agents)
-        trained.append(Rival(name, spent, means, mean))
+        trained.append(Baseline(name, spent, means, mean))
     return trained, {"open loop": Estimate(40.2, 39.6, 40.8, 500), "planning": Estimate(38.8, 38.0, 39.6, 500)}
 
 

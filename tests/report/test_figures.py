@@ -43,13 +43,13 @@ def figures_of(n, joints):
         "distributions": figures.distributions(test.reward, test.actions, test.switches, won),
         "transfer": figures.transfer_curves(phases, levels(test)),
         "displacement": figures.against_displacement(*far, spec),
-        "rivals": figures.rivals(*(builders.rivals(min(n, 10)) if n else ([], {}))),
+        "baselines": figures.baselines(*(builders.baselines(min(n, 10)) if n else ([], {}))),
         "adaptation": figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14),
         "marked": figures.marked_rows(k.spans, k.reason, k.reasons, k.ends.tolist(), k.stages, spec.period),
         "movement": figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
     }
     if t is not None:
-        curves = (t.episodes, t.deviation, t.criterium, t.performance, t.epsilon, t.temperature)
+        curves = (t.episodes, t.deviation, t.criterion, t.performance, t.epsilon, t.temperature)
         made["shaping"] = figures.shaping_curves(*curves, t.evaluated, t.chosen, spec)
         made["spread"] = figures.spread_of_agents(t.reward, t.success, t.chosen)
     return made
@@ -217,18 +217,18 @@ def test_a_run_without_anything_has_its_results_only():
     assert [s.title for s in sections] == ["Results", "Test in the simulation"]
 
 
-def test_rivals_stand_at_their_rewards_beside_the_bound():
-    trained, untrained = builders.rivals()
-    place = figures.rivals(trained, untrained).axes[0]
+def test_baselines_stand_at_their_rewards_beside_the_bound():
+    trained, untrained = builders.baselines()
+    place = figures.baselines(trained, untrained).axes[0]
     drawn = {(x, y) for line in place.lines for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)}
-    for rival in trained:
-        assert set(zip(rival.seconds, rival.reward, strict=True)) <= drawn
-        assert rival.mean.mean in {y for _, y in drawn}
+    for baseline in trained:
+        assert set(zip(baseline.seconds, baseline.reward, strict=True)) <= drawn
+        assert baseline.mean.mean in {y for _, y in drawn}
     assert {level.mean for level in untrained.values()} <= {y for _, y in drawn}
     low, high = place.get_ylim()
-    assert low < min(rival.reward.min() for rival in trained) < 40.2 < high
-    assert "open loop: 40.20 without training" in figures.rivals_alt(trained, untrained)
-    assert figures.rivals_alt([], {}) == "Reward against training time. No rival was measured."
+    assert low < min(baseline.reward.min() for baseline in trained) < 40.2 < high
+    assert "open loop: 40.20 without training" in figures.baselines_alt(trained, untrained)
+    assert figures.baselines_alt([], {}) == "Reward against training time. No baseline was measured."
 
 
 def test_the_adaptation_is_told_with_its_figures():

@@ -2,7 +2,7 @@
 
 An ``arm.toml`` holds a table ``[spec]`` with the fields of :class:`~pneumarm.arm.ArmSpec`, and, where a calibration
 found that readings must be corrected, a table ``[correction]`` with those of :class:`Correction`, and a table
-``[baseline]`` with what the arm did then, those of :class:`Baseline`::
+``[sound]`` with what the arm did then, those of :class:`SoundState`::
 
     [spec]
     joints = 1
@@ -14,7 +14,7 @@ found that readings must be corrected, a table ``[correction]`` with those of :c
     [correction]
     pressure_zero = [[41.0, 40.5]]
 
-    [baseline]
+    [sound]
     leak = [[0.025, 0.037]]
     leak_error = [[0.0007, 0.0007]]
     ends = [[160.5, 870.0]]
@@ -110,7 +110,7 @@ def _require(valid: bool, name: str, expected: str) -> None:
 
 
 @dataclass(frozen=True)
-class Baseline:
+class SoundState:
     """What a sound arm did when it was calibrated; a later check-up is compared with it. In corrected counts."""
 
     leak: tuple[tuple[float, float], ...]
@@ -123,9 +123,9 @@ class Baseline:
     def __post_init__(self) -> None:
         for name, values in vars(self).items():
             if not all(map(_finite, values)):
-                raise UnusableInput(f"Baseline: {name} needs two finite numbers a joint")
+                raise UnusableInput(f"SoundState: {name} needs two finite numbers a joint")
         if not all(error >= 0 for pair in self.leak_error for error in pair):
-            raise UnusableInput("Baseline: leak_error needs numbers that are not negative")
+            raise UnusableInput("SoundState: leak_error needs numbers that are not negative")
 
 
 @dataclass(frozen=True)
@@ -134,13 +134,13 @@ class ArmFile:
 
     spec: ArmSpec
     correction: Correction = Correction()
-    baseline: Baseline | None = None
+    sound: SoundState | None = None
 
     def __post_init__(self) -> None:
         if not self.correction.fits(self.spec.joints):
             raise UnusableInput(f"the correction must be for {self.spec.joints} joint(s), as the spec is")
-        if self.baseline is not None and any(len(v) != self.spec.joints for v in vars(self.baseline).values()):
-            raise UnusableInput(f"the baseline must be for {self.spec.joints} joint(s), as the spec is")
+        if self.sound is not None and any(len(v) != self.spec.joints for v in vars(self.sound).values()):
+            raise UnusableInput(f"the sound must be for {self.spec.joints} joint(s), as the spec is")
 
 
 def load_spec(path: Path | str) -> ArmSpec:
@@ -178,7 +178,7 @@ def load_arm_file(path: Path | str) -> ArmFile:
             raise UnusableInput(f"larger than {_LARGEST:,} bytes")
         found = tomllib.loads(text.decode())
         _refuse_unknown(found, ArmFile, "")
-        for part, kind in (("spec", ArmSpec), ("correction", Correction), ("baseline", Baseline)):
+        for part, kind in (("spec", ArmSpec), ("correction", Correction), ("sound", SoundState)):
             if isinstance(found.get(part), dict):
                 _refuse_unknown(found[part], kind, f"[{part}] ")
         for sensor in _tables(found.get("spec"), "sensors"):
@@ -202,8 +202,8 @@ def save_arm_file(known: ArmFile, path: Path | str) -> None:
     tables = {"spec": asdict(known.spec)}
     if not known.correction.is_none:
         tables["correction"] = asdict(known.correction)
-    if known.baseline is not None:
-        tables["baseline"] = asdict(known.baseline)
+    if known.sound is not None:
+        tables["sound"] = asdict(known.sound)
     lines = ["# An arm as pneumarm knows it: angles and pressures in sensor counts, times in seconds."]
     for name, table in tables.items():
         entries = [f"{key} = {_toml(value)}" for key, value in table.items() if value is not None and value != ()]

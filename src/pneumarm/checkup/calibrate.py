@@ -1,4 +1,4 @@
-"""What a check-up says of an arm, as the spec, corrections and baseline that everything else works with.
+"""What a check-up says of an arm, as the spec, corrections and sound that everything else works with.
 
 A logarithmic potentiometer is linearised by the symmetry of the joint. Its track turns the true share x of the way
 into the share (e^(k x) - 1) / (e^k - 1) of the counts; k is what makes the two halves of the sweep turn the joint
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneumarm.arm.spec_file import ArmFile, Baseline, Correction
+from pneumarm.arm.spec_file import ArmFile, Correction, SoundState
 from pneumarm.checkup.diagnose import LOGARITHMIC
 from pneumarm.checkup.figures import ends, halves, joint_figures
 from pneumarm.checkup.measure import Array, Checkup, JointTest
@@ -67,7 +67,7 @@ class Calibration:
 
 
 def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
-    """Return spec, corrections and baseline of the arm that was checked with its sensors raw.
+    """Return spec, corrections and sound of the arm that was checked with its sensors raw.
 
     Raises:
         UnusableInput: the arm cannot be calibrated like this; what it needs first is said.
@@ -112,11 +112,11 @@ def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
     calibrated = replace(
         spec, counts_per_degree=per_degree, counts_per_bar=mean_per_bar, angle_range=angle_range, period=period
     )
-    file = ArmFile(calibrated, correction, _baseline(checkup, correction))
+    file = ArmFile(calibrated, correction, _sound_state(checkup, correction))
     return Calibration(file, tuple(line.residual for line in lines))
 
 
-def _baseline(checkup: Checkup, correction: Correction) -> Baseline | None:
+def _sound_state(checkup: Checkup, correction: Correction) -> SoundState | None:
     """Return what the arm did, with its sensors corrected; None where its muscles hold no air to lose."""
     muscles = [joint_figures(checkup, j).muscles for j in range(len(checkup.joints))]
     leak, error = (np.array([[getattr(m, name) / 100 for m in pair] for pair in muscles]) for name in _LEAKS)
@@ -124,7 +124,7 @@ def _baseline(checkup: Checkup, correction: Correction) -> Baseline | None:
         return None
     raw = np.array([ends(test) for test in checkup.joints])
     true = np.stack([correction.angle(at) for at in raw.T], axis=1)
-    return Baseline(_pairs(leak, 6), _pairs(error, 6), _pairs(true))
+    return SoundState(_pairs(leak, 6), _pairs(error, 6), _pairs(true))
 
 
 _LEAKS = ("leak", "leak_error")

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.spec_file import Baseline
+from pneumarm.arm.spec_file import SoundState
 from pneumarm.checkup.figures import (
     MOVED,
     JointFigures,
@@ -31,7 +31,7 @@ WHITE = 0.25
 NOISY = 3.5
 """Readings are noisy whose standard deviation at rest exceeds so many counts (thesis A.1.3: 4 is relatively high)."""
 LEAK = 12.0
-"""A muscle leaks if it loses more than so many percent of its pressure a minute, where it has no baseline."""
+"""A muscle leaks if it loses more than so many percent of its pressure a minute, where it has no sound."""
 LOW_SUPPLY = 0.75
 """The supply is low if a full muscle reads less than this share of the pressure limit."""
 HIGH_SUPPLY = 1.04
@@ -73,15 +73,15 @@ class Finding(NamedTuple):
         return f"{self.where}: {self.kind}: {self.told_by}. {self.remedy}."
 
 
-def diagnose(checkup: Checkup, baseline: Baseline | None = None) -> list[Finding]:
+def diagnose(checkup: Checkup, sound: SoundState | None = None) -> list[Finding]:
     """Return what is wrong with the arm; an empty list for a healthy one.
 
     Args:
         checkup: what was measured.
-        baseline: what the same arm did when it was calibrated, with its sensors corrected as they are now.
+        sound: what the same arm did when it was calibrated, with its sensors corrected as they are now.
 
     """
-    found = [finding for j in range(len(checkup.joints)) for finding in _of_joint(checkup, j, baseline)]
+    found = [finding for j in range(len(checkup.joints)) for finding in _of_joint(checkup, j, sound)]
     periods = checkup.timing.periods
     if np.quantile(periods, 0.95) > 1.5 * checkup.spec.period:
         worst = f"95 % of the control periods are below {1e3 * np.quantile(periods, 0.95):.0f} ms"
@@ -90,7 +90,7 @@ def diagnose(checkup: Checkup, baseline: Baseline | None = None) -> list[Finding
     return found
 
 
-def _of_joint(checkup: Checkup, j: int, baseline: Baseline | None) -> Iterator[Finding]:
+def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Finding]:
     test, figures, bar = checkup.joints[j], joint_figures(checkup, j), checkup.spec.counts_per_bar
     name = f"joint {j + 1}" if len(checkup.joints) > 1 else "joint"
     rose = np.array([_rise(test.muscles[m]) for m in range(2)]) / bar  # [muscle filled, sensor]
@@ -136,7 +136,7 @@ def _of_joint(checkup: Checkup, j: int, baseline: Baseline | None) -> Iterator[F
         yield from stuck  # while air flows that should not, nothing else can be judged
         return
     yield from valves
-    yield from _of_leaks(figures, name, baseline, j)
+    yield from _of_leaks(figures, name, sound, j)
     if (quicker := quickening(test, checkup)) < RISING:
         told = f"at the end of the check-up muscles fill in {100 * quicker:.0f} % of the time of before"
         remedy = "See whether the reducer leaks: its buffer fills up while no air is used (thesis A.1.1)"
@@ -144,8 +144,8 @@ def _of_joint(checkup: Checkup, j: int, baseline: Baseline | None) -> Iterator[F
     yield from _of_noise(checkup, j, name)
     potentiometer = list(_of_potentiometer(checkup, test, figures, name))
     yield from potentiometer
-    if baseline is not None and not potentiometer:
-        yield from _of_calibration(checkup, test, name, baseline.ends[j])
+    if sound is not None and not potentiometer:
+        yield from _of_calibration(checkup, test, name, sound.ends[j])
 
 
 def _of_valves(
@@ -182,14 +182,14 @@ def _of_valves(
             yield Finding("pressure at the valve's side", where, told, remedy)
 
 
-def _of_leaks(figures: JointFigures, name: str, baseline: Baseline | None, j: int) -> Iterator[Finding]:
+def _of_leaks(figures: JointFigures, name: str, sound: SoundState | None, j: int) -> Iterator[Finding]:
     now = np.array([[muscle.leak, muscle.leak_error] for muscle in figures.muscles]).T / 100
     if np.isnan(now).any():
         return
     leaks = (now[0] > LEAK / 100) & (now[0] >= now[0].max())  # where one sags, the other is stretched
     then = np.zeros_like(now)
-    if baseline is not None:
-        then = np.array([baseline.leak[j], baseline.leak_error[j]])
+    if sound is not None:
+        then = np.array([sound.leak[j], sound.leak_error[j]])
         healthy, found = (LeakRates(rate[None], error[None], np.nan) for rate, error in (then, now))
         leaks |= leaking(healthy, found)[0]
     for m in np.flatnonzero(leaks):
@@ -199,7 +199,7 @@ def _of_leaks(figures: JointFigures, name: str, baseline: Baseline | None, j: in
                 f"it leaks {now[0, m] / then[0, m]:.1f} times as much as when calibrated: "
                 f"{told} instead of {100 * then[0, m]:.1f} %"
             )
-        elif baseline is not None:
+        elif sound is not None:
             told += f", instead of {100 * then[0, m]:.1f} % when calibrated"
         remedy = "Look for the leak with soap water: clamps, hose, exhaust valve"
         yield Finding("leak", f"{name}, muscle {m + 1}", told, remedy)

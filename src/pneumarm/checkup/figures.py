@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
-from pneumarm.arm.spec_file import Baseline
+from pneumarm.arm.spec_file import SoundState
 from pneumarm.checkup.leaks import falling
 from pneumarm.checkup.measure import Array, Checkup, JointTest, Trace
 
@@ -270,10 +270,10 @@ MUSCLE_HEADER = (
 """What :func:`muscle_row` gives; times are from the command to the first air, and to 63 % of the way."""
 
 
-def muscle_row(figures: JointFigures, joint: int, muscle: int, baseline: Baseline | None) -> tuple[str, ...]:
+def muscle_row(figures: JointFigures, joint: int, muscle: int, sound: SoundState | None) -> tuple[str, ...]:
     """Return the figures of a muscle as words for a table."""
     one = figures.muscles[muscle]
-    then = "-" if baseline is None else f"{100 * baseline.leak[joint][muscle]:.2f}"
+    then = "-" if sound is None else f"{100 * sound.leak[joint][muscle]:.2f}"
     return (
         f"{one.full:.2f}",
         f"{1e3 * one.fill_delay:.0f}, {1e3 * one.fill_time:.0f}",

@@ -64,19 +64,19 @@ def check_(
         require_folder(out)
     with open_arm(arm, seed) as opened:
         checkup = _measured(opened, settings)
-    baseline = None
+    sound = None
     if isinstance(opened, CorrectedArm):
-        baseline = opened.known.baseline
+        sound = opened.known.sound
         if opened.arm.spec.name not in (opened.spec.name, "arm"):
             say(f"The spec was made as {opened.spec.name}; this is {opened.arm.spec.name}.")
-    findings = diagnose(checkup, baseline)
+    findings = diagnose(checkup, sound)
     figures = [joint_figures(checkup, j) for j in range(len(checkup.joints))]
     timing = _timing(checkup)
     if out is not None:
         from pneumarm.report.checkup import checkup_page
 
         out.mkdir(exist_ok=True)
-        write_text(out / "checkup.html", checkup_page(checkup, findings, baseline))
+        write_text(out / "checkup.html", checkup_page(checkup, findings, sound))
         say(f"page: {out / 'checkup.html'}")
     places = [(j, m) for j in range(len(figures)) for m in range(2)]
     result = {
@@ -84,11 +84,11 @@ def check_(
         "findings": [finding._asdict() for finding in findings],
         "timing_ms": timing,
         "joints": [asdict(joint) for joint in figures],
-        "baseline": None if baseline is None else asdict(baseline),
+        "sound": None if sound is None else asdict(sound),
     }
 
     def rows() -> list[Any]:
-        of_muscles = zip(MUSCLE_HEADER, *(muscle_row(figures[j], j, m, baseline) for j, m in places), strict=True)
+        of_muscles = zip(MUSCLE_HEADER, *(muscle_row(figures[j], j, m, sound) for j, m in places), strict=True)
         of_joints = zip(JOINT_HEADER, *(joint_row(figure, checkup.spec) for figure in figures), strict=True)
         verdict: Sequence[str] = [str(finding) for finding in findings] or ["Nothing is wrong with it."]
         return [
@@ -175,7 +175,7 @@ def calibrate_(
         "spec": asdict(calibration.file.spec),
         "correction": asdict(calibration.file.correction),
         "linearised_residual_degrees": list(calibration.residual),
-        "baseline": None if calibration.file.baseline is None else asdict(calibration.file.baseline),
+        "sound": None if calibration.file.sound is None else asdict(calibration.file.sound),
     }
     spec = calibration.file.spec
     sources = ("by data sheet", "by protractor", "by manometer", "as it was")

@@ -47,12 +47,12 @@ def bound_(
 
     def rows() -> list[tuple[object, ...]]:
         shown = []
-        for rival in planned:
-            figures = result[rival]
+        for baseline in planned:
+            figures = result[baseline]
             ranges = [figures["intervals"][name] for name in columns]
             means = [f"{figures[n]:.3f} ({r[0]:.3f} to {r[1]:.3f})" for n, r in zip(columns, ranges, strict=True)]
             times = figures["decision_ms"]
-            shown.append((rival.replace("_", " "), *means, times["median"], times["p99"]))
+            shown.append((baseline.replace("_", " "), *means, times["median"], times["p99"]))
         return shown
 
     header = ("planner", *columns, "decision, median [ms]", "p99 [ms]")

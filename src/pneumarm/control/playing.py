@@ -23,7 +23,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import begin_acting, learn_and_act
-from pneumarm.learning.online.loop import Room, Schedule, room_of
+from pneumarm.learning.online.loop import Schedule, Workspace, workspace_of
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import Learner, learner
 from pneumarm.random import random_state, uniform
@@ -54,7 +54,7 @@ class _Watched(NamedTuple):
     applied: NDArray[np.int8]
     """Shape (joints, 2)."""
     asked: NDArray[np.int8]
-    """Room, shape (joints, 2)."""
+    """Workspace, shape (joints, 2)."""
     open_for: Array
     """Shape (joints, 2) [s]."""
     blocked: NDArray[np.bool_]
@@ -78,7 +78,7 @@ class _Mind(NamedTuple):
     x: NDArray[np.float32]
     sigma: NDArray[np.float32]
     """State window, shape (state_size,) [scaled]."""
-    room: Room
+    workspace: Workspace
     random: NDArray[np.uint64]
     places: Places
     offset: Array
@@ -162,7 +162,7 @@ class Player:
             learner(agent.weights(), agent.settings, learning_rate),
             x,
             np.zeros(window.state_size, np.float32),
-            room_of(joints, place.size),
+            workspace_of(joints, place.size),
             random_state(seed),
             place,
             np.ascontiguousarray(window.of_joints(scaling.observation_offset), np.float64),
@@ -402,7 +402,7 @@ def _move(live, watched, mind, schedule, rules, goal, played, e):  # type: ignor
             _push(mind, watched, velocity, True)
             for i in range(place.command):
                 mind.x[i] = mind.sigma[i]
-            begin_acting(mind.learner, schedule, mind.x, mind.room, mind.random)
+            begin_acting(mind.learner, schedule, mind.x, mind.workspace, mind.random)
         else:
             if time - due > watched.period / 2:
                 due = time
@@ -425,7 +425,7 @@ def _move(live, watched, mind, schedule, rules, goal, played, e):  # type: ignor
             record.reward[e] += rules.goal if success else rules.action
             record.reward[e] += rules.switch * total
             _push(mind, watched, velocity, False)
-            learn_and_act(mind.learner, schedule, mind.x, mind.room, mind.random, (paid, mind.sigma), success)
+            learn_and_act(mind.learner, schedule, mind.x, mind.workspace, mind.random, (paid, mind.sigma), success)
             if success or record.actions[e] == rules.cutoff:
                 break
         for j in range(joints):
@@ -437,7 +437,7 @@ def _move(live, watched, mind, schedule, rules, goal, played, e):  # type: ignor
             _wait(live, watched, watched.latency)
         for j in range(joints):
             for m in range(2):
-                watched.asked[j, m] = VALVES[mind.room.next_actions[j], m]
+                watched.asked[j, m] = VALVES[mind.workspace.next_actions[j], m]
         _set(live, watched)
         pass_until(
             live.muscles,

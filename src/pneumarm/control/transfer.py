@@ -123,7 +123,7 @@ def draw_movement(
 ) -> tuple[np.random.Generator, NDArray[np.float64]]:
     """Return the random numbers of movement ``number`` and its goal within ``goal_range`` (joints, 2) [counts].
 
-    Both tests use the same begin states and goals, and so does every rival with the same seed.
+    Both tests use the same begin states and goals, and so does every baseline with the same seed.
     """
     random = np.random.default_rng([seed, 0 if test else 1, number])
     low, high = goal_range.T

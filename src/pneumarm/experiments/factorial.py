@@ -71,7 +71,7 @@ class Factorial(Trainings):
     goal: float | None = None
     """The only angle to learn [counts]; None for all."""
     continued: int | None = None
-    """Episodes until which training goes on after the criterium is met; then ``gain`` is what it changed."""
+    """Episodes until which training goes on after the criterion is met; then ``gain`` is what it changed."""
     criteria: tuple[str, ...] = (*ALL, "episodes")
     """What is analysed."""
     said: tuple[Said, ...] = ()
@@ -218,12 +218,12 @@ class Factorial(Trainings):
         return f"Means over all trials{beside}: {'; '.join(said)}."
 
     def _met(self, rows: Rows) -> str:
-        """Return in words how many agents met the criterium; of training on, how those ended that were slow to."""
+        """Return in words how many agents met the criterion; of training on, how those ended that were slow to."""
         if "met" not in rows.figures:
             return ""
         if self.continued is None:
             met = rows.table("met", list(self.trials))
-            return f" {int(met.sum())} of {met.size} agents met the criterium."
+            return f" {int(met.sum())} of {met.size} agents met the criterion."
         trials = list(self.trials)
         found = interval(
             [
@@ -233,7 +233,7 @@ class Factorial(Trainings):
         )
         ended = "better" if found.low > 0 else "worse" if found.high < 0 else "neither surely better nor worse"
         return (
-            f" Agents that needed more episodes to meet the criterium are {ended} in the end: the rank correlation "
+            f" Agents that needed more episodes to meet the criterion are {ended} in the end: the rank correlation "
             f"of these episodes with the last reward is {found} within arms."
         )
 

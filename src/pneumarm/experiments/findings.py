@@ -10,7 +10,7 @@ from pneumarm.experiments.experiment import Claim, Rows
 from pneumarm.experiments.factorial import Analyses, Factorial
 from pneumarm.experiments.trainings import LEARNING
 
-_NEARLY_ALL = 0.95  # success rate: what the criterium demands (section 4.3.2)
+_NEARLY_ALL = 0.95  # success rate: what the criterion demands (section 4.3.2)
 _SMALLEST = 1e-9
 _FEWEST = 2.5  # switches (section 5.4.2)
 _TRIAL_10 = 10
@@ -172,12 +172,12 @@ def _gains(made: Factorial, rows: Rows, theirs: Analyses) -> tuple[Interval, str
     return interval(rows.samples(gain.mean(axis=0))), words
 
 
-def agents_meet_the_criterium(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
-    """Ask whether nearly all agents meet the criterium."""
+def agents_meet_the_criterion(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Ask whether nearly all agents meet the criterion."""
     met = rows.table("met", list(made.trials))
     found, count = interval(rows.samples(met.mean(axis=0))), theirs["episodes"].results.size
     return Claim(
-        f"Without shaping nearly all agents ({100 * _NEARLY_ALL:.0f} %) meet the criterium of training",
+        f"Without shaping nearly all agents ({100 * _NEARLY_ALL:.0f} %) meet the criterion of training",
         f"all {count} (table C.22)",
         f"{_percent(found)}: {int(met.sum())} of {met.size}",
         above(found, _NEARLY_ALL),

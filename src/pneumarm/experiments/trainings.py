@@ -14,7 +14,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import TrainSettings, test
-from pneumarm.learning.online.loop import Schedule, room, train_episodes
+from pneumarm.learning.online.loop import Schedule, train_episodes, workspace
 from pneumarm.learning.online.testing import run_test
 from pneumarm.learning.online.training import train
 from pneumarm.learning.online.values import learner
@@ -40,7 +40,7 @@ CRITERIA |= {EXPLORING + name: f"{text}, exploring" for name, text in CRITERIA.i
 LEARNING = "learning success_rate"
 """Share of successes while the agent goes on learning and exploring as when its training ended.
 
-It is what the criterium of the training phase is about. The same weights succeed less often once they are frozen: an
+It is what the criterion of the training phase is about. The same weights succeed less often once they are frozen: an
 agent that is stuck while it learns unlearns the action that holds it, and so gets away.
 """
 CRITERIA[LEARNING] = "share of successful episodes, learning on"
@@ -138,7 +138,7 @@ def _learning(env: Environment, weights: NDArray[np.float32], settings: TrainSet
     deviation = float(high - low) if settings.shaping else np.inf
     schedule = Schedule(deviation, float(last.epsilon), float(last.temperature), _NEWEST)
     learns = learner(weights.copy(), settings)
-    performance, _, _ = train_episodes(env, learns, schedule, one, room(one), count, 0.0)
+    performance, _, _ = train_episodes(env, learns, schedule, one, workspace(one), count, 0.0)
     return float(performance / (1 - (1 - _NEWEST) ** count))
 
 

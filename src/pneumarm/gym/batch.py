@@ -12,7 +12,7 @@ from pneumarm.task.environment import Environment, Episode, begin_episode, episo
 
 
 class Batch(NamedTuple):
-    """``n`` movements, and room for as many threads as work on them. Made by :func:`batch`."""
+    """``n`` movements, and workspace for as many threads as work on them. Made by :func:`batch`."""
 
     x: NDArray[np.float32]
     """State vectors, see :mod:`pneumarm.simulation.kernel`, shape (n, inputs)."""
@@ -29,11 +29,11 @@ class Batch(NamedTuple):
     taken: NDArray[np.int64]
     """Actions taken in the running movement, -1 where it ended and none was begun, shape (n,)."""
     hidden: NDArray[np.float32]
-    """Room, shape (threads, units)."""
+    """Workspace, shape (threads, units)."""
     change: NDArray[np.float32]
-    """Room, shape (threads, outputs)."""
+    """Workspace, shape (threads, outputs)."""
     command: NDArray[np.float32]
-    """Room, shape (threads, 2 joints)."""
+    """Workspace, shape (threads, 2 joints)."""
 
 
 class Outcome(NamedTuple):
@@ -52,7 +52,7 @@ class Outcome(NamedTuple):
 
 
 def batch(environment: Environment, n: int, threads: int) -> Batch:
-    """Return room for ``n`` movements in ``environment``; none has begun."""
+    """Return workspace for ``n`` movements in ``environment``; none has begun."""
     one = episode(environment, random_state(0))
     joints = one.goal.size
     return Batch(
@@ -70,7 +70,7 @@ def batch(environment: Environment, n: int, threads: int) -> Batch:
 
 
 def outcome(n: int, size: int) -> Outcome:
-    """Return room for the outcome of a step of ``n`` movements with observations of ``size``."""
+    """Return workspace for the outcome of a step of ``n`` movements with observations of ``size``."""
     return Outcome(
         observation=np.zeros((n, size), np.float32),
         reward=np.zeros(n),

@@ -211,7 +211,7 @@ def test(
     """Let ``agent`` move greedily and without learning, from all begin states to all goals.
 
     A policy moves as it says at once; what looking ahead adds on an arm is told by :func:`test_ahead`. Begin states
-    and goals depend on ``seed`` alone, not on what the agent does, so rivals get the same ones.
+    and goals depend on ``seed`` alone, not on what the agent does, so baselines get the same ones.
 
     Raises:
         UnusableInput: the agent was made for an arm or a window of another kind, or there is no episode.

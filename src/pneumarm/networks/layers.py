@@ -18,7 +18,7 @@ Layers = tuple[NDArray[np.float32], ...]
 
 
 class Trainable(NamedTuple):
-    """A network that is being trained: its weights and Adam's averages, and room. Made by :func:`trainable`."""
+    """A network that is being trained: its weights and Adam's averages, and workspace. Made by :func:`trainable`."""
 
     flat: NDArray[np.float32]
     """All weights, shape (size,)."""
@@ -35,9 +35,9 @@ class Trainable(NamedTuple):
     square: NDArray[np.float32]
     """Adam's average of its square, shape (size,)."""
     units: Layers
-    """Room for the units of each layer, (outputs, samples)."""
+    """Workspace for the units of each layer, (outputs, samples)."""
     errors: Layers
-    """Room for the derivatives by them, same shapes."""
+    """Workspace for the derivatives by them, same shapes."""
 
 
 def layer_sizes(sizes: tuple[int, ...]) -> list[tuple[int, int]]:
@@ -71,7 +71,7 @@ def initial_weights(sizes: tuple[int, ...], last: float, random: np.random.Gener
 def trainable(
     flat: NDArray[np.float32], sizes: tuple[int, ...], samples: int, mask: NDArray[np.float32] | None = None
 ) -> Trainable:
-    """Return a network with the weights ``flat`` (changed in place) and room for so many ``samples``."""
+    """Return a network with the weights ``flat`` (changed in place) and workspace for so many ``samples``."""
     gradient = np.zeros_like(flat)
     return Trainable(
         flat=flat,
@@ -81,13 +81,13 @@ def trainable(
         mask=np.ones_like(flat) if mask is None else mask,
         mean=np.zeros_like(flat),
         square=np.zeros_like(flat),
-        units=room(sizes, samples),
-        errors=room(sizes, samples),
+        units=workspace(sizes, samples),
+        errors=workspace(sizes, samples),
     )
 
 
-def room(sizes: tuple[int, ...], samples: int) -> Layers:
-    """Return room for the units of every layer but the inputs, (outputs, samples)."""
+def workspace(sizes: tuple[int, ...], samples: int) -> Layers:
+    """Return workspace for the units of every layer but the inputs, (outputs, samples)."""
     return tuple(np.zeros((size, samples), np.float32) for size in sizes[1:])
 
 

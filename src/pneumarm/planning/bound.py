@@ -25,7 +25,7 @@ from pneumarm.statistics import FEWEST, mean_estimate
 from pneumarm.task import Reward
 from pneumarm.transitions import Store, collect
 
-Rival = Literal["open_loop", "closed_loop", "simulated"]
+Baseline = Literal["open_loop", "closed_loop", "simulated"]
 """True physics planned once without noise, true physics planned every turn, learned simulation planned every turn."""
 RANGE_TRANSITIONS = 20_000
 """How many transitions the range of goals is measured from where no simulation tells it (11 min of arm time)."""
@@ -100,7 +100,7 @@ def measure_bound(
     reward: Reward = Reward(),
     simulation: Simulation | None = None,
     progress: Callable[[float, float], None] | None = None,
-) -> dict[Rival, Planned]:
+) -> dict[Baseline, Planned]:
     """Return what the planners achieve on fresh arms like ``parameters_of``.
 
     Args:
@@ -113,25 +113,25 @@ def measure_bound(
         progress: called with what is done and the total.
 
     """
-    rivals: list[Rival] = ["open_loop", "closed_loop"]
+    baselines: list[Baseline] = ["open_loop", "closed_loop"]
     if simulation is not None:
-        rivals.append("simulated")
-    total, results = len(rivals) * settings.episodes, {}
-    for number, rival in enumerate(rivals):
+        baselines.append("simulated")
+    total, results = len(baselines) * settings.episodes, {}
+    for number, baseline in enumerate(baselines):
         parameters = parameters_of.parameters
-        if rival == "open_loop":
+        if baseline == "open_loop":
             parameters = without_noise(parameters)
         with VirtualArm(parameters, seed=seed, name=parameters_of.spec.name) as arm:
-            if simulation is not None and rival == "simulated":
+            if simulation is not None and baseline == "simulated":
                 planner = simulated_planner(simulation, reward)
             else:
-                planner = physics_planner(arm, reward, settings.plan, open_loop=rival == "open_loop")
+                planner = physics_planner(arm, reward, settings.plan, open_loop=baseline == "open_loop")
 
             def report(done: int, before: int = number * settings.episodes) -> None:
                 if progress is not None:
                     progress(before + done, total)
 
-            results[rival] = _movements(arm, planner, goal_range, settings, seed, report)
+            results[baseline] = _movements(arm, planner, goal_range, settings, seed, report)
     return results
 
 
@@ -182,23 +182,23 @@ def known_bound(
     if not isinstance(arm, VirtualArm):
         return {"missing": f"{arm.spec.name} is no virtual arm: its true physics is not known"}
     planned = measure_bound(arm, goal_range, settings, seed=seed, reward=reward, progress=progress)
-    figures: dict[str, Any] = {rival: movements.results() for rival, movements in planned.items()}
+    figures: dict[str, Any] = {baseline: movements.results() for baseline, movements in planned.items()}
     for found in figures.values():
         del found["decision_ms"]  # of the machine, not of the arm
     figures["distance"] = {
-        test: {rival: movements.distance(paid) for rival, movements in planned.items()}
+        test: {baseline: movements.distance(paid) for baseline, movements in planned.items()}
         for test, paid in rewards.items()
     }
     return figures
 
 
 def bound_results(
-    arm: VirtualArm, goal_range: NDArray[np.float64], settings: BoundSettings, planned: dict[Rival, Planned]
+    arm: VirtualArm, goal_range: NDArray[np.float64], settings: BoundSettings, planned: dict[Baseline, Planned]
 ) -> dict[str, Any]:
     """Return all figures for the command line and for programs."""
     return {
         "arm": arm.spec.name,
         "goal_range": goal_range.tolist(),
         "settings": asdict(settings),
-        **{rival: movements.results() for rival, movements in planned.items()},
+        **{baseline: movements.results() for baseline, movements in planned.items()},
     }

@@ -8,7 +8,7 @@ controller                plans with           plans       what it is
 ========================  ===================  ==========  ==========================================================
 open loop                 true physics         once        on an arm without noise and jitter: the bound itself
 closed loop               true physics         every turn  the same with the arm's sensors and jitter
-simulated                 learned simulation   every turn  what planning makes of a simulation, as any rival may
+simulated                 learned simulation   every turn  what planning makes of a simulation, as any baseline may
 ========================  ===================  ==========  ==========================================================
 
 A planner that knows the true physics and the commands has little to learn from noisy sensors, so it is given the
@@ -30,7 +30,7 @@ from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
 from pneumarm.errors import UnusableInput
-from pneumarm.planning.search import CERTAIN, Found, PlanSettings, Uncertainty, find, problem, room_of, tree
+from pneumarm.planning.search import CERTAIN, Found, PlanSettings, Uncertainty, find, problem, tree, workspace_of
 from pneumarm.random import random_state
 from pneumarm.simulation.rollout import look_simulated, simulated_states, simulated_world
 from pneumarm.simulation.simulation import Simulation
@@ -56,7 +56,7 @@ class Model(Protocol):
     spec: ArmSpec
     world: Any
     states: Any
-    """Room for a search; the first state is where the arm is."""
+    """Workspace for a search; the first state is where the arm is."""
     uncertainty: Uncertainty
     """How far readings are from what the model says."""
 
@@ -87,7 +87,7 @@ class PhysicsModel:
         self._random = None if foresight else random_state(_OWN_SUPPLY)
         self.spec = inner.spec
         self.world = physics_of(inner)
-        self.states = physics_states(self.world, room_of(settings, self.spec.joints))
+        self.states = physics_states(self.world, workspace_of(settings, self.spec.joints))
         self.uncertainty = CERTAIN if foresight else _sensor_noise(inner)
         self._due: float | None = None
 
@@ -134,7 +134,7 @@ class SimulationModel:
             raise UnusableInput("the simulation was fitted to continuous commands; a plan needs one fitted to valves")
         self.spec = simulation.spec
         self.world = simulated_world(simulation)
-        self.states = simulated_states(self.world, room_of(settings, self.spec.joints))
+        self.states = simulated_states(self.world, workspace_of(settings, self.spec.joints))
         angle, velocity = simulation.error_std[:, :2].max(axis=0).tolist()
         self.uncertainty = Uncertainty(angle, velocity)
         self._tracker = StateTracker(simulation.window, simulation.scaling)
@@ -181,7 +181,7 @@ class Planner:
 
     def __post_init__(self) -> None:
         joints = self.model.spec.joints
-        self._room = tree(self.settings, joints)
+        self._workspace = tree(self.settings, joints)
         self._problem = problem(np.zeros(joints), self.reward, self.settings, self.model.uncertainty)
         self._turn = 0
         self._last = -1
@@ -209,7 +209,9 @@ class Planner:
         """Return the valves (joints, 2) to set where the model is."""
         if self.found is None or self.replan:
             may_hold = not self._is_stuck()
-            self.found = find(self.model.world, self.model.states, self._problem, self._room, self._last, may_hold)
+            self.found = find(
+                self.model.world, self.model.states, self._problem, self._workspace, self._last, may_hold
+            )
             self.unproven += not self.found.proven
             self._turn = 0
         plan = self.found.actions

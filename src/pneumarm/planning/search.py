@@ -132,7 +132,7 @@ class Problem(NamedTuple):
 
 
 class Tree(NamedTuple):
-    """Room for a search. Made by :func:`tree`."""
+    """Workspace for a search. Made by :func:`tree`."""
 
     depth: NDArray[np.int64]
     """Actions to each node, shape (nodes,)."""
@@ -195,8 +195,8 @@ def problem(
 
 
 def tree(settings: PlanSettings, joints: int) -> Tree:
-    """Return room for searches; ``settings.nodes`` and one expansion more."""
-    n, holds = room_of(settings, joints), settings.switches + 2
+    """Return workspace for searches; ``settings.nodes`` and one expansion more."""
+    n, holds = workspace_of(settings, joints), settings.switches + 2
     return Tree(
         depth=np.empty(n, np.int64),
         switches=np.empty(n, np.int64),
@@ -208,19 +208,19 @@ def tree(settings: PlanSettings, joints: int) -> Tree:
     )
 
 
-def room_of(settings: PlanSettings, joints: int) -> int:
-    """Return how many states a search needs room for."""
+def workspace_of(settings: PlanSettings, joints: int) -> int:
+    """Return how many states a search needs workspace for."""
     return settings.nodes + int(ACTIONS**joints) + 1
 
 
-def find(world: Any, states: Any, sought: Problem, room: Tree, last: int = -1, may_hold: bool = True) -> Found:
+def find(world: Any, states: Any, sought: Problem, workspace: Tree, last: int = -1, may_hold: bool = True) -> Found:
     """Return the best plan from state 0 of ``states``, after the action ``last`` (-1 at the begin of a movement).
 
     Unless it ``may_hold``, the plan begins with another action than ``last``.
     """
     begin = len(sought.commands) if last < 0 else last
-    length, cost, proven, simulated = search(world, states, sought, room, begin, may_hold)
-    return Found(room.plan[:length].copy(), cost, math.isfinite(cost), proven, simulated)
+    length, cost, proven, simulated = search(world, states, sought, workspace, begin, may_hold)
+    return Found(workspace.plan[:length].copy(), cost, math.isfinite(cost), proven, simulated)
 
 
 @part
@@ -264,58 +264,64 @@ def success(states, i, sought):  # type: ignore[no-untyped-def]
 
 
 @part
-def last_action(room, i):  # type: ignore[no-untyped-def]
+def last_action(workspace, i):  # type: ignore[no-untyped-def]
     """Return the action that led to node ``i``."""
-    return room.held[i, room.holds[i] - 1, 0]
+    return workspace.held[i, workspace.holds[i] - 1, 0]
 
 
 @part
-def descend(world, states, sought, room, i, parent, action):  # type: ignore[no-untyped-def]
+def descend(world, states, sought, workspace, i, parent, action):  # type: ignore[no-untyped-def]
     """Make node ``i`` what ``action`` makes of ``parent``, which may be the same; return by how much it misses."""
     if i != parent:
         copy(states, i, parent)
-        for k in range(room.holds[parent]):
-            room.held[i, k, 0], room.held[i, k, 1] = room.held[parent, k, 0], room.held[parent, k, 1]
-        room.holds[i] = room.holds[parent]
-    before = last_action(room, parent)
+        for k in range(workspace.holds[parent]):
+            workspace.held[i, k, 0], workspace.held[i, k, 1] = (
+                workspace.held[parent, k, 0],
+                workspace.held[parent, k, 1],
+            )
+        workspace.holds[i] = workspace.holds[parent]
+    before = last_action(workspace, parent)
     switched = sought.switched[before, action]
     if action != before:
-        room.held[i, room.holds[i], 0], room.held[i, room.holds[i], 1] = action, room.depth[parent]
-        room.holds[i] += 1
-    room.depth[i] = room.depth[parent] + 1
-    room.switches[i] = room.switches[parent] + switched
-    room.cost[i] = room.cost[parent] + sought.action_cost + sought.switch_cost * switched
+        workspace.held[i, workspace.holds[i], 0], workspace.held[i, workspace.holds[i], 1] = (
+            action,
+            workspace.depth[parent],
+        )
+        workspace.holds[i] += 1
+    workspace.depth[i] = workspace.depth[parent] + 1
+    workspace.switches[i] = workspace.switches[parent] + switched
+    workspace.cost[i] = workspace.cost[parent] + sought.action_cost + sought.switch_cost * switched
     advance(world, states, i, sought.commands[action])
     return misses(states, i, sought)
 
 
 @part
-def write_plan(room, i):  # type: ignore[no-untyped-def]
+def write_plan(workspace, i):  # type: ignore[no-untyped-def]
     """Write the actions that led to node ``i`` into the plan; return how many they are."""
-    for k in range(1, room.holds[i]):
-        end = room.held[i, k + 1, 1] if k + 1 < room.holds[i] else room.depth[i]
-        for n in range(room.held[i, k, 1], end):
-            room.plan[n] = room.held[i, k, 0]
+    for k in range(1, workspace.holds[i]):
+        end = workspace.held[i, k + 1, 1] if k + 1 < workspace.holds[i] else workspace.depth[i]
+        for n in range(workspace.held[i, k, 1], end):
+            workspace.plan[n] = workspace.held[i, k, 0]
     # The first hold is what was done before the plan; it goes on until the first switch.
-    end = room.held[i, 1, 1] if room.holds[i] > 1 else room.depth[i]
+    end = workspace.held[i, 1, 1] if workspace.holds[i] > 1 else workspace.depth[i]
     for n in range(end):
-        room.plan[n] = room.held[i, 0, 0]
-    return room.depth[i]
+        workspace.plan[n] = workspace.held[i, 0, 0]
+    return workspace.depth[i]
 
 
 @kernel
-def search(world, states, sought, room, begin, may_hold):  # type: ignore[no-untyped-def]
+def search(world, states, sought, workspace, begin, may_hold):  # type: ignore[no-untyped-def]
     """Seek the best plan from state 0 after the action ``begin``, which goes on only if it ``may_hold``.
 
-    Returns the length of the plan in ``room.plan``, its cost, whether it is proven, and the periods simulated.
+    Returns the length of the plan in ``workspace.plan``, its cost, whether it is proven, and the periods simulated.
     """
-    count = room.free.shape[0]
+    count = workspace.free.shape[0]
     actions = sought.commands.shape[0]
     for k in range(count):
-        room.free[k] = count - 1 - k
+        workspace.free[k] = count - 1 - k
     left = count - 1  # node 0 is the begin
-    room.depth[0], room.switches[0], room.cost[0], room.holds[0] = 0, 0, 0.0, 1
-    room.held[0, 0, 0], room.held[0, 0, 1] = begin, 0
+    workspace.depth[0], workspace.switches[0], workspace.cost[0], workspace.holds[0] = 0, 0, 0.0, 1
+    workspace.held[0, 0, 0], workspace.held[0, 0, 1] = begin, 0
     # Entries are cost, a number that settles ties, and 2 * node + 1 to branch or + 0 to hold.
     queue = [(sought.action_cost, 0, 0 if may_hold and begin < actions else 1)]
     order, simulated, proven, length = 1, 0, True, 0
@@ -328,40 +334,40 @@ def search(world, states, sought, room, begin, may_hold):  # type: ignore[no-unt
             proven = False
             break
         i, branches = entry // 2, entry % 2 == 1
-        may_branch = room.switches[i] < sought.switches
+        may_branch = workspace.switches[i] < sought.switches
         first, last = 0, actions
         if not branches:
             if may_branch:
                 heapq.heappush(queue, (cost + sought.switch_cost, order, entry + 1))
                 order += 1
-            first = last_action(room, i)
+            first = last_action(workspace, i)
             last = first + 1
         for action in range(first, last):
-            if branches and action == last_action(room, i):
+            if branches and action == last_action(workspace, i):
                 continue
             if not permitted(world, states, i, sought, action):
                 continue
-            if room.switches[i] + sought.switched[last_action(room, i), action] > sought.switches:
+            if workspace.switches[i] + sought.switched[last_action(workspace, i), action] > sought.switches:
                 continue
             left -= 1
-            child = room.free[left]
-            miss = descend(world, states, sought, room, child, i, action)
+            child = workspace.free[left]
+            miss = descend(world, states, sought, workspace, child, i, action)
             simulated += 1
             probability = success(states, child, sought)
-            expected = room.cost[child] + sought.failure_cost * (1.0 - probability)
+            expected = workspace.cost[child] + sought.failure_cost * (1.0 - probability)
             if probability > _UNLIKELY and expected < best:
                 best = expected
-                length = write_plan(room, child)
+                length = write_plan(workspace, child)
             elif best == math.inf and miss < nearest:
                 nearest = miss
-                length = write_plan(room, child)
-            if expected <= room.cost[child] or room.depth[child] == sought.cutoff:
-                room.free[left] = child
+                length = write_plan(workspace, child)
+            if expected <= workspace.cost[child] or workspace.depth[child] == sought.cutoff:
+                workspace.free[left] = child
                 left += 1
             else:
-                heapq.heappush(queue, (room.cost[child] + sought.action_cost, order, 2 * child))
+                heapq.heappush(queue, (workspace.cost[child] + sought.action_cost, order, 2 * child))
                 order += 1
         if branches or not may_branch:
-            room.free[left] = i
+            workspace.free[left] = i
             left += 1
     return length, best, proven, simulated

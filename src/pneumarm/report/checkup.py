@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from pneumarm.arm.spec_file import Baseline
+from pneumarm.arm.spec_file import SoundState
 from pneumarm.checkup.diagnose import WHITE, WORN, Finding
 from pneumarm.checkup.figures import (
     JOINT_HEADER,
@@ -24,14 +24,14 @@ from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
 _LINES = ((DARK, "-"), (MIDDLE, "--"))
 
 
-def checkup_page(checkup: Checkup, findings: Sequence[Finding], baseline: Baseline | None = None) -> str:
-    """Return the page as HTML text; ``baseline`` is what the arm did when it was calibrated."""
+def checkup_page(checkup: Checkup, findings: Sequence[Finding], sound: SoundState | None = None) -> str:
+    """Return the page as HTML text; ``sound`` is what the arm did when it was calibrated."""
     name = checkup.spec.name
     verdict = [f"{len(findings)} thing(s) to see to." if findings else "Nothing is wrong with it."]
     rows = [(f.where, f.kind, f.told_by, f.remedy) for f in findings]
     said = [Table(("where", "what", "told by", "what to do"), rows, "What is wrong.", words=True)] if rows else []
     muscles = [
-        (f"joint {j + 1}, muscle {m + 1}", *muscle_row(joint_figures(checkup, j), j, m, baseline))
+        (f"joint {j + 1}, muscle {m + 1}", *muscle_row(joint_figures(checkup, j), j, m, sound))
         for j in range(len(checkup.joints))
         for m in range(2)
     ]

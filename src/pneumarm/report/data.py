@@ -205,7 +205,7 @@ class TrainingData(Record):
     shapes = {  # noqa: RUF012
         "episodes": "evaluations",
         "deviation": "agents evaluations",
-        "criterium": "agents evaluations",
+        "criterion": "agents evaluations",
         "performance": "agents evaluations",
         "epsilon": "agents evaluations",
         "temperature": "agents evaluations",
@@ -218,7 +218,7 @@ class TrainingData(Record):
     """Episodes at each evaluation, shape (evaluations,)."""
     deviation: Array
     """Shape (agents, evaluations) [counts]; what lies behind an agent's ``evaluated`` is not looked at."""
-    criterium: Array
+    criterion: Array
     """Share of successes asked for, shape (agents, evaluations)."""
     performance: Array
     """p(k) of eq. 4.14, shape (agents, evaluations)."""

@@ -258,15 +258,15 @@ def trained(data: TrainingData, spec: ArmSpec) -> Section:
             f"{len(data.evaluated)} agents learn at once from different initial weights, because these decide most "
             "(thesis section 5.4.2); the best in a validation of its own is kept. Shaping lets begin "
             "states lie farther "
-            "from the goal as the agent meets its criterium (thesis section 4.3.2).",
+            "from the goal as the agent meets its criterion (thesis section 4.3.2).",
         ),
         (
             Picture(
                 figures.shaping_curves(
-                    data.episodes, data.deviation, data.criterium, data.performance, data.epsilon, data.temperature,
+                    data.episodes, data.deviation, data.criterion, data.performance, data.epsilon, data.temperature,
                     data.evaluated, data.chosen, spec,
                 ),
-                "Deviation, performance with its criterium, exploration and temperature over the episodes (thesis "
+                "Deviation, performance with its criterion, exploration and temperature over the episodes (thesis "
                 "figure 4.3 shows the last three over the deviation).",
                 figures.shaping_curves_alt(
                     data.episodes, data.deviation, data.performance, data.evaluated, data.chosen, spec

@@ -109,7 +109,7 @@ def svg(figure: Figure) -> str:
 def _freeze(figure: Figure) -> None:
     """Lay ``figure`` out once and for all.
 
-    The layout makes room for tick labels, and the ticks depend on the room: fixed after a first layout, they make
+    The layout makes place for tick labels, and the ticks depend on that: fixed after a first layout, they make
     the second one final. Positions are rounded, because the solver leaves differences in the last bits from call
     to call, and ids in the SVG are made of them.
     """

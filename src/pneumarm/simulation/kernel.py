@@ -53,7 +53,7 @@ class SimulationParameters(NamedTuple):
 
 
 class SimulationState(NamedTuple):
-    """What one simulated arm changes: its state, its noise, its random state, and room for sums."""
+    """What one simulated arm changes: its state, its noise, its random state, and workspace for sums."""
 
     x: NDArray[np.float32]
     """The vector described at the top of this module, shape (inputs,)."""

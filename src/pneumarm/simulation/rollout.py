@@ -19,18 +19,18 @@ from pneumarm.simulation.simulation import Simulation
 
 
 class SimulatedWorld(NamedTuple):
-    """What does not change in rollouts of a simulation, and room for one step. Made by :func:`simulated_world`."""
+    """What does not change in rollouts of a simulation, and a step's workspace. Made by :func:`simulated_world`."""
 
     simulation: SimulationParameters
     noise: NoiseParameters
-    room: SimulationState
+    workspace: SimulationState
     """Only its sums and its random state are used; the state itself lies in :class:`SimulatedStates`."""
     unit: NDArray[np.float64]
     """Offset and scale of the observations, shape (joints, 4, 2) [sensor units]."""
     command_scale: NDArray[np.float64]
     """Shape (joints, 2)."""
     command: NDArray[np.float32]
-    """Room, shape (2 joints,)."""
+    """Workspace, shape (2 joints,)."""
     limit: float
     """Inlets stay closed while their muscle reads over this [counts]."""
 
@@ -56,7 +56,7 @@ def simulated_world(simulation: Simulation) -> SimulatedWorld:
     return SimulatedWorld(
         simulation=parameters,
         noise=noise_parameters(NoiseSettings(kind="none"), simulation),
-        room=simulation_state(parameters, random_state(0)),
+        workspace=simulation_state(parameters, random_state(0)),
         unit=np.stack([offset, scale], axis=-1),
         command_scale=np.ascontiguousarray(scaling.command_scale.reshape(joints, 2)),
         command=np.zeros(2 * joints, np.float32),
@@ -65,10 +65,10 @@ def simulated_world(simulation: Simulation) -> SimulatedWorld:
 
 
 def simulated_states(world: SimulatedWorld, n: int) -> SimulatedStates:
-    """Return room for ``n`` states of a simulation."""
+    """Return workspace for ``n`` states of a simulation."""
     joints = len(world.unit)
     return SimulatedStates(
-        x=np.tile(world.room.x, (n, 1)),
+        x=np.tile(world.workspace.x, (n, 1)),
         angle=np.empty((n, joints)),
         velocity=np.empty((n, joints)),
         pressure=np.empty((n, joints, 2)),
@@ -104,7 +104,7 @@ def advance_simulated(world, states, i, valves):  # type: ignore[no-untyped-def]
     for j in range(states.angle.shape[1]):
         for m in range(2):
             world.command[2 * j + m] = valves[j, m] / world.command_scale[j, m]
-    room = world.room
-    state = SimulationState(states.x[i], room.average, room.random, room.hidden, room.change)
+    workspace = world.workspace
+    state = SimulationState(states.x[i], workspace.average, workspace.random, workspace.hidden, workspace.change)
     step(world.simulation, world.noise, state, world.command)
     look_simulated(world, states, i)

@@ -89,7 +89,7 @@ class Episode(NamedTuple):
     switched: NDArray[np.int64]
     """Whether the last action of each joint was a switch, shape (joints,)."""
     command: NDArray[np.float32]
-    """Room, shape (2 joints,)."""
+    """Workspace, shape (2 joints,)."""
 
 
 def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettings) -> Environment:
@@ -129,7 +129,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
 
 
 def episode(environment: Environment, random: RandomState) -> Episode:
-    """Return room for episodes in ``environment`` that draw from ``random``."""
+    """Return workspace for episodes in ``environment`` that draw from ``random``."""
     joints = environment.simulation.joints
     return Episode(
         state=simulation_state(environment.simulation, random),

@@ -39,9 +39,9 @@ class Fleet(NamedTuple):
     random: RandomState
     """Shape (n, 4)."""
     hidden: NDArray[np.float32]
-    """Room, shape (units, n)."""
+    """Workspace, shape (units, n)."""
     change: NDArray[np.float32]
-    """Room, shape (outputs, n)."""
+    """Workspace, shape (outputs, n)."""
     goal: NDArray[np.float64]
     """Shape (n, joints) [counts]."""
     actions: NDArray[np.int64]
@@ -49,7 +49,7 @@ class Fleet(NamedTuple):
     switched: NDArray[np.int64]
     """Whether the last action was a switch, shape (n, joints)."""
     command: NDArray[np.float32]
-    """Room, shape (n, 2 joints)."""
+    """Workspace, shape (n, 2 joints)."""
     still: NDArray[np.int64]
     """How many steps in a row the last action has changed nothing, shape (n, joints)."""
     before: NDArray[np.float32]
@@ -59,7 +59,7 @@ class Fleet(NamedTuple):
 
 
 def fleet(environment: Environment, random: RandomState) -> Fleet:
-    """Return room for as many arms in ``environment`` as there are random states in ``random`` (n, 4)."""
+    """Return workspace for as many arms in ``environment`` as there are random states in ``random`` (n, 4)."""
     inputs, units = environment.simulation.hidden.shape
     outputs, joints, n = environment.simulation.output_bias.size, environment.simulation.joints, len(random)
     x = np.zeros((inputs, n), np.float32)

@@ -31,7 +31,7 @@ class Movements(NamedTuple):
 
 
 def movements(episodes: int, joints: int) -> Movements:
-    """Return room for ``episodes``."""
+    """Return workspace for ``episodes``."""
     each, all_ = (episodes, joints), (episodes,)
     return Movements(
         goal=np.zeros(each),

@@ -161,7 +161,7 @@ class Status(NamedTuple):
 
 
 class Sensors(NamedTuple):
-    """The values of a READING, for all joints and muscles that the protocol has room for."""
+    """The values of a READING, for all joints and muscles that the protocol has workspace for."""
 
     time: int
     """Controller's clock at the sampling [us], 32 bits."""

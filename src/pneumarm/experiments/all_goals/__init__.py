@@ -8,7 +8,7 @@ On arms 1 to 5, four runs each, other weights with the same settings make 65 ± 
 own table 83 %). A learning rate of 0.10, 10 neurons and traces cost 18 ± 5, 8 ± 7 and 16 ± 7 of reward, largely
 because together with gamma 0.98 (trial 14) they diverge; SARSA and Q-learning are not told apart. Agents reach 85 %
 of their goals in the test, where the thesis' reach nearly all, and 96 % while they learn on, which is what the
-criterium is about: an agent that is stuck unlearns the action that holds it, and the same weights, frozen, stay
+criterion is about: an agent that is stuck unlearns the action that holds it, and the same weights, frozen, stay
 stuck.
 """
 
@@ -28,7 +28,7 @@ from pneumarm.experiments.findings import (
 from pneumarm.learning import TrainSettings
 
 LONGEST = 50_000
-"""Episodes after which a training that does not meet the criterium ends (the thesis' longest took 48,000)."""
+"""Episodes after which a training that does not meet the criterion ends (the thesis' longest took 48,000)."""
 BASE = replace(TrainSettings(), max_episodes=LONGEST)
 """What no factor sets (section 5.4.2)."""
 

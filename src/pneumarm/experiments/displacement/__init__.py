@@ -214,7 +214,7 @@ _THIRDS = (("success", 1, 100.0), ("actions", 2, 1.0), ("switches", 2, 1.0), ("r
 def typical_movement(agent: Agent, arm: VirtualArm, degrees: float, random: np.random.Generator) -> Typical | None:
     """Let ``agent`` move greedily by ``degrees`` from a random begin state; None where none allows that.
 
-    The direction is the one in which there is more room. All joints move alike.
+    The direction is the one in which there is more workspace. All joints move alike.
     """
     cycle = ControlCycle(guarded(arm))
     step = degrees * arm.spec.counts_per_degree

@@ -5,7 +5,7 @@ of training is looked for after every episode, as table C.22 shows.
 
     pneumarm experiment no-shaping
 
-On arms 1 to 5, four runs each, 316 of 320 agents meet the criterium without shaping, as all do in the thesis, and no
+On arms 1 to 5, four runs each, 316 of 320 agents meet the criterion without shaping, as all do in the thesis, and no
 setting surely matters to what they earn. Over all trials their reward is -18 on average, against -10 in all-goals
 with the same arms and runs; shaping-settings compares both within runs.
 """
@@ -16,7 +16,7 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.factorial import Factorial
-from pneumarm.experiments.findings import agents_meet_the_criterium
+from pneumarm.experiments.findings import agents_meet_the_criterion
 from pneumarm.learning import Exploration
 
 EXPERIMENT = Factorial(
@@ -30,5 +30,5 @@ EXPERIMENT = Factorial(
     thesis={
         name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
     },
-    findings=(agents_meet_the_criterium,),
+    findings=(agents_meet_the_criterion,),
 )

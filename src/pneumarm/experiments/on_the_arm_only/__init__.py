@@ -3,7 +3,7 @@
 The thesis guesses 29 h from 15,000 movements of 7.05 s. Here one agent learns on the arm from scratch: first the arm
 visits random begin states, which tell the range of goals and how to scale what is read; then the deviation is shaped
 as in the simulation, but the other way around (section 4.3.3): the arm goes to a random begin state and the goal is
-set close to it. Time is the arm's: venting, inflating and waiting count. The end is the criterium of section 5.2.
+set close to it. Time is the arm's: venting, inflating and waiting count. The end is the criterion of section 5.2.
 Beside it an agent from the same weights, trained in the simulation, whose collecting took arm time too.
 
 Numbered differences from the thesis:
@@ -16,7 +16,7 @@ Numbered differences from the thesis:
 
     pneumarm experiment on-the-arm-only
 
-On arms 1 to 5, four runs each, all 20 agents meet the criterium, after 23.0 ± 1.9 h and 17,000 ± 1,200 movements:
+On arms 1 to 5, four runs each, all 20 agents meet the criterion, after 23.0 ± 1.9 h and 17,000 ± 1,200 movements:
 the guess of 29 h is right in its order, because movements soon take less than the cut-off that it counts with (4.9 s,
 not 7.05). Frozen and greedy they then reach 91 ± 4 % of their goals, and earn 28 ± 26 more than single agents from
 the same weights that learned in the simulation.
@@ -167,7 +167,7 @@ class OnTheArmOnly(OnTheArm):
         return Analysis(
             summary=[
                 self.question,
-                f"{won} of {len(learned)} agents met the criterium, after {plain(hours, 1)} h of arm time and "
+                f"{won} of {len(learned)} agents met the criterion, after {plain(hours, 1)} h of arm time and "
                 f"{plain(movements, 0)} movements, {plain(seconds)} s each; the thesis guesses {said['hours']:g} h, "
                 f"{said['movements']:,} movements of {said['seconds']:g} s.",
                 f"Then, frozen and greedy, they reach {plain(mean(rows, 'success_rate', ON_ARM), 1, 100)} % of their "
@@ -261,7 +261,7 @@ def look(arm: VirtualArm, settings: TrainSettings, looks: int, seed: int) -> Age
 
 
 def learn_on(arm: VirtualArm, agent: Agent, seed: int) -> Learned:
-    """Let ``agent`` learn on ``arm`` until it meets the criterium of its settings, or for their ``max_episodes``."""
+    """Let ``agent`` learn on ``arm`` until it meets the criterion of its settings, or for their ``max_episodes``."""
     settings, spec = agent.settings, arm.spec
     player = Player(agent, arm, settings.learning_rate, settings.exploration, seed)
     deviation, made, steps, met = initial_deviation(settings, spec), 0, 0, False
@@ -272,7 +272,7 @@ def learn_on(arm: VirtualArm, agent: Agent, seed: int) -> Learned:
         played: Played = player.play(*draws(agent, seed, chunk, MOVEMENTS, made), now.schedule)
         made += len(played.time_end)
         steps += int(played.movements.actions.sum())
-        met = now.whole and player.performance >= now.criterium
+        met = now.whole and player.performance >= now.criterion
         course.append((arm.time / 3600, deviation, player.performance))
         deviation = adjusted(deviation, player.performance, settings, spec)
     return Learned(player.learned, met, made, steps, arm.time, tuple(course))

@@ -25,14 +25,14 @@ def progress_figure(arms: Sequence[Sequence[Mapping[str, float]]]) -> Figure:
     below.set_ylabel("performance [%]")
     below.set_xlabel("time on the arm [h]")
     below.set_xlim(0)
-    above.set_title("o: met the criterium; x: had not when training ended")
+    above.set_title("o: met the criterion; x: had not when training ended")
     return figure
 
 
 def progress_alt(rows: Sequence[Mapping[str, float]]) -> str:
     """Say in words what :func:`progress_figure` shows."""
     said = [
-        f"{'met the criterium' if row['met'] else 'had not met the criterium'} after {row['hours']:.1f} h"
+        f"{'met the criterion' if row['met'] else 'had not met the criterion'} after {row['hours']:.1f} h"
         for row in rows
     ]
     return f"{len(rows)} agents; they {', '.join(said)}."

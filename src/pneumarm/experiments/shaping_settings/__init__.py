@@ -10,7 +10,7 @@ Trials are data (``trials.toml``), and so is the wear (``worn.toml``). All use S
 and the learning rate 0.05 (section 5.4.2); differences are taken within runs, which begin with the same weights.
 
 On arms 1 to 5, four runs each, shaping raises the reward by 27 ± 17 and halves its spread, and without it all agents
-meet the criterium 8,800 episodes earlier, also where wear makes the fit's error of the angle ten times as large (26
+meet the criterion 8,800 episodes earlier, also where wear makes the fit's error of the angle ten times as large (26
 instead of 2.6 counts). Adjusting every 100 episodes saves 7,700 episodes and costs 27 ± 21 of reward; how much the
 deviation shrinks does not matter, because it hardly ever does.
 """
@@ -53,7 +53,7 @@ from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
 
 _CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episodes", "met")
-_WORDS = {**CRITERIA, "met": "share of agents that met the criterium at the whole range of angles"}
+_WORDS = {**CRITERIA, "met": "share of agents that met the criterion at the whole range of angles"}
 _SHOWN = ("reward", "success_rate", "episodes")
 _WITHOUT = Exploration(0.09, 10.0)
 _NEVER_MET = 0.5  # share of agents below which a method does not solve the task
@@ -186,7 +186,7 @@ class ShapingSettings(Experiment):
 
     def _results(self, tables: Tables, samples: Tables, differences: Mapping[str, list[Interval | None]]) -> Section:
         header = ["settings", "reward", "difference within runs", "greedy success", "success, learning on"]
-        header += ["episodes", "difference within runs", "criterium met"]
+        header += ["episodes", "difference within runs", "criterion met"]
         rows = []
         for place, (trial, name) in enumerate(self.trials.items()):
             rows.append(
@@ -215,14 +215,14 @@ class ShapingSettings(Experiment):
         return Section(
             "The strategy",
             [
-                "The deviation begins small, grows where the performance exceeds the criterium and shrinks where it "
-                "does not; exploration, temperature and criterium follow it."
+                "The deviation begins small, grows where the performance exceeds the criterion and shrinks where it "
+                "does not; exploration, temperature and criterion follow it."
             ],
             [
                 Picture(
                     strategy_figure(settings, spec),
-                    "Exploration, temperature and criterium as functions of the deviation (thesis fig. 4.3).",
-                    "Exploration falls from 0.5 to 0.05 and temperature from 20 to 1; the criterium rises to 0.95.",
+                    "Exploration, temperature and criterion as functions of the deviation (thesis fig. 4.3).",
+                    "Exploration falls from 0.5 to 0.05 and temperature from 20 to 1; the criterion rises to 0.95.",
                 )
             ],
         )
@@ -253,7 +253,7 @@ class ShapingSettings(Experiment):
                 "shaping-improves",
             ),
             Claim(
-                "Shaping is not indispensable: without it agents meet the criterium",
+                "Shaping is not indispensable: without it agents meet the criterion",
                 "all 48 agents (table C.22)",
                 _share(tables["met"][without]),
                 above(solved, _NEVER_MET),
@@ -267,7 +267,7 @@ class ShapingSettings(Experiment):
                 "shaping-not-indispensable",
             ),
             Claim(
-                "With a worn potentiometer shaping is indispensable: agents without it do not meet the criterium",
+                "With a worn potentiometer shaping is indispensable: agents without it do not meet the criterion",
                 "no agent reached the whole deviation (section 5.4.4, no numbers)",
                 f"{_share(tables['met'][worn_without])}; with shaping {_share(tables['met'][worn])}",
                 below(worn_solved, _NEVER_MET),
@@ -318,7 +318,7 @@ def _whole(found: Interval | None) -> str:
 
 @styled
 def strategy_figure(settings: TrainSettings, spec: ArmSpec) -> Figure:
-    """Draw exploration, temperature and criterium against the deviation (thesis fig. 4.3)."""
+    """Draw exploration, temperature and criterion against the deviation (thesis fig. 4.3)."""
     low, high = spec.angle_range
     deviations = np.linspace(initial_deviation(settings, spec), high - low, 50)
     stages = [stage(float(d), settings, spec) for d in deviations]
@@ -326,7 +326,7 @@ def strategy_figure(settings: TrainSettings, spec: ArmSpec) -> Figure:
     for axis, values, label, colour in (
         (axes[0, 0], [s.schedule.epsilon for s in stages], "exploration ε", DARK),
         (axes[0, 1], [s.schedule.temperature for s in stages], "temperature T [reward]", MIDDLE),
-        (axes[0, 2], [s.criterium for s in stages], "criterium (success rate)", GREY),
+        (axes[0, 2], [s.criterion for s in stages], "criterion (success rate)", GREY),
     ):
         axis.plot(deviations, values, color=colour)
         axis.set_xlabel("deviation [counts]")

@@ -44,17 +44,17 @@ class ValueBatch(NamedTuple):
     target: NDArray[np.float64]
     """G, shape (steps, n, joints)."""
     is_reached: NDArray[np.bool_]
-    """Room, shape (n,)."""
+    """Workspace, shape (n,)."""
     values: NDArray[np.float32]
-    """Room, shape (9,)."""
+    """Workspace, shape (9,)."""
     odds: NDArray[np.float32]
-    """Room, shape (9,)."""
+    """Workspace, shape (9,)."""
     order: NDArray[np.int64]
-    """Room, shape (steps,)."""
+    """Workspace, shape (steps,)."""
 
 
 def value_batch(steps: int, inputs: int, joints: int, n: int) -> ValueBatch:
-    """Return room for ``steps`` of ``n`` arms."""
+    """Return workspace for ``steps`` of ``n`` arms."""
     each = (steps, n, joints)
     return ValueBatch(
         inputs=np.zeros((steps + 1, inputs, n), np.float32),

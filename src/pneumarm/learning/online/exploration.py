@@ -22,7 +22,7 @@ def greedy(values):  # type: ignore[no-untyped-def]
 def choose(values, epsilon, temperature, odds, random):  # type: ignore[no-untyped-def]
     """Return the greedy action, or with probability ``epsilon`` another one by the Boltzmann distribution.
 
-    ``odds`` (9,) is room for its probabilities, up to a factor.
+    ``odds`` (9,) is workspace for its probabilities, up to a factor.
     """
     best = greedy(values)
     if uniform(random) >= epsilon:

@@ -12,7 +12,7 @@ from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import part
 from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.loop import Schedule, look_ahead, room_of
+from pneumarm.learning.online.loop import Schedule, look_ahead, workspace_of
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import action_values, forget_traces, learner, td_target, update
 from pneumarm.random import random_state
@@ -52,7 +52,7 @@ class OnlineLearner:
         self._places = places(agent.window)
         self._x = np.zeros(self._places.size, np.float32)
         self._x[self._places.one] = 1
-        self._room = room_of(joints, self._places.size)
+        self._workspace = workspace_of(joints, self._places.size)
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
@@ -62,13 +62,13 @@ class OnlineLearner:
         goal = (np.asarray(goal, np.float64).reshape(window.joints) - offset) / scale
         self._x[self._places.goal : self._places.one] = goal
         self._x[: self._places.command] = self._checked(state)
-        begin_acting(self._learner, self._schedule, self._x, self._room, self._random)
+        begin_acting(self._learner, self._schedule, self._x, self._workspace, self._random)
 
     def act(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of the current state; they stay the same until :meth:`observe`."""
-        if self._room.next_actions[0] < 0:
+        if self._workspace.next_actions[0] < 0:
             raise PneumarmError("begin an episode before acting")
-        return self._room.next_actions.copy()
+        return self._workspace.next_actions.copy()
 
     def greedy(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of highest value in the current state; changes nothing."""
@@ -90,7 +90,7 @@ class OnlineLearner:
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state`` without learning, as if an episode began there."""
         self._x[: self._places.command] = self._checked(next_state)
-        begin_acting(self._learner, self._schedule, self._x, self._room, self._random)
+        begin_acting(self._learner, self._schedule, self._x, self._workspace, self._random)
 
     def weights(self) -> NDArray[np.float32]:
         """Return a copy of the weights as they are now."""
@@ -103,10 +103,10 @@ class OnlineLearner:
         whether the goals are reached: the value of a terminal state is 0, a cut-off is not terminal.
         """
         self.act()
-        paid = np.broadcast_to(np.asarray(reward, np.float64), self._room.actions.shape).copy()
+        paid = np.broadcast_to(np.asarray(reward, np.float64), self._workspace.actions.shape).copy()
         next_state = self._checked(next_state)
         seen = paid, next_state
-        learn_and_act(self._learner, self._schedule, self._x, self._room, self._random, seen, bool(terminal))
+        learn_and_act(self._learner, self._schedule, self._x, self._workspace, self._random, seen, bool(terminal))
 
     @property
     def agent(self) -> Agent:
@@ -134,7 +134,7 @@ class OnlineLearner:
             array[...] = arrays[name]
 
     def _arrays(self) -> dict[str, NDArray[np.generic]]:
-        holders = (self._learner, self._room)
+        holders = (self._learner, self._workspace)
         found = {name: getattr(holder, name) for holder in holders for name in _SAVED if hasattr(holder, name)}
         return found | {"random": self._random, "x": self._x}
 
@@ -146,29 +146,29 @@ class OnlineLearner:
 
 
 @part
-def begin_acting(learner, schedule, x, room, random):  # type: ignore[no-untyped-def]
+def begin_acting(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
     """Begin an episode in the state and goal ``x``: choose its first actions."""
-    for joint in range(room.actions.shape[0]):
+    for joint in range(workspace.actions.shape[0]):
         forget_traces(learner, joint)
-    look_ahead(learner, schedule, x, room, random)
+    look_ahead(learner, schedule, x, workspace, random)
 
 
 @part
-def learn_and_act(learner, schedule, x, room, random, seen, terminal):  # type: ignore[no-untyped-def]
+def learn_and_act(learner, schedule, x, workspace, random, seen, terminal):  # type: ignore[no-untyped-def]
     """Do what the training loop does after an action; ``seen`` are the rewards (joints,) and the next state."""
     paid, next_state = seen
     for i in range(x.shape[0]):
-        room.before[i] = x[i]
+        workspace.before[i] = x[i]
     for i in range(next_state.shape[0]):
         x[i] = next_state[i]
-    for joint in range(room.actions.shape[0]):
-        room.actions[joint] = room.next_actions[joint]
+    for joint in range(workspace.actions.shape[0]):
+        workspace.actions[joint] = workspace.next_actions[joint]
     if not terminal:
-        look_ahead(learner, schedule, x, room, random)
+        look_ahead(learner, schedule, x, workspace, random)
     if learner.rate == 0.0:
         return
-    for joint in range(room.actions.shape[0]):
-        target = td_target(paid[joint], learner.discount, room.next_values[joint], terminal)
-        update(learner, joint, room.before, room.actions[joint], target)
-        if room.cut[joint]:
+    for joint in range(workspace.actions.shape[0]):
+        target = td_target(paid[joint], learner.discount, workspace.next_values[joint], terminal)
+        update(learner, joint, workspace.before, workspace.actions[joint], target)
+        if workspace.cut[joint]:
             forget_traces(learner, joint)

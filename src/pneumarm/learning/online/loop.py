@@ -20,8 +20,8 @@ from pneumarm.learning.online.values import action_values, forget_traces, td_tar
 from pneumarm.task.environment import Episode, angle, begin_episode, reward, take, velocity
 
 
-class Room(NamedTuple):
-    """What a loop needs to remember from one step to the next. Made by :func:`room`."""
+class Workspace(NamedTuple):
+    """What a loop needs to remember from one step to the next. Made by :func:`workspace`."""
 
     before: NDArray[np.float32]
     """State vector before the action, shape (inputs,)."""
@@ -39,14 +39,14 @@ class Room(NamedTuple):
     """Shape (joints,)."""
 
 
-def room(episode: Episode) -> Room:
-    """Return room for a loop on ``episode``."""
-    return room_of(episode.goal.size, episode.state.x.size)
+def workspace(episode: Episode) -> Workspace:
+    """Return workspace for a loop on ``episode``."""
+    return workspace_of(episode.goal.size, episode.state.x.size)
 
 
-def room_of(joints: int, inputs: int) -> Room:
-    """Return room for so many joints and inputs."""
-    return Room(
+def workspace_of(joints: int, inputs: int) -> Workspace:
+    """Return workspace for so many joints and inputs."""
+    return Workspace(
         before=np.zeros(inputs, np.float32),
         values=np.zeros(ACTIONS, np.float32),
         odds=np.zeros(ACTIONS, np.float32),
@@ -71,43 +71,43 @@ class Schedule(NamedTuple):
 
 
 @part
-def look_ahead(learner, schedule, x, room, random):  # type: ignore[no-untyped-def]
+def look_ahead(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
     """Choose the next actions in ``x`` and find the values that the targets look ahead to."""
-    for joint in range(room.actions.shape[0]):
-        action_values(learner, joint, x, room.values)
-        chosen = choose(room.values, schedule.epsilon, schedule.temperature, room.odds, random)
-        room.next_actions[joint] = chosen
-        room.next_values[joint] = room.values[chosen]
-        room.cut[joint] = 0
+    for joint in range(workspace.actions.shape[0]):
+        action_values(learner, joint, x, workspace.values)
+        chosen = choose(workspace.values, schedule.epsilon, schedule.temperature, workspace.odds, random)
+        workspace.next_actions[joint] = chosen
+        workspace.next_values[joint] = workspace.values[chosen]
+        workspace.cut[joint] = 0
         if learner.off_policy:
-            best = greedy(room.values)
-            room.next_values[joint] = room.values[best]
-            room.cut[joint] = 1 if chosen != best else 0
+            best = greedy(workspace.values)
+            workspace.next_values[joint] = workspace.values[best]
+            workspace.cut[joint] = 1 if chosen != best else 0
 
 
 @part
-def train_episode(environment, learner, schedule, episode, room):  # type: ignore[no-untyped-def]
+def train_episode(environment, learner, schedule, episode, workspace):  # type: ignore[no-untyped-def]
     """Run one episode, learning; return actions taken, sum of rewards, and whether the goal was reached."""
     x, random, total = episode.state.x, episode.state.random, 0.0
     begin_episode(environment, episode, schedule.deviation, random)
-    for joint in range(room.actions.shape[0]):
+    for joint in range(workspace.actions.shape[0]):
         forget_traces(learner, joint)
-    look_ahead(learner, schedule, x, room, random)
+    look_ahead(learner, schedule, x, workspace, random)
     for k in range(environment.task.cutoff):
         for i in range(x.shape[0]):
-            room.before[i] = x[i]
-        for joint in range(room.actions.shape[0]):
-            room.actions[joint] = room.next_actions[joint]
-        is_reached = take(environment, episode, room.actions)
+            workspace.before[i] = x[i]
+        for joint in range(workspace.actions.shape[0]):
+            workspace.actions[joint] = workspace.next_actions[joint]
+        is_reached = take(environment, episode, workspace.actions)
         if not is_reached:
-            look_ahead(learner, schedule, x, room, random)
+            look_ahead(learner, schedule, x, workspace, random)
         total += environment.task.reward_goal if is_reached else environment.task.reward_action
-        for joint in range(room.actions.shape[0]):
+        for joint in range(workspace.actions.shape[0]):
             paid = reward(environment.task, is_reached, episode.switched[joint])
             total += environment.task.reward_switch * episode.switched[joint]
-            target = td_target(paid, learner.discount, room.next_values[joint], is_reached)
-            update(learner, joint, room.before, room.actions[joint], target)
-            if room.cut[joint]:
+            target = td_target(paid, learner.discount, workspace.next_values[joint], is_reached)
+            update(learner, joint, workspace.before, workspace.actions[joint], target)
+            if workspace.cut[joint]:
                 forget_traces(learner, joint)
         if is_reached:
             return k + 1, total, True
@@ -115,11 +115,11 @@ def train_episode(environment, learner, schedule, episode, room):  # type: ignor
 
 
 @part
-def train_episodes(environment, learner, schedule, episode, room, count, performance):  # type: ignore[no-untyped-def]
+def train_episodes(environment, learner, schedule, episode, workspace, count, performance):  # type: ignore[no-untyped-def]
     """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes."""
     steps = 0
     for e in range(count):
-        actions, _, success = train_episode(environment, learner, schedule, episode, room)
+        actions, _, success = train_episode(environment, learner, schedule, episode, workspace)
         steps += actions
         performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
         if performance >= schedule.enough:
@@ -128,7 +128,7 @@ def train_episodes(environment, learner, schedule, episode, room, count, perform
 
 
 @part
-def test_episodes(environment, learner, schedule, episode, room, random, record):  # type: ignore[no-untyped-def]
+def test_episodes(environment, learner, schedule, episode, workspace, random, record):  # type: ignore[no-untyped-def]
     """Fill ``record`` with episodes over all begin states and goals, drawn from ``random``.
 
     Actions are greedy where the epsilon of ``schedule`` is 0; else they explore, by random numbers of the episode.
@@ -142,13 +142,15 @@ def test_episodes(environment, learner, schedule, episode, room, random, record)
         is_reached = False
         while not is_reached and record.actions[e] < task.cutoff:
             for joint in range(episode.goal.shape[0]):
-                action_values(learner, joint, x, room.values)
+                action_values(learner, joint, x, workspace.values)
                 if schedule.epsilon == 0.0:
-                    room.actions[joint] = greedy(room.values)
+                    workspace.actions[joint] = greedy(workspace.values)
                 else:
                     epsilon, temperature = schedule.epsilon, schedule.temperature
-                    room.actions[joint] = choose(room.values, epsilon, temperature, room.odds, episode.state.random)
-            is_reached = take(environment, episode, room.actions)
+                    workspace.actions[joint] = choose(
+                        workspace.values, epsilon, temperature, workspace.odds, episode.state.random
+                    )
+            is_reached = take(environment, episode, workspace.actions)
             record.actions[e] += 1
             record.reward[e] += task.reward_goal if is_reached else task.reward_action
             for joint in range(episode.goal.shape[0]):

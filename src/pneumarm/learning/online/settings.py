@@ -43,14 +43,14 @@ class Shaping:
     episodes: int = 500
     """Episodes between two adjustments of the deviation (thesis: 500)."""
     grow: float = 0.10
-    """Relative growth of the deviation when the performance exceeds the criterium (thesis: 10 %)."""
+    """Relative growth of the deviation when the performance exceeds the criterion (thesis: 10 %)."""
     shrink: float = 0.03
     """Relative loss of the deviation when it does not (thesis: 3 %)."""
     performance_rate: float = 0.002
     """Weight of the newest episode in the performance (thesis eq. 4.14: 0.002)."""
-    initial_criterium: float = 0.5
+    initial_criterion: float = 0.5
     """Success rate demanded at the initial deviation (thesis: 50 %)."""
-    criterium: float = 0.95
+    criterion: float = 0.95
     """Success rate demanded at the whole range of angles (thesis: 95 %)."""
     exploration: FirstExploration = field(default_factory=FirstExploration)
     """Exploration at the initial deviation (thesis: 0.5 and 20)."""
@@ -65,8 +65,8 @@ class Shaping:
             grow=0 < self.grow < math.inf,
             shrink=0 <= self.shrink < 1,
             performance_rate=0 < self.performance_rate <= 1,
-            initial_criterium=0 <= self.initial_criterium <= 1,
-            criterium=0 <= self.criterium <= 1,
+            initial_criterion=0 <= self.initial_criterion <= 1,
+            criterion=0 <= self.criterion <= 1,
             weights=len(self.weights) > 0 and min(self.weights) >= 0 and 0 < sum(self.weights) < math.inf,
         )
 
@@ -94,9 +94,9 @@ class TrainSettings:
     return_scale: float = 50.0
     """Return that a network's output of 1 stands for (thesis: outputs are normalised; returns are about -50..50)."""
     max_episodes: int = 50_000
-    """Episodes after which training ends although the criterium is not met (thesis: the longest is 50,000)."""
+    """Episodes after which training ends although the criterion is not met (thesis: the longest is 50,000)."""
     stops: bool = True
-    """Whether training ends when the criterium is met; otherwise at ``max_episodes`` (thesis: yes; not in 5.4.3)."""
+    """Whether training ends when the criterion is met; otherwise at ``max_episodes`` (thesis: yes; not in 5.4.3)."""
     validation_episodes: int = 2_000
     """Greedy episodes on which the best agent is chosen."""
     reward: Reward = field(default_factory=Reward)

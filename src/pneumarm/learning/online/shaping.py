@@ -1,10 +1,10 @@
 """Shaping: how far begin states are from the goal, what is demanded there, and how much is explored (section 4.3.2).
 
-    deviation    +10 % if the performance exceeds the criterium, else -3 %, every 500 episodes
-    criterium    0.5 -> 0.95     epsilon    0.5 -> 0.05     temperature    20 -> 1
+    deviation    +10 % if the performance exceeds the criterion, else -3 %, every 500 episodes
+    criterion    0.5 -> 0.95     epsilon    0.5 -> 0.05     temperature    20 -> 1
 
 linear in the deviation, from the initial one to the whole range of angles. The performance is the moving average of
-the successes (thesis eq. 4.14), kept by the loop. Without shaping the criterium is looked at after every episode, as
+the successes (thesis eq. 4.14), kept by the loop. Without shaping the criterion is looked at after every episode, as
 the numbers of episodes in table C.22 show.
 
 Difference from the thesis: the deviation does not shrink below the initial one, where exploration would be
@@ -24,7 +24,7 @@ class Stage(NamedTuple):
     """Where shaping stands."""
 
     schedule: Schedule
-    criterium: float
+    criterion: float
     """Performance demanded."""
     whole: bool
     """Whether the deviation is the whole range of angles."""
@@ -54,9 +54,9 @@ def stage(deviation: float, settings: TrainSettings, spec: ArmSpec) -> Stage:
 
     epsilon = between(shaping.exploration.epsilon, last.epsilon)
     temperature = between(shaping.exploration.temperature, last.temperature)
-    criterium = between(shaping.initial_criterium, shaping.criterium)
+    criterion = between(shaping.initial_criterion, shaping.criterion)
     return Stage(
-        Schedule(float(deviation), epsilon, temperature, shaping.performance_rate), criterium, deviation >= whole
+        Schedule(float(deviation), epsilon, temperature, shaping.performance_rate), criterion, deviation >= whole
     )
 
 
@@ -65,7 +65,7 @@ def adjusted(deviation: float, performance: float, settings: TrainSettings, spec
     if settings.shaping is None:
         return deviation
     low, high = spec.angle_range
-    if performance > stage(deviation, settings, spec).criterium:
+    if performance > stage(deviation, settings, spec).criterion:
         return min(deviation * (1 + settings.shaping.grow), high - low)
     return max(deviation * (1 - settings.shaping.shrink), initial_deviation(settings, spec))
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.online.loop import Schedule, room, test_episodes
+from pneumarm.learning.online.loop import Schedule, test_episodes, workspace
 from pneumarm.learning.online.settings import Exploration, TrainSettings
 from pneumarm.learning.online.values import learner
 from pneumarm.random import random_state
@@ -29,5 +29,5 @@ def run_test(
     one = episode(env, random_state((*seed, NOISE)))
     record = movements(episodes, one.goal.size)
     schedule = Schedule(np.inf, float(exploration.epsilon), float(exploration.temperature), 0.0)
-    test_episodes(env, learner(weights, settings), schedule, one, room(one), random_state(seed), record)
+    test_episodes(env, learner(weights, settings), schedule, one, workspace(one), random_state(seed), record)
     return TestResult(*record)

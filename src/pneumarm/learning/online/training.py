@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.loop import room, train_episodes
+from pneumarm.learning.online.loop import train_episodes, workspace
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.learning.online.shaping import adjusted, initial_deviation, stage
 from pneumarm.learning.online.testing import run_test
@@ -38,7 +38,7 @@ _CHECKPOINT = "pneumarm training"
 _CHECKPOINT_EVERY = 2.0  # s
 _CACHE_LINE = 128  # bytes; processors that fetch lines in pairs need two of 64
 _CHUNK_WITHOUT_SHAPING = 500  # episodes
-CURVES = ("episodes", "deviation", "criterium", "performance", "epsilon", "temperature")
+CURVES = ("episodes", "deviation", "criterion", "performance", "epsilon", "temperature")
 """Columns of the training curves."""
 
 
@@ -66,7 +66,7 @@ class Training:
     curves: tuple[NDArray[np.float64], ...]
     """By agent a row every 500 episodes, columns as in ``CURVES``; the deviation [counts] as it was until then."""
     met: NDArray[np.bool_]
-    """Which agents met the criterium at the whole deviation; the others ended at ``max_episodes``; (agents,)."""
+    """Which agents met the criterion at the whole deviation; the others ended at ``max_episodes``; (agents,)."""
     episodes: NDArray[np.int64]
     """Training episodes by agent, shape (agents,)."""
     steps: NDArray[np.int64]
@@ -121,7 +121,7 @@ def train(
     """Train ``settings.agents`` agents in ``simulation`` and return the best, with what it took.
 
     Training of an agent ends when its deviation is the whole range of angles and its performance meets the
-    criterium (section 5.2), or after ``settings.max_episodes`` (difference from the thesis, where some seed might
+    criterion (section 5.2), or after ``settings.max_episodes`` (difference from the thesis, where some seed might
     train for ever); where ``settings.stops`` is false, only then. The same seed gives the same agents, bit for bit,
     with any number of ``threads`` (default: one a core). With a ``checkpoint`` a killed training goes on from there;
     the file is left when training is done.
@@ -216,7 +216,7 @@ def _chunk(
     # What threads write must not lie on a cache line together, or each slows the other down.
     one = _apart(episode(env, agents.random[a]))
     worker = _apart(learner(agents.weights[a], settings))
-    remembered = _apart(room(one))
+    remembered = _apart(workspace(one))
     began = time.thread_time()
     performance, steps, count = train_episodes(
         env, worker, now.schedule, one, remembered, count, float(agents.performance[a])
@@ -226,8 +226,8 @@ def _chunk(
     agents.performance[a] = performance
     agents.episodes[a] += count
     agents.steps[a] += steps
-    agents.met[a] |= now.whole and performance >= now.criterium
-    row = [agents.episodes[a], agents.deviation[a], now.criterium, performance, *now.schedule[1:3]]
+    agents.met[a] |= now.whole and performance >= now.criterion
+    row = [agents.episodes[a], agents.deviation[a], now.criterion, performance, *now.schedule[1:3]]
     agents.deviation[a] = adjusted(agents.deviation[a], performance, settings, simulation.spec)
     return row, spent
 
@@ -254,7 +254,7 @@ def _compile(env: Environment, agents: _Agents, settings: TrainSettings, simulat
     one = episode(env, agents.random[0].copy())
     weights = agents.weights[0].copy()
     schedule = stage(agents.deviation[0], settings, simulation.spec).schedule
-    train_episodes(env, learner(weights, settings), schedule, one, room(one), 0, 0.0)
+    train_episodes(env, learner(weights, settings), schedule, one, workspace(one), 0, 0.0)
     run_test(env, weights, settings, 1, (0,))
 
 

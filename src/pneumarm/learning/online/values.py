@@ -45,11 +45,11 @@ class Learner(NamedTuple):
     traced: NDArray[np.bool_]
     """Which networks have traces that are not 0, shape (joints, 9)."""
     hidden: NDArray[np.float32]
-    """Room for all networks of a joint, shape (units,)."""
+    """Workspace for all networks of a joint, shape (units,)."""
     activation: NDArray[np.float32]
-    """Room for the hidden units of one network, shape (width,); 0 beyond them."""
+    """Workspace for the hidden units of one network, shape (width,); 0 beyond them."""
     slope: NDArray[np.float32]
-    """Room, same shape."""
+    """Workspace, same shape."""
     size: int
     """Hidden units of one network."""
     rate: float

@@ -17,7 +17,7 @@ from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import kernel
 from pneumarm.learning.policy.inputs import InputParameters, write_inputs
 from pneumarm.learning.policy.proximal import FORBIDDEN, log_softmax, write_bias
-from pneumarm.networks.layers import Layers, forward, room
+from pneumarm.networks.layers import Layers, forward, workspace
 from pneumarm.random import RandomState
 from pneumarm.simulation.noise import begin_noise
 from pneumarm.task.environment import Environment, reward
@@ -38,7 +38,7 @@ class Mind(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """Simulated arms in which a policy acts, and room for its decisions. Made by :func:`lanes`."""
+    """Simulated arms in which a policy acts, and workspace for its decisions. Made by :func:`lanes`."""
 
     fleet: Fleet
     rows: NDArray[np.float32]
@@ -64,7 +64,7 @@ def lanes(mind: Mind, sizes: tuple[int, ...], random: RandomState) -> Lanes:
     return Lanes(
         fleet=fleet(mind.environment, random),
         rows=np.zeros((sizes[0], n), np.float32),
-        units=room(sizes, n),
+        units=workspace(sizes, n),
         bias=np.zeros((ACTIONS * joints, n), np.float32),
         probability=np.zeros((ACTIONS * joints, n), np.float32),
         actions=np.zeros((n, joints), np.int64),
@@ -168,7 +168,7 @@ def move_all(mind, lanes, horizon):  # type: ignore[no-untyped-def]
 def decide(mind, single, lanes, samples, horizon, clear):  # type: ignore[no-untyped-def]
     """Set ``single.actions`` (1, joints) to what to do in the arm of ``single``, looking ahead where it is not clear.
 
-    ``single`` are lanes with one arm, ``samples`` is room, shape (n,).
+    ``single`` are lanes with one arm, ``samples`` is workspace, shape (n,).
     """
     judge_all(mind, single)
     if lanes.total.shape[0] == 0:

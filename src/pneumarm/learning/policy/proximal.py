@@ -63,13 +63,13 @@ class Batch(NamedTuple):
     target: NDArray[np.float32]
     """Of the values, shape (steps, n)."""
     is_reached: NDArray[np.bool_]
-    """Room, shape (n,)."""
+    """Workspace, shape (n,)."""
     order: NDArray[np.int64]
-    """Room, shape (steps,)."""
+    """Workspace, shape (steps,)."""
 
 
 def batch(steps: int, inputs: int, joints: int, n: int) -> Batch:
-    """Return room for ``steps`` of ``n`` arms."""
+    """Return workspace for ``steps`` of ``n`` arms."""
     each, float_ = (steps, n), np.float32
     return Batch(
         inputs=np.zeros((steps + 1, inputs, n), float_),

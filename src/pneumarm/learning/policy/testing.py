@@ -1,4 +1,4 @@
-"""A policy's test in the simulation: the begin states and goals of every rival, many movements side by side."""
+"""A policy's test in the simulation: the begin states and goals of every baseline, many movements side by side."""
 
 import numpy as np
 

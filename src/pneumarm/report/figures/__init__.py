@@ -5,6 +5,7 @@ main numbers, for those who do not see it.
 """
 
 from pneumarm.report.figures.adaptation import Mark, adaptation_curves, adaptation_curves_alt
+from pneumarm.report.figures.baselines import Baseline, baselines, baselines_alt
 from pneumarm.report.figures.coverage import cells, cells_alt, new_share, projections, projections_alt
 from pneumarm.report.figures.displacement import against_displacement, against_displacement_alt
 from pneumarm.report.figures.episodes import distributions, distributions_alt
@@ -21,7 +22,6 @@ from pneumarm.report.figures.residues import (
     residue_by_class,
     residue_by_class_alt,
 )
-from pneumarm.report.figures.rivals import Rival, rivals, rivals_alt
 from pneumarm.report.figures.training import (
     shaping_curves,
     shaping_curves_alt,
@@ -31,14 +31,16 @@ from pneumarm.report.figures.training import (
 from pneumarm.report.figures.transfer import Phase, transfer_curves, transfer_curves_alt
 
 __all__ = [
+    "Baseline",
     "Classification",
     "Mark",
     "Phase",
-    "Rival",
     "adaptation_curves",
     "adaptation_curves_alt",
     "against_displacement",
     "against_displacement_alt",
+    "baselines",
+    "baselines_alt",
     "cells",
     "cells_alt",
     "distributions",
@@ -63,8 +65,6 @@ __all__ = [
     "residue_alt",
     "residue_by_class",
     "residue_by_class_alt",
-    "rivals",
-    "rivals_alt",
     "shaping_curves",
     "shaping_curves_alt",
     "spread_of_agents",

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 def shaping_curves(
     episodes: Array,
     deviation: Array,
-    criterium: Array,
+    criterion: Array,
     performance: Array,
     epsilon: Array,
     temperature: Array,
@@ -40,7 +40,7 @@ def shaping_curves(
     Args:
         episodes: episodes at each evaluation, shape (evaluations,).
         deviation: largest distance of a begin state from the goal, shape (agents, evaluations) [counts].
-        criterium: share of successes asked for, the same shape.
+        criterion: share of successes asked for, the same shape.
         performance: p(k) of eq. 4.14, the same shape.
         epsilon: share of exploring actions, the same shape.
         temperature: of the Boltzmann exploration, the same shape.
@@ -69,10 +69,10 @@ def shaping_curves(
             nothing(place, "no agent was trained")
     if agents:
         upto = slice(int(evaluations[chosen]))
-        axes[0, 1].plot(episodes[upto] / 1e3, criterium[chosen, upto], color=MIDDLE, ls="--")
+        axes[0, 1].plot(episodes[upto] / 1e3, criterion[chosen, upto], color=MIDDLE, ls="--")
         second_unit(axes[0, 0], "deviation [°]", 1 / spec.counts_per_degree)
         handles = [key(DARK, lw=1.8), key(MIDDLE, "--"), key(GREY, lw=0.6)]
-        legend_below(figure, handles, ["chosen agent", "its criterium", f"the other {agents - 1}"])
+        legend_below(figure, handles, ["chosen agent", "its criterion", f"the other {agents - 1}"])
     for place in axes[-1]:
         place.set_xlabel("episodes [thousands]")
         place.set_xlim(0)

@@ -1,4 +1,4 @@
-"""Rivals side by side: what each is paid against how long it was trained."""
+"""Baselines side by side: what each is paid against how long it was trained."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -17,12 +17,12 @@ _INKS = (DARK, MIDDLE, LIGHT, GREY)
 _MARKERS = "oDsv^PX*"
 _LINES = ("--", ":", "-.")
 _AIR = 2.0
-"""Room above and below the rewards that are shown [reward]."""
+"""Workspace above and below the rewards that are shown [reward]."""
 _MOST_BELOW = 45.0
 """Rewards farther below the best are cut off: how bad a bad one is matters less than how the good ones differ."""
 
 
-class Rival(NamedTuple):
+class Baseline(NamedTuple):
     """What came of a method on some arms, agent by agent."""
 
     name: str
@@ -35,7 +35,7 @@ class Rival(NamedTuple):
 
 
 @styled
-def rivals(trained: Sequence[Rival], untrained: Mapping[str, Estimate]) -> Figure:
+def baselines(trained: Sequence[Baseline], untrained: Mapping[str, Estimate]) -> Figure:
     """Draw reward against the processor time of training.
 
     Args:
@@ -48,7 +48,7 @@ def rivals(trained: Sequence[Rival], untrained: Mapping[str, Estimate]) -> Figur
     place.set_xlabel("processor time of a training [s]")
     place.set_ylabel("reward a movement on arrival on the arm [-]")
     if not trained and not untrained:
-        nothing(place, "no rival was measured")
+        nothing(place, "no baseline was measured")
         return figure
     handles, labels = [], []
     for number, (name, level) in enumerate(untrained.items()):
@@ -56,43 +56,48 @@ def rivals(trained: Sequence[Rival], untrained: Mapping[str, Estimate]) -> Figur
         place.axhline(level.mean, color=ink, ls=line, lw=1.2)
         handles.append(key(ink, line, lw=1.2))
         labels.append(f"{name} {level.mean:.1f}")
-    for number, rival in enumerate(trained):
+    for number, baseline in enumerate(trained):
         ink, marker = _INKS[number % len(_INKS)], _MARKERS[number % len(_MARKERS)]
-        _marked(place, rival, ink, marker)
+        _marked(place, baseline, ink, marker)
         handles.append(key(ink, "", marker=marker, ms=7, mec=INK, mew=0.6))
-        labels.append(f"{rival.name} {rival.mean.mean:.1f}")
+        labels.append(f"{baseline.name} {baseline.mean.mean:.1f}")
     place.set_xscale("log")
     if trained:
-        seconds = np.concatenate([rival.seconds for rival in trained])
+        seconds = np.concatenate([baseline.seconds for baseline in trained])
         low, high = 0.6 * seconds.min(), 1.6 * seconds.max()
         ticks = [t for t in np.outer(10.0 ** np.arange(-3, 7), (1, 2, 5)).ravel() if low <= t <= high]
         place.set_xticks(ticks, [f"{t:g}" for t in ticks])
         place.set_xticks([], minor=True)
         place.set_xlim(low, high)
     paid = [level.mean for level in untrained.values()]
-    paid += [value for rival in trained for value in (*rival.reward.tolist(), rival.mean.low) if np.isfinite(value)]
+    paid += [
+        value
+        for baseline in trained
+        for value in (*baseline.reward.tolist(), baseline.mean.low)
+        if np.isfinite(value)
+    ]
     place.set_ylim(max(min(paid), max(paid) - _MOST_BELOW) - _AIR, max(paid) + _AIR)
     legend_below(figure, handles, labels)
     return figure
 
 
-def _marked(place: Axes, rival: Rival, ink: str, marker: str) -> None:
-    place.plot(rival.seconds, rival.reward, marker, color=ink, ms=3.5, alpha=0.55, mew=0)
-    centre = float(np.exp(np.log(rival.seconds).mean()))
+def _marked(place: Axes, baseline: Baseline, ink: str, marker: str) -> None:
+    place.plot(baseline.seconds, baseline.reward, marker, color=ink, ms=3.5, alpha=0.55, mew=0)
+    centre = float(np.exp(np.log(baseline.seconds).mean()))
     place.errorbar(
-        centre, rival.mean.mean,
-        yerr=[[rival.mean.mean - rival.mean.low], [rival.mean.high - rival.mean.mean]]
-        if np.isfinite(rival.mean.low) else None,
+        centre, baseline.mean.mean,
+        yerr=[[baseline.mean.mean - baseline.mean.low], [baseline.mean.high - baseline.mean.mean]]
+        if np.isfinite(baseline.mean.low) else None,
         fmt=marker, color=ink, ecolor=INK, elinewidth=1.0, capsize=3, ms=8, mec=INK, mew=0.6, zorder=3,
     )  # fmt: skip
 
 
-def rivals_alt(trained: Sequence[Rival], untrained: Mapping[str, Estimate]) -> str:
-    """Say in words what :func:`rivals` shows."""
+def baselines_alt(trained: Sequence[Baseline], untrained: Mapping[str, Estimate]) -> str:
+    """Say in words what :func:`baselines` shows."""
     parts = [f"{name}: {level.mean:.2f} without training" for name, level in untrained.items()]
     parts += [
-        f"{rival.name}: {rival.mean.mean:.2f} after {rival.seconds.mean():.1f} s of training, its "
-        f"{len(rival.seconds)} agents {rival.reward.min():.2f} to {rival.reward.max():.2f}"
-        for rival in trained
+        f"{baseline.name}: {baseline.mean.mean:.2f} after {baseline.seconds.mean():.1f} s of training, its "
+        f"{len(baseline.seconds)} agents {baseline.reward.min():.2f} to {baseline.reward.max():.2f}"
+        for baseline in trained
     ]
-    return "Reward against training time. " + ("; ".join(parts) or "No rival was measured") + "."
+    return "Reward against training time. " + ("; ".join(parts) or "No baseline was measured") + "."

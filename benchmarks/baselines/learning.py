@@ -1,4 +1,4 @@
-"""How rivals learn: ours by our commands' functions, those of other libraries through our Gymnasium environment."""
+"""How baselines learn: ours by our commands, those of other libraries through our Gymnasium environment."""
 
 import time
 from collections.abc import Callable

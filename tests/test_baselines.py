@@ -1,4 +1,4 @@
-"""The table of rivals: a killed run goes on after its last whole row, and the table is made of the rows alone."""
+"""The table of baselines: a killed run goes on after its last whole row, and the table is made of the rows alone."""
 
 import json
 import re
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.rivals import METHODS, Wanted, append, each, known
-from benchmarks.rivals.table import below, by_method, curves, floor, line, pooled, write_page
+from benchmarks.baselines import METHODS, Wanted, append, each, known
+from benchmarks.baselines.table import below, by_method, curves, floor, line, pooled, write_page
 
 from pneumarm.errors import UnusableInput
 from pneumarm.statistics import summarise
@@ -36,7 +36,7 @@ ROWS = [row(arm, method, seed) for arm in (1, 2) for method in LEVELS for seed i
 
 
 def test_rows_come_back_and_one_that_was_cut_short_is_measured_again(tmp_path: Path) -> None:
-    file = tmp_path / "rivals.jsonl"
+    file = tmp_path / "baselines.jsonl"
     assert known(file, WANTED) == {}
     append(file, ROWS[0])
     with open(file, "a") as opened:
@@ -48,7 +48,7 @@ def test_rows_come_back_and_one_that_was_cut_short_is_measured_again(tmp_path: P
 
 
 def test_methods_are_asked_for_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PNEUMARM_RIVALS_SEEDS", "4")
+    monkeypatch.setenv("PNEUMARM_BASELINES_SEEDS", "4")
     assert dict(each("open loop, planning,policy,dqn:1")) == {"open loop": 1, "planning": 1, "policy": 4, "dqn": 1}
     assert list(dict(each(",".join(METHODS)))) == list(METHODS)
     with pytest.raises(UnusableInput, match="there are open loop"):
@@ -89,7 +89,7 @@ def test_the_curve_is_the_mean_of_the_agents() -> None:
 
 def test_the_page_holds_all_arms_and_each(tmp_path: Path) -> None:
     write_page(tmp_path, ROWS)
-    text = (tmp_path / "rivals.html").read_text()
+    text = (tmp_path / "baselines.html").read_text()
     assert all(method in text for method in LEVELS)
     assert all(words in text for words in ("All arms together (2)", "Arm 1", "Arm 2"))
-    assert (tmp_path / "rivals.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "baselines.png").read_bytes().startswith(b"\x89PNG")

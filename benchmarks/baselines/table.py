@@ -1,4 +1,4 @@
-"""The table of rivals for people: lines of text, and a page with a picture."""
+"""The table of baselines for people: lines of text, and a page with a picture."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.rivals.learning import OURS, STABLE
+from benchmarks.baselines.learning import OURS, STABLE
 from pneumarm.files import write_text
 from pneumarm.report import Section, Table, render
-from pneumarm.report.figures import Rival, rivals, rivals_alt
+from pneumarm.report.figures import Baseline, baselines, baselines_alt
 from pneumarm.report.ledger import with_interval
 from pneumarm.report.page import Picture
 from pneumarm.report.style import RASTER_DPI
 from pneumarm.statistics import mean_estimate, rate_estimate, summarise
 
 Row = dict[str, Any]
-"""An agent on an arm, as in ``rivals.jsonl``."""
+"""An agent on an arm, as in ``baselines.jsonl``."""
 BOUND = "open loop"
 """The method that is the bound."""
 TRAINED = (*OURS, *STABLE)
@@ -112,7 +112,7 @@ def write_page(folder: Path, rows: list[Row]) -> None:
     """Write the page with the table and the picture."""
     found = by_method(rows)
     trained = [
-        Rival(
+        Baseline(
             name,
             np.array([row["cpu"] for row in own]),
             np.array([np.mean(row["reward"]) for row in own]),
@@ -124,8 +124,8 @@ def write_page(folder: Path, rows: list[Row]) -> None:
     untrained = {
         name: mean_estimate(joined(own, "reward")) for name, own in found.items() if name not in (*OURS, *STABLE)
     }
-    figure = rivals(trained, untrained)
-    figure.savefig(folder / "rivals.png", dpi=RASTER_DPI)
+    figure = baselines(trained, untrained)
+    figure.savefig(folder / "baselines.png", dpi=RASTER_DPI)
     arms = sorted({row["arm"] for row in rows})
     tables = [table(f"All arms together ({len(arms)})", found, found.get(BOUND, []))]
     for arm in arms:
@@ -135,7 +135,7 @@ def write_page(folder: Path, rows: list[Row]) -> None:
         figure,
         "Reward on arrival against the processor time of training, all threads together; small markers are agents, "
         "large ones with 95% intervals all their movements. Lines need no training.",
-        rivals_alt(trained, untrained),
+        baselines_alt(trained, untrained),
     )
     sections = [
         Section("All arms", (), [picture], tables[:1]),
@@ -145,7 +145,7 @@ def write_page(folder: Path, rows: list[Row]) -> None:
         "Every method gets the same simulation, begin states and goals. On the arm nothing is learned. Training is "
         "told in wall time and in processor time of all threads together. Intervals are of 95% and over movements."
     ]
-    write_text(folder / "rivals.html", render("Rivals", summary, sections))
+    write_text(folder / "baselines.html", render("Baselines", summary, sections))
 
 
 def around(values: np.ndarray) -> str:

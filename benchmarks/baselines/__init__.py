@@ -1,25 +1,25 @@
-"""The table of rivals: what planning can achieve, what every method learns, and what it costs to learn it.
+"""The table of baselines: what planning can achieve, what every method learns, and what it costs to learn it.
 
-python -m benchmarks rivals
+python -m benchmarks baselines
 
-On every arm there is one collection and one fit, and every rival gets the same simulation, begin states and goals: in
-the simulation those of ``pneumarm test --seed 0``, on the arm those of the test on arrival of
+On every arm there is one collection and one fit, and every baseline gets the same simulation, begin states and goals:
+in the simulation those of ``pneumarm test --seed 0``, on the arm those of the test on arrival of
 ``pneumarm transfer --seed 0``. Methods of other libraries train through our Gymnasium environment on the same
 simulation, where stable-baselines3 and sb3-contrib are installed (the extra ``stable-baselines``).
 
-PNEUMARM_RIVALS_ARMS       seeds of virtual arms, by default those of the judging arms, "1001,...,1010"
-PNEUMARM_RIVALS_SEEDS      how many agents each method trains, 3
-PNEUMARM_RIVALS_METHODS    "open loop,closed loop,planning,policy,batched,sarsa,ppo,dqn,qr-dqn:1"; ":1" trains one
-PNEUMARM_RIVALS_MOVEMENTS  greedy movements on the arm for each agent, 500
-PNEUMARM_RIVALS_TESTS      movements in the simulation, 10,000; a tenth of them for what plans or looks ahead
-PNEUMARM_RIVALS_STEPS      steps that the methods of other libraries train for, 450,000
-PNEUMARM_RIVALS_FOLDER     what was measured so far, from where a killed run goes on: "runs/rivals"
+PNEUMARM_BASELINES_ARMS       seeds of virtual arms, by default those of the held-out arms, "1001,...,1010"
+PNEUMARM_BASELINES_SEEDS      how many agents each method trains, 3
+PNEUMARM_BASELINES_METHODS    "open loop,closed loop,planning,policy,batched,sarsa,ppo,dqn,qr-dqn:1"; ":1" trains one
+PNEUMARM_BASELINES_MOVEMENTS  greedy movements on the arm for each agent, 500
+PNEUMARM_BASELINES_TESTS      movements in the simulation, 10,000; a tenth of them for what plans or looks ahead
+PNEUMARM_BASELINES_STEPS      steps that the methods of other libraries train for, 450,000
+PNEUMARM_BASELINES_FOLDER     what was measured so far, from where a killed run goes on: "runs/baselines"
 
-The folder holds ``rivals.jsonl`` (a row an agent, every movement on the arm in it), ``rivals.html`` and
-``rivals.png``, and what was collected and fitted. Several such commands may fill one folder at once, each with arms
-of its own; one with all arms then makes the table of what is there.
+The folder holds ``baselines.jsonl`` (a row an agent, every movement on the arm in it), ``baselines.html`` and
+``baselines.png``, and what was collected and fitted. Several such commands may fill one folder at once, each with
+arms of its own; one with all arms then makes the table of what is there.
 
-Training is timed after everything is compiled: wall time, and processor time of all threads together. Rivals of
+Training is timed after everything is compiled: wall time, and processor time of all threads together. Baselines of
 other libraries run on one thread. p99 is the processor time of a decision at the 99th percentile; wall time where the
 true physics is planned with.
 """
@@ -36,8 +36,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.agents import Timed, prepared
-from benchmarks.rivals.learning import OURS, PLANNING, STABLE, learn
-from benchmarks.rivals.table import HEADER, Row, curves, floor, line, pooled, write_page
+from benchmarks.baselines.learning import OURS, PLANNING, STABLE, learn
+from benchmarks.baselines.table import HEADER, Row, curves, floor, line, pooled, write_page
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.console import jsonable, peak_memory
@@ -57,7 +57,7 @@ SEED = 0
 
 
 def asked(name: str, default: str) -> str:
-    return os.environ.get(f"PNEUMARM_RIVALS_{name}", default)
+    return os.environ.get(f"PNEUMARM_BASELINES_{name}", default)
 
 
 @dataclass(frozen=True)
@@ -73,21 +73,21 @@ def measure() -> Iterator[str]:
     began = time.perf_counter()
     wanted = Wanted(*(int(asked(*pair)) for pair in (("MOVEMENTS", "500"), ("TESTS", "10000"), ("STEPS", "450000"))))
     arms = [int(arm) for arm in asked("ARMS", ",".join(str(seed) for seed in range(1001, 1011))).split(",")]
-    folder = Path(asked("FOLDER", "runs/rivals"))
+    folder = Path(asked("FOLDER", "runs/baselines"))
     folder.mkdir(parents=True, exist_ok=True)
     methods = dict(each(asked("METHODS", ",".join(METHODS) + ":1")))
     if missing := unavailable(methods):
         yield missing
         methods = {name: seeds for name, seeds in methods.items() if name not in STABLE}
     rows: list[Row] = []
-    done = known(folder / "rivals.jsonl", wanted)
+    done = known(folder / "baselines.jsonl", wanted)
     yield HEADER
     for arm in arms:
         for method, seeds in methods.items():
             for seed in range(seeds):
                 if (row := done.get((arm, method, seed))) is None:
                     row = measured(folder, arm, method, seed, wanted)
-                    append(folder / "rivals.jsonl", row)
+                    append(folder / "baselines.jsonl", row)
                 rows.append(row)
                 yield line(row)
     yield ""
@@ -96,7 +96,7 @@ def measure() -> Iterator[str]:
     yield from curves(rows)
     write_page(folder, rows)
     yield (
-        f"{folder / 'rivals.html'}, {folder / 'rivals.png'}; {time.perf_counter() - began:.0f} s, "
+        f"{folder / 'baselines.html'}, {folder / 'baselines.png'}; {time.perf_counter() - began:.0f} s, "
         f"at most {max(peak_memory(), *(row['memory_mb'] for row in rows)):.0f} MB of memory"
     )
 
@@ -174,7 +174,7 @@ def measured(folder: Path, arm: int, method: str, seed: int, wanted: Wanted) -> 
 
 @functools.cache
 def bound(folder: Path, arm: int, movements: int) -> dict[str, Planned]:
-    """Return what planning with the true physics achieves in the movements of every rival."""
+    """Return what planning with the true physics achieves in the movements of every baseline."""
     simulation, _ = prepared(folder, arm)
     settings = BoundSettings(episodes=movements)
     return dict(measure_bound(VirtualArm(draw_parameters(arm)), simulation.goal_range, settings, seed=SEED))

@@ -1,7 +1,7 @@
-"""The whole job with its defaults on the ten judging arms, which nothing is developed on.
+"""The whole job with its defaults on the ten held-out arms, which nothing is developed on.
 
-Takes about a minute an arm on two cores. Settings of ``pneumarm run`` may be given in PNEUMARM_JUDGING, such as
-"--method q-learning --seed 1"; PNEUMARM_JUDGING_ARMS names other arms, such as "virtual,virtual:seed=5".
+Takes about a minute an arm on two cores. Settings of ``pneumarm run`` may be given in PNEUMARM_HELD_OUT, such as
+"--method q-learning --seed 1"; PNEUMARM_HELD_OUT_ARMS names other arms, such as "virtual,virtual:seed=5".
 """
 
 import json
@@ -19,7 +19,7 @@ HEADER = f"{'arm':18}{'':12}{'reward':>18}{'success':>22}{'actions':>9}{'switche
 
 
 def measure() -> Iterator[str]:
-    arms = os.environ.get("PNEUMARM_JUDGING_ARMS")
+    arms = os.environ.get("PNEUMARM_HELD_OUT_ARMS")
     yield HEADER
     found = []
     for arm in arms.split(",") if arms else ARMS:
@@ -37,7 +37,7 @@ def measure() -> Iterator[str]:
 def run(arm: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pneumarm.cli", "run", "--arm", arm, "--out", str(Path(folder) / "run")]
-        command += ["--json", *shlex.split(os.environ.get("PNEUMARM_JUDGING", ""))]
+        command += ["--json", *shlex.split(os.environ.get("PNEUMARM_HELD_OUT", ""))]
         done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     results: dict[str, Any] = json.loads(done.stdout)
     return results

@@ -25,7 +25,7 @@ COMMANDS = {
         "pneumarm import recording.csv arm.db --mapping examples/recordings/mpi_pam.toml",
     ),
     "coverage": (
-        "Say which part of its space a store covers, and whether it is enough.",
+        "Say how much of the state space a store covers, and whether that is enough.",
         "pneumarm coverage arm.db",
     ),
     "fit": (
@@ -53,7 +53,7 @@ COMMANDS = {
         "pneumarm versions adapted --to 1",
     ),
     "bound": (
-        "Say what can be achieved on a virtual arm at all, by planning with its true physics.",
+        "Say what is possible on a virtual arm, by planning with its true physics.",
         "pneumarm bound --arm virtual:seed=7 --episodes 500",
     ),
     "arm check": (
@@ -61,11 +61,11 @@ COMMANDS = {
         "pneumarm arm check virtual:seed=7 --out checkup",
     ),
     "arm calibrate": (
-        "Measure an arm's sensors and write what everything else needs to know of it.",
+        "Measure what an arm's counts mean and what it does while it is sound; write arm.toml.",
         "pneumarm arm calibrate virtual:seed=7 --out arm.toml",
     ),
     "arm sensors": (
-        "Show what the sensors say, with all valves closed.",
+        "Show the sensors' readings, with all valves closed.",
         "pneumarm arm sensors virtual --seconds 2",
     ),
     "arm errors": (
@@ -73,7 +73,7 @@ COMMANDS = {
         "pneumarm arm errors --out errors.html --transitions 4000",
     ),
     "arm valves": (
-        "Click every valve, one by one, saying which; before the air is on.",
+        "Click every valve, one by one, and name it; before the air is on.",
         "pneumarm arm valves virtual",
     ),
     "arm emulate": (
@@ -81,19 +81,19 @@ COMMANDS = {
         "pneumarm arm emulate virtual:seed=7 --link arm.port",
     ),
     "taguchi analyse": (
-        "Analyse a table of trials and runs by the design that they were made with.",
+        "Analyse a table of trials and runs by the design of its experiment.",
         "pneumarm taguchi analyse results.csv --goal larger --design design.toml --out analysis",
     ),
     "experiment": (
-        "Do an experiment of the thesis again.",
+        "Repeat an experiment of the thesis.",
         "pneumarm experiment all-goals --out laboratory --runs 8",
     ),
     "claims": (
-        "Say which of the thesis' conclusions hold here, from the experiments that were done.",
+        "Say which of the thesis' conclusions hold, from the experiments done so far.",
         "pneumarm claims --out laboratory",
     ),
     "report": (
-        "Write the report of a finished run again.",
+        "Rewrite the report of a finished run.",
         "pneumarm report runs/first",
     ),
 }
@@ -137,10 +137,9 @@ def _run(arguments: list[str]) -> int:
         complain(error)
         return error.exit_code
     except KeyboardInterrupt as error:
-        told = f" ({error})" if str(error) else ""
+        reason = f" ({error})" if str(error) else ""
         complain(
-            f"interrupted{told}; the arm is closed; run, collect, transfer and experiment go on where they were when "
-            "called again"
+            f"interrupted{reason}; the arm is closed. Call run, collect, transfer or experiment again to continue"
         )
         return getattr(error, "exit_code", 128 + signal.SIGINT)
     except BrokenPipeError:
@@ -149,7 +148,7 @@ def _run(arguments: list[str]) -> int:
     except Exception as error:
         if os.environ.get("PNEUMARM_DEBUG"):
             raise
-        complain(f"{type(error).__name__}: {error} (an error of pneumarm itself: PNEUMARM_DEBUG=1 shows where)")
+        complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
         return 1
     return 0
 

@@ -161,7 +161,7 @@ def until_failure(arm: SerialArm) -> tuple[float, str]:
         ("WATCHDOG", "its program hung"),
     ],
 )
-def test_controller_that_begins_anew_in_an_episode(arm: SerialArm, cause: str, words: str) -> None:
+def test_board_that_restarts_in_an_episode(arm: SerialArm, cause: str, words: str) -> None:
     """It is vented and told of; the host shakes hands again within 2 s, and its readings' times stay true."""
     board = in_motion(arm)
     before, happened = arm.read().time, board.time
@@ -175,7 +175,7 @@ def test_controller_that_begins_anew_in_an_episode(arm: SerialArm, cause: str, w
     if cause == "WATCHDOG":  # it is silent first
         assert "not answered" in why
     else:
-        assert f"began anew while in use ({words})" in why
+        assert f"restarted while in use ({words})" in why
     assert took <= 2 * arm.spec.period + LONGEST_EXCHANGE
     with pytest.raises(ArmFailure):
         arm.make_ready()
@@ -184,7 +184,7 @@ def test_controller_that_begins_anew_in_an_episode(arm: SerialArm, cause: str, w
     arm.rearm()
     assert board.time - begun < 2
     assert arm.reset_causes() == [words]
-    # The controller's clock began anew; readings go on in the host's time.
+    # The board restarted; readings go on in the host's time.
     for _ in range(30):
         sent = board.time
         reading = arm.read()

@@ -132,7 +132,7 @@ class GuardedArm(Arm):
         """Return a checked reading and remember which muscles and joints are at their limits.
 
         Raises:
-            ArmFailure: a reading that is none, or one from before the last: the arm's clock began anew.
+            ArmFailure: a reading that is none, or one from before the last: the arm's clock restarted.
 
         """
         reading = checked(self.arm.read(), self.spec)
@@ -141,7 +141,7 @@ class GuardedArm(Arm):
             self._inflation = _Inflation(self.spec.max_inflation, self.applied.size)
             raise ArmFailure(
                 f"{self.spec.name}: its clock went back from {before:.2f} to {reading.time:.2f} s while in use, as "
-                "when a controller begins anew; see to its power and run the same command again"
+                "when a board restarts; check its power and run the same command again"
             )
         over = max(reading.pressure.ravel().tolist()) > self._limit
         self._over = reading.pressure > self._limit if over else None

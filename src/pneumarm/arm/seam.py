@@ -25,7 +25,7 @@ SensorKind = Literal["velocity", "acceleration", "temperature"]
 class Sensor:
     """A further sensor of an arm: an accelerometer of a joint, or a thermometer of a muscle.
 
-    The velocity of the joints is none of these: a controller makes it of the angle's faster samples, without a
+    The velocity of the joints is none of these: a board makes it of the angle's faster samples, without a
     sensor of its own; see :attr:`ArmSpec.velocity_sensor`.
     """
 
@@ -36,7 +36,7 @@ class Sensor:
     muscle: int | None = None
     """Muscle that a thermometer is at, 1 or 2; None for an accelerometer."""
     channel: int | None = None
-    """The controller's extra channel that it is wired to, from 1; None where there is no controller between."""
+    """The board's extra channel that it is wired to, from 1; None where there is no board between."""
     scale: float = 1.0
     """What a count of that channel is worth [m/s2 or Celsius]."""
     offset: float = 0.0
@@ -90,7 +90,7 @@ class ArmSpec:
     angle_limits: tuple[float, float] | None = None
     """At these angles [counts] valves that push further out stay closed; None where the end stops bear that."""
     velocity_sensor: bool = False
-    """Whether readings carry the velocity that the arm measures itself, as a controller does that samples faster
+    """Whether readings carry the velocity that the arm measures itself, as a board does that samples faster
     (thesis sections 5.1 and 7.3)."""
     sensors: tuple[Sensor, ...] = ()
     """Further sensors whose readings it carries, no two in one place or on one channel (thesis appendix A)."""

@@ -140,7 +140,7 @@ class ArmFile:
         if not self.correction.fits(self.spec.joints):
             raise UnusableInput(f"the correction must be for {self.spec.joints} joint(s), as the spec is")
         if self.sound is not None and any(len(v) != self.spec.joints for v in vars(self.sound).values()):
-            raise UnusableInput(f"the sound must be for {self.spec.joints} joint(s), as the spec is")
+            raise UnusableInput(f"the sound state must be for {self.spec.joints} joint(s), as the spec is")
 
 
 def load_spec(path: Path | str) -> ArmSpec:

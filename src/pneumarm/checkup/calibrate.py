@@ -54,7 +54,7 @@ class Known:
                 raise UnusableInput(f"{name} must be above 0, got {value}")
         for measured, sheet in (("angles", "counts_per_degree"), ("supply", "counts_per_bar")):
             if getattr(self, measured) and getattr(self, sheet) is not None:
-                raise UnusableInput(f"give {measured} or {sheet}, not both: which of them were to hold?")
+                raise UnusableInput(f"give {measured} or {sheet}, not both")
 
 
 @dataclass(frozen=True)

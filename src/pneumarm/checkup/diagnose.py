@@ -1,4 +1,4 @@
-"""What is wrong with an arm, in plain words: what, where, how it is told, and what to do.
+"""What is wrong with an arm, in plain words: what, where, how it shows, and what to do.
 
 Every rule looks at one thing that a healthy arm cannot do. The limits are far from what healthy virtual arms show
 (``python -m benchmarks checkup`` makes the figures again), because a false complaint costs more than a fault that the
@@ -109,25 +109,28 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Fi
         if (filled_by_venting[m] or swapped) and _filled_by_venting(test.muscles[m], m, checkup):
             swapped_pair = True
             yield Finding(
-                "valves swapped", where, "its pressure rises on letting air out", "Swap its inlet and exhaust wires"
+                "valves swapped",
+                where,
+                "its pressure rises when its exhaust opens",
+                "Swap its inlet and exhaust wires",
             )
     if crossed and reversed_:
-        told = "filling one raises the pressure of the other and turns the joint the other way"
-        yield Finding("muscles swapped", name, told, "Swap the valves of muscle 1 with those of muscle 2")
+        detail = "filling one raises the pressure of the other and turns the joint the other way"
+        yield Finding("muscles swapped", name, detail, "Swap the valves of muscle 1 with those of muscle 2")
     elif crossed:
-        told = "filling one raises the pressure of the other, yet the joint turns the right way"
-        yield Finding("pressure sensors swapped", name, told, "Swap the two pressure sensors")
+        detail = "filling one raises the pressure of the other, yet the joint turns the right way"
+        yield Finding("pressure sensors swapped", name, detail, "Swap the two pressure sensors")
     elif reversed_:
-        told = f"muscle 1 turns it by {turned[0]:.0f}, muscle 2 by {turned[1]:.0f} degrees"
-        yield Finding("angle reversed", name, told, "Swap the outer wires of the potentiometer")
+        detail = f"muscle 1 turns it by {turned[0]:.0f}, muscle 2 by {turned[1]:.0f} degrees"
+        yield Finding("angle reversed", name, detail, "Swap the outer wires of the potentiometer")
     if crossed or swapped_pair:
         return
     limit = checkup.spec.max_pressure
     full = np.mean([muscle.full for muscle in figures.muscles])
     if full > HIGH_SUPPLY * limit:
-        told = f"muscles fill to {full:.2f} bar before their inlets can be closed at the limit of {limit:.2f} bar"
-        remedy = "Turn the reducer down; if it creeps up again it leaks: a safety valve on the buffer (thesis A.1.1)"
-        yield Finding("high supply", name, told, remedy)
+        detail = f"muscles fill to {full:.2f} bar before their inlets can be closed at the limit of {limit:.2f} bar"
+        remedy = "Turn the reducer down; if it creeps up again, put a safety valve on the buffer (thesis A.1.1)"
+        yield Finding("high supply", name, detail, remedy)
         return  # so fast nothing else can be judged
     frozen = [_is_frozen(test, m) for m in range(2)]
     valves = list(_of_valves(figures, rose, stays, frozen, checkup, name))
@@ -138,9 +141,9 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Fi
     yield from valves
     yield from _of_leaks(figures, name, sound, j)
     if (quicker := quickening(test, checkup)) < RISING:
-        told = f"at the end of the check-up muscles fill in {100 * quicker:.0f} % of the time of before"
-        remedy = "See whether the reducer leaks: its buffer fills up while no air is used (thesis A.1.1)"
-        yield Finding("rising supply", name, told, remedy)
+        detail = f"at the end of the check-up muscles fill in {100 * quicker:.0f} % of the time that they took before"
+        remedy = "Check whether the reducer leaks: its buffer fills up while no air is used (thesis A.1.1)"
+        yield Finding("rising supply", name, detail, remedy)
     yield from _of_noise(checkup, j, name)
     potentiometer = list(_of_potentiometer(checkup, test, figures, name))
     yield from potentiometer
@@ -155,31 +158,31 @@ def _of_valves(
     own, other = rose.diagonal(), rose[::-1].diagonal()  # by its own inlet, by the other muscle's
     full = np.array([m.full for m in figures.muscles])
     if (own < MOVED).all():
-        yield Finding("low supply", name, "no muscle fills", "Turn the air on; see to the valves' power")
+        yield Finding("low supply", name, "no muscle fills", "Turn the air on; check the valves' power")
         return
     if (np.maximum(full, own) < LOW_SUPPLY * limit).all():
-        told = f"full muscles reach {full[0]:.2f} and {full[1]:.2f} bar of {limit:.2f}"
-        yield Finding("low supply", name, told, "See to the reducer, the buffer and the filters")
+        detail = f"full muscles reach {full[0]:.2f} and {full[1]:.2f} bar of {limit:.2f}"
+        yield Finding("low supply", name, detail, "Check the reducer, the buffer and the filters")
     for m, muscle in enumerate(figures.muscles):
         where = f"{name}, muscle {m + 1}"
         if frozen[m]:
             continue  # nothing is known of its valves
         if own[m] < MOVED:
-            told = f"it gains {own[m]:.2f} bar when its inlet opens"
-            yield Finding("inlet stuck closed", where, told, "See to the inlet valve, its wire and its hose")
+            detail = f"it gains {own[m]:.2f} bar when its inlet opens"
+            yield Finding("inlet stuck closed", where, detail, "Check the inlet valve, its wire and its hose")
         elif muscle.full < 0.6 * own[m]:
-            told = f"of {own[m]:.2f} bar it keeps {muscle.full:.2f} when its valves close"
-            yield Finding("exhaust stuck open", where, told, "See to the exhaust valve; or the muscle has burst")
+            detail = f"it keeps {muscle.full:.2f} of {own[m]:.2f} bar when its valves close"
+            yield Finding("exhaust stuck open", where, detail, "Check the exhaust valve; or the muscle has burst")
         elif other[m] > _EVEN or muscle.leak < -LEAK:
-            told = "its pressure rises while its valves are closed"
-            yield Finding("inlet stuck open", where, told, "See to the inlet valve: dirt in its seat, or it sticks")
+            detail = "its pressure rises while its valves are closed"
+            yield Finding("inlet stuck open", where, detail, "Check the inlet valve: it sticks, or its seat is dirty")
         elif stays[m]:
-            told = "its pressure does not fall when its exhaust opens"
-            yield Finding("exhaust stuck closed", where, told, "See to the exhaust valve, its wire and its silencer")
+            detail = "its pressure does not fall when its exhaust opens"
+            yield Finding("exhaust stuck closed", where, detail, "Check the exhaust valve, its wire and its silencer")
         elif muscle.leap > max(LEAP, _CLEAR * muscle.noise / checkup.spec.counts_per_bar):
-            told = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
+            detail = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
             remedy = "Move the pressure sensor to the far end of the muscle (thesis A.1.1)"
-            yield Finding("pressure at the valve's side", where, told, remedy)
+            yield Finding("pressure at the valve's side", where, detail, remedy)
 
 
 def _of_leaks(figures: JointFigures, name: str, sound: SoundState | None, j: int) -> Iterator[Finding]:
@@ -193,16 +196,16 @@ def _of_leaks(figures: JointFigures, name: str, sound: SoundState | None, j: int
         healthy, found = (LeakRates(rate[None], error[None], np.nan) for rate, error in (then, now))
         leaks |= leaking(healthy, found)[0]
     for m in np.flatnonzero(leaks):
-        told = f"closed, it loses {100 * now[0, m]:.1f} % of its pressure a minute"
+        detail = f"closed, it loses {100 * now[0, m]:.1f} % of its pressure a minute"
         if then[0, m] > _CLEAR * then[1, m]:
-            told = (
+            detail = (
                 f"it leaks {now[0, m] / then[0, m]:.1f} times as much as when calibrated: "
-                f"{told} instead of {100 * then[0, m]:.1f} %"
+                f"{detail} instead of {100 * then[0, m]:.1f} %"
             )
         elif sound is not None:
-            told += f", instead of {100 * then[0, m]:.1f} % when calibrated"
+            detail += f", instead of {100 * then[0, m]:.1f} % when calibrated"
         remedy = "Look for the leak with soap water: clamps, hose, exhaust valve"
-        yield Finding("leak", f"{name}, muscle {m + 1}", told, remedy)
+        yield Finding("leak", f"{name}, muscle {m + 1}", detail, remedy)
 
 
 def _of_calibration(
@@ -211,18 +214,18 @@ def _of_calibration(
     spec = checkup.spec
     vented = spec.bar(test.before.pressure[-10:].mean(axis=0))
     for m in np.flatnonzero(np.abs(vented) > ZERO):
-        told = f"vented, its sensor reads {vented[m]:.2f} bar; the zero has moved, or the spec is of another arm"
-        yield Finding("not as calibrated", f"{name}, muscle {m + 1}", told, _AGAIN)
+        detail = f"vented, its sensor reads {vented[m]:.2f} bar; the zero has moved, or the spec is of another arm"
+        yield Finding("not as calibrated", f"{name}, muscle {m + 1}", detail, _AGAIN)
     moved = (ends(test) - calibrated) / spec.counts_per_degree
     if np.abs(moved).max() > ENDS:
-        told = (
+        detail = (
             f"its ends are {moved[0]:+.1f} and {moved[1]:+.1f} degrees from where they were; the potentiometer has "
             "slipped on its axis, the muscles or their mounting have changed, or the spec is of another arm"
         )
-        yield Finding("not as calibrated", name, told, _AGAIN)
+        yield Finding("not as calibrated", name, detail, _AGAIN)
 
 
-_AGAIN = "See to it, then calibrate it anew with `pneumarm arm calibrate`"
+_AGAIN = "Check it, then calibrate again with `pneumarm arm calibrate`"
 
 
 def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
@@ -231,13 +234,13 @@ def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
     low, high = checkup.spec.angle_range
     if np.ptp(everything) == 0:
         dead = everything[0] <= low or everything[0] >= high
-        remedy = "See to the potentiometer's wires" if dead else "See to the potentiometer's axis and its wires"
-        told = f"it reads {everything[0]:.0f} whatever moves"
-        yield Finding("angle dead" if dead else "angle frozen", name, told, remedy)
+        remedy = "Check the potentiometer's wires" if dead else "Check the potentiometer's axis and its wires"
+        detail = f"it reads {everything[0]:.0f} no matter what moves"
+        yield Finding("angle dead" if dead else "angle frozen", name, detail, remedy)
     for m in range(2):
         if _is_frozen(test, m):
-            told = f"it reads {test.rest.pressure[0, m]:.0f} whatever moves"
-            yield Finding("pressure frozen", f"{name}, muscle {m + 1}", told, "See to the pressure sensor's wires")
+            detail = f"it reads {test.rest.pressure[0, m]:.0f} no matter what moves"
+            yield Finding("pressure frozen", f"{name}, muscle {m + 1}", detail, "Check the pressure sensor's wires")
 
 
 def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
@@ -251,13 +254,13 @@ def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
         worst = int(np.argmax(np.abs(correlation[1:]))) + 1
         unlikely = ljung_box(correlation, len(values)) > _LIKELY
         if unlikely and abs(correlation[worst]) > WHITE:
-            told = f"at rest its readings {worst} apart have a correlation of {correlation[worst]:.2f}"
+            detail = f"at rest its readings {worst} apart have a correlation of {correlation[worst]:.2f}"
             remedy = "Look for hum of the mains, a bad ground, or a filter; medians of such readings help little"
-            yield Finding("noise not white", f"{name}, {what}", told, remedy)
+            yield Finding("noise not white", f"{name}, {what}", detail, remedy)
         elif clean.std() > NOISY and not (what == "angle" and len(_worn(test)[0])):
-            told = f"at rest its readings vary by {clean.std():.1f} counts, each one by chance"
-            remedy = "Let the controller take the median of more conversions (thesis A.1.3); see to ground and shield"
-            yield Finding("noise", f"{name}, {what}", told, remedy)
+            detail = f"at rest its readings vary by {clean.std():.1f} counts, independently of each other"
+            remedy = "Let the board take the median of more conversions (thesis A.1.3); check ground and shield"
+            yield Finding("noise", f"{name}, {what}", detail, remedy)
 
 
 _CLEAR = 5.0  # standard deviations of the noise: what stands out of hundreds of readings
@@ -267,19 +270,19 @@ _LIKELY = 90.0
 
 def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, name: str) -> Iterator[Finding]:
     if not np.isnan(figures.halves) and not 1 / LOGARITHMIC < figures.halves < LOGARITHMIC:
-        told = (
+        detail = (
             f"the upper half of the pressure difference turns it {figures.halves:.2f} times as far as the lower half"
         )
         remedy = "Put in a linear one, or let `pneumarm arm calibrate` linearise it"
-        yield Finding("angle logarithmic", name, told, remedy)
+        yield Finding("angle logarithmic", name, detail, remedy)
     worn, off = _worn(test)
     if len(worn):
         degrees = checkup.spec.degrees(worn)
         zones = np.split(degrees, np.flatnonzero(np.diff(degrees) > _APART) + 1)
         places = " and ".join(f"{z[0]:.0f}" if len(z) == 1 else f"{z[0]:.0f} to {z[-1]:.0f}" for z in zones)
-        told = f"readings are off by up to {off.max():.0f} counts at {places} degrees"
+        detail = f"readings are off by up to {off.max():.0f} counts at {places} degrees"
         remedy = "Put in a new potentiometer, and mount it so that nothing presses on its axis (thesis A.1.2)"
-        yield Finding("angle worn", name, told, remedy)
+        yield Finding("angle worn", name, detail, remedy)
 
 
 _APART = 6.0  # degrees between two worn zones

@@ -74,7 +74,7 @@ def leak_test(arm: Arm, test: LeakTest | None = None) -> LeakRates:
     degrees = arm.spec.degrees(np.array([r.angle for r in readings]))
     if (pressure.mean(axis=0) < 0.2 * arm.spec.max_pressure_counts).any():
         low = arm.spec.bar(pressure.mean(axis=0)).round(2).tolist()
-        raise UnusableInput(f"{arm.spec.name}: filled muscles hold only {low} bar; see to supply and valves first")
+        raise UnusableInput(f"{arm.spec.name}: filled muscles hold only {low} bar; check supply and valves first")
     turned = (degrees - degrees.mean(axis=0))[..., None] * np.array([-1, 1])  # a muscle pulls its own way
     squeezed = test.compression * turned * (pressure.mean(axis=0) + ATMOSPHERE * arm.spec.counts_per_bar)
     return LeakRates(*falling(time, pressure - squeezed), float(time[-1] - begin))

@@ -52,7 +52,7 @@ def check_(
     ----------
     arm
         virtual, virtual:seed=N, serial:PORT or python:module:callable; ``,spec=arm.toml`` names a calibration, and
-        the arm is then compared with what it was.
+        the arm is compared with its sound state there.
     out
         Folder for a page with curves; made where there is none.
     seed
@@ -68,7 +68,7 @@ def check_(
     if isinstance(opened, CorrectedArm):
         sound = opened.known.sound
         if opened.arm.spec.name not in (opened.spec.name, "arm"):
-            say(f"The spec was made as {opened.spec.name}; this is {opened.arm.spec.name}.")
+            say(f"The spec is of {opened.spec.name}; this arm is {opened.arm.spec.name}.")
     findings = diagnose(checkup, sound)
     figures = [joint_figures(checkup, j) for j in range(len(checkup.joints))]
     timing = _timing(checkup)
@@ -125,10 +125,10 @@ def calibrate_(
     settings: Annotated[CheckupSettings, Settings] = CheckupSettings(),
     json: Json = False,
 ) -> None:
-    """Measure an arm's sensors and write what everything else needs to know of it.
+    """Measure what an arm's counts mean and what it does while it is sound, and write that to a file.
 
-    Afterwards ``,spec=FILE`` behind the arm's name uses it with any command. What the counts of an arm on a serial
-    port mean is asked for, unless the options or a ``,spec=FILE`` say it; other arms know it themselves.
+    ``,spec=FILE`` behind the arm's name then uses the file with any command. The command asks what the counts of an
+    arm on a serial port mean, unless options or a ``,spec=FILE`` say it; other arms know it themselves.
 
     Parameters
     ----------
@@ -137,8 +137,8 @@ def calibrate_(
     out
         File to write, arm.toml.
     angles
-        Angles of the joint with muscle 2 full and with muscle 1 full, by a protractor [degrees]; for all joints, or
-        once for each.
+        Angles of the joint with muscle 2 full and with muscle 1 full, by a protractor [degrees]; once for all joints,
+        or once for each.
     counts_per_degree
         ... or counts of the angle's sensors per degree: for a potentiometer on the joint's axis 1023 divided by its
         electrical angle in degrees.
@@ -156,7 +156,7 @@ def calibrate_(
     missing = missing_of(arm, known)
     asking = sys.stdin.isatty() and not json
     if missing and not asking:
-        raise UnusableInput(f"{arm}: what its counts mean must be said: give {' and '.join(missing)}")
+        raise UnusableInput(f"{arm}: nobody said what its counts mean; give {' and '.join(missing)}")
     with open_arm(arm, seed) as opened:
         if isinstance(opened, CorrectedArm) and not opened.known.correction.is_none:
             raise UnusableInput(f"{arm} is calibrated already; leave spec= out, or give a spec without corrections")
@@ -164,7 +164,7 @@ def calibrate_(
         findings = diagnose(checkup)
         blocking = [finding for finding in findings if finding.kind not in _NO_HINDRANCE]
         if blocking:
-            raise UnusableInput(f"{arm} is to be mended before it is calibrated: {' '.join(map(str, blocking))}")
+            raise UnusableInput(f"{arm}: mend it before you calibrate it. {' '.join(map(str, blocking))}")
         for finding in findings:
             say(str(finding))
         if missing:
@@ -215,7 +215,7 @@ def errors_(
     from pneumarm.appendix_a.page import errors_page
 
     require_folder(out)
-    with progress("living through them") as report:
+    with progress("playing the errors") as report:
         errors = lived(seed, settings, progress=report)
     write_text(out, errors_page(errors, f"virtual:seed={seed}" if seed else "the nominal virtual arm"))
     say(f"page: {out}")
@@ -239,7 +239,7 @@ def errors_(
 
 
 def sensors_(arm: str, /, *, seconds: float = 60.0, every: float = 0.2, json: Json = False) -> None:
-    """Show what the sensors say, with all valves closed: turn the joint by hand, and its angle must follow.
+    """Show the sensors' readings, with all valves closed: turn the joint by hand, and its angle must follow.
 
     Parameters
     ----------
@@ -302,7 +302,7 @@ def _sensed(reading: Reading, spec: ArmSpec) -> str:
 
 
 def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Json = False) -> None:
-    """Click every valve, one by one, saying which: with the air off, to see and hear that all are wired right.
+    """Click every valve, one by one, and name it: with the air off, to check by eye and ear that all are wired right.
 
     Parameters
     ----------
@@ -339,15 +339,15 @@ def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Jso
 def emulate_(arm: str, /, *, link: Path | None = None, seed: int = 0, json: Json = False) -> None:
     """Serve a virtual arm behind an emulated microcontroller and serial port, in real time, until interrupted.
 
-    ``serial:PATH``, with the path that it prints, names this arm on every other command line, as a real one would be
-    named by its port. It answers by the same protocol as the firmware, with the same dead-man and limits.
+    ``serial:PATH``, with the path that it prints, names this arm in every other command, as the port names a real
+    arm. It answers by the same protocol as the firmware, with the same dead-man and limits.
 
     Parameters
     ----------
     arm
         virtual or virtual:seed=N, with ,faults=PLAN.toml if you like.
     link
-        Path of a symbolic link to the port, for a name that stays the same; removed in the end.
+        Path of a symbolic link to the port, for a name that stays the same; removed at the end.
     seed
         Of the arm's noise.
     json

@@ -1,4 +1,4 @@
-"""What only a person can say of an arm, asked for while the arm is held still."""
+"""What only a person can know of an arm, asked for while the arm is held still."""
 
 import math
 import select
@@ -40,7 +40,7 @@ def _protractor(guard: GuardedArm, checkup: Checkup, joint: int) -> tuple[float,
         said.append(_answer(guard, question))
         counts.append(float(guard.read().angle[joint]))
     if not (said[0] < said[1] and counts[0] < counts[1]):
-        raise UnusableInput(f"{guard.spec.name}: with muscle 1 full the angle must be the higher one, got {said}")
+        raise UnusableInput(f"{guard.spec.name}: muscle 1 must turn the joint to the higher angle, got {said}")
     per_degree = (counts[1] - counts[0]) / (said[1] - said[0])
     then = ends(checkup.joints[joint])  # it has crept a little since
     low, high = (s + (float(t) - c) / per_degree for s, t, c in zip(said, then, counts, strict=True))
@@ -55,11 +55,11 @@ def _answer(guard: GuardedArm, question: str) -> float:
             guard.wait(_TURN)
         line = sys.stdin.readline()
         if not line:
-            raise UnusableInput("no answer came; give --angles and --supply as options")
+            raise UnusableInput("no answer came; give --angles and --supply instead")
         try:
             value = float(line.replace(",", "."))
         except ValueError:
             value = float("nan")
         if math.isfinite(value):
             return value
-        say(f"{line.strip()!r} is no number.")
+        say(f"{line.strip()!r} is not a number.")

@@ -20,15 +20,15 @@ def bound_(
     settings: Annotated[BoundSettings, Settings] = BoundSettings(),
     json: Json = False,
 ) -> None:
-    """Say what can be achieved on a virtual arm at all, by planning with its true physics.
+    """Say what is possible on a virtual arm, by planning with its true physics.
 
     Parameters
     ----------
     arm
-        virtual, virtual:seed=N or virtual:preset=A; nobody knows the true physics of another.
+        virtual, virtual:seed=N or virtual:preset=A; the true physics of other arms are unknown.
     sim
-        A simulation of this arm: goals are drawn from its range, and it is planned with as well. Without one the
-        range of goals is measured by a short collecting.
+        A simulation of this arm: goals are drawn from its range, and a third planner uses it. Without one, a short
+        collection measures the range of goals.
     seed
         Of the begin states, the goals and the noise; those of ``pneumarm transfer`` with the same seed.
     json

@@ -28,10 +28,10 @@ PAGE = "claims.html"
 def claims_(
     *, out: Path = Path("laboratory"), markdown: Annotated[bool, Parameter(negative="")] = False, json: Json = False
 ) -> None:
-    """Show what the thesis claims beside what was found here, and write the page of it.
+    """Show what the thesis claims beside what was found here, and write a page of it.
 
-    All is taken from the experiments of a laboratory, nothing is run. The page lists experiments without results with
-    the command that makes them.
+    Everything is taken from the experiments of a laboratory; nothing is run. Experiments without results are listed
+    with the command that makes them.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from pneumarm.transitions import Store, Window, enough_data
 
 
 def coverage_(db: Path, /, *, json: Json = False) -> None:
-    """Say which part of its space a store covers, and whether its second half still found anything new.
+    """Say how much of the state space a store covers, and whether its second half still found anything new.
 
     Parameters
     ----------

@@ -23,20 +23,20 @@ def experiment_(
     settings: Annotated[LaboratorySettings, Settings] = LaboratorySettings(),
     json: Json = False,
 ) -> None:
-    """Do an experiment of the thesis again and write its page.
+    """Repeat an experiment of the thesis and write its page.
 
-    A second call computes only the rows that are missing, also after a call that was killed or asked for fewer runs.
+    A second call computes only the missing rows, also after a call that was killed or that asked for fewer runs.
 
     Parameters
     ----------
     name
-        Of the experiment, such as all-goals; a name that there is not makes the command list those that there are.
+        Name of the experiment, such as all-goals; an unknown name lists all of them.
     out
         Folder of the laboratory, shared by all experiments; made where there is none.
     arms
-        Names of the arms, separated by commas; otherwise those of the experiment.
+        Names of the arms, separated by commas; by default those of the experiment.
     runs
-        How often every trial is done, each time from other weights; otherwise as often as in the thesis.
+        How often every trial is done, each time from other weights; by default as often as in the thesis.
     workers
         Rows computed at once; by default as many as there are cores.
     dask

@@ -8,7 +8,7 @@ from pneumarm.report import write_report
 
 
 def report_(folder: Path, /, *, json: Json = False) -> None:
-    """Write the report of a finished run again.
+    """Rewrite the report of a finished run.
 
     Parameters
     ----------

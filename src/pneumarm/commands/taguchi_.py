@@ -26,7 +26,7 @@ def analyse_(
     out: Path | None = None,
     json: Json = False,
 ) -> None:
-    """Analyse a table of trials and runs by the design that they were made with.
+    """Analyse a table of trials and runs by the design of its experiment.
 
     Parameters
     ----------
@@ -35,9 +35,9 @@ def analyse_(
     goal
         Which results are good: larger or smaller ones.
     design
-        TOML file of the design: array, factors, interactions; otherwise L16 as in the thesis (tables 5.3 and 5.4).
+        TOML file of the design: array, factors, interactions; by default L16 as in the thesis (tables 5.3 and 5.4).
     columns
-        How the headings of the columns to take begin; otherwise those that begin with run, or all.
+        How the headings of the columns to use begin; by default those that begin with run, or all.
     confirmation
         A table with one row: runs made with the derived settings, compared with what the effects predict.
     quantity
@@ -52,7 +52,7 @@ def analyse_(
     if len(read.results) != chosen.array.trials:
         raise UnusableInput(
             f"{results}: {chosen.array.name} needs {chosen.array.trials} trials, got {len(read.results)}; give the "
-            "design that they were made by with --design"
+            "design of the experiment with --design"
         )
     analysis = analyse_table(chosen, read.results, goal)
     figures = analysis.figures()

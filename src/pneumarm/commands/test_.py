@@ -15,8 +15,8 @@ from pneumarm.transitions import Store
 def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: int = 0, json: Json = False) -> None:
     """Test an agent in a simulation: greedy, not learning, from all begin states to all goals.
 
-    An agent that looks ahead on an arm is tested without, and then with it on the first 500 of the movements
-    ("lookahead"): what would move on the arm is the latter, but it takes a hundred times as long.
+    An agent that looks ahead on an arm is tested without lookahead, and then with it on the first 500 movements
+    ("lookahead"). The latter is what would move the arm, but it takes a hundred times as long.
 
     Parameters
     ----------

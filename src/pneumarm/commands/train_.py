@@ -33,11 +33,11 @@ def train_(
     db
         The store, which the begin states are drawn from.
     out
-        File of the agent to write; it needs neither of the others then.
+        File of the agent to write; it contains all that it needs.
     seed
         Of the initial weights, the exploration and the begin states.
     agents
-        Agents trained at once, of which the best is kept; otherwise as many as the method's settings say.
+        Agents trained at once, of which the best is kept; by default as many as the method's settings say.
     json
         Print one JSON object on stdout and nothing else there.
     """

@@ -19,7 +19,7 @@ def versions_(folder: Path, /, *, to: int | None = None, json: Json = False) -> 
     folder
         The folder of a transfer or a run.
     to
-        Number of the version to put back: adapted.safetensors becomes that one. The others are kept.
+        Number of the version to put back into adapted.safetensors. The others are kept.
     json
         Print one JSON object on stdout and nothing else there.
     """
@@ -35,7 +35,7 @@ def versions_(folder: Path, /, *, to: int | None = None, json: Json = False) -> 
 
 
 def say_history(folder: Path) -> None:
-    """Say when the arm in ``folder`` was found to have changed and what became of the agent, where it adapts."""
+    """Say when the arm in ``folder`` was found to have changed and what the agent did about it."""
     if (folder / HISTORY).exists():
         for sentence in read_history(folder).sentences:
             say(sentence)

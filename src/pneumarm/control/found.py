@@ -20,7 +20,7 @@ WAYS = {
 """What the guard counts, in plain words."""
 LINK = {
     "requests": "requests answered",
-    "retries": "attempts besides the first of a request",
+    "retries": "requests sent again",
     "silences": "requests without an answer for a control period or longer",
     "foreign": "late or doubled replies, dropped",
     "corrupt": "damaged frames, dropped",

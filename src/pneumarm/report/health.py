@@ -47,10 +47,10 @@ def health(results: Mapping[str, Any], marked: MarkedData | None, spec: ArmSpec)
     ]
     if found:
         text.append(
-            "A finding tells since when something was wrong as far as the readings show it, when that was noticed, "
+            "A finding tells since when something was wrong, as far as the readings show it, when that was noticed, "
             "and until when it lasted, on the arm's clock. Rows read while a valve, a sensor or the supply was "
             "broken are marked: they are kept, and nothing is learned from them. A leak or a change of the arm is "
-            "told and not marked, for what such an arm does is what there is to learn."
+            "reported and not marked, because what such an arm does is what there is to learn."
         )
     return Section("What was found wrong", text, [_picture(marked, spec)] if marked and spoiled else [], tables)
 

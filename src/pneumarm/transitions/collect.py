@@ -221,7 +221,7 @@ def collect(
             raise
         raise ArmFailure(
             f"{arm.spec.name}: failed while collecting sequence {number + 1} ({type(error).__name__}: {error}); "
-            f"the {number} sequences before it are stored: see to the arm and run the same command again"
+            f"the {number} sequences before it are stored. Check the arm and run the same command again"
         ) from error
     return CollectResult(
         transitions=done,

@@ -66,7 +66,7 @@ def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, str]:
 def create_tables(path: Path, spec: ArmSpec, valves: bool) -> None:
     """Make an empty store of the file ``path``, which does not exist yet."""
     if spec.joints > MOST_JOINTS:
-        raise UnusableInput(f"{path}: a store has workspace for {MOST_JOINTS} joints, this arm has {spec.joints}")
+        raise UnusableInput(f"{path}: a store has room for {MOST_JOINTS} joints, this arm has {spec.joints}")
     connection = sqlite3.connect(path, isolation_level=None)
     try:
         with translated(path):

@@ -10,14 +10,14 @@ import pytest
 from tests.arm.serial.wired import all_valves, wired
 
 import pneumarm.arm
-from pneumarm.arm.serial.clock import WRAP, ControllerClock
+from pneumarm.arm.serial.clock import WRAP, BoardClock
 
 ROUND_TRIP = 1e-3
 
 
 def mapped(times: list[float], rate: float, begin: int, seed: int = 0) -> np.ndarray:
     """Return the errors [s] of readings at host's ``times`` [s] by a clock that runs ``rate`` times as fast."""
-    rng, clock, errors = random.Random(seed), ControllerClock(), []
+    rng, clock, errors = random.Random(seed), BoardClock(), []
     for moment in times:
         before, after = (ROUND_TRIP / 2 + (rng.random() < 0.1) * rng.expovariate(1 / 0.003) for _ in range(2))
         raw = (round(1e6 * rate * moment) + begin) % WRAP
@@ -42,7 +42,7 @@ def test_wraps_in_a_pause_are_counted(pause: float) -> None:
 
 
 def test_mapped_times_never_go_back_and_lie_in_their_exchange() -> None:
-    rng, clock, last = random.Random(3), ControllerClock(), -1.0
+    rng, clock, last = random.Random(3), BoardClock(), -1.0
     for k in range(2000):
         moment = k / 100
         before, after = rng.expovariate(1 / 0.005), rng.expovariate(1 / 0.005)
@@ -82,7 +82,7 @@ def test_a_clock_on_the_wall_that_jumps_changes_nothing(monkeypatch: pytest.Monk
 
 def test_times_rise_though_the_controller_s_clock_stands_still() -> None:
     """As that of an emulated board does on a computer that is too busy for it."""
-    clock = ControllerClock()
+    clock = BoardClock()
     times = [clock.map(5_000, sent, sent + 1e-3) for sent in np.arange(0.0, 1.0, 1 / 60)]
     assert (np.diff(times) > 0).all()
     assert times == pytest.approx(np.arange(0.0, 1.0, 1 / 60), abs=1.1e-3)

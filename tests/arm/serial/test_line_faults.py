@@ -186,14 +186,14 @@ def test_host_that_stalls(w: Wired, stall: float) -> None:
     ("cause", "words"),
     [(Cause.EXTERNAL, "reset pin"), (Cause.BROWN_OUT, "supply too low"), (Cause.POWER_ON, "power on")],
 )
-def test_controller_that_begins_anew(w: Wired, cause: Cause, words: str) -> None:
+def test_board_that_restarts(w: Wired, cause: Cause, words: str) -> None:
     in_motion(w)
     w.board.reset(cause)
     assert w.is_vented
     took, why = until_failure(w)
     assert took <= 2 * PERIOD
-    assert f"began anew while in use ({words})" in why
-    with pytest.raises(ArmFailure, match="began anew"):
+    assert f"restarted while in use ({words})" in why
+    with pytest.raises(ArmFailure, match="restarted"):
         w.arm.make_ready()
     assert w.is_vented
     begun = w.line.now()

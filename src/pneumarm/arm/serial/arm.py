@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import Arm, ArmSpec, Reading, with_measured
-from pneumarm.arm.serial.clock import ControllerClock
+from pneumarm.arm.serial.clock import BoardClock
 from pneumarm.arm.serial.line import Line
 from pneumarm.arm.serial.link import Answer, Link
 from pneumarm.arm.serial.protocol import (
@@ -39,17 +39,17 @@ from pneumarm.arm.serial.protocol import (
 from pneumarm.errors import ArmFailure, UnusableInput
 
 CONVERSIONS = 5
-"""Conversions of which the controller sends the median (thesis A.1.3)."""
+"""Conversions of which the board sends the median (thesis A.1.3)."""
 VELOCITY_MS = 16
-"""Time over which the controller averages the velocity [ms] (thesis 5.1, 7.3)."""
+"""Time over which the board averages the velocity [ms] (thesis 5.1, 7.3)."""
 CUT_OFF = 1.5
-"""The controller cuts a muscle off at so many times ``spec.max_pressure``; moving closed ones compresses them."""
+"""The board cuts a muscle off at so many times ``spec.max_pressure``; moving closed ones compresses them."""
 FED = 0.1
-"""While waiting the valves are sent again this often [s], so that the controller does not take us for dead."""
+"""While waiting the valves are sent again this often [s], so that the board's dead-man is fed."""
 BOOT = 3.0
-"""Longest time to wait for a controller that opening the port has reset [s]."""
+"""Longest time to wait for a board that opening the port has reset [s]."""
 KNOCK = 0.1
-"""Time between two CONNECTs to a controller that may still be booting [s]."""
+"""Time between two CONNECTs to a board that may still be booting [s]."""
 _CAUSES = {
     Cause.POWER_ON: "power on",
     Cause.EXTERNAL: "reset pin",
@@ -61,20 +61,20 @@ _CAUSES = {
 class SerialArm(Arm):
     """An arm on a serial line. It is connected, configured and armed on opening; closing vents it.
 
-    Whatever the controller does by itself (vents a muscle over its limit, vents all when the host is silent, begins
-    anew) makes the next :meth:`set_valves` fail and stays until :meth:`rearm`, or until :meth:`make_ready` before
+    Whatever the board does by itself (vents a muscle over its limit, vents all when the host is silent,
+    restarts) makes the next :meth:`set_valves` fail and stays until :meth:`rearm`, or until :meth:`make_ready` before
     a movement where only the silence of this host was the cause.
 
     Args:
-        line: to the controller; it is opened again by :meth:`rearm` if it failed.
+        line: to the board; it is opened again by :meth:`rearm` if it failed.
         spec: what the arm is.
         conversions: 5, 7 or 9, of which each value is the median.
-        velocity_ms: time over which the controller averages the velocity [ms].
-        cut_off: pressure [bar] at which the controller cuts a muscle off; 1.5 times ``spec.max_pressure`` by default.
+        velocity_ms: time over which the board averages the velocity [ms].
+        cut_off: pressure [bar] at which the board cuts a muscle off; 1.5 times ``spec.max_pressure`` by default.
 
     Raises:
-        UnusableInput: more joints or sensors than the controller has pins for, or a controller of another protocol.
-        ArmFailure: no controller answers, or it finds the arm unfit to move.
+        UnusableInput: more joints or sensors than the board has pins for, or a board of another protocol.
+        ArmFailure: no board answers, or it finds the arm unfit to move.
 
     """
 
@@ -88,19 +88,19 @@ class SerialArm(Arm):
         cut_off: float | None = None,
     ) -> None:
         if spec.joints > JOINTS:
-            raise UnusableInput(f"{spec.name}: a controller has pins for {JOINTS} joints, not for {spec.joints}")
+            raise UnusableInput(f"{spec.name}: a board has pins for {JOINTS} joints, not for {spec.joints}")
         for one in spec.sensors:
             if one.channel is None or one.channel > EXTRAS:
                 raise UnusableInput(
-                    f"{spec.name}: {one.name} needs one of the controller's {EXTRAS} extra channels, its spec says "
+                    f"{spec.name}: {one.name} needs one of the board's {EXTRAS} extra channels, its spec says "
                     f"{one.channel}; correct it, or leave the sensor out"
                 )
         self.spec = spec
         self.link = Link(line, spec.period, spec.name, secrets.randbelow(SEQUENCES))
         self.hello: Hello | None = None
-        """What the controller said of itself when it was connected."""
+        """What the board said of itself when it was connected."""
         self._line = line
-        self._clock = ControllerClock()
+        self._clock = BoardClock()
         self._valves = np.zeros((spec.joints, 2), np.int8)
         self._fed = line.now()
         self._closed = False
@@ -119,7 +119,7 @@ class SerialArm(Arm):
         """Return the sensors of one moment, and that moment on the host's clock.
 
         Raises:
-            ArmFailure: the link is lost, or the controller began anew.
+            ArmFailure: the link is lost, or the board restarted.
 
         """
         return self._reading(self.link.ask(Request.READ))
@@ -128,7 +128,7 @@ class SerialArm(Arm):
         """Set the valves (joints, 2) of -1, 0, +1.
 
         Raises:
-            ArmFailure: the controller did not do so, and why.
+            ArmFailure: the board did not do so, and why.
 
         """
         self._exchange(np.asarray(valves, np.int8).reshape(self._valves.shape))
@@ -148,7 +148,7 @@ class SerialArm(Arm):
         self._line.sleep_until(time)
 
     def make_ready(self) -> None:
-        """Arm the controller if it vented the arm only because nobody moved it for a while.
+        """Arm the board if it vented the arm only because nobody moved it for a while.
 
         Raises:
             ArmFailure: it was something else.
@@ -161,7 +161,7 @@ class SerialArm(Arm):
             self._arm()
 
     def rearm(self) -> None:
-        """Connect again, opening the line anew if it had failed, and arm: a person has looked at the arm.
+        """Connect again, opening the line again if it had failed, and arm: a person has looked at the arm.
 
         Raises:
             ArmFailure: a cause remains.
@@ -179,12 +179,12 @@ class SerialArm(Arm):
             if self.link.lost is None:
                 self.link.ask(Request.DISARM)
         except ArmFailure:
-            pass  # who is not heard lets the controller vent by itself
+            pass  # who is not heard lets the board vent by itself
         finally:
             self._line.close()
 
     def _connect(self) -> None:
-        """Have a controller that may still be booting answer, then configure it."""
+        """Have a board that may still be booting answer, then configure it."""
         self._armed = False
         begun = self._line.now()
         while True:
@@ -198,10 +198,10 @@ class SerialArm(Arm):
                     raise
                 if self._line.now() - begun >= BOOT:
                     raise ArmFailure(
-                        f"{self.spec.name}: nobody answered for {BOOT:g} s; is this the right port, is the "
-                        "controller powered, is pneumarm's firmware on it?"
+                        f"{self.spec.name}: nobody answered for {BOOT:g} s. Is this the right port, is the "
+                        "board powered, is pneumarm's firmware on it?"
                     ) from error
-        self._clock = ControllerClock()
+        self._clock = BoardClock()
         self._status(self.link.ask(Request.CONFIGURE, *self._settings))
 
     def _greet(self) -> None:
@@ -214,7 +214,7 @@ class SerialArm(Arm):
         frame = self.link.knock(Request.CONNECT, VERSION, self._session, wait=KNOCK).frame
         if frame.kind != Reply.HELLO or frame.values[0] != VERSION:
             raise UnusableInput(
-                f"{self.spec.name}: the controller speaks another protocol than version {VERSION}; "
+                f"{self.spec.name}: the board speaks another protocol than version {VERSION}; "
                 "flash the firmware that came with this pneumarm"
             )
         self.hello = Hello(*frame.values)
@@ -234,7 +234,7 @@ class SerialArm(Arm):
             self._fail(flags)
         if sensors.valves != packed:
             applied = unpack_valves(sensors.valves, self.spec.joints)
-            raise ArmFailure(f"{self.spec.name}: valves {valves.tolist()} were asked, {applied} are set")
+            raise ArmFailure(f"{self.spec.name}: valves {valves.tolist()} were asked for, {applied} are set")
         self._valves = valves
         self._fed = answer.sent
 
@@ -267,20 +267,20 @@ class SerialArm(Arm):
         if refused.reason in (Reason.NOT_CONNECTED, Reason.NOT_ARMED):
             self._armed = False
         if refused.reason == Reason.NOT_CONNECTED:
-            self._began_anew()
+            self._restarted()
         if flags & LATCHES or refused.reason == Reason.CAUSE_REMAINS:
             self._fail(flags)
         reasons = {int(reason): reason.name.lower().replace("_", " ") for reason in Reason}
         why = reasons.get(refused.reason, f"reason {refused.reason}")
-        raise ArmFailure(f"{self.spec.name}: the controller refused: {why}")
+        raise ArmFailure(f"{self.spec.name}: the board refused: {why}")
 
-    def _began_anew(self) -> NoReturn:
-        """Ask the controller why it began anew, and raise that; nothing more is asked until :meth:`rearm`."""
+    def _restarted(self) -> NoReturn:
+        """Ask the board why it restarted, and raise that; nothing more is asked until :meth:`rearm`."""
         with suppress(OSError, ArmFailure):  # then it says so the next time
             self._greet()
         causes = f" ({', '.join(self.reset_causes())})" if self.link.lost is None and self.reset_causes() else ""
         raise self.link.lose(
-            f"the controller began anew while in use{causes}, all muscles are vented; look at its power, its plug "
+            f"the board restarted while in use{causes}, all muscles are vented; check its power, its plug "
             "and, after a hang, its firmware"
         )
 
@@ -293,15 +293,15 @@ class SerialArm(Arm):
                 if flags & flag
             ]
             raise ArmFailure(
-                f"{self.spec.name}: the controller cut off {' and '.join(muscles)}, which read over "
-                f"{self._limit:.2f} bar; look at its inlet valve and at the supply"
+                f"{self.spec.name}: the board cut off {' and '.join(muscles)}, which read over "
+                f"{self._limit:.2f} bar; check its inlet valve and the supply"
             )
         if flags & Flag.CONVERTER:
-            raise ArmFailure(f"{self.spec.name}: the controller's converter stopped, all muscles are vented")
+            raise ArmFailure(f"{self.spec.name}: the board's converter stopped, all muscles are vented")
         self._armed = False
         raise ArmFailure(
-            f"{self.spec.name}: the controller heard nothing for a quarter of a second and vented all muscles; "
-            "this computer was too busy, or asleep"
+            f"{self.spec.name}: the board heard nothing for a quarter of a second and vented all muscles; "
+            "this computer was too busy or asleep"
         )
 
     def link_counts(self) -> dict[str, int]:
@@ -309,6 +309,6 @@ class SerialArm(Arm):
         return asdict(self.link.counts)
 
     def reset_causes(self) -> list[str]:
-        """Return why the controller last began anew, in words; several may be true."""
+        """Return why the board last restarted, in words; several may be true."""
         causes = Cause(self.hello.reset_cause) if self.hello is not None else Cause(0)
         return [text for cause, text in _CAUSES.items() if causes & cause]

@@ -1,4 +1,4 @@
-"""A controller in pure Python, with any arm on it: the same bytes and the same rules as the firmware's."""
+"""A board in pure Python, with any arm on it: the same bytes and the same rules as the firmware's."""
 
 from collections import deque
 
@@ -78,7 +78,7 @@ class EmulatedBoard:
         return bool(self._flags & Flag.ARMED)
 
     def reset(self, cause: Cause = Cause.EXTERNAL) -> None:
-        """Begin anew, vented."""
+        """Restart, vented."""
         self._time = self._booted = self.arm.read().time
         self._cause = cause
         self._hung = False
@@ -99,7 +99,7 @@ class EmulatedBoard:
         self._earlier = self._now = self._look()
 
     def hang(self) -> None:
-        """Stop answering, as a program does that hangs; the watchdog begins it anew."""
+        """Stop answering, as a program does that hangs; the watchdog restarts it."""
         self._hung = True
         self._hung_at = self._time
 

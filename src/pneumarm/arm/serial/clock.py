@@ -1,10 +1,10 @@
-"""The controller's clock on the host's: unwrapped, and mapped by what is known of when its readings were made."""
+"""The board's clock on the host's: unwrapped, and mapped by what is known of when its readings were made."""
 
 from collections import deque
 from typing import NamedTuple
 
 WRAP = 1 << 32
-"""The controller's clock begins again after so many microseconds, 71.6 minutes."""
+"""The board's clock begins again after so many microseconds, 71.6 minutes."""
 STRETCH = 1.0
 """Of the exchanges of a stretch [s] the quickest is kept: its reading is known best."""
 STRETCHES = 30
@@ -16,7 +16,7 @@ MOST_OFF = 0.02
 
 
 class _Exchange(NamedTuple):
-    controller: float
+    board: float
     """Unwrapped time of the reading [s]."""
     host: float
     """Middle between sending and receiving [s]."""
@@ -24,8 +24,8 @@ class _Exchange(NamedTuple):
     """[s]"""
 
 
-class ControllerClock:
-    """Maps times of the controller to times of the host, from exchanges of which both are known.
+class BoardClock:
+    """Maps times of the board to times of the host, from exchanges of which both are known.
 
     The reading of an exchange was made between sending the request and receiving the reply; the quicker the
     exchange, the better its time is known. A straight line through the quickest of each second gives rate and
@@ -36,14 +36,14 @@ class ControllerClock:
         self._kept: deque[_Exchange] = deque(maxlen=STRETCHES)
         self._last: float | None = None
         self.rate = 1.0
-        """Seconds of the host per second of the controller."""
+        """Seconds of the host per second of the board."""
         self._origin = (0.0, 0.0)
 
     def map(self, raw: int, sent: float, received: float) -> float:
         """Return the host's time [s] of a reading made at ``raw`` [us] in an exchange between two host times [s]."""
-        controller = self._unwrapped(raw, received)
-        self._keep(_Exchange(controller, (sent + received) / 2, received - sent))
-        mapped = self._origin[1] + self.rate * (controller - self._origin[0])
+        board = self._unwrapped(raw, received)
+        self._keep(_Exchange(board, (sent + received) / 2, received - sent))
+        mapped = self._origin[1] + self.rate * (board - self._origin[0])
         mapped = min(max(mapped, sent), received)  # it was made then, whatever the line says
         if self._last is not None:
             mapped = max(mapped, self._last)
@@ -51,7 +51,7 @@ class ControllerClock:
         return mapped
 
     def _unwrapped(self, raw: int, received: float) -> float:
-        """Return the controller's time [s] with the number of wraps that fits best to the host's clock.
+        """Return the board's time [s] with the number of wraps that fits best to the host's clock.
 
         In a pause of hours it wraps several times; the host's clock tells how often, for it is wrong by far less
         than half a wrap.
@@ -73,10 +73,10 @@ class ControllerClock:
         # The middle is wrong by up to half a round trip: each weighs as much as it is known.
         weights = [1 / max(e.round_trip, SURELY) ** 2 for e in kept]
         total = sum(weights)
-        controller = sum(w * e.controller for w, e in zip(weights, kept, strict=True)) / total
+        board = sum(w * e.board for w, e in zip(weights, kept, strict=True)) / total
         host = sum(w * e.host for w, e in zip(weights, kept, strict=True)) / total
-        spread = sum(w * (e.controller - controller) ** 2 for w, e in zip(weights, kept, strict=True)) / total
-        together = sum(w * (e.controller - controller) * (e.host - host) for w, e in zip(weights, kept, strict=True))
+        spread = sum(w * (e.board - board) ** 2 for w, e in zip(weights, kept, strict=True)) / total
+        together = sum(w * (e.board - board) * (e.host - host) for w, e in zip(weights, kept, strict=True))
         rate = together / total / spread if spread > STRETCH**2 / 64 else 1.0
         self.rate = min(max(rate, 1 - MOST_OFF), 1 + MOST_OFF)
-        self._origin = (controller, host)
+        self._origin = (board, host)

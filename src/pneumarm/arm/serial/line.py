@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 
 
 class Line(ABC):
-    """Bytes to and from a controller, and the clock by which the host waits for them.
+    """Bytes to and from a board, and the clock by which the host waits for them.
 
     A line that is gone raises OSError from any of its methods.
     """

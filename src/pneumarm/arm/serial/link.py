@@ -1,4 +1,4 @@
-"""One request at a time over a line: asked again until it is answered, and given up when the controller is gone."""
+"""One request at a time over a line: asked again until it is answered, and given up when the board is gone."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from pneumarm.arm.serial.protocol import ANSWER, DEAD_MAN_MS, SEQUENCES, Frame, 
 from pneumarm.errors import ArmFailure
 
 GIVE_UP = DEAD_MAN_MS / 1e3
-"""Silence after which any link is lost [s]: by then the controller has vented the arm by itself."""
+"""Silence after which any link is lost [s]: by then the board has vented the arm by itself."""
 MOMENT = 1e-9
 """Times closer than this [s] are the same: a clock that is computed may end a step of its numbers early."""
 _ADVICE = f"it vents all muscles by itself after {GIVE_UP:g} s. Look at plug and power"
@@ -41,15 +41,15 @@ class Answer(NamedTuple):
 
 
 class Link:
-    """Asks a controller, one request under way.
+    """Asks a board, one request under way.
 
     A request that is not answered in time is sent again, as a request of its own: with the next sequence. All
     requests say what shall be, none what shall be changed, so that doing one twice does no harm; and of each answer
-    it is known which attempt it belongs to, and so when the controller can have read, and that it fed the dead-man.
+    it is known which attempt it belongs to, and so when the board can have read, and that it fed the dead-man.
     The attempt before is stale from then on, in case it still comes; an answer to it is as good. Replies of other
     sequences are dropped.
 
-    A line that fails, or a controller that is silent for too long (:class:`~pneumarm.arm.serial.pace.Pace`, or
+    A line that fails, or a board that is silent for too long (:class:`~pneumarm.arm.serial.pace.Pace`, or
     :data:`GIVE_UP` at the latest), makes the link ``lost``: nothing more is sent until :meth:`begin`.
 
     Args:
@@ -104,7 +104,7 @@ class Link:
             return self._ask(request, values, wait)
         except OSError as error:
             self.broken = True
-            raise self.lose(f"the line to the controller is gone ({error}); {_ADVICE}") from error
+            raise self.lose(f"the line to the board is gone ({error}); {_ADVICE}") from error
         finally:
             self.counts.corrupt = self._splitter.corrupt
 
@@ -126,7 +126,7 @@ class Link:
                 return answer
             late = silence >= GIVE_UP and len(sent) >= FEWEST
             if wait is not None or late or self._pace.hopeless(silence, len(sent)):
-                raise self.lose(f"the controller has not answered for {silence:.2f} s; {_ADVICE}")
+                raise self.lose(f"the board has not answered for {silence:.2f} s; {_ADVICE}")
             self.counts.retries += 1
 
     def _listen(self, kinds: tuple[Reply, Reply], sent: dict[int, float], until: float) -> Answer | None:

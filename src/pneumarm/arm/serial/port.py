@@ -144,7 +144,7 @@ def _advice(path: str, error: Exception) -> str:
     """Return what to do about ``error``."""
     if not os.path.exists(path):
         found = ", ".join(port.device for port in list_ports.comports()) or "none"
-        return f"no such port; ports found: {found}. Is the controller plugged in?"
+        return f"no such port; ports found: {found}. Is the board plugged in?"
     if isinstance(error, PermissionError) or "Permission" in str(error):
         group = ""
         if sys.platform != "win32":

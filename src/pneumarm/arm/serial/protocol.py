@@ -44,7 +44,7 @@ class Request(IntEnum):
 
 
 class Reply(IntEnum):
-    """What the controller answers."""
+    """What the board answers."""
 
     HELLO = 0x81
     STATUS = 0x82
@@ -61,7 +61,7 @@ class Code(IntEnum):
 
 
 class Flag(IntFlag):
-    """The controller's state."""
+    """The board's state."""
 
     ARMED = 0x0001
     CONFIGURED = 0x0002
@@ -97,7 +97,7 @@ class Reason(IntEnum):
 
 
 class Cause(IntFlag):
-    """Why the controller began anew."""
+    """Why the board restarted."""
 
     POWER_ON = 1
     EXTERNAL = 2
@@ -142,7 +142,7 @@ class Frame(NamedTuple):
 
 
 class Hello(NamedTuple):
-    """Who answers, and why it began anew."""
+    """Who answers, and why it restarted."""
 
     version: int
     firmware: int
@@ -152,19 +152,19 @@ class Hello(NamedTuple):
 
 
 class Status(NamedTuple):
-    """State of the controller."""
+    """State of the board."""
 
     time: int
-    """Controller's clock [us], 32 bits."""
+    """Board's clock [us], 32 bits."""
     flags: int
     valves: int
 
 
 class Sensors(NamedTuple):
-    """The values of a READING, for all joints and muscles that the protocol has workspace for."""
+    """The values of a READING, for all joints and muscles that the protocol provides for."""
 
     time: int
-    """Controller's clock at the sampling [us], 32 bits."""
+    """Board's clock at the sampling [us], 32 bits."""
     flags: int
     valves: int
     angle: tuple[int, ...]

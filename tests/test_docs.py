@@ -33,7 +33,7 @@ def test_what_a_page_names_is_there(page: Path) -> None:
     text = page.read_text()
     links = {link for link in re.findall(r"\]\(([^)#:]+)\)", text) if not (page.parent / link).exists()}
     code = code_of(text)
-    places = re.findall(r"^([\w/]+(?:\.py|/))(?:::(\w+))?$", code, re.M)
+    places = re.findall(r"^([\w/]+/|\w+\.py|[\w/]+/\w+\.\w+)(?:::(\w+))?$", code, re.M)
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.M))
     benchmarks = {path.stem for path in (ROOT / "benchmarks").iterdir()}
     commands = {command.split()[0] for command in COMMANDS}

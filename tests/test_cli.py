@@ -130,7 +130,7 @@ def test_too_little_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert Outcome(capsys, "collect", "virtual", tmp_path / "a.db", "--transitions", 1999).is_refused("2,000")
     assert Outcome(capsys, "run", "--out", tmp_path / "run", "--transitions", 100).is_refused("2,000")
     asked = ("transfer", agent, "--arm", "virtual", "--out", tmp_path / "t")
-    assert Outcome(capsys, *asked, "--test-episodes", 0).is_refused("at least 1 test episode")
+    assert Outcome(capsys, *asked, "--test-episodes", 0).is_refused("test_episodes cannot be 0; expected 1 or more")
     assert not list(tmp_path.iterdir())
 
 

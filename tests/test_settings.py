@@ -1,12 +1,14 @@
 """Settings: what help says of a default is what is used."""
 
 from collections.abc import Iterator
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
 import pytest
 
+from pneumarm.errors import UnusableInput
 from pneumarm.run import RunSettings
+from pneumarm.settings import Settings, Valid
 
 
 def defaults(kind: type) -> Iterator[tuple[str, Any, Any]]:
@@ -28,3 +30,36 @@ def test_nested_defaults_are_those_of_their_type(name: str, hint: Any, default: 
     """Help shows the defaults of the type; an option beside it must not bring other ones back."""
     assert type(default) in (hint, *get_args(hint)), name
     assert default == type(default)(), name
+
+
+@dataclass(frozen=True)
+class Parent(Settings):
+    share: float = 0.5
+
+    def _valid(self) -> Valid:
+        return {"share": 0 <= self.share <= 1 or "0 to 1"}
+
+
+@dataclass(frozen=True)
+class Child(Parent):
+    count: int = 1
+
+    def _valid(self) -> Valid:
+        return {"count": self.count >= 1}
+
+
+def test_what_a_parent_demands_is_demanded_of_its_children() -> None:
+    with pytest.raises(UnusableInput, match="Child: share cannot be 2; expected 0 to 1"):
+        Child(share=2)
+    with pytest.raises(UnusableInput, match="Child: count cannot be 0; see its documentation"):
+        Child(count=0)
+    with pytest.raises(UnusableInput, match="RunSettings: method cannot be 'nonsense'"):
+        RunSettings(method="nonsense")
+
+
+def test_no_class_of_settings_can_forget_its_parent() -> None:
+    with pytest.raises(TypeError, match="_valid"):
+
+        class Forgetful(Parent):
+            def __post_init__(self) -> None:
+                pass

@@ -27,9 +27,10 @@ from pneumarm.planning import PlanSettings
 from pneumarm.planning.bound import BoundSettings, known_bound
 from pneumarm.records import demonstrate, marked_record, test_record, training_record
 from pneumarm.report import read_episodes, save_movement, save_spec, write_report
+from pneumarm.settings import Valid
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.task import BeginStates, begin_states
-from pneumarm.transitions import KINDS, CollectSettings, Store, collect, require_enough
+from pneumarm.transitions import KINDS, CollectSettings, Store, collect, enough
 
 Progress = Callable[[str], AbstractContextManager[Report]]
 
@@ -60,12 +61,12 @@ class RunSettings(LearnSettings):
     fit: FitSettings = field(default_factory=FitSettings)
     transfer: TransferSettings = field(default_factory=TransferSettings)
 
-    def __post_init__(self) -> None:
-        require_enough(self.transitions)
-        if self.test_episodes < 1:
-            raise UnusableInput(f"a run needs at least 1 test episode, got {self.test_episodes}")
-        if self.bound_episodes < 0:
-            raise UnusableInput(f"a run needs 0 or more movements for the bound, got {self.bound_episodes}")
+    def _valid(self) -> Valid:
+        return {
+            "transitions": enough(self.transitions),
+            "test_episodes": self.test_episodes >= 1 or "1 or more",
+            "bound_episodes": self.bound_episodes >= 0 or "0 or more",
+        }
 
 
 class Run:

@@ -1,11 +1,40 @@
 """Settings that a person chooses: every class of them says which values are valid, in one way."""
 
+from collections.abc import Mapping
+from reprlib import repr as shortened
+from typing import Any
+
 from pneumarm.errors import UnusableInput
 
+Valid = Mapping[str, bool | str]
+"""By field True where its value is valid; otherwise what is expected in its place, or False."""
 
-def check(settings: object, **valid: bool) -> None:
-    """Raise UnusableInput for the first field of ``settings`` that is not ``valid``."""
-    for name, is_valid in valid.items():
-        if not is_valid:
-            kind = type(settings).__name__
-            raise UnusableInput(f"{kind}: {name} cannot be {getattr(settings, name)!r}; see its documentation")
+
+class Settings:
+    """Base of frozen dataclasses whose values are checked when they are made, in Python and on the command line.
+
+    A class says by ``_valid`` which of its own fields are. What the classes that it inherits from say is asked as
+    well, so that none can be forgotten.
+    """
+
+    def _valid(self) -> Valid:
+        return {}
+
+    def __post_init__(self) -> None:
+        validate(self)
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "__post_init__" in vars(cls):
+            raise TypeError(f"{cls.__name__}: settings are checked by _valid(), not by a __post_init__ of their own")
+
+
+def validate(settings: object) -> None:
+    """Raise UnusableInput for the first field that the class of ``settings``, or one of its bases, finds invalid."""
+    for kind in reversed(type(settings).__mro__):
+        if "_valid" in vars(kind):
+            for name, found in vars(kind)["_valid"](settings).items():
+                if found is not True:
+                    expected = f"expected {found}" if found else "see its documentation"
+                    value = shortened(getattr(settings, name))
+                    raise UnusableInput(f"{type(settings).__name__}: {name} cannot be {value}; {expected}")

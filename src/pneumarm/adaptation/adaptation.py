@@ -29,7 +29,7 @@ from pneumarm.learning.methods import AnyAgent
 from pneumarm.learning.policy.agent import PolicyAgent
 from pneumarm.learning.policy.training import PolicyLearner
 from pneumarm.networks import Network
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates, begin_states
 from pneumarm.transitions.rows import Rows
@@ -40,7 +40,7 @@ What = Literal["noticed", "accepted", "refused", "rolled back"]
 
 
 @dataclass(frozen=True)
-class AdaptationSettings:
+class AdaptationSettings(Settings):
     """How a policy adapts to an arm between movements."""
 
     first: int = 10
@@ -62,16 +62,15 @@ class AdaptationSettings:
     trial: TrialSettings = field(default_factory=TrialSettings)
     """When an adapted agent is taken back."""
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            first=self.first >= 1,
-            growth=1 < self.growth < math.inf,
-            every=self.every >= 0,
-            updates=self.updates >= 1,
-            warm_up=self.warm_up >= 0,
-            learning_rate=0 < self.learning_rate < math.inf,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "first": self.first >= 1,
+            "growth": 1 < self.growth < math.inf,
+            "every": self.every >= 0,
+            "updates": self.updates >= 1,
+            "warm_up": self.warm_up >= 0,
+            "learning_rate": 0 < self.learning_rate < math.inf,
+        }
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.quality import residue
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Rows
@@ -26,7 +26,7 @@ from pneumarm.transitions.window import QUANTITIES, transitions
 
 
 @dataclass(frozen=True)
-class WatchSettings:
+class WatchSettings(Settings):
     """When an arm counts as changed."""
 
     allowance: float = 1.3
@@ -40,14 +40,13 @@ class WatchSettings:
     window: int = 20
     """Movements over which the ratio that people are told is taken."""
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            allowance=1 <= self.allowance < self.largest,
-            alarm=0 < self.alarm < math.inf,
-            largest=self.largest < math.inf,
-            window=self.window >= 1,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "allowance": 1 <= self.allowance < self.largest,
+            "alarm": 0 < self.alarm < math.inf,
+            "largest": self.largest < math.inf,
+            "window": self.window >= 1,
+        }
 
 
 class Watch:

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from pneumarm.adaptation.change import error_squares
 from pneumarm.arm.valves import VALVES
 from pneumarm.networks import LevenbergMarquardt, Network, levenberg_marquardt
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.quality import residue
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Rows
@@ -43,7 +43,7 @@ _REHEARSED_STEPS = 20  # of a rehearsed movement; the policy's take about ten
 
 
 @dataclass(frozen=True)
-class RefitSettings:
+class RefitSettings(Settings):
     """How a simulation is fitted further."""
 
     newest: int = 400
@@ -65,19 +65,18 @@ class RefitSettings:
     epochs: int = 10
     """Epochs of Levenberg-Marquardt."""
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            newest=self.newest >= 2,
-            folds=self.folds >= 2,
-            gain=0 <= self.gain < 1,
-            certainty=0 <= self.certainty < math.inf,
-            ridge=0 < self.ridge < math.inf,
-            anchor=0 <= self.anchor < math.inf,
-            rehearsed=0 <= self.rehearsed < math.inf,
-            fewest_rehearsed=self.fewest_rehearsed >= 0,
-            epochs=self.epochs >= 1,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "newest": self.newest >= 2,
+            "folds": self.folds >= 2,
+            "gain": 0 <= self.gain < 1,
+            "certainty": 0 <= self.certainty < math.inf,
+            "ridge": 0 < self.ridge < math.inf,
+            "anchor": 0 <= self.anchor < math.inf,
+            "rehearsed": 0 <= self.rehearsed < math.inf,
+            "fewest_rehearsed": self.fewest_rehearsed >= 0,
+            "epochs": self.epochs >= 1,
+        }
 
 
 @dataclass(frozen=True)

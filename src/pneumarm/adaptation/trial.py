@@ -17,13 +17,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 
 Verdict = Literal["open", "worse", "confirmed"]
 
 
 @dataclass(frozen=True)
-class TrialSettings:
+class TrialSettings(Settings):
     """When an adapted agent is taken back."""
 
     looks: tuple[int, ...] = (10, 20, 40, 80)
@@ -37,15 +37,14 @@ class TrialSettings:
     fewest: int = 8
     """Movements that the agent before it must have made; with fewer nothing is taken back."""
 
-    def __post_init__(self) -> None:
+    def _valid(self) -> Valid:
         rising = all(a < b for a, b in zip(self.looks, self.looks[1:], strict=False))
-        check(
-            self,
-            looks=len(self.looks) >= 1 and self.looks[0] >= 2 and rising,
-            limit=0 < self.limit < math.inf,
-            remembered=self.remembered >= self.fewest,
-            fewest=self.fewest >= 2,
-        )
+        return {
+            "looks": len(self.looks) >= 1 and self.looks[0] >= 2 and rising,
+            "limit": 0 < self.limit < math.inf,
+            "remembered": self.remembered >= self.fewest,
+            "fewest": self.fewest >= 2,
+        }
 
 
 def verdict(old: Sequence[float], new: Sequence[float], settings: TrialSettings) -> Verdict:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ArmSpec, Reading
 from pneumarm.checkup import Checkup, CheckupSettings, diagnose, measure
 from pneumarm.control.monitor import Monitor
-from pneumarm.errors import UnusableInput
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation import FitSettings, Simulation, fit_store
-from pneumarm.transitions import Store, collect, require_enough
+from pneumarm.transitions import Store, collect, enough
 from pneumarm.transitions.choice import joined
 from pneumarm.transitions.rows import Rows
 
@@ -28,7 +28,7 @@ CLOSELY = CheckupSettings(step=0.001)
 
 
 @dataclass(frozen=True)
-class RunsSettings:
+class RunsSettings(Settings):
     """How much is done for each picture."""
 
     transitions: int = 10_000
@@ -36,10 +36,8 @@ class RunsSettings:
     epochs: int = 20
     """Epochs of each fit at most."""
 
-    def __post_init__(self) -> None:
-        require_enough(self.transitions)
-        if self.epochs < 1:
-            raise UnusableInput(f"a fit needs at least 1 epoch, got {self.epochs}")
+    def _valid(self) -> Valid:
+        return {"transitions": enough(self.transitions), "epochs": self.epochs >= 1 or "1 or more"}
 
 
 @dataclass(frozen=True)

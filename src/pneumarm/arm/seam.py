@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.settings import Settings, Valid
 
 SensorKind = Literal["velocity", "acceleration", "temperature"]
 """Kinds of further sensors, besides those of angle and pressure that every arm has."""
 
 
 @dataclass(frozen=True)
-class Sensor:
+class Sensor(Settings):
     """A further sensor of an arm: an accelerometer of a joint, or a thermometer of a muscle.
 
     The velocity of the joints is none of these: a board makes it of the angle's faster samples, without a
@@ -42,8 +43,8 @@ class Sensor:
     offset: float = 0.0
     """What the count 0 says [m/s2 or Celsius]."""
 
-    def __post_init__(self) -> None:
-        checks = {
+    def _valid(self) -> Valid:
+        return {
             "kind": self.kind in ("acceleration", "temperature"),
             "joint": self.joint >= 1,
             "muscle": self.muscle in (1, 2) if self.kind == "temperature" else self.muscle is None,
@@ -51,9 +52,6 @@ class Sensor:
             "scale": math.isfinite(self.scale) and self.scale != 0,
             "offset": math.isfinite(self.offset),
         }
-        for name, valid in checks.items():
-            if not valid:
-                raise UnusableInput(f"Sensor: {name} cannot be {getattr(self, name)!r}; see its docstring")
 
     @property
     def name(self) -> str:
@@ -70,7 +68,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class ArmSpec:
+class ArmSpec(Settings):
     """What pneumarm must know of an arm. All angles and pressures of the seam are in sensor counts."""
 
     joints: int = 1
@@ -101,10 +99,10 @@ class ArmSpec:
     name: str = "arm"
     """What reports call the arm."""
 
-    def __post_init__(self) -> None:
+    def _valid(self) -> Valid:
         low, high = self.angle_range
         lowest, highest = self.angle_limits or (-1.0, 1.0)
-        checks = {
+        return {
             "joints": isinstance(self.joints, int) and self.joints >= 1,
             "velocity_sensor": isinstance(self.velocity_sensor, bool),
             "period": _positive(self.period),
@@ -119,9 +117,6 @@ class ArmSpec:
             and _unlike(one.name for one in self.sensors)
             and _unlike(one.channel for one in self.sensors),
         }
-        for name, valid in checks.items():
-            if not valid:
-                raise UnusableInput(f"ArmSpec: {name} cannot be {getattr(self, name)!r}; see its docstring")
 
     @property
     def max_pressure_counts(self) -> float:

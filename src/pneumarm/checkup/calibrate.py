@@ -16,6 +16,7 @@ from pneumarm.checkup.diagnose import LOGARITHMIC
 from pneumarm.checkup.figures import ends, halves, joint_figures
 from pneumarm.checkup.measure import Array, Checkup, JointTest
 from pneumarm.errors import UnusableInput
+from pneumarm.settings import Settings, Valid
 
 POINTS = 17
 """Points of a linearisation table."""
@@ -30,7 +31,7 @@ _REACTION = 2.0  # a period must be so many times the 99th percentile of setting
 
 
 @dataclass(frozen=True)
-class Known:
+class Known(Settings):
     """What only a person can say of an arm."""
 
     angles: tuple[tuple[float, float], ...] = ()
@@ -42,19 +43,21 @@ class Known:
     counts_per_bar: float | None = None
     """... or what the pressure sensors count, by their data sheet; where both are missing the spec's scale stays."""
 
-    def __post_init__(self) -> None:
-        for pair in self.angles:
-            if not (all(map(math.isfinite, pair)) and pair[0] < pair[1]):
-                raise UnusableInput(f"the angles must be a lower and a higher one in degrees, got {pair}")
-        if self.supply is not None and not 0.1 <= self.supply <= 10:
-            raise UnusableInput(f"the supply must be 0.1 to 10 bar gauge, got {self.supply}")
-        for name in ("counts_per_degree", "counts_per_bar"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < math.inf:
-                raise UnusableInput(f"{name} must be above 0, got {value}")
-        for measured, sheet in (("angles", "counts_per_degree"), ("supply", "counts_per_bar")):
-            if getattr(self, measured) and getattr(self, sheet) is not None:
-                raise UnusableInput(f"give {measured} or {sheet}, not both")
+    def _valid(self) -> Valid:
+        pairs = all(all(map(math.isfinite, pair)) and pair[0] < pair[1] for pair in self.angles)
+        return {
+            "angles": pairs or "a lower and a higher one in degrees",
+            "supply": self.supply is None or 0.1 <= self.supply <= 10 or "0.1 to 10 bar gauge",
+            "counts_per_degree": _of_a_sheet(self.counts_per_degree, self.angles, "angles"),
+            "counts_per_bar": _of_a_sheet(self.counts_per_bar, self.supply, "supply"),
+        }
+
+
+def _of_a_sheet(counts: float | None, measured: object, name: str) -> bool | str:
+    """Return whether ``counts`` are valid, or what is expected in their place."""
+    if counts is not None and measured:
+        return f"{name} or this, not both"
+    return counts is None or 0 < counts < math.inf or "above 0"
 
 
 @dataclass(frozen=True)

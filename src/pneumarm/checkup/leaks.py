@@ -19,10 +19,11 @@ from pneumarm.arm.guard import GuardedArm, guarded
 from pneumarm.arm.seam import Arm, Reading
 from pneumarm.control.monitor.expectation import ATMOSPHERE
 from pneumarm.errors import UnusableInput
+from pneumarm.settings import Settings, Valid
 
 
 @dataclass(frozen=True)
-class LeakTest:
+class LeakTest(Settings):
     """How a leak test is made."""
 
     fill: float = 1.5
@@ -43,10 +44,9 @@ class LeakTest:
     more: float = 1.25
     """... and times as large as that it must be."""
 
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0 < value < math.inf and not (name == "compression" and value == 0):
-                raise UnusableInput(f"LeakTest: {name} cannot be {value!r}; see its docstring")
+    def _valid(self) -> Valid:
+        positive = {name: 0 < value < math.inf or "above 0" for name, value in vars(self).items()}
+        return {**positive, "compression": 0 <= self.compression < math.inf or "0 or more"}
 
 
 class LeakRates(NamedTuple):

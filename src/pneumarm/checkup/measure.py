@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
 from pneumarm.checkup.leaks import LeakTest, watch_closed
-from pneumarm.errors import UnusableInput
+from pneumarm.settings import Settings, Valid
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class CheckupSettings:
+class CheckupSettings(Settings):
     """How long an arm is looked at, and how closely."""
 
     step: float = 0.005
@@ -52,10 +52,8 @@ class CheckupSettings:
     repeats: int = 200
     """How often a reading and a setting are timed."""
 
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0 < value < 1e4:
-                raise UnusableInput(f"the check-up's {name} must be above 0, got {value!r}")
+    def _valid(self) -> Valid:
+        return {name: 0 < value < 1e4 or "above 0 and below 10,000" for name, value in vars(self).items()}
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder, write_text
 from pneumarm.learning import AnyAgent, fingerprint
+from pneumarm.settings import Settings, Valid
 from pneumarm.statistics import summarise
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
@@ -41,7 +42,7 @@ _TOGETHER = 10
 
 
 @dataclass(frozen=True)
-class TransferSettings:
+class TransferSettings(Settings):
     """How an agent is tested and adapted on an arm."""
 
     episodes: int = 1500
@@ -61,16 +62,13 @@ class TransferSettings:
     close_while_computing: bool = False
     """Close the valves between reading and acting (thesis figure 2.8: left as they are)."""
 
-    def __post_init__(self) -> None:
-        if self.episodes < 0 or self.test_episodes < 1:
-            raise UnusableInput(
-                f"transfer needs 0 or more episodes and at least 1 test episode, got {self.episodes} and "
-                f"{self.test_episodes}"
-            )
-        if not 0 <= self.averaged <= 1:
-            raise UnusableInput(f"the share of movements averaged over must be in 0..1, got {self.averaged}")
-        if not 0 <= self.learning_rate <= 1:
-            raise UnusableInput(f"the learning rate on the arm must be in 0..1, got {self.learning_rate}")
+    def _valid(self) -> Valid:
+        return {
+            "episodes": self.episodes >= 0 or "0 or more",
+            "learning_rate": 0 <= self.learning_rate <= 1 or "0 to 1",
+            "test_episodes": self.test_episodes >= 1 or "1 or more",
+            "averaged": 0 <= self.averaged <= 1 or "0 to 1",
+        }
 
     def movements(self, phase: Phase) -> int:
         """Number of movements in ``phase``."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 
 if TYPE_CHECKING:
     from pneumarm.report.page import Section
@@ -25,7 +25,7 @@ ARMS = tuple(f"virtual:seed={number}" for number in range(1, 6))
 
 
 @dataclass(frozen=True)
-class LaboratorySettings:
+class LaboratorySettings(Settings):
     """What decides the rows of an experiment, besides the experiment itself. More arms and runs only add rows."""
 
     seed: int = 0
@@ -39,13 +39,12 @@ class LaboratorySettings:
     exploring: bool = False
     """Test every agent a second time, exploring as when its training ended; that takes as long as training it."""
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            seed=self.seed >= 0,
-            test_episodes=self.test_episodes >= 1,
-            max_episodes=self.max_episodes is None or self.max_episodes >= 1,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "seed": self.seed >= 0,
+            "test_episodes": self.test_episodes >= 1,
+            "max_episodes": self.max_episodes is None or self.max_episodes >= 1,
+        }
 
 
 class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -28,7 +28,7 @@ from pneumarm.learning.online.training import train
 from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
 from pneumarm.simulation.quality import propagation
 from pneumarm.task import BeginStates, begin_states
-from pneumarm.transitions import KINDS, QUANTITIES, CollectSettings, Store, collect
+from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, QUANTITIES, CollectSettings, Store, collect
 from pneumarm.transitions.choice import joined
 
 TRANSITIONS = 40_000
@@ -43,7 +43,6 @@ TRAINING = TrainSettings(agents=4, validation_episodes=500)
 
 The first weights decide most (section 5.4.2): with a single agent a row the intervals would be twice as wide.
 """
-_FEWEST = 2_000  # transitions that can be fitted
 _FIGURES = "figures.json"
 _SAME = 1e-9
 
@@ -97,7 +96,7 @@ def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:
 class Recipe:
     """How the transitions of a simulation are collected and how it is fitted to them."""
 
-    transitions: int = _FEWEST
+    transitions: int = FEWEST_TRANSITIONS
     """At least."""
     minutes: float = 0.0
     """At least, on the arm's clock."""
@@ -123,7 +122,7 @@ def collected(
     """
     collecting = CollectSettings(close_while_computing=recipe.close_while_computing)
     with opened(arm, seed, recipe.frequency) as there, Store.for_arm(path, there.spec) as store:
-        first = max(recipe.transitions, _FEWEST)
+        first = max(recipe.transitions, FEWEST_TRANSITIONS)
         done = collect(there, store, first, seed, settings=collecting, progress=progress)
         while done.seconds < 60 * recipe.minutes:
             progress(done.seconds, 60 * recipe.minutes)

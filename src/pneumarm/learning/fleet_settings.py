@@ -4,13 +4,13 @@ import math
 from dataclasses import dataclass, field
 
 from pneumarm.learning.online.settings import Exploration, TrainSettings
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.task.reward import Reward
 
 
 @dataclass(frozen=True)
-class FleetSettings:
+class FleetSettings(Settings):
     """What learning in many simulated arms at once needs, whatever is learned."""
 
     agents: int = 2
@@ -47,22 +47,21 @@ class FleetSettings:
         """Begin states are all the same, near to the goal or far from it."""
         return (1.0,)
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            agents=1 <= self.agents <= 256,
-            updates=self.updates >= 1,
-            arms=1 <= self.arms <= 65_536,
-            steps=1 <= self.steps <= 4096,
-            learning_rate=0 < self.learning_rate < math.inf,
-            epochs=self.epochs >= 1,
-            discount=0 <= self.discount <= 1,
-            trace_decay=0 <= self.trace_decay <= 1,
-            largest_gradient=0 < self.largest_gradient < math.inf,
-            return_scale=0 < self.return_scale < math.inf,
-            cutoff=self.cutoff >= 1,
-            validation_episodes=self.validation_episodes >= 1,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "agents": 1 <= self.agents <= 256,
+            "updates": self.updates >= 1,
+            "arms": 1 <= self.arms <= 65_536,
+            "steps": 1 <= self.steps <= 4096,
+            "learning_rate": 0 < self.learning_rate < math.inf,
+            "epochs": self.epochs >= 1,
+            "discount": 0 <= self.discount <= 1,
+            "trace_decay": 0 <= self.trace_decay <= 1,
+            "largest_gradient": 0 < self.largest_gradient < math.inf,
+            "return_scale": 0 < self.return_scale < math.inf,
+            "cutoff": self.cutoff >= 1,
+            "validation_episodes": self.validation_episodes >= 1,
+        }
 
 
 @dataclass(frozen=True)
@@ -90,21 +89,19 @@ class PolicySettings(FleetSettings):
     clear: float = 0.001
     """Actions less probable than this are not looked at; where only one is left the decision is clear."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check(
-            self,
-            hidden=1 <= len(self.hidden) <= 8 and all(1 <= size <= 1024 for size in self.hidden),
-            clip=0 < self.clip < 1,
-            entropy=0 <= self.entropy < math.inf,
-            hold=math.isfinite(self.hold),
-            squash=len(self.squash) <= 16 and all(0 < error < math.inf for error in self.squash),
-            still=0 <= self.still < math.inf,
-            patience=self.patience >= 0,
-            lookahead=0 <= self.lookahead <= 65_536,
-            horizon=self.horizon >= 1,
-            clear=0 <= self.clear < 1,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "hidden": 1 <= len(self.hidden) <= 8 and all(1 <= size <= 1024 for size in self.hidden),
+            "clip": 0 < self.clip < 1,
+            "entropy": 0 <= self.entropy < math.inf,
+            "hold": math.isfinite(self.hold),
+            "squash": len(self.squash) <= 16 and all(0 < error < math.inf for error in self.squash),
+            "still": 0 <= self.still < math.inf,
+            "patience": self.patience >= 0,
+            "lookahead": 0 <= self.lookahead <= 65_536,
+            "horizon": self.horizon >= 1,
+            "clear": 0 <= self.clear < 1,
+        }
 
 
 @dataclass(frozen=True)
@@ -161,6 +158,5 @@ class BatchedSettings(FleetSettings):
             noise=self.noise,
         )
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check(self, hidden=1 <= self.hidden <= 1024)
+    def _valid(self) -> Valid:
+        return {"hidden": 1 <= self.hidden <= 1024}

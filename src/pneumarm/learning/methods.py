@@ -29,7 +29,7 @@ from pneumarm.learning.online.training import train as train_online
 from pneumarm.learning.policy.agent import KIND as POLICY
 from pneumarm.learning.policy.agent import PolicyAgent
 from pneumarm.learning.policy.training import FleetTraining, PolicyLearner, train_fleet
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import TaskSettings
@@ -39,7 +39,7 @@ from pneumarm.transitions.window import Window
 Method = Literal["policy", "batched", "sarsa", "q-learning"]
 """A policy, by default; the thesis' nine networks learned in many arms at once; the thesis' own two."""
 METHODS: tuple[Method, ...] = get_args(Method)
-Settings = PolicySettings | BatchedSettings | TrainSettings
+MethodSettings = PolicySettings | BatchedSettings | TrainSettings
 """Settings of a training; their type says which method is meant."""
 Trained = FleetTraining[PolicyAgent] | FleetTraining[Agent] | Training
 
@@ -48,7 +48,7 @@ LOOKING_AHEAD = 500
 
 
 @dataclass(frozen=True)
-class LearnSettings:
+class LearnSettings(Settings):
     """Which method learns, and the settings of each."""
 
     method: Method = "policy"
@@ -60,11 +60,11 @@ class LearnSettings:
     thesis: TrainSettings = field(default_factory=TrainSettings)
     """Of the methods sarsa and q-learning."""
 
-    def __post_init__(self) -> None:
-        check(self, method=self.method in METHODS)
+    def _valid(self) -> Valid:
+        return {"method": self.method in METHODS or f"one of {', '.join(METHODS)}"}
 
     @property
-    def chosen(self) -> Settings:
+    def chosen(self) -> MethodSettings:
         """The settings of the method."""
         if self.method == "policy":
             return self.policy
@@ -175,7 +175,7 @@ def load_agent(path: Path) -> AnyAgent:
 def train(
     simulation: Simulation,
     begin_states: BeginStates,
-    settings: Settings | None = None,
+    settings: MethodSettings | None = None,
     seed: int = 0,
     *,
     progress: Callable[[Progress], None] | None = None,

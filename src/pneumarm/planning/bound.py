@@ -20,6 +20,7 @@ from pneumarm.control.transfer import BEGIN, Episode, draw_movement, summary
 from pneumarm.errors import UnusableInput
 from pneumarm.planning.planner import Planner, physics_planner, simulated_planner
 from pneumarm.planning.search import PlanSettings
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.statistics import FEWEST, mean_estimate
 from pneumarm.task import Reward
@@ -32,7 +33,7 @@ RANGE_TRANSITIONS = 20_000
 
 
 @dataclass(frozen=True)
-class BoundSettings:
+class BoundSettings(Settings):
     """How the bound of an arm is measured."""
 
     episodes: int = 500
@@ -40,9 +41,8 @@ class BoundSettings:
     plan: PlanSettings = field(default_factory=PlanSettings)
     """Which plans are considered."""
 
-    def __post_init__(self) -> None:
-        if self.episodes < 1:
-            raise UnusableInput(f"a bound needs at least 1 movement, got {self.episodes}")
+    def _valid(self) -> Valid:
+        return {"episodes": self.episodes >= 1 or "1 or more movements"}
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel, part
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
 from pneumarm.task.reward import Reward
 
@@ -70,7 +71,7 @@ def _copy(states, to, source):  # type: ignore[no-untyped-def]
 
 
 @dataclass(frozen=True)
-class PlanSettings:
+class PlanSettings(Settings):
     """Which plans are considered, and how long they are sought."""
 
     switches: int = 3
@@ -83,16 +84,13 @@ class PlanSettings:
     """What it costs to miss the goal at the end of a plan and to plan again, in units of reward; where the model is
     uncertain, plans end where the odds are better."""
 
-    def __post_init__(self) -> None:
-        valid = {
+    def _valid(self) -> Valid:
+        return {
             "switches": self.switches >= 0,
             "cutoff": self.cutoff >= 1,
             "nodes": self.nodes >= 1,
             "failure_cost": 0 <= self.failure_cost < math.inf,
         }
-        for name, is_valid in valid.items():
-            if not is_valid:
-                raise UnusableInput(f"PlanSettings: {name} cannot be {getattr(self, name)!r}; see its documentation")
 
 
 class Uncertainty(NamedTuple):

@@ -27,23 +27,22 @@ from pneumarm.networks import (
     nguyen_widrow,
 )
 from pneumarm.networks import importance as importance_of
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Scaling, Simulation, Velocity
 from pneumarm.transitions.choice import share_held_out
+from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
 from pneumarm.transitions.grid import GridSettings
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
-
-FEWEST = 2000
-"""Transitions without which a fit is not tried."""
 
 _MARGIN = 0.05
 """Predicted pressures may exceed the recorded ones by this part of their range."""
 
 
 @dataclass(frozen=True)
-class FitSettings:
+class FitSettings(Settings):
     """What a person may choose of a fit."""
 
     history: int = 3
@@ -71,8 +70,8 @@ class FitSettings:
     seed: int = 0
     """Of the initial weights and of every other choice by lot."""
 
-    def __post_init__(self) -> None:
-        checks = {
+    def _valid(self) -> Valid:
+        return {
             "history": self.history >= 1,
             "approximator": self.approximator in ("network", "least-squares"),
             "hidden": 1 <= self.hidden <= 1000,
@@ -84,9 +83,6 @@ class FitSettings:
             "held_out": 0 < self.held_out < 1,
             "seed": self.seed >= 0,
         }
-        for name, valid in checks.items():
-            if not valid:
-                raise UnusableInput(f"FitSettings: {name} cannot be {getattr(self, name)!r}; see its docstring")
 
 
 class FitResult(NamedTuple):
@@ -329,8 +325,10 @@ def fit_store(
 
     """
     settings = settings or FitSettings()
-    if store.transitions < FEWEST:
-        raise UnusableInput(f"{store.transitions} transitions are too few to fit; collect at least {FEWEST:,}")
+    if store.transitions < FEWEST_TRANSITIONS:
+        raise UnusableInput(
+            f"{store.transitions} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}"
+        )
     window = Window.of(store.spec, settings.history, settings.sensors)
     window.require(store.further, str(store.path))
     sequences = [entry.number for entry in store.catalogue()]

@@ -22,16 +22,16 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.errors import UnusableInput
 from pneumarm.kernels import part
 from pneumarm.random import normal
+from pneumarm.settings import Settings, Valid
 
 if TYPE_CHECKING:
     from pneumarm.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True)
-class NoiseSettings:
+class NoiseSettings(Settings):
     """How much noise the simulation's predictions get, and of what kind."""
 
     kind: Literal["correlated", "white", "none"] = "correlated"
@@ -49,8 +49,8 @@ class NoiseSettings:
     slow_share: float = 0.2
     """Share of the noise that a slow arm gets (thesis: 20 %)."""
 
-    def __post_init__(self) -> None:
-        valid = {
+    def _valid(self) -> Valid:
+        return {
             "kind": self.kind in ("correlated", "white", "none"),
             "factor": 0 <= self.factor < math.inf,
             "steps": self.steps >= 1,
@@ -58,9 +58,6 @@ class NoiseSettings:
             "fast": self.fast < math.inf,
             "slow_share": 0 <= self.slow_share <= 1,
         }
-        for name, is_valid in valid.items():
-            if not is_valid:
-                raise UnusableInput(f"noise: {name} cannot be {getattr(self, name)!r}; see NoiseSettings")
 
 
 class NoiseParameters(NamedTuple):

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 
 
 @dataclass(frozen=True)
-class Reward:
+class Reward(Settings):
     """When a goal is reached (thesis eq. 5.1, 5.2) and what is paid for an action (eq. 4.2, section 5.4.1)."""
 
     goal: float = 50.0
@@ -24,15 +24,14 @@ class Reward:
     velocity_tolerance: float = 1.0
     """Highest speed at which it counts as reached [counts/ms] (thesis: 1)."""
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            goal=math.isfinite(self.goal),
-            action=math.isfinite(self.action),
-            switch=math.isfinite(self.switch),
-            angle_tolerance=0 < self.angle_tolerance < math.inf,
-            velocity_tolerance=0 < self.velocity_tolerance < math.inf,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "goal": math.isfinite(self.goal),
+            "action": math.isfinite(self.action),
+            "switch": math.isfinite(self.switch),
+            "angle_tolerance": 0 < self.angle_tolerance < math.inf,
+            "velocity_tolerance": 0 < self.velocity_tolerance < math.inf,
+        }
 
     def reached(self, angle: ArrayLike, velocity: ArrayLike, goal: ArrayLike) -> bool:
         """Return whether all joints are at their goals; all arguments (joints,) in [counts], [counts/ms]."""

@@ -1,7 +1,16 @@
 """Transitions: the store, collecting, the state window, the grid filter, import of recordings."""
 
 from pneumarm.transitions.choice import held_out
-from pneumarm.transitions.collect import KINDS, CollectBegin, CollectResult, CollectSettings, collect, require_enough
+from pneumarm.transitions.collect import (
+    FEWEST_TRANSITIONS,
+    KINDS,
+    CollectBegin,
+    CollectResult,
+    CollectSettings,
+    collect,
+    enough,
+    require_enough,
+)
 from pneumarm.transitions.filtering import Enough, Filter, Filtered, enough_data, filter_transitions
 from pneumarm.transitions.grid import Coverage, Grid, GridSettings
 from pneumarm.transitions.players import Keyboard, Trajectory
@@ -11,6 +20,7 @@ from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
 
 __all__ = [
+    "FEWEST_TRANSITIONS",
     "KINDS",
     "QUANTITIES",
     "CollectBegin",
@@ -31,6 +41,7 @@ __all__ = [
     "Transitions",
     "Window",
     "collect",
+    "enough",
     "enough_data",
     "filter_transitions",
     "held_out",

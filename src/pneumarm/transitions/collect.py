@@ -32,6 +32,7 @@ from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, Reading
 from pneumarm.arm.valves import ACTIONS, to_valves
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
+from pneumarm.settings import Settings, Valid
 from pneumarm.transitions.players import Trajectory
 from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.store import Store
@@ -59,7 +60,7 @@ class CollectBegin(BeginState):
 
 
 @dataclass(frozen=True)
-class CollectSettings:
+class CollectSettings(Settings):
     """How transitions are collected."""
 
     actions: int = 200
@@ -73,15 +74,12 @@ class CollectSettings:
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting (thesis figure 2.8)."""
 
-    def __post_init__(self) -> None:
-        checks = {
+    def _valid(self) -> Valid:
+        return {
             "actions": 1 <= self.actions <= 50_000,
             "velocity_share": 0 <= self.velocity_share <= 1,
             "longest_hold": self.longest_hold >= 1,
         }
-        for name, valid in checks.items():
-            if not valid:
-                raise UnusableInput(f"CollectSettings: {name} cannot be {getattr(self, name)!r}; see its docstring")
 
 
 @dataclass(frozen=True)
@@ -249,12 +247,15 @@ def _still_wrong(arm: Arm, watch: Watch, before: int) -> int:
     return before + 1
 
 
+def enough(transitions: int) -> bool | str:
+    """Return whether something can be learned from so many ``transitions``, or what is expected in their place."""
+    return transitions >= FEWEST_TRANSITIONS or f"{FEWEST_TRANSITIONS:,} or more"
+
+
 def require_enough(transitions: int) -> None:
     """Raise UnusableInput where so few transitions are asked for that nothing can be learned from them."""
-    if transitions < FEWEST_TRANSITIONS:
-        raise UnusableInput(
-            f"{transitions:,} transitions are too few to learn from; ask for at least {FEWEST_TRANSITIONS:,}"
-        )
+    if (found := enough(transitions)) is not True:
+        raise UnusableInput(f"{transitions:,} transitions are too few to learn from; expected {found}")
 
 
 def _check(arm: Arm, store: Store, transitions: int, seed: int) -> None:

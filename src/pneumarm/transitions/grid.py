@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.valves import ACTIONS, to_actions
 from pneumarm.errors import UnusableInput
+from pneumarm.settings import Settings, Valid
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.window import Transitions, Window
 
 
 @dataclass(frozen=True)
-class GridSettings:
+class GridSettings(Settings):
     """How finely the grid divides, and how much of each cell is kept."""
 
     angle_bins: int = 8
@@ -41,13 +42,10 @@ class GridSettings:
     """Transitions kept at most, on average; over that the probability to be kept is lowered everywhere alike. It
     bounds memory where there are so many dimensions that nearly every transition has a cell of its own."""
 
-    def __post_init__(self) -> None:
+    def _valid(self) -> Valid:
         whole = ("angle_bins", "velocity_bins", "pressure_bins", "command_bins", "per_cell", "most")
-        for name in whole:
-            if getattr(self, name) < 1:
-                raise UnusableInput(f"GridSettings: {name} must be 1 or more, got {getattr(self, name)!r}")
-        if not 0.5 <= self.inside <= 1:
-            raise UnusableInput(f"GridSettings: inside must lie within 0.5 to 1, got {self.inside!r}")
+        enough = {name: getattr(self, name) >= 1 or "1 or more" for name in whole}
+        return {**enough, "inside": 0.5 <= self.inside <= 1 or "0.5 to 1"}
 
 
 @dataclass(frozen=True)

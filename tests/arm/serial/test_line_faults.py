@@ -243,7 +243,7 @@ def test_a_controller_of_another_version_is_refused(monkeypatch: pytest.MonkeyPa
 
 
 def test_shares_are_shares() -> None:
-    with pytest.raises(UnusableInput, match="dropped is a share of 0 to 1"):
+    with pytest.raises(UnusableInput, match=r"dropped cannot be 1\.5; expected a share of 0 to 1"):
         LineFaults(dropped=1.5)
 
 

@@ -72,7 +72,7 @@ def test_a_worn_potentiometer_loses_contact_now_and_then(nominal):
 
 
 def test_impossible_sensors_are_refused():
-    with pytest.raises(UnusableInput, match="conversions must be 1, 5, 7 or 9, got 4"):
+    with pytest.raises(UnusableInput, match="conversions cannot be 4; expected 1, 5, 7 or 9"):
         SensorParameters(conversions=4)
     with pytest.raises(UnusableInput, match="angle_noise cannot be nan"):
         SensorParameters(angle_noise=float("nan"))

@@ -6,14 +6,14 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from pneumarm.arm.serial.line import Line
-from pneumarm.errors import UnusableInput
+from pneumarm.settings import Settings, Valid
 
 CLAIMED_EMPTY = 0.005
 """For so long a driver says that nothing came [s], once it does."""
 
 
 @dataclass(frozen=True)
-class LineFaults:
+class LineFaults(Settings):
     """How often what happens to a frame, in both directions; shares of 1."""
 
     dropped: float = 0.0
@@ -29,10 +29,9 @@ class LineFaults:
     """[s]"""
     seed: int = 0
 
-    def __post_init__(self) -> None:
-        for field in fields(self)[:5]:
-            if not 0 <= getattr(self, field.name) <= 1:
-                raise UnusableInput(f"LineFaults: {field.name} is a share of 0 to 1, got {getattr(self, field.name)}")
+    def _valid(self) -> Valid:
+        shares = [field.name for field in fields(self)[:5]]
+        return {name: 0 <= getattr(self, name) <= 1 or "a share of 0 to 1" for name in shares}
 
 
 class FaultyLine(Line):

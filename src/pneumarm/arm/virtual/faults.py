@@ -24,6 +24,7 @@ from typing import Any, Literal
 import msgspec
 
 from pneumarm.errors import UnusableInput
+from pneumarm.settings import Valid, validate
 
 LINK_KINDS = (
     "unplugged",
@@ -51,14 +52,11 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """When it is over [s]; never, where it is None."""
 
     def __post_init__(self) -> None:
-        self._require(begin=0 <= self.begin < math.inf, end=self.end is None or self.begin < self.end < math.inf)
+        validate(self)
 
-    def _require(self, **checks: bool) -> None:
-        for name, valid in checks.items():
-            if not valid:
-                raise UnusableInput(
-                    f"fault {self.kind}: {name} cannot be {getattr(self, name)!r}; see {type(self).__name__}"
-                )
+    def _valid(self) -> Valid:
+        end = self.end is None or self.begin < self.end < math.inf
+        return {"begin": 0 <= self.begin < math.inf, "end": end or "later than its begin"}
 
     @property
     def kind(self) -> str:
@@ -147,9 +145,8 @@ class Leak(_MuscleFault, frozen=True, kw_only=True, tag="leak"):
     factor: float = 3.0
     """How many times as much."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(factor=0 < self.factor < 1e6)
+    def _valid(self) -> Valid:
+        return {"factor": 0 < self.factor < 1e6}
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -165,9 +162,8 @@ class SupplyLoss(Fault, frozen=True, kw_only=True, tag="supply-loss"):
     over: float = 0.2
     """Time in which it falls, evenly [s]."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(to=0 <= self.to <= 10, over=0 <= self.over <= 3600)
+    def _valid(self) -> Valid:
+        return {"to": 0 <= self.to <= 10, "over": 0 <= self.over <= 3600}
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -188,14 +184,13 @@ class ReducerLeak(Fault, frozen=True, kw_only=True, tag="reducer-leak"):
     """Pressure at which a safety valve on the buffer opens [bar gauge]; there is none by default, as before the
     thesis' engineers found out."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(
-            rate=0 < self.rate <= 10,
-            source=0 < self.source <= 10,
-            consumption=0 <= self.consumption <= 10,
-            safety_valve=self.safety_valve is None or 0 < self.safety_valve <= 10,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "rate": 0 < self.rate <= 10,
+            "source": 0 < self.source <= 10,
+            "consumption": 0 <= self.consumption <= 10,
+            "safety_valve": self.safety_valve is None or 0 < self.safety_valve <= 10,
+        }
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -226,9 +221,8 @@ class LogarithmicPotentiometer(_Potentiometer, frozen=True, kw_only=True, tag="l
     middle: float = 0.15
     """Reading in the middle of the track as a share of the highest one; 0.5 would be linear."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(middle=0.01 <= self.middle < 0.5)
+    def _valid(self) -> Valid:
+        return {"middle": 0.01 <= self.middle < 0.5}
 
 
 class WornPotentiometer(_Potentiometer, frozen=True, kw_only=True, tag="worn-potentiometer"):
@@ -243,14 +237,13 @@ class WornPotentiometer(_Potentiometer, frozen=True, kw_only=True, tag="worn-pot
     contact: float = 5.0
     """Standard deviation of what changes from reading to reading in its middle [counts]."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(
-            angle=abs(self.angle) <= 90,
-            width=0 < self.width <= 90,
-            height=0 <= self.height <= 1000,
-            contact=0 <= self.contact <= 1000,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "angle": abs(self.angle) <= 90,
+            "width": 0 < self.width <= 90,
+            "height": 0 <= self.height <= 1000,
+            "contact": 0 <= self.contact <= 1000,
+        }
 
 
 class SensorNoise(Fault, frozen=True, kw_only=True, tag="sensor-noise"):
@@ -261,9 +254,8 @@ class SensorNoise(Fault, frozen=True, kw_only=True, tag="sensor-noise"):
     pressure: float = 5.0
     """Standard deviation of a conversion of a pressure [counts]."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(angle=0 <= self.angle <= 1000, pressure=0 <= self.pressure <= 1000)
+    def _valid(self) -> Valid:
+        return {"angle": 0 <= self.angle <= 1000, "pressure": 0 <= self.pressure <= 1000}
 
 
 class ValveSideSensor(_MuscleFault, frozen=True, kw_only=True, tag="valve-side-sensor"):
@@ -277,9 +269,8 @@ class ValveSideSensor(_MuscleFault, frozen=True, kw_only=True, tag="valve-side-s
     settling: float = 0.010
     """Time in which 95 % of a leap are gone after the valve has closed [s] (thesis: 10 ms)."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(share=0 < self.share <= 1, settling=0 < self.settling <= 1)
+    def _valid(self) -> Valid:
+        return {"share": 0 < self.share <= 1, "settling": 0 < self.settling <= 1}
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -293,9 +284,8 @@ class Cold(Fault, frozen=True, kw_only=True, tag="cold"):
     temperature: float = 5.0
     """Of muscles and room [degrees Celsius]."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(temperature=0 < self.temperature <= 50)
+    def _valid(self) -> Valid:
+        return {"temperature": 0 < self.temperature <= 50}
 
 
 class Payload(_JointFault, frozen=True, kw_only=True, tag="payload"):
@@ -304,9 +294,8 @@ class Payload(_JointFault, frozen=True, kw_only=True, tag="payload"):
     mass: float = 0.1
     """Added mass [kg]."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require(mass=0 < self.mass <= 100)
+    def _valid(self) -> Valid:
+        return {"mass": 0 < self.mass <= 100}
 
     @property
     def parts(self) -> frozenset[Part]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pneumarm.errors import UnusableInput
+from pneumarm.settings import Settings, Valid
 
 BAR = 1e5
 """One bar [Pa]."""
@@ -25,18 +26,19 @@ ELEMENTS = 4
 """Maxwell-slip elements and creep branches of a muscle."""
 
 
-def _check(parameters: object, may_be_zero: set[str], skipped: Collection[str] = ()) -> None:
-    """Raise UnusableInput unless every number is finite and positive, or 0 where that makes sense."""
-    for name, value in vars(parameters).items():
-        if name in skipped:
-            continue
-        values = np.atleast_1d(value)
-        if not np.isfinite(values).all() or (values < 0).any() or (name not in may_be_zero and (values == 0).any()):
-            raise UnusableInput(f"{type(parameters).__name__}: {name} cannot be {value!r}; see its docstring")
+def _positive(
+    parameters: object, may_be_zero: Collection[str], skipped: Collection[str] = ()
+) -> dict[str, bool | str]:
+    """Return of every number whether it is finite and positive, or 0 where that makes sense."""
+    numbers = {name: np.atleast_1d(value) for name, value in vars(parameters).items() if name not in skipped}
+    return {
+        name: bool(np.isfinite(values).all() and (values >= 0 if name in may_be_zero else values > 0).all())
+        for name, values in numbers.items()
+    }
 
 
 @dataclass(frozen=True)
-class MuscleParameters:
+class MuscleParameters(Settings):
     """One braided muscle of 30 mm (thesis section 2.2) with its valves and its hose."""
 
     diameter: float = 0.030
@@ -97,24 +99,23 @@ class MuscleParameters:
     heat_transfer: float = 0.2
     """Heat given to the room [W/K] (estimate: a time constant of 9 to 18 minutes)."""
 
-    def __post_init__(self) -> None:
-        per_element = (self.slip_lengths, self.slip_weights, self.creep_times, self.creep_stiffness)
-        if any(len(values) != ELEMENTS for values in per_element):
-            raise UnusableInput(f"MuscleParameters: slip and creep need {ELEMENTS} values each, got {per_element!r}")
+    def _valid(self) -> Valid:
+        per_element = ("slip_lengths", "slip_weights", "creep_times", "creep_stiffness")
         may_be_zero = {"friction", "friction_per_pressure", "viscosity", "viscosity_per_pressure", "leak"}
         may_be_zero |= {"seat_leak", "bladder_stiffness", "dead_volume", "creep_stiffness", "stop_stiffness"}
-        _check(self, may_be_zero)
-        for name, fits in {
-            "critical_ratio": self.critical_ratio < self.laminar_ratio < 1,
-            "weave_angle": self.weave_angle < math.pi / 2,
-            "bladder_diameter": self.bladder_diameter < self.diameter,
-        }.items():
-            if not fits:
-                raise UnusableInput(f"MuscleParameters: {name} cannot be {getattr(self, name)!r}; see its docstring")
+        found = _positive(self, may_be_zero)
+        for name in per_element:
+            found[name] = found[name] and (len(getattr(self, name)) == ELEMENTS or f"{ELEMENTS} values")
+        return {
+            **found,
+            "critical_ratio": 0 < self.critical_ratio < self.laminar_ratio < 1,
+            "weave_angle": 0 < self.weave_angle < math.pi / 2,
+            "bladder_diameter": 0 < self.bladder_diameter < self.diameter,
+        }
 
 
 @dataclass(frozen=True)
-class JointParameters:
+class JointParameters(Settings):
     """A hinge with a pulley, a hanging arm with a weight at its end, and two antagonistic muscles."""
 
     muscles: tuple[MuscleParameters, MuscleParameters] = (MuscleParameters(), MuscleParameters())
@@ -138,12 +139,11 @@ class JointParameters:
     viscosity: float = 0.002
     """Viscous friction of the bearings [N m s/rad] (thesis section 2.3.2: negligible)."""
 
-    def __post_init__(self) -> None:
-        if not math.isfinite(self.tilt):
-            raise UnusableInput(f"JointParameters: tilt cannot be {self.tilt!r}; see its docstring")
-        _check(self, {"mass", "link_inertia", "stop_stiffness", "stop_damping", "viscosity"}, {"muscles", "tilt"})
-        if self.inertia <= 0:
-            raise UnusableInput("JointParameters: mass and link_inertia cannot both be 0")
+    def _valid(self) -> Valid:
+        may_be_zero = {"mass", "link_inertia", "stop_stiffness", "stop_damping", "viscosity"}
+        found = _positive(self, may_be_zero, {"muscles", "tilt"})
+        found["mass"] = found["mass"] and (self.inertia > 0 or "above 0 where link_inertia is 0")
+        return {**found, "tilt": math.isfinite(self.tilt)}
 
     @property
     def inertia(self) -> float:
@@ -152,7 +152,7 @@ class JointParameters:
 
 
 @dataclass(frozen=True)
-class AirParameters:
+class AirParameters(Settings):
     """The supply, the pipes and the switching of the valves."""
 
     supply: float = 1.02 * BAR
@@ -176,12 +176,12 @@ class AirParameters:
     closing_time: float = 0.002
     """Time in which a valve closes [s]."""
 
-    def __post_init__(self) -> None:
-        _check(self, {"fluctuation", "compressor", "pipe_delay", "opening_time", "closing_time"})
+    def _valid(self) -> Valid:
+        return _positive(self, {"fluctuation", "compressor", "pipe_delay", "opening_time", "closing_time"})
 
 
 @dataclass(frozen=True)
-class RoomParameters:
+class RoomParameters(Settings):
     """The temperature around the arm: heated in the day, cold after the night."""
 
     cold: float = 17.0
@@ -193,12 +193,12 @@ class RoomParameters:
     day: float = 36000.0
     """Seconds of each 24 hours, from the start of the arm's clock, in which the room is heated [s]."""
 
-    def __post_init__(self) -> None:
-        _check(self, {"cold", "warm", "day"})
+    def _valid(self) -> Valid:
+        return _positive(self, {"cold", "warm", "day"})
 
 
 @dataclass(frozen=True)
-class SensorParameters:
+class SensorParameters(Settings):
     """A potentiometer at the hinge, a pressure sensor at each muscle, and the 10-bit converter."""
 
     angle_noise: float = 1.6
@@ -216,16 +216,17 @@ class SensorParameters:
     wear_seed: int = 0
     """Where the bumps are."""
 
-    def __post_init__(self) -> None:
-        if self.conversions not in (1, 5, 7, 9):
-            raise UnusableInput(f"SensorParameters: conversions must be 1, 5, 7 or 9, got {self.conversions!r}")
-        if not 0 <= self.dropout <= 1:
-            raise UnusableInput(f"SensorParameters: dropout must be in 0..1, got {self.dropout!r}")
-        _check(self, {"angle_noise", "pressure_noise", "noise_limit", "wear", "dropout", "wear_seed"})
+    def _valid(self) -> Valid:
+        may_be_zero = {"angle_noise", "pressure_noise", "noise_limit", "wear", "dropout", "wear_seed"}
+        return {
+            **_positive(self, may_be_zero),
+            "conversions": self.conversions in (1, 5, 7, 9) or "1, 5, 7 or 9",
+            "dropout": 0 <= self.dropout <= 1 or "0 to 1",
+        }
 
 
 @dataclass(frozen=True)
-class ArmParameters:
+class ArmParameters(Settings):
     """A whole virtual arm; the defaults are the nominal one."""
 
     joints: tuple[JointParameters, ...] = (JointParameters(),)
@@ -237,11 +238,12 @@ class ArmParameters:
     max_pressure: float = 1.05 * BAR
     """The limit of ``ArmSpec.max_pressure`` [Pa]; presets A and C need it, B saturates below by itself."""
 
-    def __post_init__(self) -> None:
-        if len(self.joints) != 1:
-            # The rigid body of two coupled joints is not written yet; everything else is general in joints.
-            raise UnusableInput(f"ArmParameters: a virtual arm has 1 joint in this version, got {len(self.joints)}")
-        _check(self, {"jitter"}, {"joints", "air", "room", "sensors"})
+    def _valid(self) -> Valid:
+        # The rigid body of two coupled joints is not written yet; everything else is general in joints.
+        return {
+            **_positive(self, {"jitter"}, {"joints", "air", "room", "sensors"}),
+            "joints": len(self.joints) == 1 or "1 joint in this version",
+        }
 
 
 def without_noise(parameters: ArmParameters) -> ArmParameters:

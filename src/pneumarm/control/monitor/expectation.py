@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.monitor.hypotheses import carried_out
-from pneumarm.errors import UnusableInput
 from pneumarm.kernels import part
 from pneumarm.random import random_state
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.kernel import (
     SimulationParameters,
     SimulationState,
@@ -32,7 +32,7 @@ _LEAST_STD = 0.5  # counts; below this the converter's rounding is all there is
 
 
 @dataclass(frozen=True)
-class RuleSettings:
+class RuleSettings(Settings):
     """What the rules take for granted of an arm, until a simulation knows better; presets of the thesis' arm."""
 
     filling: float = 1.5
@@ -50,10 +50,9 @@ class RuleSettings:
     unsure_moving: float = 0.7
     """... of a moving arm [counts per degree]."""
 
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0 <= value < math.inf or (value == 0 and name != "delay"):
-                raise UnusableInput(f"RuleSettings: {name} cannot be {value!r}; see its docstring")
+    def _valid(self) -> Valid:
+        positive = {name: 0 < value < math.inf or "above 0" for name, value in vars(self).items()}
+        return {**positive, "delay": 0 <= self.delay < math.inf or "0 or more"}
 
 
 class RuleParameters(NamedTuple):

@@ -20,6 +20,7 @@ from pneumarm.control.monitor.evidence import (
 from pneumarm.control.monitor.expectation import RuleParameters, RuleSettings, predictor, rule_parameters
 from pneumarm.control.monitor.hypotheses import hypotheses
 from pneumarm.errors import UnusableInput
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Mark, Recorded
 
@@ -32,7 +33,7 @@ _CHANGES = (*_DISAGREEMENTS, "leak")
 
 
 @dataclass(frozen=True)
-class MonitorSettings:
+class MonitorSettings(Settings):
     """How much evidence a monitor wants."""
 
     alarm: float = 11.0
@@ -85,8 +86,8 @@ class MonitorSettings:
     rules: RuleSettings = field(default_factory=RuleSettings)
     """What is taken for granted before there is a simulation."""
 
-    def __post_init__(self) -> None:
-        checks = {
+    def _valid(self) -> Valid:
+        return {
             "alarm": 0 < self.alarm < math.inf,
             "alarm_by_rules": 0 < self.alarm_by_rules < math.inf,
             "supply": 0 <= self.supply < self.alarm,
@@ -111,9 +112,6 @@ class MonitorSettings:
             "frozen": self.frozen >= 2,
             "acted": 0 < self.acted < math.inf,
         }
-        for name, valid in checks.items():
-            if not valid:
-                raise UnusableInput(f"MonitorSettings: {name} cannot be {getattr(self, name)!r}; see its docstring")
 
 
 @dataclass(frozen=True)

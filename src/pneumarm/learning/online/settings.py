@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.task.reward import Reward
 
@@ -12,7 +12,7 @@ Method = Literal["sarsa", "q-learning"]
 
 
 @dataclass(frozen=True)
-class Exploration:
+class Exploration(Settings):
     """Max-Boltzmann exploration with the greedy action disabled (section 4.2.2)."""
 
     epsilon: float = 0.05
@@ -20,8 +20,9 @@ class Exploration:
     temperature: float = 1.0
     """Temperature T of its Boltzmann distribution, in units of reward (thesis: 1 at the end of shaping)."""
 
-    def __post_init__(self) -> None:
-        check(self, epsilon=0 <= self.epsilon <= 1, temperature=0 < self.temperature < math.inf)
+    def valid(self) -> Valid:
+        """Return which values are valid."""
+        return {"epsilon": 0 <= self.epsilon <= 1, "temperature": 0 < self.temperature < math.inf}
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class FirstExploration(Exploration):
 
 
 @dataclass(frozen=True)
-class Shaping:
+class Shaping(Settings):
     """From begin states next to the goal to all begin states (section 4.3.2)."""
 
     initial_deviation: float = 5.0
@@ -57,22 +58,22 @@ class Shaping:
     weights: tuple[float, ...] = (0.4, 0.3, 0.2, 0.1)
     """Weights of the sub-intervals of begin states on each side of the goal, the farthest first (thesis: these)."""
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            initial_deviation=0 < self.initial_deviation < math.inf,
-            episodes=self.episodes >= 1,
-            grow=0 < self.grow < math.inf,
-            shrink=0 <= self.shrink < 1,
-            performance_rate=0 < self.performance_rate <= 1,
-            initial_criterion=0 <= self.initial_criterion <= 1,
-            criterion=0 <= self.criterion <= 1,
-            weights=len(self.weights) > 0 and min(self.weights) >= 0 and 0 < sum(self.weights) < math.inf,
-        )
+    def valid(self) -> Valid:
+        """Return which values are valid."""
+        return {
+            "initial_deviation": 0 < self.initial_deviation < math.inf,
+            "episodes": self.episodes >= 1,
+            "grow": 0 < self.grow < math.inf,
+            "shrink": 0 <= self.shrink < 1,
+            "performance_rate": 0 < self.performance_rate <= 1,
+            "initial_criterion": 0 <= self.initial_criterion <= 1,
+            "criterion": 0 <= self.criterion <= 1,
+            "weights": len(self.weights) > 0 and min(self.weights) >= 0 and 0 < sum(self.weights) < math.inf,
+        }
 
 
 @dataclass(frozen=True)
-class TrainSettings:
+class TrainSettings(Settings):
     """Everything that decides a training phase, besides the simulation, the begin states and the seed."""
 
     method: Method = "sarsa"
@@ -113,18 +114,18 @@ class TrainSettings:
         """Weights of the sub-intervals of begin states, see :class:`Shaping`."""
         return self.shaping.weights if self.shaping else (1.0,)
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            method=self.method in ("sarsa", "q-learning"),
-            learning_rate=0 <= self.learning_rate < math.inf,
-            hidden=1 <= self.hidden <= 1024,
-            trace_decay=0 <= self.trace_decay <= 1,
-            discount=0 <= self.discount <= 1,
-            cutoff=self.cutoff >= 1,
-            agents=1 <= self.agents <= 4096,
-            initial_weight=0 < self.initial_weight < math.inf,
-            return_scale=0 < self.return_scale < math.inf,
-            max_episodes=self.max_episodes >= 1,
-            validation_episodes=self.validation_episodes >= 1,
-        )
+    def valid(self) -> Valid:
+        """Return which values are valid."""
+        return {
+            "method": self.method in ("sarsa", "q-learning"),
+            "learning_rate": 0 <= self.learning_rate < math.inf,
+            "hidden": 1 <= self.hidden <= 1024,
+            "trace_decay": 0 <= self.trace_decay <= 1,
+            "discount": 0 <= self.discount <= 1,
+            "cutoff": self.cutoff >= 1,
+            "agents": 1 <= self.agents <= 4096,
+            "initial_weight": 0 < self.initial_weight < math.inf,
+            "return_scale": 0 < self.return_scale < math.inf,
+            "max_episodes": self.max_episodes >= 1,
+            "validation_episodes": self.validation_episodes >= 1,
+        }

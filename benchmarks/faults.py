@@ -169,8 +169,8 @@ class Twins(Arm):
     def level(self) -> None:
         """Give the sound arm, at rest with closed valves, the air and the angle of the other one."""
         if self.sound is not None:
-            muscles, joints = self.sound.records.muscles, self.sound.records.joints
-            muscles[...], joints[...] = self.arm.records.muscles, self.arm.records.joints
+            muscles, joints = self.sound.body.muscles, self.sound.body.joints
+            muscles[...], joints[...] = self.arm.body.muscles, self.arm.body.joints
             muscles["open"] = muscles["pending"] = 0
 
     def read(self) -> Reading:

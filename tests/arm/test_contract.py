@@ -184,7 +184,7 @@ def test_closing_closes_the_valves_also_twice_and_after_an_error(arm):
         arm.wait(0.1)
         before = arm.pressure
         arm.wait(1.0)
-        assert (arm._muscles["open"] == 0).all()
+        assert (arm.body.muscles["open"] == 0).all()
         assert arm.pressure == pytest.approx(before, abs=3000)
     elif isinstance(arm, SimulationArm):
         before = arm.read().pressure

@@ -110,7 +110,7 @@ def test_leaks_and_times_are_measured_as_they_are():
         # Not all that a sound muscle loses is leak: it creeps and cools too.
         assert 7 < other.muscles[0].leak / one.muscles[0].leak < 10.5
         assert other.muscles[1].leak < 0.5 * other.muscles[0].leak  # it is only stretched
-        delay = float(arm.constants.surroundings["opening_delay"][0])
+        delay = float(arm.body.constants.surroundings["opening_delay"][0])
         for muscle in one.muscles:
             assert 0.4 < muscle.fill_time < 0.8
             assert 0.1 < muscle.exhaust_time < 0.4

@@ -53,7 +53,7 @@ def test_further_sensors_come_through_their_channels() -> None:
     sensors = usual_sensors(["temperature"])[1]
     bare = VirtualArm(draw_parameters(3), velocity_sensor=True, sensors=sensors)
     inner = single_conversions(bare, seed=1)
-    inner.records.muscles["temperature"] = [[15.0, 35.0]]
+    inner.body.muscles["temperature"] = [[15.0, 35.0]]
     with SerialArm(SimulatedLine(SimulatedBoard(inner)), replace(inner.spec, name="firmware")) as arm:
         arm.wait(0.05)
         arm.set_valves(np.array([[1, -1]], np.int8))

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from pneumarm.arm import BeginState
 from pneumarm.arm.guard import VENTING
 from pneumarm.arm.valves import VALVES
-from pneumarm.arm.virtual.arm import Live, VirtualArm, pass_for, pass_until
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm.virtual.body import Body
+from pneumarm.arm.virtual.passing import pass_for, pass_until
 from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
@@ -222,7 +224,7 @@ class Player:
         played = Played(record, np.zeros(len(goals)), np.zeros(len(goals)))
         aims = _Aims(goals, durations, self._near, self._aim_random)
         count, self.performance = _play(
-            self.arm.live,
+            self.arm.plain,
             self._watched,
             (self._mind, schedule or self._schedule),
             self._rules,
@@ -239,7 +241,7 @@ class Player:
         """
         durations = np.ascontiguousarray(durations, np.float64)
         angle, pressure = np.zeros(durations.shape[:2]), np.zeros(durations.shape)
-        _visit(self.arm.live, self._watched, self._rules, durations, angle, pressure)
+        _visit(self.arm.plain, self._watched, self._rules, durations, angle, pressure)
         return angle, pressure
 
     @property
@@ -254,18 +256,9 @@ def _schedule(exploration: Exploration | None) -> Schedule:
 
 
 @kernel
-def _read(live: Live, watched: _Watched) -> float:
+def _read(body: Body, watched: _Watched) -> float:
     """Read the sensors, and count for how long inlets have been open; return the time."""
-    time: float = sense(
-        live.muscles,
-        live.joints,
-        live.air,
-        live.sensor_constants,
-        live.sensor_random,
-        live.conversions,
-        watched.angle,
-        watched.pressure,
-    )
+    time: float = sense(body, watched.angle, watched.pressure)
     passed = 0.0 if np.isnan(watched.clock[0]) else time - watched.clock[0]
     watched.clock[0] = time
     for j in range(watched.applied.shape[0]):
@@ -283,7 +276,7 @@ def _read(live: Live, watched: _Watched) -> float:
 
 
 @kernel
-def _set(live: Live, watched: _Watched) -> None:
+def _set(body: Body, watched: _Watched) -> None:
     """Set the valves as asked, but for inlets of muscles at their limits."""
     for j in range(watched.applied.shape[0]):
         for m in range(2):
@@ -291,30 +284,16 @@ def _set(live: Live, watched: _Watched) -> None:
             if valve > 0 and (watched.pressure[j, m] > watched.limit or watched.blocked[j, m]):
                 valve = 0
             watched.applied[j, m] = valve
-    command(live.muscles, live.air, live.air_constants, watched.applied)
+    command(body, watched.applied)
 
 
 @kernel
-def _pass(live: Live, seconds: float) -> None:
-    pass_for(
-        live.muscles,
-        live.muscle_constants,
-        live.joints,
-        live.joint_constants,
-        live.air,
-        live.air_constants,
-        live.supply_random,
-        seconds,
-    )
-
-
-@kernel
-def _wait(live: Live, watched: _Watched, seconds: float) -> None:
+def _wait(body: Body, watched: _Watched, seconds: float) -> None:
     """Let time pass, looking at the limits every period while an inlet is open."""
     while seconds > watched.period and (watched.applied > 0).any():
-        _pass(live, watched.period)
+        pass_for(body, watched.period)
         seconds -= watched.period
-        _read(live, watched)
+        _read(body, watched)
         changes = False
         for j in range(watched.applied.shape[0]):
             for m in range(2):
@@ -322,30 +301,30 @@ def _wait(live: Live, watched: _Watched, seconds: float) -> None:
                 over = watched.pressure[j, m] > watched.limit or watched.blocked[j, m]
                 changes |= over and watched.applied[j, m] > 0
         if changes:
-            _set(live, watched)
-    _pass(live, seconds)
+            _set(body, watched)
+    pass_for(body, seconds)
 
 
 @kernel
-def _reach(live: Live, watched: _Watched, rules: _Rules, durations: Array) -> None:
+def _reach(body: Body, watched: _Watched, rules: _Rules, durations: Array) -> None:
     """As :meth:`BeginState.reach`, with the ``durations`` (joints, 2) [s] given."""
-    _read(live, watched)
+    _read(body, watched)
     watched.asked[:] = -1
-    _set(live, watched)
-    _wait(live, watched, rules.deflate)
+    _set(body, watched)
+    _wait(body, watched, rules.deflate)
     passed = 0.0
     ends = np.sort(durations.copy().ravel())
     for k in range(ends.size + 1):
         end = ends[k - 1] if k > 0 else 0.0
         if end > passed:
-            _wait(live, watched, end - passed)
+            _wait(body, watched, end - passed)
             passed = end
-        _read(live, watched)
+        _read(body, watched)
         for j in range(durations.shape[0]):
             for m in range(2):
                 watched.asked[j, m] = 1 if durations[j, m] > passed else 0
-        _set(live, watched)
-    _wait(live, watched, rules.settle)
+        _set(body, watched)
+    _wait(body, watched, rules.settle)
 
 
 @kernel
@@ -384,7 +363,7 @@ def _aim(aims: _Aims, watched: _Watched, deviation: float, goal: Array) -> None:
 
 
 @kernel
-def _move(live, watched, mind, schedule, rules, goal, played, e):  # type: ignore[no-untyped-def]
+def _move(body, watched, mind, schedule, rules, goal, played, e):  # type: ignore[no-untyped-def]
     """Make movement ``e`` to ``goal``, as ``move`` does; return whether it succeeded."""
     record, joints = played.movements, goal.size
     before, velocity = np.zeros(joints), np.zeros(joints)
@@ -392,7 +371,7 @@ def _move(live, watched, mind, schedule, rules, goal, played, e):  # type: ignor
     place = mind.places
     success, due, then = False, 0.0, 0.0
     while True:
-        time = _read(live, watched)
+        time = _read(body, watched)
         if record.actions[e] == 0:
             played.time_start[e] = time
             due = time
@@ -434,25 +413,14 @@ def _move(live, watched, mind, schedule, rules, goal, played, e):  # type: ignor
         record.actions[e] += 1
         due += watched.period
         if watched.latency > 0.0:
-            _wait(live, watched, watched.latency)
+            _wait(body, watched, watched.latency)
         for j in range(joints):
             for m in range(2):
                 watched.asked[j, m] = VALVES[mind.workspace.next_actions[j], m]
-        _set(live, watched)
-        pass_until(
-            live.muscles,
-            live.muscle_constants,
-            live.joints,
-            live.joint_constants,
-            live.air,
-            live.air_constants,
-            live.supply_random,
-            live.jitter_random,
-            live.lateness,
-            due,
-        )
+        _set(body, watched)
+        pass_until(body, due)
     watched.asked[:] = 0
-    _set(live, watched)
+    _set(body, watched)
     played.time_end[e] = time
     record.success[e] = success
     for j in range(joints):
@@ -461,18 +429,18 @@ def _move(live, watched, mind, schedule, rules, goal, played, e):  # type: ignor
 
 
 @kernel
-def _play(live, watched, mind_schedule, rules, aims, played, performance):  # type: ignore[no-untyped-def]
+def _play(body, watched, mind_schedule, rules, aims, played, performance):  # type: ignore[no-untyped-def]
     """Fill ``played`` with movements; return how many, and the performance (thesis eq. 4.14) after them."""
     mind, schedule = mind_schedule
     goal = np.zeros(aims.goals.shape[1])
     for e in range(aims.goals.shape[0]):
-        _reach(live, watched, rules, aims.durations[e])
+        _reach(body, watched, rules, aims.durations[e])
         for j in range(goal.size):
             goal[j] = aims.goals[e, j]
         if schedule.deviation < np.inf:
-            _read(live, watched)
+            _read(body, watched)
             _aim(aims, watched, schedule.deviation, goal)
-        success = _move(live, watched, mind, schedule, rules, goal, played, e)
+        success = _move(body, watched, mind, schedule, rules, goal, played, e)
         performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
         if performance >= schedule.enough:
             return e + 1, performance
@@ -480,9 +448,9 @@ def _play(live, watched, mind_schedule, rules, aims, played, performance):  # ty
 
 
 @kernel
-def _visit(live, watched, rules, durations, angle, pressure):  # type: ignore[no-untyped-def]
+def _visit(body, watched, rules, durations, angle, pressure):  # type: ignore[no-untyped-def]
     for e in range(durations.shape[0]):
-        _reach(live, watched, rules, durations[e])
-        _read(live, watched)
+        _reach(body, watched, rules, durations[e])
+        _read(body, watched)
         angle[e] = watched.angle
         pressure[e] = watched.pressure

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, resting_angle
+from pneumarm.arm.virtual.body import body_of
 from pneumarm.arm.virtual.constants import constants
 from pneumarm.arm.virtual.muscle import move
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR
@@ -49,7 +50,7 @@ def test_filling_a_held_muscle(preset, held):
 
 def test_exhausting_a_held_muscle(held, nominal):
     arm = VirtualArm(held(nominal))
-    arm._muscles["pressure"] = ATMOSPHERE + BAR
+    arm.body.muscles["pressure"] = ATMOSPHERE + BAR
     arm.set_valves([[-1, -1]])
     for time, pressure in EXHAUST.items():
         arm.wait(time - arm.time)
@@ -61,9 +62,9 @@ def displaced(parameters, pressure, degrees):
     arm, fixed = VirtualArm(parameters), constants(parameters)
     rest = float(resting_angle(parameters, [[pressure, pressure]])[0])
     for i, angle in enumerate(rest + np.radians(np.linspace(0, degrees, 17))):
-        arm._joints["angle"] = angle
+        arm.body.joints["angle"] = angle
         for m in range(2):
-            muscle, c = arm._muscles[0, m], fixed.muscles[0, m]
+            muscle, c = arm.body.muscles[0, m], fixed.muscles[0, m]
             length = c["length_at_zero"] + (2 * m - 1) * fixed.joints[0]["radius"] * angle
             if i == 0:
                 prepare(muscle, c, length, pressure)
@@ -82,8 +83,7 @@ def path(arm, seconds, step=0.002):
 
 @pytest.mark.parametrize(("bar", "hertz"), [(0.05, 2.2), (0.1, 2.6), (0.2, 2.9), (0.4, 3.5)])
 def test_ring_of_the_closed_arm(nominal, bar, hertz):
-    fixed = constants(nominal)
-    found = ring_frequency(fixed.muscles, fixed.joints, fixed.surroundings, bar * BAR)
+    found = ring_frequency(body_of(nominal), 0, bar * BAR)
     assert found == pytest.approx(hertz, rel=0.1)
 
 
@@ -110,7 +110,7 @@ def energy(arm, fixed, polytropic):
     beyond = max(0.0, abs(angle) - joint["stop_angle"])
     total += joint["stop_stiffness"] * beyond**2 / 2
     for m in range(2):
-        muscle, c = arm._muscles[0, m], fixed.muscles[0, m]
+        muscle, c = arm.body.muscles[0, m], fixed.muscles[0, m]
         gas = muscle["pressure"] * (muscle["volume"] + c["dead_volume"]) / (polytropic - 1)
         total += gas + ATMOSPHERE * muscle["volume"]
         stretch = muscle["length"] - muscle["bladder_length"]
@@ -165,7 +165,7 @@ def loop(arm, period, cycles, middle=0.3, amplitude=0.25):
     angles, samples = [], 400
     for i in range(cycles * samples):
         wave = amplitude * math.sin(2 * math.pi * i / samples)
-        arm._muscles["pressure"][0] = ATMOSPHERE + (middle + np.array([wave, -wave])) * BAR
+        arm.body.muscles["pressure"][0] = ATMOSPHERE + (middle + np.array([wave, -wave])) * BAR
         arm.wait(period / samples)
         angles.append(np.degrees(arm.angle[0]))
     return np.reshape(angles, (cycles, samples))
@@ -195,7 +195,7 @@ def test_zero_pressure_memory(nominal):
     for which in range(2):
         arm = VirtualArm(nominal)
         for bar in np.concatenate([np.linspace(0, 0.9, 200), np.linspace(0.9, 0, 200)]):
-            arm._muscles["pressure"][0, which] = ATMOSPHERE + bar * BAR
+            arm.body.muscles["pressure"][0, which] = ATMOSPHERE + bar * BAR
             arm.wait(0.02)
         arm.wait(2.0)
         left.append(np.degrees(arm.angle[0]))
@@ -205,8 +205,8 @@ def test_zero_pressure_memory(nominal):
 
 def hand_over(giver, taker):
     """Give the muscles with all that they remember to another joint."""
-    taker._muscles[...] = giver._muscles
-    taker._joints[...] = giver._joints
+    taker.body.muscles[...] = giver.body.muscles
+    taker.body.joints[...] = giver.body.joints
 
 
 def test_creep_under_a_hanging_weight(nominal):
@@ -229,7 +229,7 @@ def test_creep_under_a_hanging_weight(nominal):
 def test_leak_of_a_closed_arm(held, nominal):
     def lost_in_a_minute(parameters):
         arm = VirtualArm(held(parameters))
-        arm._muscles["pressure"] = ATMOSPHERE + 0.6 * BAR
+        arm.body.muscles["pressure"] = ATMOSPHERE + 0.6 * BAR
         arm.wait(60.0)
         return 1 - arm.pressure / (0.6 * BAR)
 
@@ -286,7 +286,7 @@ def babble(parameters, longest, seed=0, seconds=5.0):
     arm, random, states = VirtualArm(parameters), np.random.default_rng(seed), []
     for i in range(round(seconds * 30)):
         arm.set_valves(random.integers(-1, 2, (1, 2)))
-        integrate(*arm._physics, (i + 1) / 30, longest)
+        integrate(arm.body, (i + 1) / 30, longest)
         states.append([np.degrees(arm.angle[0]), *arm.pressure[0] / BAR])
     return np.array(states)
 

@@ -27,7 +27,7 @@ def test_rest_is_within_a_count_of_full_integration(seed, last):
     rested, integrated = after_work(parameters, last), after_work(parameters, last)
     for seconds in (60, 1200):
         rested.wait(seconds)
-        integrate(*integrated._physics, integrated.time + seconds, SUBSTEP)
+        integrate(integrated.body, integrated.time + seconds, SUBSTEP)
         assert rested.time == integrated.time
         assert np.degrees(rested.angle - integrated.angle) * 11.378 == pytest.approx(0, abs=0.5)
         assert (rested.pressure - integrated.pressure) / 1e5 * 166 == pytest.approx(np.zeros((1, 2)), abs=0.5)
@@ -39,7 +39,7 @@ def test_what_comes_after_rest_is_the_same_too():
     for full in (False, True):
         arm = after_work(ArmParameters(), (0, 0))
         if full:
-            integrate(*arm._physics, arm.time + 300, SUBSTEP)
+            integrate(arm.body, arm.time + 300, SUBSTEP)
         else:
             arm.wait(300)
         arm.set_valves([[1, -1]])
@@ -86,7 +86,7 @@ def probe(arm):
     """The angle [deg] at 0.3 and 0.1 bar, reached slowly from the vented arm."""
     arm.rest(3.0)
     for share in np.linspace(0, 1, 100):
-        arm._muscles["pressure"][0] = ATMOSPHERE + share * np.array([0.3, 0.1]) * BAR
+        arm.body.muscles["pressure"][0] = ATMOSPHERE + share * np.array([0.3, 0.1]) * BAR
         arm.wait(0.02)
     arm.wait(4.0)
     return np.degrees(arm.angle[0])
@@ -113,6 +113,6 @@ def test_cutting_a_wait_changes_nothing_slow():
     whole.wait(3.0)
     for _ in range(40):
         cut.wait(0.075)
-    assert cut._surroundings["supply"] == pytest.approx(whole._surroundings["supply"], rel=1e-12)
+    assert cut.body.surroundings["supply"] == pytest.approx(whole.body.surroundings["supply"], rel=1e-12)
     assert cut.angle == pytest.approx(whole.angle, abs=1e-9)
-    assert whole._surroundings["tick"][0] <= whole.time < whole._surroundings["tick"][0] + 2 * SLOW_TICK
+    assert whole.body.surroundings["tick"][0] <= whole.time < whole.body.surroundings["tick"][0] + 2 * SLOW_TICK

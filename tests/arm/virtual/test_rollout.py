@@ -33,7 +33,9 @@ def own_stepping(arm: VirtualArm, actions: np.ndarray) -> tuple[list, list[tuple
     records = []
 
     def decide(reading):  # type: ignore[no-untyped-def]
-        records.append(tuple(part.tobytes() for part in arm.records))
+        body = arm.body
+        parts = (body.muscles, body.joints, body.surroundings, body.supply_random)
+        records.append(tuple(part.tobytes() for part in parts))
         action = next(remaining, None)
         return None if action is None else VALVES[action].reshape(1, 2)
 

@@ -11,8 +11,8 @@ from pneumarm.errors import UnusableInput
 def readings(parameters, count=4000, seed=0, angle=0.1, pressure=0.5 * BAR):
     """Many readings of one moment: angles (count,) and pressures (count, 2) [counts]."""
     arm = VirtualArm(parameters, seed=seed)
-    arm._joints["angle"] = angle
-    arm._muscles["pressure"] = ATMOSPHERE + pressure
+    arm.body.joints["angle"] = angle
+    arm.body.muscles["pressure"] = ATMOSPHERE + pressure
     read = [arm.read() for _ in range(count)]
     return np.array([r.angle[0] for r in read]), np.array([r.pressure[0] for r in read])
 

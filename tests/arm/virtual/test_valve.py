@@ -66,4 +66,4 @@ def test_both_valves_of_a_muscle_are_never_told_to_be_open():
     for _ in range(200):
         arm.set_valves(random.integers(-1, 2, (1, 2)))
         arm.wait(random.uniform(0, 0.04))
-        assert (arm._muscles["open"].sum(axis=-1) <= 1).all()
+        assert (arm.body.muscles["open"].sum(axis=-1) <= 1).all()

@@ -59,7 +59,7 @@ def test_a_wrong_state_is_refused_and_changes_nothing():
     with pytest.raises(UnusableInput, match="other parameters"):
         arm.set_state(VirtualArm(draw_parameters(1)).get_state())
     header = 28
-    pressure, clock = header, header + arm._muscles.nbytes + arm._joints.nbytes
+    pressure, clock = header, header + arm.body.muscles.nbytes + arm.body.joints.nbytes
     for place, damage in ((pressure, np.nan), (pressure, np.inf), (pressure, -1.0), (clock, np.nan), (clock, 1e300)):
         damaged = bytearray(state)
         damaged[place : place + 8] = np.float64(damage).tobytes()
@@ -113,7 +113,7 @@ def test_rest_vents_the_arm():
     arm.rest(5.0)
     arm.wait(0.1)
     assert arm.pressure == pytest.approx(np.zeros((1, 2)), abs=100)
-    assert (arm._muscles["open"] == 0).all()
+    assert (arm.body.muscles["open"] == 0).all()
 
 
 @pytest.mark.parametrize(
@@ -158,31 +158,29 @@ PLAIN = """
 import json
 import numpy as np
 from pneumarm.arm.virtual import draw_parameters
-from pneumarm.arm.virtual.constants import constants
+from pneumarm.arm.virtual.body import body_of
+from pneumarm.arm.virtual.constants import Constants
 from pneumarm.arm.virtual.start import start
 from pneumarm.arm.virtual.rest import fast_forward
 from pneumarm.arm.virtual.sensors import sense
-from pneumarm.arm.virtual.state import JOINT, MUSCLE, SURROUNDINGS
 from pneumarm.arm.virtual.step import integrate
 from pneumarm.arm.virtual.valve import command
-from pneumarm.random import random_states
 from pneumarm.arm.virtual.parameters import ArmParameters
 
 np.seterr(over="ignore")
-fixed = constants(ArmParameters())
 view = (lambda a: a.view(np.recarray)) if {plain} else (lambda a: a)
-muscles, joints = view(np.zeros((1, 2), MUSCLE)), view(np.zeros(1, JOINT))
-air, random = view(np.zeros(1, SURROUNDINGS)), random_states(5, 2)
-of = [view(a) for a in fixed]
-physics = (muscles, of[0], joints, of[1], air, of[2], random[0])
-start(*physics)
+body = body_of(ArmParameters(), 5)
+muscles, joints, air = view(body.muscles), view(body.joints), view(body.surroundings)
+body = body._replace(muscles=muscles, joints=joints, surroundings=air,
+                     constants=Constants(*(view(a) for a in body.constants)))
+start(body)
 for i, valves in enumerate([[1, -1], [0, 1], [-1, 0], [0, 0]]):
-    command(muscles, air, of[2], np.array([valves], np.int8))
-    integrate(*physics, 0.04 * (i + 1), 0.5e-3)
+    command(body, np.array([valves], np.int8))
+    integrate(body, 0.04 * (i + 1), 0.5e-3)
 angle, pressure = np.zeros(1), np.zeros((1, 2))
-sense(muscles, joints, air, of[3], random[1], np.zeros(9), angle, pressure)
+sense(body, angle, pressure)
 joints["speed"] = 0.0
-fast_forward(muscles, of[0], joints, of[1], air[0], of[2][0], random[0], 20.0)
+fast_forward(body, 20.0)
 print(json.dumps([float(joints["angle"][0]), *muscles["pressure"].ravel().tolist(), *muscles["slip"].ravel().tolist(),
             *muscles["temperature"].ravel().tolist(), float(air["supply"][0]), *angle.tolist(),
             *pressure.ravel().tolist()]))

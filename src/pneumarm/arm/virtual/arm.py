@@ -1,80 +1,36 @@
 """The virtual arm behind the seam."""
 
 import hashlib
-import math
 import struct
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Arm, ArmSpec, Reading, Sensor, with_measured
-from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, Constants, constants
-from pneumarm.arm.virtual.faults import Fault, Plan
+from pneumarm.arm.virtual.body import Body, body_of
+from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, constants
+from pneumarm.arm.virtual.faults import Fault, Plan, check_plan
 from pneumarm.arm.virtual.further import begin_sampling, changing, further_sensors, pass_sampling, sense_further
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
+from pneumarm.arm.virtual.passing import drawn_lateness, pass_for, pass_time, pass_until
 from pneumarm.arm.virtual.playing import FaultPlayer
-from pneumarm.arm.virtual.rest import pass_time, static_angle
-from pneumarm.arm.virtual.sensors import MOST_CONVERSIONS, sense, sense_with_faults
+from pneumarm.arm.virtual.rest import static_angle
+from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.start import start
-from pneumarm.arm.virtual.state import INLET, JOINT, MUSCLE, OUTLET, QUEUE, SLOW_TICK, SURROUNDINGS
+from pneumarm.arm.virtual.state import INLET, MUSCLE, OUTLET, QUEUE, SLOW_TICK, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command, command_sides
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.kernels import kernel
-from pneumarm.random import random_states, uniform
+from pneumarm.kernels import direct
 
 LATENCY = 0.007
 """Time between reading and acting [s] (thesis section 5.1: about 7 ms)."""
-MOST_LATENESS = 8.0
-"""The control cycle is never later than so many standard deviations."""
 LONGEST_WAIT = 1e8
 """Longest wait [s], three years."""
-_SUPPLY, _SENSORS, _JITTER = range(3)
+_sense, _command, _pass_for, _pass_until = direct(sense), direct(command), direct(pass_for), direct(pass_until)
 _HEADER = struct.Struct("<8sI16s")
-_MAGIC, _VERSION = b"pneumarm", 1
-
-
-class Records(NamedTuple):
-    """The arm's own state records, not copies: read them, and leave them alone."""
-
-    muscles: NDArray[Any]
-    """MUSCLE, shape (joints, 2)."""
-    joints: NDArray[Any]
-    """JOINT, shape (joints,)."""
-    surroundings: NDArray[Any]
-    """SURROUNDINGS, shape (1,)."""
-    supply_random: NDArray[np.uint64]
-    """Random state of the supply's fluctuation, shape (4,)."""
-
-
-class Live(NamedTuple):
-    """All that kernels need to move an arm, its own arrays and not copies. See :attr:`VirtualArm.live`."""
-
-    muscles: NDArray[Any]
-    """MUSCLE, shape (joints, 2)."""
-    muscle_constants: NDArray[Any]
-    """MUSCLE_CONSTANTS, shape (joints, 2)."""
-    joints: NDArray[Any]
-    """JOINT, shape (joints,)."""
-    joint_constants: NDArray[Any]
-    """JOINT_CONSTANTS, shape (joints,)."""
-    air: NDArray[Any]
-    """SURROUNDINGS, shape (1,)."""
-    air_constants: NDArray[Any]
-    """SURROUNDINGS_CONSTANTS, shape (1,)."""
-    sensor_constants: NDArray[Any]
-    """SENSOR_CONSTANTS, shape (1,)."""
-    supply_random: NDArray[np.uint64]
-    """Random state of the supply's fluctuation, shape (4,)."""
-    sensor_random: NDArray[np.uint64]
-    """Random state of the sensors' noise, shape (4,)."""
-    jitter_random: NDArray[np.uint64]
-    """Random state of the control cycle's lateness, shape (4,)."""
-    conversions: NDArray[np.float64]
-    """Room for the conversions of a reading, shape (MOST_CONVERSIONS,)."""
-    lateness: float
-    """Mean lateness of the control cycle [s]."""
+_MAGIC, _VERSION = b"pneumarm", 2
 
 
 class VirtualArm(Arm):
@@ -123,38 +79,15 @@ class VirtualArm(Arm):
             velocity_sensor=velocity_sensor,
             sensors=tuple(sensors),
         )
-        self._constants = constants(self.parameters)
-        self._muscles = np.zeros((joints, 2), MUSCLE)
-        self._joints = np.zeros(joints, JOINT)
-        self._surroundings = np.zeros(1, SURROUNDINGS)
         if seed < 0:
             raise UnusableInput(f"the seed of a virtual arm must be 0 or more, got {seed}")
-        self._random = random_states(seed, 3)
-        self._lateness = self.parameters.jitter / math.sqrt(2)  # an interval has two ends
-        self._scratch = np.zeros(MOST_CONVERSIONS)
-        fixed = self._constants
-        self._physics = (
-            self._muscles,
-            fixed.muscles,
-            self._joints,
-            fixed.joints,
-            self._surroundings,
-            fixed.surroundings,
-            self._random[_SUPPLY],
-        )
-        self._sensing = (
-            self._muscles,
-            self._joints,
-            self._surroundings,
-            fixed.sensors,
-            self._random[_SENSORS],
-            self._scratch,
-        )
-        start(*self._physics)
+        self.body = body_of(self.parameters, seed)
+        """The arm itself, not a copy, for kernels; read it, and leave it alone."""
+        start(self.body)
         self._player: FaultPlayer | None = None
         self._further = further_sensors(self.spec, seed) if self.spec.further else None
         if self._further is not None:
-            begin_sampling(self._sensing, self._further.sound, self._further)
+            begin_sampling(self.body, self._further)
         self.faults = tuple(faults)
 
     @property
@@ -164,26 +97,11 @@ class VirtualArm(Arm):
 
     @faults.setter
     def faults(self, plan: Sequence[Fault]) -> None:
-        asked = self._asked()
-        before, self._player = self._player, None
+        plan = check_plan(plan, self.spec.joints)
+        asked, before = self._asked(), self._player
         if before is not None:
             before.restore()
-        try:
-            if plan:
-                self._player = FaultPlayer(
-                    tuple(plan),
-                    self.parameters,
-                    self._constants,
-                    self._muscles,
-                    self._joints,
-                    self._surroundings,
-                    asked,
-                )
-        except UnusableInput:
-            self._player = before
-            if before is not None:
-                before.update(self.time, afresh=True)
-            raise
+        self._player = FaultPlayer(plan, self.parameters, self.body, asked) if plan else None
         if before is not None or plan:
             self.set_valves(asked)
 
@@ -191,22 +109,12 @@ class VirtualArm(Arm):
         """Return the valves (joints, 2) as they were last asked for."""
         if self._player is not None:
             return self._player.asked.copy()
-        sides = (self._muscles["open"] + self._muscles["pending"]) % 2
+        sides = (self.body.muscles["open"] + self.body.muscles["pending"]) % 2
         return (sides[..., INLET] - sides[..., OUTLET]).astype(np.int8)
 
     @property
-    def constants(self) -> Constants:
-        """The arm's parameters as records for kernels."""
-        return self._constants
-
-    @property
-    def records(self) -> Records:
-        """The arm's true state as records for kernels."""
-        return Records(self._muscles, self._joints, self._surroundings, self._random[_SUPPLY])
-
-    @property
-    def live(self) -> Live:
-        """What kernels move the arm by.
+    def plain(self) -> Body:
+        """The body of an arm that kernels alone can move.
 
         Raises:
             UnusableInput: the arm plays faults or has further sensors, which only its own methods do.
@@ -216,60 +124,42 @@ class VirtualArm(Arm):
             raise UnusableInput(f"{self.spec.name}: kernels cannot move an arm that plays faults; remove them")
         if self._further is not None:
             raise UnusableInput(f"{self.spec.name}: kernels cannot read further sensors; open the arm without them")
-        fixed = self._constants
-        return Live(
-            self._muscles,
-            fixed.muscles,
-            self._joints,
-            fixed.joints,
-            self._surroundings,
-            fixed.surroundings,
-            fixed.sensors,
-            self._random[_SUPPLY],
-            self._random[_SENSORS],
-            self._random[_JITTER],
-            self._scratch,
-            self._lateness,
-        )
+        return self.body
 
     @property
     def time(self) -> float:
         """The arm's clock [s]."""
-        return float(self._surroundings["time"][0])
+        return float(self.body.surroundings["time"][0])
 
     @property
     def angle(self) -> NDArray[np.float64]:
         """The true angles, shape (joints,) [rad]."""
-        return self._joints["angle"].copy()
+        return self.body.joints["angle"].copy()
 
     @property
     def speed(self) -> NDArray[np.float64]:
         """The true angular velocities, shape (joints,) [rad/s]."""
-        return self._joints["speed"].copy()
+        return self.body.joints["speed"].copy()
 
     @property
     def pressure(self) -> NDArray[np.float64]:
         """The true gauge pressures, shape (joints, 2) [Pa]."""
-        return self._muscles["pressure"] - ATMOSPHERE
+        return self.body.muscles["pressure"] - ATMOSPHERE
 
     @property
     def temperature(self) -> NDArray[np.float64]:
         """The true temperatures of the muscles, shape (joints, 2) [degrees Celsius]."""
-        return self._muscles["temperature"].copy()
+        return self.body.muscles["temperature"].copy()
 
     def read(self) -> Reading:
         """Return what the sensors say now; two readings at the same time differ by their noise."""
         joints = self.spec.joints
         angle, pressure = np.empty(joints), np.empty((joints, 2))
-        if self._player is not None:
-            time = sense_with_faults(*self._sensing, self._player.track, self._player.leap, angle, pressure)
-        else:
-            time = sense(*self._sensing, angle, pressure)
-        reading = Reading(time, angle, pressure)
+        reading = Reading(_sense(self.body, angle, pressure), angle, pressure)
         if self._further is None:
             return reading
         values = np.empty(len(self.spec.further))
-        sense_further(self._sensing, self._constants.joints, self._further, values)
+        sense_further(self.body, self._further, values)
         return with_measured(reading, self.spec, values.tolist())
 
     def set_valves(self, valves: ArrayLike) -> None:
@@ -280,14 +170,14 @@ class VirtualArm(Arm):
 
         """
         asked = np.asarray(valves)
-        if asked.shape == self._muscles.shape:
+        if asked.shape == self.body.muscles.shape:
             exact = asked if asked.dtype == np.int8 else _as_int8(asked)
             if self._player is not None and np.isin(exact, (-1, 0, 1)).all():
                 self._route(self._player, exact)
                 return
-            if command(self._muscles, self._surroundings, self._constants.surroundings, np.ascontiguousarray(exact)):
+            if _command(self.body, np.ascontiguousarray(exact)):
                 return
-        raise PneumarmError(f"valves must be {self._muscles.shape} of -1, 0 or +1, got {valves!r}")
+        raise PneumarmError(f"valves must be {self.body.muscles.shape} of -1, 0 or +1, got {valves!r}")
 
     def wait(self, seconds: float) -> None:
         """Let exactly ``seconds`` [s] pass.
@@ -303,7 +193,7 @@ class VirtualArm(Arm):
         elif self._further is not None:
             self._pass(self.time + seconds)
         else:
-            pass_for(*self._physics, seconds)
+            _pass_for(self.body, float(seconds))
 
     def wait_until(self, time: float) -> None:
         """Let time pass until the clock shows ``time`` [s], or a little more; return at once if it is past.
@@ -319,7 +209,7 @@ class VirtualArm(Arm):
         elif self._further is not None:
             self._pass_late(time)
         else:
-            pass_until(*self._physics, self._random[_JITTER], self._lateness, time)
+            _pass_until(self.body, float(time))
 
     def _play(self, player: FaultPlayer, until: float, *, late: bool = False) -> None:
         """Let time pass until ``until`` [s], or until a little ``late``, cut where faults change."""
@@ -335,45 +225,46 @@ class VirtualArm(Arm):
     def _pass(self, until: float) -> None:
         """Let time pass until ``until`` [s], with samples of the angle where there is a sensor that needs them."""
         if self._further is None:
-            pass_time(*self._physics, until)
+            pass_time(self.body, until)
         else:
-            track = self._further.sound if self._player is None else self._player.track
-            pass_sampling(self._physics, self._sensing, track, self._further, until)
+            pass_sampling(self.body, self._further, until)
 
     def _pass_late(self, until: float) -> None:
         """Let time pass until ``until`` [s], or a little more; not at all if it is past."""
         if self._further is None:
-            pass_until(*self._physics, self._random[_JITTER], self._lateness, until)
+            pass_until(self.body, until)
         elif until > self.time:
-            self._pass(until + drawn_lateness(self._random[_JITTER], self._lateness))
+            self._pass(until + drawn_lateness(self.body))
 
     def _update(self, player: FaultPlayer) -> None:
         if player.update(self.time):
             self._route(player, player.asked.copy())
 
     def _route(self, player: FaultPlayer, asked: NDArray[np.int8]) -> None:
-        command_sides(self._muscles, self._surroundings, self._constants.surroundings, player.route(asked))
+        command_sides(self.body, player.route(asked))
 
     def rest(self, seconds: float) -> None:
         """Vent all muscles for ``seconds`` [s] and close the valves again; a night costs milliseconds."""
-        self.set_valves(np.full(self._muscles.shape, -1, np.int8))
+        self.set_valves(np.full(self.body.muscles.shape, -1, np.int8))
         self.wait(seconds)
-        self.set_valves(np.zeros(self._muscles.shape, np.int8))
+        self.set_valves(np.zeros(self.body.muscles.shape, np.int8))
 
     def close(self) -> None:
         """Close all valves."""
-        self.set_valves(np.zeros(self._muscles.shape, np.int8))
+        self.set_valves(np.zeros(self.body.muscles.shape, np.int8))
 
     def _parts(self) -> tuple[NDArray[Any], ...]:
         further = () if self._further is None else changing(self._further)
-        return self._muscles, self._joints, self._surroundings, self._random, *further
+        body = self.body
+        random = body.supply_random, body.sensor_random, body.jitter_random
+        return body.muscles, body.joints, body.surroundings, *random, *further
 
     def _digest(self) -> bytes:
         digest = hashlib.blake2b(digest_size=16)
         player = self._player
-        for record in self._constants if player is None else player.sound:
+        for record in self.body.constants if player is None else player.sound:
             digest.update(record.tobytes())
-        digest.update(struct.pack("<d", self._lateness))
+        digest.update(struct.pack("<d", self.body.lateness))
         if self._further is not None:
             digest.update(repr((self.spec.velocity_sensor, self.spec.sensors)).encode())
         if player is not None:
@@ -434,27 +325,6 @@ def _as_int8(values: NDArray[Any]) -> NDArray[np.int8]:
     return np.where(np.isin(values, (-1, 0, 1)), values, 2).astype(np.int8)
 
 
-@kernel
-def pass_for(muscles, muscle_c, joints, joint_c, air, air_c, random, seconds):  # type: ignore[no-untyped-def]
-    """Let ``seconds`` [s] pass."""
-    pass_time(muscles, muscle_c, joints, joint_c, air, air_c, random, air[0].time + seconds)
-
-
-@kernel
-def drawn_lateness(jitter, lateness):  # type: ignore[no-untyped-def]
-    """Return how long the operating system takes to wake up [s]."""
-    return min(-lateness * math.log(1.0 - uniform(jitter)), MOST_LATENESS * lateness)
-
-
-@kernel
-def pass_until(  # type: ignore[no-untyped-def]
-    muscles, muscle_c, joints, joint_c, air, air_c, random, jitter, lateness, time
-):
-    """Let time pass until ``time`` [s] and then as long as the operating system takes to wake up."""
-    if time > air[0].time:
-        pass_time(muscles, muscle_c, joints, joint_c, air, air_c, random, time + drawn_lateness(jitter, lateness))
-
-
 def resting_angle(parameters: ArmParameters, pressures: ArrayLike, *, end_stops: bool = True) -> NDArray[np.float64]:
     """Return the angles [rad] (joints,) at which an arm rests at gauge ``pressures`` (joints, 2) [Pa].
 
@@ -462,7 +332,5 @@ def resting_angle(parameters: ArmParameters, pressures: ArrayLike, *, end_stops:
     """
     fixed = constants(parameters)
     pressures = np.asarray(pressures, np.float64).reshape(fixed.muscles.shape)
-    angles = [
-        static_angle(fixed.muscles[j], fixed.joints[j], pressures[j], end_stops) for j in range(len(fixed.joints))
-    ]
+    angles = [static_angle(fixed, j, pressures[j], end_stops) for j in range(len(fixed.joints))]
     return np.array(angles)

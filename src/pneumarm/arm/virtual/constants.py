@@ -48,6 +48,14 @@ JOINT_CONSTANTS = np.dtype(
             "stop_stiffness",
             "stop_damping",
             "viscosity",
+            # what faults have made of its potentiometer:
+            "rail",  # the reading of a broken one, NaN for a whole one [counts]
+            "frozen",  # the reading of one that slips, NaN for one that does not [counts]
+            "bend",  # exponent of a logarithmic track, 0 for a linear one
+            "worn_at",  # [counts]
+            "worn_width",  # [counts]
+            "worn_height",  # [counts]
+            "worn_contact",  # [counts]
         )
     ]
 )
@@ -122,6 +130,8 @@ def constants(parameters: ArmParameters) -> Constants:
         for name in ("radius", "inertia", "tilt", "stop_angle", "stop_stiffness", "stop_damping", "viscosity"):
             hinges[j][name] = getattr(joint, name)
         hinges[j]["weight"] = joint.mass * GRAVITY * joint.distance
+    hinges["rail"] = hinges["frozen"] = math.nan
+    hinges["worn_width"] = 1.0
     return Constants(muscles, hinges, _surroundings(parameters), _sensors(parameters))
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pneumarm.arm.virtual.constants import constants
+from pneumarm.arm.virtual.body import body_of
 from pneumarm.arm.virtual.parameters import (
     BAR,
     AirParameters,
@@ -63,11 +63,10 @@ class Figures(NamedTuple):
 
 def figures(parameters: ArmParameters, joint: int = 0) -> Figures:
     """Return the figures of ``joint``, computed with the supply at its mean."""
-    fixed = constants(parameters)
-    muscle_c, joint_c = fixed.muscles[joint : joint + 1], fixed.joints[joint : joint + 1]
-    low, high, shortest, longest = sweep(muscle_c[0], joint_c[0])
-    first, second = (fill_time(muscle_c, joint_c, fixed.surroundings, m, 0.95 * BAR) for m in range(2))
-    ring = ring_frequency(muscle_c, joint_c, fixed.surroundings, 0.1 * BAR)
+    body = body_of(parameters)
+    low, high, shortest, longest = sweep(body.constants, joint)
+    first, second = (fill_time(body, joint, m, 0.95 * BAR) for m in range(2))
+    ring = ring_frequency(body, joint, 0.1 * BAR)
     return Figures((low, high), (shortest, longest), ring, (first, second))
 
 
@@ -83,7 +82,7 @@ def draw_parameters(seed: int) -> ArmParameters:
     random = np.random.default_rng([seed, _STREAM])
     for _ in range(_MOST_DRAWS):
         parameters = _draw(random)
-        if figures(parameters).usable:
+        if all(figures(parameters, joint).usable for joint in range(len(parameters.joints))):
             return parameters
     raise AssertionError("the distribution of arms holds no usable arm")
 

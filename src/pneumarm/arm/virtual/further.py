@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.arm.virtual.constants import GRAVITY
-from pneumarm.arm.virtual.rest import pass_time
-from pneumarm.arm.virtual.sensors import TRACK, median_conversion, potentiometer
+from pneumarm.arm.virtual.passing import pass_time
+from pneumarm.arm.virtual.sensors import median_conversion, potentiometer
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.random import RandomState, random_state
@@ -90,8 +90,6 @@ class Further(NamedTuple):
     random: RandomState
     feelers: NDArray[Any]
     """Accelerometers and thermometers, shape (n,)."""
-    sound: NDArray[Any]
-    """Potentiometers without faults, shape (joints,)."""
 
 
 def further_sensors(spec: ArmSpec, seed: int) -> Further:
@@ -101,11 +99,8 @@ def further_sensors(spec: ArmSpec, seed: int) -> Further:
         place = one.kind == "acceleration", one.joint - 1, (one.muscle or 1) - 1
         for name, value in zip(_FEELER.names or (), (*place, one.scale, one.offset), strict=True):
             feeler[name] = value
-    sound = np.zeros(spec.joints, TRACK)
-    sound["rail"] = sound["frozen"] = np.nan
-    sound["worn_width"] = 1.0
     past = np.zeros((spec.joints if spec.velocity_sensor else 0, _PAST))
-    return Further(past, np.full(1, -1, np.int64), random_state((seed, 1)), feelers, sound)
+    return Further(past, np.full(1, -1, np.int64), random_state((seed, 1)), feelers)
 
 
 def changing(further: Further) -> Sequence[NDArray[Any]]:
@@ -114,32 +109,31 @@ def changing(further: Further) -> Sequence[NDArray[Any]]:
 
 
 @kernel
-def begin_sampling(sensing, track, further):  # type: ignore[no-untyped-def]
+def begin_sampling(body, further):  # type: ignore[no-untyped-def]
     """Take the arm to have been at rest where it is now."""
-    further.tick[0] = math.floor(sensing[2][0].time / _TICK + _ROUNDING)
+    further.tick[0] = math.floor(body.surroundings[0].time / _TICK + _ROUNDING)
     for j in range(further.past.shape[0]):
-        now = potentiometer(sensing[1][j], track[j], sensing[3][0], further.random, sensing[5])
+        now = potentiometer(body, j, further.random)
         for i in range(further.past.shape[1]):
             further.past[j, i] = now
 
 
 @kernel
-def pass_sampling(physics, sensing, track, further, until):  # type: ignore[no-untyped-def]
+def pass_sampling(body, further, until):  # type: ignore[no-untyped-def]
     """Let time pass until ``until`` [s], sampling the angle in the last milliseconds; earlier ones are forgotten."""
     last = math.floor(until / _TICK + _ROUNDING)
     for tick in range(max(further.tick[0] + 1, last - further.past.shape[1] + 1), last + 1):
-        pass_time(*physics, min(tick * _TICK, until))
+        pass_time(body, min(tick * _TICK, until))
         further.tick[0] = tick
         for j in range(further.past.shape[0]):
-            now = potentiometer(sensing[1][j], track[j], sensing[3][0], further.random, sensing[5])
-            further.past[j, tick % further.past.shape[1]] = now
-    pass_time(*physics, until)
+            further.past[j, tick % further.past.shape[1]] = potentiometer(body, j, further.random)
+    pass_time(body, until)
 
 
 @kernel
-def sense_further(sensing, joint_c, further, values):  # type: ignore[no-untyped-def]
+def sense_further(body, further, values):  # type: ignore[no-untyped-def]
     """Write what the further sensors say now into ``values``, in the order of :attr:`ArmSpec.further`."""
-    muscles, joints, c = sensing[0], sensing[1], sensing[3][0]
+    c = body.constants.sensors[0]
     velocities, ring = further.past.shape
     for j in range(velocities):
         newest, oldest = further.tick[0] % ring, (further.tick[0] + 1) % ring
@@ -147,10 +141,11 @@ def sense_further(sensing, joint_c, further, values):  # type: ignore[no-untyped
     for i in range(further.feelers.shape[0]):
         feeler = further.feelers[i]
         if feeler.acceleration:
-            joint, hinge = joints[feeler.joint], joint_c[feeler.joint]
+            joint, hinge = body.joints[feeler.joint], body.constants.joints[feeler.joint]
             felt = MOUNTED * joint.torque / hinge.inertia + GRAVITY * math.sin(joint.angle + hinge.tilt)
             felt = min(max(felt, -MOST_ACCELERATION), MOST_ACCELERATION)
         else:
-            felt = muscles[feeler.joint, feeler.muscle].temperature
-        counts = median_conversion((felt - feeler.offset) / feeler.scale, NOISE, c, further.random, sensing[5])
+            felt = body.muscles[feeler.joint, feeler.muscle].temperature
+        converted = (felt - feeler.offset) / feeler.scale
+        counts = median_conversion(converted, NOISE, c, further.random, body.conversions)
         values[velocities + i] = feeler.offset + feeler.scale * counts

@@ -2,7 +2,7 @@
 
 import math
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
 
 
 @kernel
@@ -33,15 +33,15 @@ def stop_torque(c, angle, speed):  # type: ignore[no-untyped-def]
     return 0.0
 
 
-@kernel
-def accelerate(joints, joint_c, muscles, dt):  # type: ignore[no-untyped-def]
+@part
+def accelerate(body, dt):  # type: ignore[no-untyped-def]
     """Sum the torques, and move all joints by one semi-implicit Euler step: speed first, then angle."""
-    for j in range(len(joints)):
-        joint, c = joints[j], joint_c[j]
+    for j in range(len(body.joints)):
+        joint, c = body.joints[j], body.constants.joints[j]
         torque = gravity_torque(c, joint.angle) + stop_torque(c, joint.angle, joint.speed)
         torque -= c.viscosity * joint.speed
         for m in range(2):
-            torque -= muscle_direction(m) * c.radius * muscles[j, m].tension
+            torque -= muscle_direction(m) * c.radius * body.muscles[j, m].tension
         joint.torque = torque
         joint.speed += dt * torque / c.inertia
         joint.angle += dt * joint.speed

@@ -38,14 +38,15 @@ def passive_pull(stiffness, bladder_length, c, length):  # type: ignore[no-untyp
 
 @kernel
 def air_in(muscle, c, supply):  # type: ignore[no-untyped-def]
-    """Return what flows into the muscle through valves and leaks [m3/s of free air]."""
-    pressure = muscle.pressure
+    """Return what flows into the muscle through valves and leaks, and through the inlet alone [m3/s of free air]."""
+    pressure, taken = muscle.pressure, 0.0
     flow = c.seat_leak * (supply - pressure) - c.leak * (pressure - ATMOSPHERE)
     if muscle.open[INLET]:
-        flow += free_air(c.inlet, supply, pressure, c)
+        taken = free_air(c.inlet, supply, pressure, c)
+        flow += taken
     if muscle.open[OUTLET]:
         flow -= free_air(c.outlet, pressure, ATMOSPHERE, c)
-    return flow
+    return flow, taken
 
 
 @kernel
@@ -85,7 +86,9 @@ def move(muscle, c, length, speed, supply, polytropic, dt):  # type: ignore[no-u
     """
     stretch = length - muscle.length
     pull, volume = braid(c, length)
-    compress(muscle, c, volume, dt * air_in(muscle, c, supply), polytropic)
+    flow, taken = air_in(muscle, c, supply)
+    muscle.taken += dt * taken
+    compress(muscle, c, volume, dt * flow, polytropic)
     muscle.length = length
     above = muscle.pressure - ATMOSPHERE - threshold(muscle.threshold, c, length)
     muscle.engaged, muscle.engagement = engage(above)

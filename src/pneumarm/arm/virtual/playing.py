@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.virtual.body import Body
 from pneumarm.arm.virtual.constants import COUNTS_PER_DEGREE, GRAVITY, HIGHEST_COUNT, Constants
 from pneumarm.arm.virtual.faults import (
     Cold,
@@ -30,10 +31,8 @@ from pneumarm.arm.virtual.faults import (
     SwappedValves,
     ValveSideSensor,
     WornPotentiometer,
-    check_plan,
 )
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
-from pneumarm.arm.virtual.sensors import TRACK
 from pneumarm.arm.virtual.state import INLET, OUTLET
 from pneumarm.errors import UnusableInput
 
@@ -49,51 +48,30 @@ class FaultPlayer:
     """Plays ``plan`` on the records of a virtual arm: its constants, valves and readings.
 
     Args:
-        plan: the faults.
+        plan: the faults, checked.
         parameters: of the arm.
-        fixed: its constants; changed in place, and put back by :meth:`restore`.
-        muscles: its MUSCLE records (joints, 2); read, and in :class:`Cold` changed.
-        surroundings: its SURROUNDINGS record (1,).
+        body: its; the constants are changed in place, and put back by :meth:`restore`.
         asked: the valves (joints, 2) as they were last asked for.
 
     """
 
-    def __init__(
-        self,
-        plan: Plan,
-        parameters: ArmParameters,
-        fixed: Constants,
-        muscles: NDArray[Any],
-        joints: NDArray[Any],
-        surroundings: NDArray[Any],
-        asked: NDArray[np.int8],
-    ) -> None:
+    def __init__(self, plan: Plan, parameters: ArmParameters, body: Body, asked: NDArray[np.int8]) -> None:
         count = len(parameters.joints)
-        self.plan = check_plan(plan, count)
+        self.plan = plan
         self._parameters = parameters
-        self._fixed = fixed
-        self.sound = Constants(*(record.copy() for record in fixed))
+        self._body = body
+        self.sound = Constants(*(record.copy() for record in body.constants))
         """The constants as they are without faults."""
-        self._muscles, self._joints, self._surroundings = muscles, joints, surroundings
         self._state = np.zeros(1, _state_dtype(count, len(self.plan)))
         self._state["asked"] = asked
         self._state["frozen"] = np.nan
-        self.track: NDArray[Any] = np.zeros(count, TRACK)
-        """What faults have made of the potentiometers, shape (joints,)."""
         self._now: list[Fault] = []
-        self._wear()
         self.update(self.time)
 
     @property
     def time(self) -> float:
         """The arm's clock [s]."""
-        return float(self._surroundings["time"][0])
-
-    @property
-    def leap(self) -> NDArray[np.float64]:
-        """What the pressure sensors read too much, shape (joints, 2) [Pa]."""
-        air: NDArray[np.float64] = self._state["leap"][0]
-        return air
+        return float(self._body.surroundings["time"][0])
 
     @property
     def asked(self) -> NDArray[np.int8]:
@@ -106,8 +84,12 @@ class FaultPlayer:
         return msgspec.json.encode(self.plan)
 
     def restore(self) -> None:
-        """Put the arm's constants back to what they were."""
-        for record, sound in zip(self._fixed, self.sound, strict=True):
+        """Put the arm back to what it is without faults."""
+        self._body.muscles["leap"] = 0.0
+        self._restore_constants()
+
+    def _restore_constants(self) -> None:
+        for record, sound in zip(self._body.constants, self.sound, strict=True):
             record[...] = sound
 
     def route(self, asked: NDArray[np.int8]) -> NDArray[np.int64]:
@@ -137,16 +119,13 @@ class FaultPlayer:
             elif isinstance(fault, ReducerLeak):
                 following = min(following, now + (FOLLOWED if self._inlets() else FOLLOWED_IDLE))
             elif isinstance(fault, ValveSideSensor):
-                muscle = self._muscles[fault.index]
+                muscle = self._body.muscles[fault.index]
                 due = [muscle["toggles"][side][0] for side in _SIDES.values() if muscle["pending"][side] > 0]
                 following = min([following, *(time for time in due if time > now)])
         return following
 
-    def update(self, time: float, *, afresh: bool = False) -> bool:
-        """Bring everything to ``time``, which is now [s]; return whether faults have begun or ended.
-
-        ``afresh`` changes the constants again, after another player has put them back.
-        """
+    def update(self, time: float) -> bool:
+        """Bring everything to ``time``, which is now [s]; return whether faults have begun or ended."""
         state = self._state[0]
         elapsed, state["time"] = time - float(state["time"]), time
         self._fill(elapsed)
@@ -156,13 +135,13 @@ class FaultPlayer:
         self._now = playing
         if changed:
             self._begin(time)
-        if changed or afresh or any(isinstance(fault, SupplyLoss | ReducerLeak) for fault in playing):
+        if changed or any(isinstance(fault, SupplyLoss | ReducerLeak) for fault in playing):
             self._change(time)
         return changed
 
     def _inlets(self) -> int:
         """Return how many inlets are open or about to be."""
-        side = self._muscles["pending"][..., INLET] + self._muscles["open"][..., INLET]
+        side = self._body.muscles["pending"][..., INLET] + self._body.muscles["open"][..., INLET]
         return int((side > 0).sum())
 
     def _fill(self, elapsed: float) -> None:
@@ -181,14 +160,14 @@ class FaultPlayer:
 
     def _leap(self, elapsed: float) -> None:
         """Let what a sensor at the valve's side reads too much follow the air for ``elapsed`` [s]."""
-        supply = float(self._surroundings["supply"][0])
+        supply = float(self._body.surroundings["supply"][0])
         for fault in self._now:
             if isinstance(fault, ValveSideSensor):
-                muscle = self._muscles[fault.index]
+                muscle = self._body.muscles[fault.index]
                 pressure = float(muscle["pressure"])
                 drop = (supply - pressure) * muscle["open"][INLET] + (ATMOSPHERE - pressure) * muscle["open"][OUTLET]
                 target = fault.share * drop
-                leap = self._state["leap"][0]
+                leap = self._body.muscles["leap"]
                 leap[fault.index] += (leap[fault.index] - target) * math.expm1(-_SETTLED * elapsed / fault.settling)
 
     def _begin(self, time: float) -> None:
@@ -199,24 +178,23 @@ class FaultPlayer:
             begins = playing and not state["begun"][number]
             state["begun"][number] = playing
             if isinstance(fault, FrozenPotentiometer) and begins:
-                angle = COUNTS_PER_DEGREE * math.degrees(float(self._joints["angle"][fault.place]))
+                angle = COUNTS_PER_DEGREE * math.degrees(float(self._body.joints["angle"][fault.place]))
                 reading = math.floor(HIGHEST_COUNT / 2 + angle + 0.5)
                 state["frozen"][fault.place] = min(max(reading, 0.0), HIGHEST_COUNT)
             if isinstance(fault, Cold) and begins:
-                self._muscles["temperature"] = fault.temperature
-                self._surroundings["temperature"] = fault.temperature
+                self._body.muscles["temperature"] = fault.temperature
+                self._body.surroundings["temperature"] = fault.temperature
         if not any(isinstance(fault, ReducerLeak) for fault in self._now):
             state["excess"] = 0.0
         sides = {fault.index for fault in self._now if isinstance(fault, ValveSideSensor)}
-        for index in np.ndindex(state["leap"].shape):
+        for index in np.ndindex(self._body.muscles.shape):
             if index not in sides:
-                state["leap"][index] = 0.0
+                self._body.muscles["leap"][index] = 0.0
 
     def _change(self, time: float) -> None:
         """Change the constants to what the faults that are on make of them."""
-        self.restore()
-        self._wear()
-        fixed = self._fixed
+        self._restore_constants()
+        fixed = self._body.constants
         for fault in self._now:
             match fault:
                 case Leak():
@@ -245,22 +223,14 @@ class FaultPlayer:
                     fixed.sensors["noise_limit"] = max(
                         4 * fault.angle, 4 * fault.pressure, float(self.sound.sensors["noise_limit"][0])
                     )
-
-    def _wear(self) -> None:
-        """Make the potentiometers what the faults that are on make of them."""
-        self.track[...] = 0
-        self.track["rail"] = self.track["frozen"] = np.nan
-        self.track["worn_width"] = 1.0
-        for fault in self._now:
-            match fault:
                 case DeadPotentiometer():
-                    self.track["rail"][fault.place] = 0.0 if fault.rail == "low" else HIGHEST_COUNT
+                    fixed.joints["rail"][fault.place] = 0.0 if fault.rail == "low" else HIGHEST_COUNT
                 case FrozenPotentiometer():
-                    self.track["frozen"][fault.place] = self._state["frozen"][0][fault.place]
+                    fixed.joints["frozen"][fault.place] = self._state["frozen"][0][fault.place]
                 case LogarithmicPotentiometer():
-                    self.track["bend"][fault.place] = 2 * math.log(1 / fault.middle - 1)
+                    fixed.joints["bend"][fault.place] = 2 * math.log(1 / fault.middle - 1)
                 case WornPotentiometer():
-                    place: Any = self.track[fault.place : fault.place + 1]
+                    place: Any = fixed.joints[fault.place : fault.place + 1]
                     place["worn_at"] = HIGHEST_COUNT / 2 + COUNTS_PER_DEGREE * fault.angle
                     place["worn_width"] = COUNTS_PER_DEGREE * fault.width
                     place["worn_height"], place["worn_contact"] = fault.height, fault.contact
@@ -284,7 +254,7 @@ class FaultPlayer:
 
         """
         found: NDArray[Any] = np.frombuffer(state, self._state.dtype)
-        finite = all(np.isfinite(found[name]).all() for name in ("time", "excess", "leap"))
+        finite = all(np.isfinite(found[name]).all() for name in ("time", "excess"))
         if found.shape != (1,) or not finite or not np.isin(found["asked"], (-1, 0, 1)).all():
             raise UnusableInput(f"{name}: the saved state is damaged: that of its faults holds impossible numbers")
         return found
@@ -301,7 +271,6 @@ def _state_dtype(joints: int, faults: int) -> np.dtype[Any]:
         [
             ("time", "f8"),  # of the last update [s]
             ("excess", "f8"),  # pressure that a leaking reducer added to the supply [Pa]
-            ("leap", "f8", (joints, 2)),  # what sensors at the valves read too much [Pa]
             ("frozen", "f8", (joints,)),  # [counts]
             ("asked", "i1", (joints, 2)),  # valves
             ("begun", "i1", (faults,)),

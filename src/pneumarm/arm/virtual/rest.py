@@ -14,7 +14,6 @@ from pneumarm.arm.virtual.muscle import move, static_tension
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, FREE_AIR
 from pneumarm.arm.virtual.slow import relax_muscle, surround
 from pneumarm.arm.virtual.state import INLET, OUTLET
-from pneumarm.arm.virtual.step import SUBSTEP, integrate
 from pneumarm.kernels import kernel
 
 LONG = 10.0
@@ -40,35 +39,20 @@ _LARGEST = 0.05  # an equilibrium farther away than this was no rest [rad]
 
 
 @kernel
-def pass_time(muscles, muscle_c, joints, joint_c, air, air_c, random, until):  # type: ignore[no-untyped-def]
-    """Let time pass until the clock shows ``until`` [s], by fast-forward where the arm rests."""
-    surroundings, constants = air[0], air_c[0]
-    calm = 0
-    while until - surroundings.time > LONG:
-        if calm >= CALM_SAMPLES and steady(muscles):
-            rested = fast_forward(muscles, muscle_c, joints, joint_c, surroundings, constants, random, until - LAST)
-            calm = CALM_SAMPLES if rested else 0
-        soon = surroundings.time + SAMPLE
-        integrate(muscles, muscle_c, joints, joint_c, air, air_c, random, min(until, soon), SUBSTEP)
-        calm = calm + 1 if fastest(joints) < CALM_SPEED else 0
-    integrate(muscles, muscle_c, joints, joint_c, air, air_c, random, until, SUBSTEP)
-
-
-@kernel
-def fastest(joints):  # type: ignore[no-untyped-def]
+def fastest(body):  # type: ignore[no-untyped-def]
     """Return the speed of the fastest joint [rad/s]."""
     speed = 0.0
-    for j in range(len(joints)):
-        speed = max(speed, abs(joints[j].speed))
+    for j in range(len(body.joints)):
+        speed = max(speed, abs(body.joints[j].speed))
     return speed
 
 
 @kernel
-def steady(muscles):  # type: ignore[no-untyped-def]
+def steady(body):  # type: ignore[no-untyped-def]
     """Return whether every muscle is closed or vented, with no valve about to switch."""
-    for j in range(muscles.shape[0]):
+    for j in range(len(body.joints)):
         for m in range(2):
-            muscle = muscles[j, m]
+            muscle = body.muscles[j, m]
             if muscle.open[INLET] or muscle.pending[INLET] or muscle.pending[OUTLET]:
                 return False
             if muscle.open[OUTLET] and muscle.pressure - ATMOSPHERE > VENTED:
@@ -77,26 +61,26 @@ def steady(muscles):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fast_forward(muscles, muscle_c, joints, joint_c, surroundings, c, random, until):  # type: ignore[no-untyped-def]
+def fast_forward(body, until):  # type: ignore[no-untyped-def]
     """Bring a resting arm to ``until`` [s]; return False, before that, where it would not stay at rest."""
+    surroundings = body.surroundings[0]
     start = surroundings.time
-    trial = np.empty_like(muscles)
-    for j in range(len(joints)):
-        joints[j].speed = 0.0
+    trial = np.empty_like(body.muscles)
+    for j in range(len(body.joints)):
+        body.joints[j].speed = 0.0
     while surroundings.time < until:
         longest = min(LONGEST_STEP, FIRST_STEP + GROWTH * (surroundings.time - start))
         end = min(until, surroundings.time + longest)
         elapsed = end - surroundings.time
         surroundings.time = end
         surroundings.tick = end
-        surround(surroundings, c, random, elapsed)
-        for j in range(len(joints)):
+        surround(body, elapsed)
+        for j in range(len(body.joints)):
             for m in range(2):
-                relax_muscle(muscles[j, m], muscle_c[j, m], surroundings.temperature, elapsed)
-                leak(muscles[j, m], muscle_c[j, m], c, elapsed)
-            if not settle(
-                muscles[j], muscle_c[j], trial[j], joints[j], joint_c[j], surroundings.supply, c.polytropic
-            ):
+                muscle, c = body.muscles[j, m], body.constants.muscles[j, m]
+                relax_muscle(muscle, c, surroundings.temperature, elapsed)
+                leak(muscle, c, body.constants.surroundings[0], elapsed)
+            if not settle(body, j, trial[j]):
                 return False
     return True
 
@@ -116,27 +100,34 @@ def leak(muscle, c, surroundings_c, elapsed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def resting_torque(muscles, muscle_c, trial, c, angle, supply, polytropic):  # type: ignore[no-untyped-def]
-    """Return the torque [N m] after an infinitely slow move to ``angle`` [rad]; ``trial`` holds the muscles then."""
+def resting_torque(body, j, trial, angle):  # type: ignore[no-untyped-def]
+    """Return the torque [N m] of joint ``j`` after an infinitely slow move to ``angle`` [rad].
+
+    ``trial`` (2,) holds its muscles then.
+    """
+    c, supply = body.constants.joints[j], body.surroundings[0].supply
+    polytropic = body.constants.surroundings[0].polytropic
     torque = gravity_torque(c, angle) + stop_torque(c, angle, 0.0)
     for m in range(2):
-        trial[m] = muscles[m]
+        muscle_c = body.constants.muscles[j, m]
+        trial[m] = body.muscles[j, m]
         if trial[m].open[OUTLET]:
             trial[m].engagement = 0.0  # an open muscle is not compressed
-        move(trial[m], muscle_c[m], muscle_length(c, muscle_c[m], m, angle), 0.0, supply, polytropic, 0.0)
+        move(trial[m], muscle_c, muscle_length(c, muscle_c, m, angle), 0.0, supply, polytropic, 0.0)
         torque -= muscle_direction(m) * c.radius * trial[m].tension
     return torque
 
 
 @kernel
-def settle(muscles, muscle_c, trial, joint, c, supply, polytropic):  # type: ignore[no-untyped-def]
-    """Move a joint to its equilibrium near by; return False if there is none.
+def settle(body, j, trial):  # type: ignore[no-untyped-def]
+    """Move joint ``j`` to its equilibrium near by; return False if there is none. ``trial`` (2,) is workspace.
 
     The torque falls with the angle, so the equilibrium is bracketed by growing steps and found by the Illinois
     variant of regula falsi.
     """
+    joint = body.joints[j]
     near = joint.angle
-    torque_near = resting_torque(muscles, muscle_c, trial, c, near, supply, polytropic)
+    torque_near = resting_torque(body, j, trial, near)
     step = 1e-6 if torque_near > 0.0 else -1e-6
     far, torque_far = near, torque_near
     while torque_far * torque_near > 0.0:
@@ -145,10 +136,10 @@ def settle(muscles, muscle_c, trial, joint, c, supply, polytropic):  # type: ign
         step *= 3.0
         if abs(far - joint.angle) > _LARGEST:
             return False
-        torque_far = resting_torque(muscles, muscle_c, trial, c, far, supply, polytropic)
+        torque_far = resting_torque(body, j, trial, far)
     while abs(far - near) > _TOLERANCE and torque_far != 0.0:
         middle = far - torque_far * (far - near) / (torque_far - torque_near)
-        torque = resting_torque(muscles, muscle_c, trial, c, middle, supply, polytropic)
+        torque = resting_torque(body, j, trial, middle)
         if torque * torque_far < 0.0:
             near, torque_near = far, torque_far
         else:
@@ -158,15 +149,16 @@ def settle(muscles, muscle_c, trial, joint, c, supply, polytropic):  # type: ign
             break
         far, torque_far = middle, torque
     joint.angle = far
-    resting_torque(muscles, muscle_c, trial, c, far, supply, polytropic)
+    resting_torque(body, j, trial, far)
     for m in range(2):
-        muscles[m] = trial[m]
+        body.muscles[j, m] = trial[m]
     return True
 
 
 @kernel
-def static_angle(muscle_c, c, pressures, with_stops):  # type: ignore[no-untyped-def]
-    """Return the angle [rad] at which a joint rests at gauge ``pressures`` (2,) [Pa] without friction or creep."""
+def static_angle(constants, j, pressures, with_stops):  # type: ignore[no-untyped-def]
+    """Return at which angle [rad] joint ``j`` rests at gauge ``pressures`` (2,) [Pa], without friction or creep."""
+    c = constants.joints[j]
     low, high = -1.5, 1.5
     for _ in range(60):
         angle = 0.5 * (low + high)
@@ -174,8 +166,9 @@ def static_angle(muscle_c, c, pressures, with_stops):  # type: ignore[no-untyped
         if with_stops:
             torque += stop_torque(c, angle, 0.0)
         for m in range(2):
-            length = muscle_length(c, muscle_c[m], m, angle)
-            torque -= muscle_direction(m) * c.radius * static_tension(muscle_c[m], pressures[m], length)
+            muscle_c = constants.muscles[j, m]
+            length = muscle_length(c, muscle_c, m, angle)
+            torque -= muscle_direction(m) * c.radius * static_tension(muscle_c, pressures[m], length)
         if torque > 0.0:
             low = angle
         else:

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.virtual.arm import VirtualArm
+from pneumarm.arm.virtual.body import Body
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
-from pneumarm.arm.virtual.rest import pass_time
+from pneumarm.arm.virtual.passing import pass_time
 from pneumarm.arm.virtual.sensors import convert, worn
 from pneumarm.arm.virtual.state import JOINT, MUSCLE, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command
@@ -24,14 +25,8 @@ from pneumarm.kernels import kernel
 class Physics(NamedTuple):
     """What does not change in rollouts of an arm. Made by :func:`physics_of`."""
 
-    muscles: NDArray[Any]
-    """MUSCLE_CONSTANTS, shape (joints, 2)."""
-    joints: NDArray[Any]
-    """JOINT_CONSTANTS, shape (joints,)."""
-    surroundings: NDArray[Any]
-    """SURROUNDINGS_CONSTANTS, shape (1,)."""
-    sensors: NDArray[Any]
-    """SENSOR_CONSTANTS, shape (1,)."""
+    body: Body
+    """The arm's own; of it only the constants are used."""
     period: float
     """Control period [s]."""
     latency: float
@@ -71,12 +66,12 @@ def physics_of(arm: VirtualArm) -> Physics:
     if arm.faults:
         raise UnusableInput(f"{arm.spec.name}: no rollouts of an arm with faults; remove them")
     spec = arm.spec
-    return Physics(*arm.constants, spec.period, spec.latency, spec.max_pressure_counts)
+    return Physics(arm.body, spec.period, spec.latency, spec.max_pressure_counts)
 
 
 def physics_states(physics: Physics, n: int) -> PhysicsStates:
     """Return room for ``n`` states of an arm."""
-    joints = len(physics.joints)
+    joints = len(physics.body.joints)
     return PhysicsStates(
         muscles=np.empty((n, joints, 2), MUSCLE),
         joints=np.empty((n, joints), JOINT),
@@ -91,18 +86,35 @@ def physics_states(physics: Physics, n: int) -> PhysicsStates:
 
 def capture(arm: VirtualArm, physics: Physics, states: PhysicsStates, i: int) -> None:
     """Copy the state of ``arm``, at rest and due now, into place ``i`` of ``states``."""
-    live = arm.records
-    states.muscles[i], states.joints[i], states.surroundings[i] = live.muscles, live.joints, live.surroundings
-    states.random[i] = live.supply_random
+    body = arm.body
+    states.muscles[i], states.joints[i], states.surroundings[i] = body.muscles, body.joints, body.surroundings
+    states.random[i] = body.supply_random
     states.due[i] = arm.time
     look(physics, states, i)
     states.velocity[i] = 0.0
 
 
 @kernel
+def body_at(physics, states, i):  # type: ignore[no-untyped-def]
+    """Return the body of state ``i``."""
+    own = physics.body
+    return Body(
+        states.muscles[i],
+        states.joints[i],
+        states.surroundings[i],
+        own.constants,
+        states.random[i],
+        own.sensor_random,
+        own.jitter_random,
+        own.conversions,
+        own.lateness,
+    )
+
+
+@kernel
 def look(physics, states, i):  # type: ignore[no-untyped-def]
     """Set the readings of state ``i`` to what sensors without noise say."""
-    c = physics.sensors[0]
+    c = physics.body.constants.sensors[0]
     for j in range(states.angle.shape[1]):
         value = c.middle + c.counts_per_radian * states.joints[i, j].angle
         if c.wear > 0.0:
@@ -132,17 +144,16 @@ def copy_physics(states, to, source):  # type: ignore[no-untyped-def]
 @kernel
 def advance_physics(physics, states, i, valves):  # type: ignore[no-untyped-def]
     """Let one turn of the control cycle pass in state ``i``: latency, ``valves`` (joints, 2), rest of the period."""
-    muscles, joints, air, random = states.muscles[i], states.joints[i], states.surroundings[i], states.random[i]
-    begin = air[0].time
+    body = body_at(physics, states, i)
+    begin = body.surroundings[0].time
     states.due[i] += physics.period
     acted = begin + physics.latency
-    pass_time(muscles, physics.muscles, joints, physics.joints, air, physics.surroundings, random, acted)
-    command(muscles, air, physics.surroundings, valves)
-    end = max(states.due[i], acted)
-    pass_time(muscles, physics.muscles, joints, physics.joints, air, physics.surroundings, random, end)
+    pass_time(body, acted)
+    command(body, valves)
+    pass_time(body, max(states.due[i], acted))
     for j in range(states.angle.shape[1]):
         states.velocity[i, j] = states.angle[i, j]  # kept until the new angle is read
     look(physics, states, i)
-    elapsed = 1e3 * (air[0].time - begin)
+    elapsed = 1e3 * (body.surroundings[0].time - begin)
     for j in range(states.angle.shape[1]):
         states.velocity[i, j] = (states.angle[i, j] - states.velocity[i, j]) / elapsed

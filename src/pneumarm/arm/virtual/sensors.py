@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from pneumarm.arm.virtual.constants import BUMPS
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
 from pneumarm.kernels import kernel
@@ -13,18 +11,6 @@ MOST_CONVERSIONS = 9
 """Most conversions of which a median is taken."""
 BUMP_WIDTH = 6.0
 """Standard deviation of a worn place, about half a degree [counts]."""
-TRACK = np.dtype(
-    [
-        ("rail", "f8"),  # the reading of a broken potentiometer, NaN for a whole one [counts]
-        ("frozen", "f8"),  # the reading of one that slips, NaN for one that does not [counts]
-        ("bend", "f8"),  # exponent of a logarithmic track, 0 for a linear one
-        ("worn_at", "f8"),  # [counts]
-        ("worn_width", "f8"),  # [counts]
-        ("worn_height", "f8"),  # [counts]
-        ("worn_contact", "f8"),  # [counts]
-    ]
-)
-"""What faults have made of a potentiometer."""
 _RIPPLES = (17.0, 7.0)  # lengths of the lasting errors of a worn track, in counts
 
 
@@ -59,44 +45,27 @@ def worn(value, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sense(muscles, joints, surroundings, sensors_c, random, scratch, angle, pressure):  # type: ignore[no-untyped-def]
+def sense(body, angle, pressure):  # type: ignore[no-untyped-def]
     """Write the readings into ``angle`` (joints,) and ``pressure`` (joints, 2) [counts]; return the time [s]."""
-    c = sensors_c[0]
-    for j in range(len(joints)):
-        value = c.middle + c.counts_per_radian * joints[j].angle
-        if c.wear > 0.0:
-            value = worn(value, c)
-        angle[j] = median_conversion(value, c.angle_noise, c, random, scratch)
-        if c.dropout > 0.0 and uniform(random) < c.dropout:
-            angle[j] = 0.0
+    c = body.constants.sensors[0]
+    for j in range(len(body.joints)):
+        angle[j] = potentiometer(body, j, body.sensor_random)
         for m in range(2):
-            value = c.counts_per_pascal * (muscles[j, m].pressure - ATMOSPHERE)
-            pressure[j, m] = median_conversion(value, c.pressure_noise, c, random, scratch)
-    return surroundings[0].time
+            muscle = body.muscles[j, m]
+            value = c.counts_per_pascal * (muscle.pressure - ATMOSPHERE + muscle.leap)
+            pressure[j, m] = median_conversion(value, c.pressure_noise, c, body.sensor_random, body.conversions)
+    return body.surroundings[0].time
 
 
 @kernel
-def sense_with_faults(  # type: ignore[no-untyped-def]
-    muscles, joints, surroundings, sensors_c, random, scratch, track, leap, angle, pressure
-):
-    """As :func:`sense`, with potentiometers ``track`` (joints,) and ``leap`` (joints, 2) [Pa] added to pressures."""
-    c = sensors_c[0]
-    for j in range(len(joints)):
-        angle[j] = potentiometer(joints[j], track[j], c, random, scratch)
-        for m in range(2):
-            value = c.counts_per_pascal * (muscles[j, m].pressure - ATMOSPHERE + leap[j, m])
-            pressure[j, m] = median_conversion(value, c.pressure_noise, c, random, scratch)
-    return surroundings[0].time
-
-
-@kernel
-def potentiometer(joint, track, c, random, scratch):  # type: ignore[no-untyped-def]
-    """Return what the potentiometer ``track`` says of ``joint`` [counts]."""
-    value = c.middle + c.counts_per_radian * joint.angle
+def potentiometer(body, j, random):  # type: ignore[no-untyped-def]
+    """Return what the potentiometer of joint ``j`` says [counts], with noise from ``random``."""
+    c, track = body.constants.sensors[0], body.constants.joints[j]
+    value = c.middle + c.counts_per_radian * body.joints[j].angle
     if c.wear > 0.0:
         value = worn(value, c)
     value = shown(value, track, c, random)
-    angle = median_conversion(value, c.angle_noise, c, random, scratch)
+    angle = median_conversion(value, c.angle_noise, c, random, body.conversions)
     if c.dropout > 0.0 and uniform(random) < c.dropout:
         angle = 0.0
     if not math.isnan(track.frozen):
@@ -108,7 +77,7 @@ def potentiometer(joint, track, c, random, scratch):  # type: ignore[no-untyped-
 
 @kernel
 def shown(value, track, c, random):  # type: ignore[no-untyped-def]
-    """Return what a potentiometer with faults shows at the angle ``value`` [counts]."""
+    """Return what a potentiometer with faults shows at the angle ``value`` [counts]; ``track``: JOINT_CONSTANTS."""
     if track.bend > 0.0:
         inside = min(max(value / c.highest, 0.0), 1.0)
         value = c.highest * math.expm1(track.bend * inside) / math.expm1(track.bend)

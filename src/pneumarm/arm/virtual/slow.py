@@ -62,11 +62,12 @@ def relax_muscle(muscle, c, room, elapsed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def surround(surroundings, c, random, elapsed):  # type: ignore[no-untyped-def]
-    """Let ``elapsed`` [s] before ``surroundings.time`` pass in the supply and in the room."""
+def surround(body, elapsed):  # type: ignore[no-untyped-def]
+    """Let ``elapsed`` [s] before the clock's time pass in the supply and in the room."""
+    surroundings, c = body.surroundings[0], body.constants.surroundings[0]
     now = surroundings.time
     kept = math.exp(-elapsed / c.fluctuation_time)
-    noise = c.fluctuation * math.sqrt(1.0 - kept * kept) * normal(random)
+    noise = c.fluctuation * math.sqrt(1.0 - kept * kept) * normal(body.supply_random)
     surroundings.deviation = surroundings.deviation * kept + noise
     phase = now / c.compressor_period
     saw = c.compressor * (1.0 - 2.0 * (phase - math.floor(phase)))  # the vessel empties until the compressor starts

@@ -11,19 +11,21 @@ from pneumarm.kernels import kernel
 
 
 @kernel
-def start(muscles, muscle_c, joints, joint_c, air, air_c, random):  # type: ignore[no-untyped-def]
-    """Put all records into the begin state."""
-    surroundings = air[0]
-    surroundings.temperature = air_c[0].cold
-    surround(surroundings, air_c[0], random, 1e9)  # so late that the fluctuation has forgotten its begin
-    surroundings.temperature = air_c[0].cold
-    for j in range(len(joints)):
-        joints[j].angle = static_angle(muscle_c[j], joint_c[j], np.zeros(2), True)
+def start(body):  # type: ignore[no-untyped-def]
+    """Put everything into the begin state."""
+    surroundings, fixed = body.surroundings[0], body.constants
+    cold = fixed.surroundings[0].cold
+    surroundings.temperature = cold
+    surround(body, 1e9)  # so late that the fluctuation has forgotten its begin
+    surroundings.temperature = cold
+    for j in range(len(body.joints)):
+        body.joints[j].angle = static_angle(fixed, j, np.zeros(2), True)
         for m in range(2):
-            place(muscles[j, m], muscle_c[j, m], muscle_length(joint_c[j], muscle_c[j, m], m, joints[j].angle))
-            muscles[j, m].temperature = air_c[0].cold
-            adapt(muscles[j, m], muscle_c[j, m])
-            move(muscles[j, m], muscle_c[j, m], muscles[j, m].length, 0.0, surroundings.supply, 1.0, 0.0)
+            muscle, c = body.muscles[j, m], fixed.muscles[j, m]
+            place(muscle, c, muscle_length(fixed.joints[j], c, m, body.joints[j].angle))
+            muscle.temperature = cold
+            adapt(muscle, c)
+            move(muscle, c, muscle.length, 0.0, surroundings.supply, 1.0, 0.0)
 
 
 @kernel

@@ -14,6 +14,8 @@ creep                   relaxed stretch xi of each branch of the Prony series   
 creep_pull              sum of G_k xi_k                                                       N
 temperature             temperature of the muscle                                             Celsius
 heat                    work turned into heat since the last slow tick                        J
+taken                   free air that the inlet has let in so far                             m3
+leap                    what its sensor reads too much while air flows; faults make it        Pa
 open                    whether the inlet and the outlet are open (0 or 1)                    1
 pending                 number of switchings under way at the inlet and the outlet            1
 toggles                 their times; a valve is open or closed, so a time says everything     s
@@ -65,6 +67,8 @@ MUSCLE = np.dtype(
         ("creep_pull", "f8"),
         ("temperature", "f8"),
         ("heat", "f8"),
+        ("taken", "f8"),
+        ("leap", "f8"),
         ("open", "i8", (2,)),
         ("pending", "i8", (2,)),
         ("toggles", "f8", (2, QUEUE)),

@@ -1,4 +1,4 @@
-"""Small trials with one joint that tell what kind of arm it is."""
+"""Small trials with a joint, on a body of their own, that tell what kind of arm it is."""
 
 import math
 
@@ -10,7 +10,7 @@ from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, REFERENCE_TEMPERATU
 from pneumarm.arm.virtual.rest import static_angle
 from pneumarm.arm.virtual.slow import adapt
 from pneumarm.arm.virtual.start import place
-from pneumarm.arm.virtual.state import INLET, JOINT, MUSCLE
+from pneumarm.arm.virtual.state import INLET, OUTLET
 from pneumarm.arm.virtual.step import SUBSTEP, substep
 from pneumarm.kernels import kernel
 
@@ -25,25 +25,26 @@ _TURNS = 4  # turning points that make a frequency
 
 
 @kernel
-def sweep(muscle_c, c):  # type: ignore[no-untyped-def]
-    """Return the lowest and highest angle [rad] at 1 bar, and the shortest and longest muscle between [m]."""
+def sweep(constants, j):  # type: ignore[no-untyped-def]
+    """Return the lowest and highest angle [rad] of joint ``j`` at 1 bar, and its shortest and longest muscle [m]."""
     full = np.zeros(2)
     full[1] = 1.0 * BAR
-    low = static_angle(muscle_c, c, full, False)
+    low = static_angle(constants, j, full, False)
     full[0], full[1] = full[1], 0.0
-    high = static_angle(muscle_c, c, full, False)
+    high = static_angle(constants, j, full, False)
     shortest, longest = math.inf, 0.0
     for m in range(2):
         for angle in (low, high):
-            length = muscle_length(c, muscle_c[m], m, angle)
+            length = muscle_length(constants.joints[j], constants.muscles[j, m], m, angle)
             shortest, longest = min(shortest, length), max(longest, length)
     return low, high, shortest, longest
 
 
 @kernel
 def prepare(muscle, c, length, pressure):  # type: ignore[no-untyped-def]
-    """Put a muscle at ``length`` [m] and gauge ``pressure`` [Pa], relaxed and at the reference temperature."""
+    """Put a muscle at ``length`` [m] and gauge ``pressure`` [Pa], closed, relaxed, at the reference temperature."""
     place(muscle, c, length)
+    muscle.open[INLET] = muscle.open[OUTLET] = 0
     muscle.temperature = REFERENCE_TEMPERATURE
     adapt(muscle, c)
     muscle.pressure = ATMOSPHERE + pressure
@@ -51,9 +52,9 @@ def prepare(muscle, c, length, pressure):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fill_time(muscle_c, joint_c, air_c, which, target):  # type: ignore[no-untyped-def]
-    """Return the time [s] from the command to ``target`` [Pa gauge] in muscle ``which``, held at the angle 0."""
-    muscle, c = np.zeros(1, MUSCLE)[0], muscle_c[0, which]
+def fill_time(body, j, m, target):  # type: ignore[no-untyped-def]
+    """Return the time [s] from the command to ``target`` [Pa gauge] in muscle ``m`` of joint ``j``, at angle 0."""
+    muscle, c, air = body.muscles[j, m], body.constants.muscles[j, m], body.constants.surroundings[0]
     prepare(muscle, c, c.length_at_zero, 0.0)
     muscle.open[INLET] = 1
     time = 0.0
@@ -61,33 +62,43 @@ def fill_time(muscle_c, joint_c, air_c, which, target):  # type: ignore[no-untyp
         if time > LONGEST_FILL:
             return math.inf
         time += SUBSTEP
-        move(muscle, c, c.length_at_zero, 0.0, air_c[0].supply, air_c[0].polytropic, SUBSTEP)
-    return time + air_c[0].opening_delay
+        move(muscle, c, c.length_at_zero, 0.0, air.supply, air.polytropic, SUBSTEP)
+    return time + air.opening_delay
 
 
 @kernel
-def ring_frequency(muscle_c, joint_c, air_c, pressure):  # type: ignore[no-untyped-def]
-    """Return the frequency [Hz] at which the closed arm at gauge ``pressure`` [Pa] swings when let go; 0 if not."""
-    muscles, joints = np.zeros((1, 2), MUSCLE), np.zeros(1, JOINT)
-    pressures = np.full(2, pressure)
-    rest = static_angle(muscle_c[0], joint_c[0], pressures, True)
-    polytropic = air_c[0].polytropic
+def pose(body, j, pressure, away):  # type: ignore[no-untyped-def]
+    """Move joint ``j``, closed at gauge ``pressure`` [Pa], slowly ``away`` [rad] from where it rests."""
+    joint, c, polytropic = body.joints[j], body.constants.joints[j], body.constants.surroundings[0].polytropic
+    rest = static_angle(body.constants, j, np.full(2, pressure), True)
+    joint.speed = 0.0
     for i in range(_PATH + 1):
-        joints[0].angle = rest + RELEASE * i / _PATH
+        joint.angle = rest + away * i / _PATH
         for m in range(2):
-            length = muscle_length(joint_c[0], muscle_c[0, m], m, joints[0].angle)
+            muscle, muscle_c = body.muscles[j, m], body.constants.muscles[j, m]
+            length = muscle_length(c, muscle_c, m, joint.angle)
             if i == 0:
-                prepare(muscles[0, m], muscle_c[0, m], length, pressure)
-            move(muscles[0, m], muscle_c[0, m], length, 0.0, ATMOSPHERE, polytropic, 0.0)
+                prepare(muscle, muscle_c, length, pressure)
+            move(muscle, muscle_c, length, 0.0, ATMOSPHERE, polytropic, 0.0)
+
+
+@kernel
+def ring_frequency(body, j, pressure):  # type: ignore[no-untyped-def]
+    """Return the frequency [Hz] at which joint ``j`` swings when let go; 0 if it does not.
+
+    All valves are closed, at gauge ``pressure`` [Pa]; the other joints begin at rest.
+    """
+    for other in range(len(body.joints)):
+        pose(body, other, pressure, RELEASE if other == j else 0.0)
     turns, first, last, before = 0, 0.0, 0.0, 0.0
     for i in range(int(RING_TIME / SUBSTEP)):
-        substep(muscles, muscle_c, joints, joint_c, ATMOSPHERE, polytropic, SUBSTEP)
-        if joints[0].speed * before < 0.0:
+        substep(body, ATMOSPHERE, body.constants.surroundings[0].polytropic, SUBSTEP)
+        if body.joints[j].speed * before < 0.0:
             turns += 1
             last = i * SUBSTEP
             if turns == 1:
                 first = last
             if turns == _TURNS:
                 break
-        before = joints[0].speed
+        before = body.joints[j].speed
     return 0.5 * (turns - 1) / (last - first) if turns > 1 else 0.0

@@ -29,35 +29,33 @@ def switch(muscle, side, wanted, time):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def command(muscles, surroundings, surroundings_c, valves):  # type: ignore[no-untyped-def]
+def command(body, valves):  # type: ignore[no-untyped-def]
     """Set ``valves`` (joints, 2); return False, with nothing set, if one of them is not -1, 0 or +1."""
-    for j in range(muscles.shape[0]):
+    for j in range(len(body.joints)):
         for m in range(2):
             if not -1 <= valves[j, m] <= 1:
                 return False
-    now = surroundings[0].time
-    opened = now + surroundings_c[0].opening_delay
-    closed = now + surroundings_c[0].closing_delay
-    for j in range(muscles.shape[0]):
+    now, c = body.surroundings[0].time, body.constants.surroundings[0]
+    opened, closed = now + c.opening_delay, now + c.closing_delay
+    for j in range(len(body.joints)):
         for m in range(2):
             wanted = 1 if valves[j, m] == 1 else 0
-            switch(muscles[j, m], INLET, wanted, opened if wanted else closed)
+            switch(body.muscles[j, m], INLET, wanted, opened if wanted else closed)
             wanted = 1 if valves[j, m] == -1 else 0
-            switch(muscles[j, m], OUTLET, wanted, opened if wanted else closed)
+            switch(body.muscles[j, m], OUTLET, wanted, opened if wanted else closed)
     return True
 
 
 @kernel
-def command_sides(muscles, surroundings, surroundings_c, sides):  # type: ignore[no-untyped-def]
+def command_sides(body, sides):  # type: ignore[no-untyped-def]
     """Set inlets and outlets apart, ``sides`` (joints, 2, 2) of 0 or 1: what faults make of a command."""
-    now = surroundings[0].time
-    opened = now + surroundings_c[0].opening_delay
-    closed = now + surroundings_c[0].closing_delay
-    for j in range(muscles.shape[0]):
+    now, c = body.surroundings[0].time, body.constants.surroundings[0]
+    opened, closed = now + c.opening_delay, now + c.closing_delay
+    for j in range(len(body.joints)):
         for m in range(2):
             for side in range(2):
                 wanted = sides[j, m, side]
-                switch(muscles[j, m], side, wanted, opened if wanted else closed)
+                switch(body.muscles[j, m], side, wanted, opened if wanted else closed)
 
 
 @kernel

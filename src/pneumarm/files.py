@@ -112,7 +112,7 @@ def _opened(path: Path, expected: str) -> Iterator[tuple[str, Any, Any]]:
     from safetensors import SafetensorError, safe_open
 
     if path.exists() and not path.is_file():
-        raise UnusableInput(f"{path}: {expected}, this is no file")  # opening a pipe would wait for ever
+        raise UnusableInput(f"{path}: {expected}, this is not a file")  # opening a pipe would wait forever
     try:
         size = path.stat().st_size
         with open(path, "rb") as file:

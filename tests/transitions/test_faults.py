@@ -312,9 +312,9 @@ def test_things_that_are_no_files_are_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "fifo.db")
     (tmp_path / "folder.db").mkdir()
     for name in ("fifo.db", "folder.db"):
-        with pytest.raises(UnusableInput, match="this is no file"):
+        with pytest.raises(UnusableInput, match="this is not a file"):
             Store.open(tmp_path / name)
-        with pytest.raises(UnusableInput, match="this is no file"):
+        with pytest.raises(UnusableInput, match="this is not a file"):
             Store.append_to(tmp_path / name)
         with pytest.raises(UnusableInput, match="exists already"):
             Store.create(tmp_path / name, ArmSpec())

@@ -191,7 +191,7 @@ def test_places_that_are_taken_or_missing_are_told(imported, tmp_path):
         import_recording(tmp_path / "r.csv", tmp_path / "m.toml", tmp_path / "none" / "s.db")
     with pytest.raises(UnusableInput, match="no such file"):
         import_recording(tmp_path / "none.csv", tmp_path / "m.toml", tmp_path / "t.db")
-    with pytest.raises(UnusableInput, match="there is none"):
+    with pytest.raises(UnusableInput, match="no such file"):
         import_recording(tmp_path / "r.csv", tmp_path / "none.toml", tmp_path / "t.db")
 
 

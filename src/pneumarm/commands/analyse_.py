@@ -21,7 +21,7 @@ def analyse_(db: Path, sim: Path, /, *, out: Path, json: Json = False) -> None:
     sim
         The simulation, from ``pneumarm fit``.
     out
-        Folder for the page and its figures; made where there is none.
+        Folder for the page and its figures; created if it does not exist.
     json
         Print one JSON object on stdout and nothing else there.
     """

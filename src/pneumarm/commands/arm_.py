@@ -54,7 +54,7 @@ def check_(
         virtual, virtual:seed=N, serial:PORT or python:module:callable; ``,spec=arm.toml`` names a calibration, and
         the arm is compared with its sound state there.
     out
-        Folder for a page with curves; made where there is none.
+        Folder for a page with curves; created if it does not exist.
     seed
         Of a virtual arm's noise.
     json

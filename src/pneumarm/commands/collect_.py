@@ -29,7 +29,7 @@ def collect_(
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     db
-        The store; made where there is none.
+        The store; created if it does not exist.
     transitions
         How many to record in all (thesis section 3.2.2: 200,000, two hours).
     seed

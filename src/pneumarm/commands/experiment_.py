@@ -32,7 +32,7 @@ def experiment_(
     name
         Name of the experiment, such as all-goals; an unknown name lists all of them.
     out
-        Folder of the laboratory, shared by all experiments; made where there is none.
+        Folder of the laboratory, shared by all experiments; created if it does not exist.
     arms
         Names of the arms, separated by commas; by default those of the experiment.
     runs

@@ -23,7 +23,7 @@ def run_(
     Parameters
     ----------
     out
-        Folder of the run; made where there is none.
+        Folder of the run; created if it does not exist.
     json
         Print one JSON object on stdout and nothing else there.
     """

@@ -43,7 +43,7 @@ def analyse_(
     quantity
         What the results are, for the pictures.
     out
-        Folder for page.html; made where there is none.
+        Folder for page.html; created if it does not exist.
     json
         Print one JSON object on stdout and nothing else there.
     """

@@ -32,7 +32,7 @@ def transfer_(
     seed
         Of the begin states, the goals and the exploration, and of a virtual arm's noise.
     out
-        Folder for episodes.csv, the store of all movements and the adapted agent; made where there is none.
+        Folder for episodes.csv, the store of all movements and the adapted agent; created if it does not exist.
     json
         Print one JSON object on stdout and nothing else there.
     """

@@ -58,7 +58,7 @@ def sweep(
 
     Args:
         experiment: what to do.
-        laboratory: folder of all experiments; made where there is none.
+        laboratory: folder of all experiments; created if it does not exist.
         arms: names as of :func:`pneumarm.arm.open_arm`.
         runs: how often every trial is done, each time with other weights; the experiment's number by default.
         settings: what else decides the rows.

@@ -62,7 +62,7 @@ class Blocks:
             try:
                 table = np.fromiter(values, np.float64, count=total * len(columns)).reshape(total, -1)
             except (ValueError, TypeError) as error:
-                raise damaged(store.path, f"rows are missing or no numbers: {error}") from error
+                raise damaged(store.path, f"rows are missing or not numbers: {error}") from error
             surplus = next(values, None) is not None
         per_joint = table[:, 2 : 2 + 5 * joints].reshape(total, joints, 5)
         rows = Rows(

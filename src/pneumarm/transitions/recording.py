@@ -180,9 +180,9 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
     """
     try:
         if not path.is_file():
-            raise UnusableInput(f"{path}: expected a mapping file (TOML), there is none")
+            raise UnusableInput(f"{path}: no such file; expected a mapping file (TOML)")
         if path.stat().st_size > _LONGEST_MAPPING:
-            raise UnusableInput(f"{path}: a mapping file has {_LONGEST_MAPPING} bytes at most, this is none")
+            raise UnusableInput(f"{path}: not a mapping file: it has more than {_LONGEST_MAPPING} bytes")
         text = path.read_text(encoding="utf-8")
         if max(map(len, text.splitlines()), default=0) > _LONGEST_MAPPING_LINE:
             raise UnusableInput(f"{path}: a line has {_LONGEST_MAPPING_LINE} characters at most")
@@ -330,7 +330,7 @@ class _Reader:
                 self.rows += 1
             yield from self._whole(times, table)
         except csv.Error as error:
-            raise self._wrong(lines.line_num, f"no CSV ({error})") from error
+            raise self._wrong(lines.line_num, f"not CSV ({error})") from error
 
     def _whole(
         self, times: list[float], table: list[list[float]]
@@ -345,7 +345,7 @@ class _Reader:
         while line := file.readline(_LONGEST_LINE + 1):
             number += 1
             if len(line) > _LONGEST_LINE:
-                raise self._wrong(number, f"longer than {_LONGEST_LINE} characters: this is no CSV")
+                raise self._wrong(number, f"longer than {_LONGEST_LINE} characters: this is not CSV")
             yield line
 
     def _places(self, header: list[str]) -> list[int]:

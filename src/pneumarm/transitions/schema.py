@@ -124,7 +124,7 @@ def _check_header(path: Path) -> None:
     if not path.exists():
         raise UnusableInput(f"{path}: no such file; {expected}")
     if not path.is_file():
-        raise UnusableInput(f"{path}: {expected}, this is no file")
+        raise UnusableInput(f"{path}: {expected}, this is not a file")
     try:
         with open(path, "rb") as file:
             header = file.read(100)

@@ -106,7 +106,7 @@ class Store:
         """Return the store at ``path`` for writing.
 
         Raises:
-            UnusableInput: it is no store or a damaged one, or another process is writing to it.
+            UnusableInput: it is not a store, or it is damaged, or another process is writing to it.
 
         """
         path = Path(path)
@@ -129,7 +129,7 @@ class Store:
         """Return the store at ``path`` for reading, also while another process writes to it.
 
         Raises:
-            UnusableInput: it is no store or a damaged one.
+            UnusableInput: it is not a store, or it is damaged.
 
         """
         return cls._opened(Path(path), None)

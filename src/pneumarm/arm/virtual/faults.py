@@ -350,7 +350,7 @@ def plan_of(tables: Iterable[Any], where: str = "plan") -> Plan:
     """Return the plan of ``tables``, a mapping with a ``kind`` each.
 
     Raises:
-        UnusableInput: a table is no fault that a virtual arm can play.
+        UnusableInput: a table is not a fault that a virtual arm can play.
 
     """
     return tuple(_fault(table, f"{where}: fault {number}") for number, table in enumerate(tables, 1))
@@ -359,7 +359,7 @@ def plan_of(tables: Iterable[Any], where: str = "plan") -> Plan:
 def _fault(table: Any, where: str) -> Fault:
     kind = table.get("kind") if isinstance(table, dict) else None
     if kind in LINK_KINDS:
-        raise UnusableInput(f"{where}: {kind} is a fault of a link, which this arm has none of; remove it")
+        raise UnusableInput(f"{where}: {kind} is a fault of a serial link, which this arm does not have; remove it")
     if not isinstance(kind, str) or kind not in _BY_KIND:
         raise UnusableInput(f"{where}: expected a kind of {', '.join(_BY_KIND)}; got {kind!r}")
     try:

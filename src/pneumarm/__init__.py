@@ -4,19 +4,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pneumarm.control.agent import AgentController
+    from pneumarm.arm import Controller
 
 __version__ = "0.1.0"
 
 
-def load_controller(agent: str | Path) -> "AgentController":
-    """Return the greedy controller in the file ``agent``: ``reset(goal)``, then ``act(reading) -> valves``.
+def load_controller(file: str | Path) -> "Controller":
+    """Return the controller in ``file``, a greedy agent or a tuned one: ``reset(goal)``, ``act(reading) -> valves``.
 
     It has made its first turns when it is returned: an arm that waits for it waits for nothing to be compiled.
     """
+    from pneumarm.classical import is_tuned, load_tuned
     from pneumarm.control.agent import AgentController, warm_up
     from pneumarm.control.open_agent import open_agent
 
-    opened = open_agent(Path(agent))
+    path = Path(file)
+    if is_tuned(path):
+        return load_tuned(path).controller()
+    opened = open_agent(path)
     warm_up(opened)
     return AgentController(opened)

@@ -48,6 +48,18 @@ COMMANDS = {
         "Move an agent onto an arm and let it adapt there.",
         "pneumarm transfer arm.agent --arm virtual:seed=7 --episodes 500 --out adapted",
     ),
+    "move": (
+        "Move an arm to goals and hold them.",
+        "pneumarm move arm.agent --arm virtual:seed=7 20deg -5deg",
+    ),
+    "track": (
+        "Have an arm follow a reference.",
+        "pneumarm track arm.pid --arm virtual:seed=7 --reference sine:0.5Hz,20deg",
+    ),
+    "tune": (
+        "Tune a classical controller on an arm: pid, scheduled, pwm or sliding.",
+        "pneumarm tune pid --arm virtual:seed=7 --out arm.pid",
+    ),
     "versions": (
         "List the versions of an agent that adapted on an arm, and put one back.",
         "pneumarm versions adapted --to 1",

@@ -5,15 +5,25 @@ import math
 import resource
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from typing import Any
+from contextlib import contextmanager, nullcontext
+from time import monotonic
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.status import Status
 from rich.table import Table
+
+if TYPE_CHECKING:  # the command line answers before these are imported
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pneumarm.arm.seam import ArmSpec, Reading
 
 Report = Callable[[float, float], None]
 """Called with what is done and the total."""
+
+_LOOK = 0.1  # s between two looks of a person
 
 _errors = Console(stderr=True, highlight=False)
 
@@ -36,6 +46,28 @@ def progress(title: str) -> Iterator[Report]:
             bar.update(task, completed=int(done), total=int(total))
 
         yield report
+
+
+@contextmanager
+def live(spec: "ArmSpec") -> "Iterator[Callable[[Reading, NDArray[np.float64]], None]]":
+    """Show where an arm is and where it is wanted on stderr while the block runs; nothing where that is no terminal.
+
+    Gives what is to be called with every reading and the angles (joints,) wanted [counts].
+    """
+    with Status("", console=_errors) if _errors.is_terminal else nullcontext() as status:
+        shown = -math.inf
+
+        def seen(reading: "Reading", wanted: "NDArray[np.float64]") -> None:
+            nonlocal shown
+            now = monotonic()
+            if status is None or now - shown < _LOOK:
+                return
+            shown = now
+            joints = zip(spec.degrees(reading.angle), spec.degrees(wanted), spec.bar(reading.pressure), strict=True)
+            said = [f"{at:6.1f}° of {goal:6.1f}°  {p[0]:.2f} {p[1]:.2f} bar" for at, goal, p in joints]
+            status.update(f"{reading.time:8.1f} s  {'   '.join(said)}")
+
+        yield seen
 
 
 def say(text: str) -> None:

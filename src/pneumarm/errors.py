@@ -22,3 +22,7 @@ class ArmFailure(PneumarmError):  # noqa: N818
 
 class ControllerFailure(PneumarmError):  # noqa: N818
     """A controller went on giving decisions that cannot be used; the arm is vented."""
+
+
+class MovementFailed(PneumarmError):  # noqa: N818
+    """A movement did not come to rest at its goal, after all its tries."""

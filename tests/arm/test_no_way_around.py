@@ -31,6 +31,7 @@ GUARDED = {
     "gym/on_arm.py": "guards its arm",
     "checkup/leaks.py": "takes a GuardedArm",
     "checkup/measure.py": "takes a GuardedArm",
+    "classical/calibration.py": "takes a GuardedArm",
     "commands/arm_.py": "guards its arm",
 }
 """Files that may set valves, and why."""

@@ -1,0 +1,78 @@
+"""``pneumarm move``."""
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from pneumarm.arm import open_arm
+from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.goals import read_goals
+from pneumarm.console import live, say, show, table
+from pneumarm.control.named import open_tracking
+from pneumarm.errors import MovementFailed
+from pneumarm.moving import Moved, MoveSettings, move
+
+
+def move_(
+    controller: str,
+    /,
+    *goals: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    arm: str,
+    seed: int = 0,
+    settings: Annotated[MoveSettings, Settings] = MoveSettings(),
+    json: Json = False,
+) -> None:
+    """Move an arm to goals, one after the other, and hold each. A goal that is not settled at is tried again.
+
+    Exit code 1 where one is still not settled at after its tries; the goals after it are moved to all the same.
+
+    Parameters
+    ----------
+    controller
+        An agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation.
+    goals
+        20deg (from the middle of the range) or 650 (counts); of several joints 20deg,-5deg; - for standard input,
+        one a line.
+    arm
+        virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
+    seed
+        Of a virtual arm's noise.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    with open_arm(arm, seed) as opened:
+        mover, spec, goal_range = open_tracking(controller, opened, settings.tolerance)
+        wanted = read_goals(goals, spec, goal_range)
+        made: list[Moved] = []
+        with live(spec) as seen:
+            for one in move(opened, mover, wanted, settings, seen=seen):
+                made.append(one)
+                say(_told(one))
+    # What is printed is printed even where one failed: it says which.
+    result = {"movements": [one.results() for one in made]}
+    header = ("goal [deg]", "settled after [s]", "error at rest [deg]", "tries", "valve changes", "air [l]")
+    show(result, json, lambda: [table(header, [_row(one) for one in made], arm)])
+    failed = [one for one in made if not one.success]
+    if failed:
+        raise MovementFailed(
+            f"{len(failed)} of {len(made)} movements did not settle within {settings.tolerance:g} degrees: to "
+            f"{'; '.join(_degrees(one) for one in failed)}"
+        )
+
+
+def _told(one: Moved) -> str:
+    if one.time_settled is None:
+        how = f"not settled in {one.tries} tries"
+    else:
+        how = f"settled after {one.time_settled - one.time_start:.2f} s"
+    return f"{_degrees(one)}: {how}, error at rest {', '.join(f'{e:.2f}' for e in one.rest_error)} deg"
+
+
+def _degrees(one: Moved) -> str:
+    return ", ".join(f"{degrees:.1f}deg" for degrees in one.goal_degrees)
+
+
+def _row(one: Moved) -> tuple[object, ...]:
+    settled = "no" if one.time_settled is None else one.time_settled - one.time_start
+    rest = ", ".join(f"{e:.2f}" for e in one.rest_error)
+    return _degrees(one), settled, rest, one.tries, one.switches, "-" if one.air is None else one.air

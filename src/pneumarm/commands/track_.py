@@ -1,0 +1,53 @@
+"""``pneumarm track``."""
+
+from pneumarm.arm import open_arm
+from pneumarm.commands.common import Json
+from pneumarm.console import live, show, table
+from pneumarm.control.named import open_tracking
+from pneumarm.moving import check_seconds, track
+from pneumarm.task.reference import check_reachable, parse_reference
+
+_SECONDS = 20.0
+
+
+def track_(
+    controller: str,
+    /,
+    *,
+    arm: str,
+    reference: str,
+    seconds: float | None = None,
+    unforeseen: bool = False,
+    seed: int = 0,
+    json: Json = False,
+) -> None:
+    """Have an arm follow a reference. It first moves to where the reference begins.
+
+    Parameters
+    ----------
+    controller
+        An agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation.
+    arm
+        virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
+    reference
+        sine:0.5Hz,20deg, ramp:30deg/s,20deg, minimum-jerk:1s,20deg, steps:FILE.csv, or FILE.csv of time [s] and
+        degrees of each joint, 0 in the middle of the range.
+    seconds
+        For how long; by default as long as a file says, else 20 s.
+    unforeseen
+        The controller must not look at the reference's future, as if a person gave it by hand.
+    seed
+        Of a virtual arm's noise.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    with open_arm(arm, seed) as opened:
+        mover, spec, goal_range = open_tracking(controller, opened)
+        wanted = parse_reference(reference, spec, known_ahead=not unforeseen)
+        lasting = seconds if seconds is not None else wanted.duration or _SECONDS
+        check_seconds(lasting)
+        check_reachable(wanted, lasting, goal_range, spec)
+        with live(spec) as seen:
+            followed = track(opened, mover, wanted, lasting, seen=seen)
+    result = followed.results()
+    show(result, json, lambda: [table((reference, ""), [(name, str(value)) for name, value in result.items()], arm)])

@@ -1,0 +1,55 @@
+"""``pneumarm tune``."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pneumarm.arm import open_arm
+from pneumarm.classical import TuneSettings, tune
+from pneumarm.commands.common import Json, Settings
+from pneumarm.console import progress, say, show, table
+from pneumarm.files import require_folder
+
+
+def tune_(
+    kind: str,
+    /,
+    *,
+    arm: str,
+    out: Path,
+    seed: int = 0,
+    settings: Annotated[TuneSettings, Settings] = TuneSettings(),
+    json: Json = False,
+) -> None:
+    """Tune a classical controller on an arm: measure a static map and filling rates, then try gains on movements.
+
+    Parameters
+    ----------
+    kind
+        pid: a PID loop on the angle over loops on the pressures, with feed-forward through the static map; scheduled:
+        the same with gains scheduled over the angle; pwm: PID by pulse-width modulation; sliding: sliding mode over
+        the nine actions.
+    arm
+        virtual, virtual:seed=N, serial:PORT or python:module:callable.
+    out
+        File for the controller, JSON.
+    seed
+        Of what is tried, and of a virtual arm's noise.
+    json
+        Print one JSON object on stdout and nothing else there.
+    """
+    require_folder(out)
+    with open_arm(arm, seed) as opened, progress("tuning") as report:
+        tuned = tune(kind, opened, settings, seed, report)
+    tuned.save(out)
+    say(f"controller: {out}; move the arm by it with `pneumarm move {out} --arm {arm} 10deg`")
+    gains = dict(vars(tuned.gains))
+    low, high = tuned.spec.degrees(tuned.goal_range).T
+    result = {
+        "kind": kind,
+        "seconds": tuned.seconds,
+        "cost": tuned.cost,
+        "gains": gains,
+        "goal_range_deg": list(map(list, zip(low.tolist(), high.tolist(), strict=True))),
+    }
+    rows = [("arm time [s]", tuned.seconds), ("cost", tuned.cost), *gains.items()]
+    show(result, json, lambda: [table((kind, ""), rows, arm)])

@@ -1,0 +1,294 @@
+"""Moving to a goal and holding it, and following a reference, on any arm, with figures for people.
+
+A goal is *settled* when all joints are within the tolerance from a moment on until the end of the hold. The *error at
+rest* is the mean absolute error over the last second of the hold. A *switch* is a change of the setting of a muscle's
+valves; a pulse within a control period is two.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.arm import Arm, ControlCycle, GuardedArm, Reading, guarded
+from pneumarm.arm.controller import Controller, TrackingController
+from pneumarm.arm.reference import Reference
+from pneumarm.errors import UnusableInput
+from pneumarm.settings import check
+from pneumarm.transitions.rows import Recorded
+from pneumarm.transitions.watch import Watch, watched
+
+KIND = "movement"
+"""Kind of the sequence that a movement is."""
+LEAD_IN = 2.0
+"""Time in which the arm moves to where a reference begins, before that begins [s]."""
+Seen = Callable[[Reading, NDArray[np.float64]], None]
+"""Called with every reading and the angles (joints,) wanted at that time [counts]."""
+
+
+@dataclass(frozen=True)
+class MoveSettings:
+    """How a goal is moved to."""
+
+    hold: float = 2.0
+    """For how long a goal is held, from when it is given [s]."""
+    tries: int = 2
+    """How often a movement that has not settled is made (thesis section 5.6.1)."""
+    tolerance: float = 1.0
+    """A joint is there within so much [degrees]."""
+    pause: float = 2.0
+    """Time between two tries, with closed valves [s] (thesis section 5.6.1)."""
+
+    def __post_init__(self) -> None:
+        check(
+            self,
+            hold=0 < self.hold <= 86400,
+            tries=1 <= self.tries <= 100,
+            tolerance=0 < self.tolerance < 360,
+            pause=0 <= self.pause <= 3600,
+        )
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A goal that was given, and what came of it. Times are on the arm's clock [s]."""
+
+    goal: NDArray[np.float64]
+    """Shape (joints,) [counts]."""
+    time_start: float
+    """When the goal was given: the beginning of the first try."""
+    time_settled: float | None
+    """Since when all joints stayed within the tolerance; None where they did not."""
+    rest_error: NDArray[np.float64]
+    """Shape (joints,) [degrees]."""
+    overshoot: NDArray[np.float64]
+    """How far each joint went beyond the goal in its direction, shape (joints,) [degrees]."""
+    tries: int
+    switches: int
+    """Of all tries."""
+    air: float | None
+    """Air taken from the supply in all tries [normal litres]; None where the arm cannot say."""
+    recorded: Recorded
+    """The last try."""
+    goal_degrees: NDArray[np.float64]
+    """The goal in degrees from the middle of the range."""
+
+    @property
+    def success(self) -> bool:
+        """Whether it settled."""
+        return self.time_settled is not None
+
+    def results(self) -> dict[str, Any]:
+        """Return it as ``pneumarm move --json`` tells it."""
+        return {
+            "goal_deg": self.goal_degrees.round(4).tolist(),
+            "time_start": self.time_start,
+            "time_settled": self.time_settled,
+            "rest_error_deg": self.rest_error.round(4).tolist(),
+            "success": self.success,
+            "tries": self.tries,
+            "switches": self.switches,
+            "air_litres": self.air,
+        }
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """A reference that was followed. Times are on the arm's clock [s]."""
+
+    time_start: float
+    seconds: float
+    rms_error: NDArray[np.float64]
+    """Root of the mean squared error over all readings, shape (joints,) [degrees]."""
+    switches: int
+    air: float | None
+    """Air taken from the supply [normal litres]; None where the arm cannot say."""
+    recorded: Recorded
+    wanted: NDArray[np.float64]
+    """What the reference asked for at each reading, shape (n, joints) [counts]."""
+
+    def results(self) -> dict[str, Any]:
+        """Return it as ``pneumarm track --json`` tells it."""
+        return {
+            "time_start": self.time_start,
+            "seconds": self.seconds,
+            "rms_error_deg": self.rms_error.round(4).tolist(),
+            "switches": self.switches,
+            "air_litres": self.air,
+        }
+
+
+def at_period(arm: Arm, period: float) -> Arm:
+    """Return ``arm``, as it was opened, controlled with another ``period`` [s].
+
+    An arm whose spec lets its own latency pass (a modelled one) is given one of at most two fifths of the period: who
+    controls it faster computes faster.
+    """
+    if isinstance(arm, GuardedArm):
+        raise UnusableInput("the control period of an arm is chosen before it is guarded")
+    arm.spec = replace(arm.spec, period=period, latency=min(arm.spec.latency, 0.4 * period))
+    return arm
+
+
+def move(
+    arm: Arm,
+    controller: Controller,
+    goals: Iterable[ArrayLike],
+    settings: MoveSettings = MoveSettings(),
+    *,
+    watch: Watch | None = None,
+    seen: Seen | None = None,
+) -> Iterator[Moved]:
+    """Move ``arm`` to one goal (joints,) [counts] after the other, hold each, and yield what came of it.
+
+    Args:
+        arm: any arm; it is guarded here where it is not yet.
+        controller: what acts. One that cannot hold a goal is to be wrapped in :class:`~pneumarm.moving.Holding`.
+        goals: in order; the next is taken when the one before has been held.
+        settings: how long to hold, how often to try, how near is there.
+        watch: sees every reading, such as a :class:`~pneumarm.control.Monitor`.
+        seen: called with every reading, for a display.
+
+    """
+    cycle = ControlCycle(guarded(arm))
+    for goal in goals:
+        yield _move_to(cycle, controller, np.array(goal, np.float64).reshape(-1), settings, watch, seen)
+
+
+def track(
+    arm: Arm,
+    controller: TrackingController,
+    reference: Reference,
+    seconds: float,
+    *,
+    lead_in: float = LEAD_IN,
+    watch: Watch | None = None,
+    seen: Seen | None = None,
+) -> Tracked:
+    """Move ``arm`` to where ``reference`` begins, then follow it for ``seconds``; see :func:`move` for the rest."""
+    check_seconds(seconds)
+    cycle = ControlCycle(guarded(arm))
+    cycle.arm.make_ready()
+    closed = np.zeros_like(cycle.arm.applied)
+    if lead_in > 0:
+        begin = reference.at(0.0)
+        controller.reset(begin)
+        played(cycle, controller, lead_in, lambda time: begin, watch, seen)
+    air = _air_used(cycle.arm)
+    controller.track(reference)
+    recorded = played(cycle, controller, seconds, reference.at, watch, seen)
+    passed = recorded.time - recorded.time[0]
+    wanted = np.array([reference.at(float(time)) for time in passed])
+    error = (recorded.angle - wanted) / cycle.arm.spec.counts_per_degree
+    return Tracked(
+        time_start=float(recorded.time[0]),
+        seconds=float(passed[-1]),
+        rms_error=np.sqrt((error**2).mean(axis=0)),
+        switches=valve_changes(recorded.command[:-1], closed),
+        air=_air_since(cycle.arm, air),
+        recorded=recorded,
+        wanted=wanted,
+    )
+
+
+def played(
+    cycle: ControlCycle,
+    controller: Controller,
+    seconds: float,
+    wanted: Callable[[float], NDArray[np.float64]],
+    watch: Watch | None = None,
+    seen: Seen | None = None,
+) -> Recorded:
+    """Let ``controller`` act for ``seconds`` on the arm's clock; return all that was read and applied."""
+    begin: float | None = None
+
+    def decide(reading: Reading) -> NDArray[Any] | None:
+        nonlocal begin
+        begin = reading.time if begin is None else begin
+        passed = reading.time - begin
+        if seen is not None:
+            seen(reading, wanted(passed))
+        # The last turn is the one nearest to the end: a late one must not add another period.
+        return None if passed > seconds - cycle.arm.spec.period / 2 else controller.act(reading)
+
+    steps = watched(cycle.run(decide), watch, at_rest=False)
+    return Recorded.from_steps(steps, cycle.arm.spec, kind=KIND)
+
+
+def valve_changes(commands: NDArray[Any], before: NDArray[Any]) -> int:
+    """Return how often the setting of a muscle's valves changed.
+
+    Args:
+        commands: as applied, shape (n, joints, 2): -1, 0, +1, or pulses, the share of the period that is open.
+        before: what was applied before the first, of the same kind, shape (joints, 2).
+
+    """
+    opened = np.sign(commands)
+    left = np.where(np.abs(commands) >= 1, opened, 0)
+    found = np.concatenate([np.where(np.abs(before) >= 1, np.sign(before), 0)[None], left])[:-1]
+    return int((opened != found).sum() + (left != opened).sum())
+
+
+def check_seconds(seconds: float) -> None:
+    """Raise UnusableInput where a reference cannot be followed for ``seconds``."""
+    if not 0 < seconds <= 86400:
+        raise UnusableInput(f"a reference is followed for up to 86400 s, got {seconds}")
+
+
+def _move_to(
+    cycle: ControlCycle,
+    controller: Controller,
+    goal: NDArray[np.float64],
+    settings: MoveSettings,
+    watch: Watch | None,
+    seen: Seen | None,
+) -> Moved:
+    arm, spec = cycle.arm, cycle.arm.spec
+    if goal.shape != (spec.joints,) or not np.isfinite(goal).all():
+        raise UnusableInput(f"a goal needs {spec.joints} finite angle(s) in counts, got {goal}")
+    closed = np.zeros_like(arm.applied)
+    switches, air, start = 0, _air_used(arm), arm.read().time
+    for number in range(1, settings.tries + 1):
+        arm.make_ready()
+        controller.reset(goal)
+        recorded = played(cycle, controller, settings.hold, lambda time: goal, watch, seen)
+        switches += valve_changes(recorded.command[:-1], closed)
+        error = (recorded.angle - goal) / spec.counts_per_degree
+        settled = _settled(recorded.time, np.abs(error).max(axis=1), settings.tolerance)
+        if settled is not None or number == settings.tries:
+            break
+        arm.wait(settings.pause)
+    resting = recorded.time > recorded.time[-1] - 1
+    direction = -np.sign(error[0])
+    return Moved(
+        goal=goal,
+        time_start=start,
+        time_settled=settled,
+        rest_error=np.abs(error[resting]).mean(axis=0),
+        overshoot=np.maximum((direction * error).max(axis=0), 0.0),
+        tries=number,
+        switches=switches,
+        air=_air_since(arm, air),
+        recorded=recorded,
+        goal_degrees=spec.degrees(goal),
+    )
+
+
+def _settled(times: NDArray[np.float64], error: NDArray[np.float64], tolerance: float) -> float | None:
+    """Return the first of the ``times`` (n,) from which on the ``error`` (n,) stays within ``tolerance``."""
+    outside = np.flatnonzero(error > tolerance)
+    first = int(outside[-1]) + 1 if len(outside) else 0
+    return float(times[first]) if first < len(times) else None
+
+
+def _air_used(arm: GuardedArm) -> float | None:
+    """Return the air that ``arm`` has taken so far [normal litres]; None where it cannot say."""
+    used = getattr(arm, "air_used", None) or getattr(arm.arm, "air_used", None)
+    return float(used()) if callable(used) else None
+
+
+def _air_since(arm: GuardedArm, before: float | None) -> float | None:
+    now = _air_used(arm)
+    return None if now is None or before is None else now - before

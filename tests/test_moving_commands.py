@@ -1,0 +1,92 @@
+"""``pneumarm tune``, ``move`` and ``track`` on a virtual arm."""
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+
+from pneumarm.cli import main
+
+ARM = ("--arm", "virtual:seed=3")
+
+
+def called(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return int(str(ended.value.code)), out, err
+
+
+@pytest.fixture(scope="module")
+def controller(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("tuned") / "arm.pid"
+    with pytest.raises(SystemExit) as ended:
+        main(["tune", "pid", *ARM, "--out", str(file), "--seconds", "150", "--json"])
+    assert ended.value.code == 0
+    return file
+
+
+def test_move_tells_of_every_goal(
+    controller: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("12.5deg\n\n500\n"))
+    code, out, _ = called(capsys, "move", controller, *ARM, "--tries", 3, "0deg", "-5deg", "-", "650", "--json")
+    assert code == 0
+    assert out.count("\n") == 1
+    made = json.loads(out)["movements"]
+    assert [one["goal_deg"] for one in made] == [[0], [-5], [12.5], [-1.0107], [12.1726]]
+    for one in made:
+        assert one["success"] is True
+        assert one["time_start"] <= one["time_settled"]
+        assert 0 <= one["rest_error_deg"][0] < 1.5
+        assert one["switches"] > 0
+        assert 1 <= one["tries"] <= 3
+
+
+def test_a_movement_that_fails_is_told_of_and_ends_with_1(
+    controller: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tolerance = ("--tolerance", "0.01")
+    code, out, err = called(capsys, "move", controller, *ARM, "--tries", 1, *tolerance, "10deg", "--json")
+    assert code == 1
+    assert json.loads(out)["movements"][0]["time_settled"] is None
+    assert "did not settle" in err
+
+
+def test_track_tells_of_the_error(controller: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = called(
+        capsys, "track", controller, *ARM, "--reference", "sine:0.5Hz,15deg", "--seconds", 4, "--json"
+    )
+    followed = json.loads(out)
+    assert code == 0
+    assert set(followed) == {"time_start", "seconds", "rms_error_deg", "switches", "air_litres"}
+    assert followed["seconds"] == pytest.approx(4, abs=0.05)
+    assert 0 < followed["rms_error_deg"][0] < 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("move", "FILE", *ARM), "no goal"),
+        (("move", "FILE", *ARM, "90deg"), "seen to reach"),
+        (("move", "FILE", *ARM, "1000"), "seen to reach"),
+        (("move", "FILE", *ARM, "10deg,5deg"), "expected 1 angle"),
+        (("move", "FILE", *ARM, "ten"), "expected an angle"),
+        (("move", "FILE", *ARM, "--holt", "2", "10deg"), "holt"),
+        (("move", "FILE", *ARM, "--hold", "0", "10deg"), "hold"),
+        (("move", "none", *ARM, "10deg"), "no file none"),
+        (("track", "FILE", *ARM, "--reference", "sine:1Hz,80deg"), "choose a smaller one"),
+        (("track", "FILE", *ARM, "--reference", "cosine"), "expected sine"),
+        (("track", "FILE", *ARM, "--reference", "sine:1Hz,8deg", "--seconds", "0"), "86400"),
+        (("tune", "fuzzy", *ARM, "--out", "x"), "pid, pwm"),
+        (("tune", "pid", *ARM, "--out", "missing/x"), "does not exist"),
+        (("tune", "pid", *ARM, "--out", "x", "--seconds", "0"), "seconds"),
+    ],
+)
+def test_unusable_input_is_one_line_and_2(
+    controller: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
+) -> None:
+    code, out, err = called(capsys, *[str(controller) if one == "FILE" else one for one in arguments])
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err

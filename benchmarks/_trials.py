@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import open_arm
-from pneumarm.control import AgentController, Movement
+from pneumarm.control import AgentController
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent
 from pneumarm.simulation import FitSettings, StoreFit
-from pneumarm.task import BeginStates
+from pneumarm.task import BeginStates, Movement
 
 HELD_OUT = ",".join(str(seed) for seed in range(1001, 1011))
 """The arms to judge on; nothing is developed on them."""

@@ -52,6 +52,7 @@ from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, key, legend_below, 
 from pneumarm.simulation import FitSettings, fit_store
 from pneumarm.statistics import moving_mean
 from pneumarm.task import begin_states
+from pneumarm.task.movements import joined
 from pneumarm.transitions import KINDS, Store, collect
 
 Floats = NDArray[np.float64]
@@ -162,16 +163,16 @@ class Bench:
         arm = changed_arm(change, seed, 2000 + seed)
         with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", arm.spec) as store:
             moved = transfer(agent, arm, store, settings, seed=seed)
-        made = [*moved.phase("before"), *moved.phase("learning")]
+        made = joined([moved.movements["before"], moved.movements["learning"]])
         assert moved.adapted is not None
         return {
             "change": change,
             "seed": seed,
             "baseline": baseline,
-            "reward": [episode.reward for episode in made],
-            "success": [episode.success for episode in made],
-            "time": [episode.time_end - made[0].time_start for episode in made],
-            "squares": np.round(moved.adapted.squares[: len(made), 1], 4).tolist(),
+            "reward": made.reward.tolist(),
+            "success": made.success.tolist(),
+            "time": (made.time_end - made.time_start[0]).tolist(),
+            "squares": np.round(moved.adapted.squares[: made.n, 1], 4).tolist(),
             "events": [asdict(event) for event in moved.adapted.events if event.what != "refused"],
             "goal_range": agent.goal_range.tolist(),
         }

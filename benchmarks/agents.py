@@ -24,12 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
-from pneumarm.control import BEGIN, AgentController, Movement, move
+from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.control.transfer import begin_and_goal
 from pneumarm.learning import AnyAgent, LearnSettings, PolicyAgent, Trained, test, train
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.statistics import summarise
-from pneumarm.task import BeginStates, begin_states
+from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.transitions import KINDS, Store, collect
 
 TRANSITIONS = 200_000

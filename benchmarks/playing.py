@@ -52,7 +52,7 @@ def _played(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:
     player = Player(agent, arm, SETTINGS.learning_rate, EXPLORATION, seed=SEED, begin=BEGIN)
     began = time.process_time()
     made = player.play(goals, durations)
-    return time.process_time() - began, float(made.movements.reward.sum()), float(made.time_end[-1])
+    return time.process_time() - began, float(made.reward.sum()), float(made.time_end[-1])
 
 
 def _moved(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:

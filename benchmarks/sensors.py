@@ -34,11 +34,11 @@ from benchmarks._trials import SEED_OF_MOVEMENTS, Rows
 from pneumarm.arm import open_arm
 from pneumarm.arm.seam import SensorKind
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.control import Movement
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent, test, train
 from pneumarm.simulation import FitSettings
+from pneumarm.task import Movement
 from pneumarm.transitions import Store
 
 NIGHT = 14 * 3600.0

@@ -28,9 +28,9 @@ import numpy as np
 
 from benchmarks._trials import HELD_OUT, Rows, collected, fitted, moved
 from benchmarks.agents import kind
-from pneumarm.control import Movement
 from pneumarm.learning import load_agent, train
 from pneumarm.statistics import mean_estimate, rate_estimate
+from pneumarm.task import Movement
 
 SEED = 0
 """Of everything but the arm, as ``pneumarm run`` has it."""

@@ -9,8 +9,8 @@ import pytest
 from benchmarks import minutes, success
 from benchmarks._trials import Rows, collected, moved
 
-from pneumarm.control import Movement
 from pneumarm.learning import load_agent
+from pneumarm.task import Movement
 from pneumarm.transitions import Recorded
 
 

@@ -41,14 +41,15 @@ from benchmarks.baselines.table import HEADER, Row, curves, floor, line, pooled,
 from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.console import jsonable, peak_memory
-from pneumarm.control import BEGIN, Movement, move
+from pneumarm.control import BEGIN, move
 from pneumarm.control.transfer import begin_and_goal
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import AnyAgent, PolicyAgent, load_agent, test, test_ahead
 from pneumarm.planning import PlanAgent
 from pneumarm.planning.bound import BoundSettings, Planned, measure_bound
 from pneumarm.simulation import Simulation
-from pneumarm.task import BeginStates
+from pneumarm.task import BeginStates, Movement
+from pneumarm.task.movements import of_rows
 
 BOUNDS = {"open loop": "open_loop", "closed loop": "closed_loop"}
 METHODS = (*BOUNDS, PLANNING, *OURS, *STABLE)
@@ -149,9 +150,8 @@ def measured(folder: Path, arm: int, method: str, seed: int, wanted: Wanted) -> 
     row: Row = {"arm": arm, "method": method, "seed": seed, "wanted": vars(wanted)}
     if method in BOUNDS:
         planned = bound(folder, arm, wanted.movements)[BOUNDS[method]]
-        made, p99 = planned.episodes, planned.results()["decision_ms"]["p99"]
+        made, p99 = planned.made, planned.results()["decision_ms"]["p99"]
         row |= {"wall": 0.0, "cpu": 0.0, "curve": [], "simulation": None}
-        switches = [one.switches for one in made]
     else:
         learned = learn(method, simulation, begin, seed, wanted.steps)
         if method != PLANNING:
@@ -160,13 +160,13 @@ def measured(folder: Path, arm: int, method: str, seed: int, wanted: Wanted) -> 
             learned = replace(learned, agent=load_agent(agent))  # what is measured is what anyone could use
         row |= {"wall": learned.wall, "cpu": learned.cpu, "curve": learned.curve}
         row["simulation"] = tested(learned.agent, simulation, begin, wanted.tests)
-        made, p99 = moved(learned.agent, arm, wanted.movements)
-        switches = [int(one.switches.sum()) for one in made]
+        rows, p99 = moved(learned.agent, arm, wanted.movements)
+        made = of_rows(one.row() for one in rows)
     return row | {
-        "reward": [one.reward for one in made],
-        "success": [int(one.success) for one in made],
-        "actions": [one.actions for one in made],
-        "switches": switches,
+        "reward": made.reward.tolist(),
+        "success": made.success.astype(int).tolist(),
+        "actions": made.actions.tolist(),
+        "switches": made.all_switches.tolist(),
         "p99_ms": p99,
         "memory_mb": peak_memory(),
     }

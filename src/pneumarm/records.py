@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.control import BEGIN, AgentController, move
-from pneumarm.control import Movement as Moved
 from pneumarm.learning import AnyAgent, FleetTraining, Trained
-from pneumarm.report.data import Episodes, LearningData, MarkedData, Movement, TrainingData
-from pneumarm.task import TestResult
+from pneumarm.report.data import Demonstration, LearningData, MarkedData, TrainingData
+from pneumarm.task import Movement
 from pneumarm.transitions import Store
 
 DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large displacement": 70.0}
@@ -49,21 +48,6 @@ def training_record(training: Trained) -> TrainingData | LearningData:
     )
 
 
-def test_record(tested: TestResult) -> Episodes:
-    """Return the movements of a test in the simulation."""
-    nothing = np.zeros(len(tested.reward))
-    return Episodes(
-        goal=tested.goal,
-        angle_begin=tested.angle_begin,
-        actions=tested.actions.astype(np.float64),
-        switches=tested.switches.sum(axis=1).astype(np.float64),
-        reward=tested.reward,
-        success=tested.success,
-        time_start=nothing,
-        time_end=nothing,
-    )
-
-
 def marked_record(store: Store) -> MarkedData:
     """Return which of the stored rows are marked and why, in the order of recording."""
     stages = {number: run["purpose"] for number, run in store.runs().items()}
@@ -98,7 +82,7 @@ def _in_short(reason: str) -> str:
     return reason.split(" since ")[0].split(" here: ")[0].replace("-", " ")
 
 
-def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Movement]:
+def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Demonstration]:
     """Make and record typical movements, with a second after each in which the arm swings out.
 
     The agent itself brings the arm to where a movement begins; a displacement larger than its range is left out.
@@ -118,18 +102,18 @@ def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Movement]:
     return shown
 
 
-def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Moved:
+def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Movement:
     task = agent.settings
     return move(cycle, AgentController(agent), goal, task.reward, task.cutoff, velocity=agent.window.velocity)
 
 
-def _recorded(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Movement:
+def _recorded(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Demonstration:
     spec = cycle.arm.spec
     made = _move(agent, cycle, goal)
     tail = list(cycle.run(_closed_for(round(_TAIL / spec.period), cycle.applied)))
     recorded = made.recorded
     closed = np.zeros((len(tail), spec.joints, 2))
-    return Movement(
+    return Demonstration(
         time=np.concatenate([recorded.time[:-1], _times(tail)]),
         angle=np.concatenate([recorded.angle[:-1], [step.reading.angle for step in tail]]),
         pressure=np.concatenate([recorded.pressure[:-1], [step.reading.pressure for step in tail]]),

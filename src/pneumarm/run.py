@@ -17,7 +17,7 @@ from typing import Any
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
-from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper, write_episodes
+from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper
 from pneumarm.control.found import collected_results
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
@@ -25,11 +25,12 @@ from pneumarm.learning import LOOKING_AHEAD, LearnSettings, load_agent, results_
 from pneumarm.learning import test as test_agent
 from pneumarm.planning import PlanSettings
 from pneumarm.planning.bound import BoundSettings, known_bound
-from pneumarm.records import demonstrate, marked_record, test_record, training_record
-from pneumarm.report import read_episodes, save_movement, save_spec, write_report
+from pneumarm.records import demonstrate, marked_record, training_record
+from pneumarm.report import save_demonstration, save_spec, write_report
+from pneumarm.report.run_report import TEST
 from pneumarm.settings import Valid
 from pneumarm.simulation import FitSettings, Simulation, fit_store
-from pneumarm.task import BeginStates, begin_states
+from pneumarm.task import BeginStates, begin_states, read_episodes, write_episodes
 from pneumarm.transitions import KINDS, CollectSettings, Store, collect, enough
 
 Progress = Callable[[str], AbstractContextManager[Report]]
@@ -182,7 +183,7 @@ class Run:
         begin, episodes, seed = self._begin_states(simulation), self.settings.test_episodes, self.settings.seed
         tested = test_agent(agent, simulation, begin, episodes, seed)
         ahead = test_ahead(agent, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
-        test_record(tested).save(self.folder)
+        tested.save(self.folder / TEST)
         return {"test": results_with_lookahead(tested, ahead)}
 
     def _transfer(self) -> dict[str, Any]:
@@ -201,13 +202,13 @@ class Run:
                 progress=report,
                 keep_version=version_keeper(self.folder),
             )
-            movements = demonstrate(moved.agent, arm, wanted.seed)
+            demonstrations = demonstrate(moved.agent, arm, wanted.seed)
             marked_record(store).save(self.folder)
         moved.agent.save(self.adapted)
         save_history(self.folder, moved.adapted)
-        write_episodes(self.episodes, moved.episodes)
-        for number, movement in enumerate(movements):
-            save_movement(self.folder, movement, number)
+        write_episodes(self.episodes, moved.movements)
+        for number, shown in enumerate(demonstrations):
+            save_demonstration(self.folder, shown, number)
         return {"transfer": moved.results()}
 
     def _bound(self) -> dict[str, Any]:

@@ -25,17 +25,15 @@ def planned():  # type: ignore[no-untyped-def]
 
 def test_planners_reach_the_same_goals_and_none_beats_the_bound_by_far(planned) -> None:  # type: ignore[no-untyped-def]
     assert list(planned) == ["open_loop", "closed_loop"]
-    open_, closed = (planned[baseline].episodes for baseline in planned)
-    assert [e.goal for e in open_] == [e.goal for e in closed]
-    assert all(e.success for e in open_)
-    assert all(abs(a.angle_begin[0] - b.angle_begin[0]) < 60 for a, b in zip(open_, closed, strict=True))
+    open_, closed = (planned[baseline].made for baseline in planned)
+    np.testing.assert_array_equal(open_.goal, closed.goal)
+    assert open_.success.all()
+    assert (np.abs(open_.angle_begin - closed.angle_begin) < 60).all()
     for planned_ in planned.values():
-        results = planned_.results()
+        results, made = planned_.results(), planned_.made
         assert results["episodes"] == 8
         assert results["unproven_plans"] == 0
-        assert results["reward"] == pytest.approx(
-            np.mean([51 * e.success - e.actions - 8 * e.switches for e in planned_.episodes])
-        )
+        assert results["reward"] == pytest.approx(np.mean(51 * made.success - made.actions - 8 * made.all_switches))
         assert results["decision_ms"]["p99"] >= results["decision_ms"]["median"] > 0
     assert planned["open_loop"].results()["reward"] > 30
 
@@ -43,9 +41,9 @@ def test_planners_reach_the_same_goals_and_none_beats_the_bound_by_far(planned) 
 def test_the_same_seed_gives_the_same_movements(planned) -> None:  # type: ignore[no-untyped-def]
     again = measure_bound(VirtualArm(draw_parameters(9), name="ninth"), GOALS, FEW, seed=3)
     for baseline in planned:
-        assert again[baseline].episodes == planned[baseline].episodes
+        assert again[baseline].made.rows() == planned[baseline].made.rows()
     other = measure_bound(VirtualArm(draw_parameters(9)), GOALS, FEW, seed=4)
-    assert other["open_loop"].episodes != planned["open_loop"].episodes
+    assert other["open_loop"].made.rows() != planned["open_loop"].made.rows()
 
 
 def test_the_arm_that_is_asked_about_is_not_moved() -> None:
@@ -72,7 +70,7 @@ def test_command(capsys: pytest.CaptureFixture[str], small_run: Path) -> None:
 
 
 def test_the_distance_is_taken_movement_by_movement(planned) -> None:  # type: ignore[no-untyped-def]
-    best = np.array([e.reward for e in planned["open_loop"].episodes])
+    best = planned["open_loop"].made.reward
     lost = np.array([0.0, 3.0, 1.0, 8.0, 0.0])
     assert planned["open_loop"].distance(best[:5] - lost) == {"episodes": 5, "reward": 2.4, "interval": None}
     more = planned["open_loop"].distance(np.concatenate([best - 1.0, np.zeros(100)]))

@@ -12,13 +12,13 @@ from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.arm.valves import VALVES
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, without_noise
 from pneumarm.arm.virtual.rollout import advance_physics
-from pneumarm.control import Movement, move
+from pneumarm.control import move
 from pneumarm.errors import UnusableInput
 from pneumarm.planning import PhysicsModel, Planner, PlanSettings, SimulationModel, physics_planner, simulated_planner
 from pneumarm.planning.search import Uncertainty, find, problem, tree, within, workspace_of
 from pneumarm.simulation import NoiseSettings, SimulationArm
 from pneumarm.simulation.rollout import advance_simulated, copy_simulated, simulated_states, simulated_world
-from pneumarm.task import Reward
+from pneumarm.task import Movement, Reward
 
 BEGIN = BeginState(deflate=0.5, inflate=0.8, settle=0.5)
 REWARD = Reward()

@@ -17,6 +17,7 @@ from pneumarm.learning import Agent, Exploration, TrainSettings
 from pneumarm.learning.online.learner import OnlineLearner
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.values import draw_networks
+from pneumarm.task.movements import joined, of_rows
 
 COUNT = 12
 RANGE = np.array([[150.0, 850.0]])
@@ -59,14 +60,9 @@ def test_it_is_move_bit_for_bit(parameters: ArmParameters, settings: dict[str, o
         made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
     player = Player(agent, other, rate, exploration, seed=4, begin=begin)
     first, second = (player.play(*(a[part] for a in draws(begin))) for part in (slice(0, 5), slice(5, COUNT)))
-    for name in ("goal", "angle_begin", "angle_end", "velocity_end", "actions", "switches", "reward", "success"):
-        expected = {
-            "angle_begin": [m.recorded.angle[0] for m in made],
-            "angle_end": [m.recorded.angle[-1] for m in made],
-        }.get(name) or [getattr(m, name) for m in made]
-        found = np.concatenate([getattr(first.movements, name), getattr(second.movements, name)])
-        np.testing.assert_array_equal(found, np.array(expected).reshape(found.shape), err_msg=name)
-    np.testing.assert_array_equal(np.concatenate([first.time_end, second.time_end]), [m.time_end for m in made])
+    played, expected = joined([first, second]), of_rows(one.row() for one in made)
+    for name in played._fields:
+        np.testing.assert_array_equal(getattr(played, name), getattr(expected, name), err_msg=name)
     np.testing.assert_array_equal(player.learned.weights(), learning.weights())
     assert other.get_state() == one.get_state()
     assert (rate == 0) == np.array_equal(learning.weights(), agent.weights())
@@ -78,12 +74,12 @@ def test_goals_near_to_where_the_arm_stands() -> None:
     """Within the deviation and the range of goals, as far as there is one within both."""
     agent, (goals, durations) = new_agent(), draws(BeginState())
     player = Player(agent, VirtualArm(draw_parameters(2), seed=1), 0.05, seed=1)
-    near = player.play(goals, durations, Schedule(60.0, 0.5, 20.0, 0.002)).movements
+    near = player.play(goals, durations, Schedule(60.0, 0.5, 20.0, 0.002))
     inside = np.clip(near.angle_begin, *RANGE[0])
     assert np.abs(near.goal - inside).max() <= 62.0  # another reading of the angle: its noise
     assert ((near.goal >= RANGE[0, 0]) & (near.goal <= RANGE[0, 1])).all()
     assert len(np.unique(near.goal)) == COUNT
-    far = Player(agent, VirtualArm(draw_parameters(2), seed=1)).play(goals, durations).movements
+    far = Player(agent, VirtualArm(draw_parameters(2), seed=1)).play(goals, durations)
     np.testing.assert_array_equal(far.goal, goals)
 
 
@@ -91,9 +87,9 @@ def test_it_ends_where_the_performance_is_enough() -> None:
     generous = replace(TrainSettings().reward, angle_tolerance=1e4, velocity_tolerance=1e4)
     player = Player(new_agent(reward=generous), VirtualArm(seed=1), 0.05)
     played = player.play(*draws(BeginState()), Schedule(np.inf, 0.1, 1.0, 0.5, enough=0.9))
-    assert len(played.time_end) == 4  # 1 - 0.5^4 is the first above 0.9
+    assert played.n == 4  # 1 - 0.5^4 is the first above 0.9
     assert player.performance == 1 - 0.5**4
-    assert (played.movements.actions == 1).all()
+    assert (played.actions == 1).all()
 
 
 def test_visits_are_begin_states() -> None:
@@ -102,7 +98,7 @@ def test_visits_are_begin_states() -> None:
     angle, pressure = Player(agent, quiet[0]).visit(durations)
     assert angle.shape == (COUNT, 1)
     assert pressure.shape == (COUNT, 1, 2)
-    played = Player(agent, quiet[1]).play(goals[:1], durations[:1]).movements
+    played = Player(agent, quiet[1]).play(goals[:1], durations[:1])
     assert played.angle_begin[0] == angle[0]
 
 

@@ -9,8 +9,8 @@ from pneumarm.arm import ControlCycle, Reading, Step, guarded
 from pneumarm.arm.valves import to_valves
 from pneumarm.arm.virtual import SupplyLoss, VirtualArm, draw_parameters
 from pneumarm.control import Monitor
-from pneumarm.control.transfer import LONGEST_PAUSE, running_time
 from pneumarm.errors import ArmFailure
+from pneumarm.task.movements import LONGEST_PAUSE, running_time
 from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
 from pneumarm.transitions.rows import Recorded
 

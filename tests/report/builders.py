@@ -12,9 +12,8 @@ from pneumarm.control import Adapted, Finding
 from pneumarm.control.found import Found
 from pneumarm.report import (
     CoverageData,
-    Episodes,
+    Demonstration,
     MarkedData,
-    Movement,
     QualityData,
     RunData,
     TrainingData,
@@ -22,6 +21,7 @@ from pneumarm.report import (
 )
 from pneumarm.report.figures import Baseline
 from pneumarm.statistics import Estimate
+from pneumarm.task import Movements
 from pneumarm.transitions.window import QUANTITIES, Window
 
 
@@ -118,15 +118,17 @@ def episodes(n, joints=1, seed=0, begin=0.0, on_arm=True, success=0.98, extra=0.
     reward = 50.0 * won - actions + won - 8 * switches
     seconds = actions / 30
     ends = begin + np.cumsum(seconds + 3.75)
-    return Episodes(
+    return Movements(
         goal=goal,
         angle_begin=start,
-        actions=actions.astype(float),
-        switches=switches.astype(float),
+        angle_end=goal,
+        velocity_end=np.zeros_like(goal),
+        actions=actions,
+        switches=switches[:, None],
         reward=reward,
         success=won,
-        time_start=ends - seconds if on_arm else np.zeros(n),
-        time_end=ends if on_arm else np.zeros(n),
+        time_start=np.round(ends - seconds, 4) if on_arm else np.zeros(n),
+        time_end=np.round(ends, 4) if on_arm else np.zeros(n),
     )
 
 
@@ -165,7 +167,7 @@ def movement(name="large displacement", goal=70.0, joints=1, n=45, reached=True)
     pressure = spec.counts_per_bar * np.stack([0.3 + 0.5 * path, 0.7 - 0.45 * path], axis=1)
     valves = np.zeros((n, joints, 2))
     valves[:14, :, 0], valves[:9, :, 1], valves[14:20, :, 1] = 1, -1, 1
-    return Movement(
+    return Demonstration(
         time=t,
         angle=np.repeat(angle[:, None], joints, axis=1),
         pressure=np.repeat(pressure[:, None], joints, axis=1),
@@ -257,7 +259,7 @@ def run(joints=1, small=False):
         test=episodes(10_000 // part, joints, on_arm=False, success=0.995),
         transfer=transfer(joints, (500 // part, 1500 // part, 500 // part)),
         adaptation=adaptation(2500 // part, joints),
-        movements=(
+        demonstrations=(
             movement("large displacement", 70.0, joints),
             movement("typical displacement", 30.0, joints),
             movement("small displacement", -5.0, joints, reached=False),

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from pneumarm.arm import ArmSpec
-from pneumarm.report import Episodes, figures
+from pneumarm.report import figures
 from pneumarm.report.figures import Classification
 from pneumarm.report.sections import RunData, all_sections, classifications, levels, phases_of
 from pneumarm.report.style import DARK, LIGHT, MIDDLE, svg
+from pneumarm.task.movements import movements
 
 SPEC = ArmSpec()
 
@@ -25,7 +26,7 @@ def figures_of(n, joints):
     test = builders.episodes(n, joints, on_arm=False)
     phases = phases_of(builders.transfer(joints, (n, n, n)))
     won = test.success
-    far = (test.distance[won], test.actions[won], test.switches[won])
+    far = (test.distance[won], test.actions[won], test.all_switches[won])
     real, simulated = q.target - q.observation, q.predicted - q.observation
     adapted = builders.adaptation(n, joints)
     marks = [figures.Mark(event.movement, event.what) for event in adapted.events]
@@ -40,7 +41,7 @@ def figures_of(n, joints):
         "density": figures.isoplot(real, simulated, spec, density=True),
         "propagation": figures.error_propagation(q.propagation, spec),
         "importance": figures.input_importance(q.weights, q.inputs, q.outputs),
-        "distributions": figures.distributions(test.reward, test.actions, test.switches, won),
+        "distributions": figures.distributions(test.reward, test.actions, test.all_switches, won),
         "transfer": figures.transfer_curves(phases, levels(test)),
         "displacement": figures.against_displacement(*far, spec),
         "baselines": figures.baselines(*(builders.baselines(min(n, 10)) if n else ([], {}))),
@@ -207,13 +208,13 @@ def test_all_alternatives_hold_computed_numbers():
             assert "thesis" in picture.caption
             assert "nan" not in picture.alt
     test = run.test
-    alt = figures.distributions_alt(test.reward, test.actions, test.switches, test.success)
+    alt = figures.distributions_alt(test.reward, test.actions, test.all_switches, test.success)
     assert f"{test.success.mean():.2%}" in alt
     assert f"median {np.median(test.actions):g}" in alt
 
 
 def test_a_run_without_anything_has_its_results_only():
-    sections = all_sections(RunData(SPEC, {}, test=Episodes.none(1)))
+    sections = all_sections(RunData(SPEC, {}, test=movements(0)))
     assert [s.title for s in sections] == ["Results", "Test in the simulation"]
 
 

@@ -1,4 +1,3 @@
-import csv
 import json
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -12,24 +11,24 @@ from pneumarm.control import save_history
 from pneumarm.errors import UnusableInput
 from pneumarm.report import (
     CoverageData,
-    Episodes,
-    Movement,
+    Demonstration,
     QualityData,
     RunData,
     Section,
     Table,
     TrainingData,
-    read_episodes,
     read_run,
     render,
     run_page,
-    save_movement,
+    save_demonstration,
     save_spec,
     write_report,
 )
-from pneumarm.report.data import COLUMNS
 from pneumarm.report.ledger import beside_thesis, ledger
+from pneumarm.report.run_report import TEST
 from pneumarm.report.sections import overview
+from pneumarm.task import Movements, read_episodes, write_episodes
+from pneumarm.task.movements import COLUMNS, movements
 
 VOID = {"meta", "img", "link", "br", "hr", "input"}
 MOST_BYTES = 6e6
@@ -149,21 +148,13 @@ def test_sections_of_the_same_title_are_refused():
 def save(folder, run):
     (folder / "results.json").write_text(json.dumps(run.results))
     save_spec(folder, run.spec)
-    for record in (run.coverage, run.quality, run.training, run.test, run.marked):
+    for record in (run.coverage, run.quality, run.training, run.marked):
         record.save(folder)
+    run.test.save(folder / TEST)
     save_history(folder, run.adaptation)
-    for number, movement in enumerate(run.movements):
-        save_movement(folder, movement, number)
-    with open(folder / "episodes.csv", "w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for phase, e in run.transfer.phases.items():
-            for i in range(len(e)):
-                goal, begin = (" ".join(repr(float(v)) for v in values[i]) for values in (e.goal, e.angle_begin))
-                writer.writerow(
-                    [phase, goal, e.time_start[i], e.time_end[i], begin, goal, "0.1", e.actions[i], e.switches[i],
-                     e.reward[i], int(e.success[i])]
-                )  # fmt: skip
+    for number, shown in enumerate(run.demonstrations):
+        save_demonstration(folder, shown, number)
+    write_episodes(folder / "episodes.csv", run.transfer.phases)
 
 
 @pytest.mark.parametrize("joints", [1, 2])
@@ -173,15 +164,15 @@ def test_what_a_run_leaves_in_its_folder_comes_back(tmp_path, joints):
     found = read_run(tmp_path)
     assert found.spec == run.spec
     records = [(found.coverage, run.coverage), (found.quality, run.quality), (found.training, run.training)]
-    records += [(found.test, run.test), (found.marked, run.marked), *zip(found.movements, run.movements, strict=True)]
-    records += list(zip(found.transfer.phases.values(), run.transfer.phases.values(), strict=True))
-    for back, sent in records:
-        for name in sent.shapes:
+    records += [(found.marked, run.marked), *zip(found.demonstrations, run.demonstrations, strict=True)]
+    made = [(found.test, run.test), *zip(found.transfer.phases.values(), run.transfer.phases.values(), strict=True)]
+    for back, sent in [*records, *made]:
+        for name in getattr(sent, "shapes", Movements._fields):
             assert np.array_equal(getattr(back, name), getattr(sent, name)), name
     assert found.transfer.learning_rate == 0.05
     assert found.adaptation.events == run.adaptation.events
     np.testing.assert_array_equal(found.adaptation.squares, run.adaptation.squares)
-    assert [m.end for m in found.movements] == [m.end for m in run.movements]
+    assert [m.end for m in found.demonstrations] == [m.end for m in run.demonstrations]
 
 
 def test_write_report_writes_the_same_page_every_time(tmp_path):
@@ -195,7 +186,7 @@ def test_write_report_writes_the_same_page_every_time(tmp_path):
 def test_report_of_a_run_without_transfer(tmp_path):
     (tmp_path / "results.json").write_text("{}")
     save_spec(tmp_path, ArmSpec())
-    builders.episodes(1, on_arm=False).save(tmp_path)
+    builders.episodes(1, on_arm=False).save(tmp_path / TEST)
     page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
     assert [a["id"] for t, a in page.elements if t == "section"] == [
         "section-results",
@@ -204,7 +195,7 @@ def test_report_of_a_run_without_transfer(tmp_path):
 
 
 def test_run_whose_arm_did_nothing_can_be_reported():
-    run = RunData(ArmSpec(), {}, test=Episodes.none(1), transfer=builders.transfer(counts=(0, 0, 0)))
+    run = RunData(ArmSpec(), {}, test=movements(0), transfer=builders.transfer(counts=(0, 0, 0)))
     assert "No episodes were done on the arm." in run_page(run)
     assert "nan" not in " ".join(Page(run_page(run)).text)
 
@@ -218,7 +209,7 @@ def test_run_whose_arm_did_nothing_can_be_reported():
         ("arm.json", '{"angle_range": [0, 1023], "wings": 2}', "expected the spec of an arm"),
         ("episodes.csv", "phase,goal\n", "'actions'"),
         ("episodes.csv", ",".join(COLUMNS) + "\nbefore,x,0,1,2,2,0,1,0,50,1\n", "a cell is not what its column says"),
-        ("episodes.csv", ",".join(COLUMNS) + "\nbefore,1 2,0,1,2,2,0,1,0,50,1\n", "angle_begin must have the shape"),
+        ("episodes.csv", ",".join(COLUMNS) + "\nbefore,1 2,0,1,2,2,0,1,0,50,1\n", "goal of 2"),
         ("test_episodes.safetensors", "damaged", "this is something else"),
     ],
 )
@@ -233,9 +224,9 @@ def test_unusable_files_are_named_with_what_to_do(tmp_path, file, content, told)
 
 
 def test_a_file_of_another_record_is_refused(tmp_path):
-    builders.coverage(10).save(tmp_path, Episodes.file)
-    with pytest.raises(UnusableInput, match="report Episodes"):
-        Episodes.load(tmp_path)
+    file = builders.coverage(10).save(tmp_path)
+    with pytest.raises(UnusableInput, match="pneumarm movements"):
+        Movements.load(file)
 
 
 @pytest.mark.parametrize(
@@ -249,7 +240,6 @@ def test_a_file_of_another_record_is_refused(tmp_path):
         (builders.movement, {"time": np.full(45, np.nan)}),
         (builders.marked, {"stages": ("collect",)}),
         (builders.marked, {"reasons": ("one",)}),
-        (lambda: builders.episodes(5), {"reward": np.zeros(4)}),
     ],
 )
 def test_records_refuse_arrays_that_do_not_fit(make, change):
@@ -258,7 +248,7 @@ def test_records_refuse_arrays_that_do_not_fit(make, change):
 
 
 def test_records_name_their_files():
-    files = [r.file for r in (CoverageData, QualityData, TrainingData, Episodes, Movement)]
+    files = [r.file for r in (CoverageData, QualityData, TrainingData, Demonstration)]
     assert len(set(files)) == len(files)
 
 

@@ -2,17 +2,15 @@
 
 from pneumarm.control.agent import AgentController
 from pneumarm.control.monitor import Finding, Monitor, MonitorSettings
-from pneumarm.control.movement import LearningController, Movement, move
+from pneumarm.control.movement import LearningController, move
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.players import open_controller
 from pneumarm.control.transfer import (
     BEGIN,
-    Episode,
     Transferred,
     TransferSettings,
     transfer,
     transfer_into,
-    write_episodes,
 )
 from pneumarm.control.versions import Adapted, History, put_back, read_history, save_history, version_keeper
 
@@ -20,13 +18,11 @@ __all__ = [
     "BEGIN",
     "Adapted",
     "AgentController",
-    "Episode",
     "Finding",
     "History",
     "LearningController",
     "Monitor",
     "MonitorSettings",
-    "Movement",
     "TransferSettings",
     "Transferred",
     "move",
@@ -38,5 +34,4 @@ __all__ = [
     "transfer",
     "transfer_into",
     "version_keeper",
-    "write_episodes",
 ]

@@ -1,7 +1,6 @@
 """One movement on an arm: from where it stands to a goal, counted as the thesis counts an episode (5.1, 5.2)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, Controller, Reading, Step
 from pneumarm.errors import ArmFailure
-from pneumarm.task import Reward
+from pneumarm.task import Movement, Reward
 from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.watch import Watch, watched
 
@@ -30,33 +29,6 @@ class LearningController(Controller, Protocol):
 
         ``terminal`` says that the goal is reached; a movement that is merely cut off is not terminal.
         """
-
-
-@dataclass(frozen=True)
-class Movement:
-    """A movement that was made: its figures, and all that was read and applied."""
-
-    goal: NDArray[np.float64]
-    """Shape (joints,) [counts]."""
-    actions: int
-    switches: NDArray[np.int64]
-    """Shape (joints,): how often the action of a joint differed from the one before it."""
-    reward: float
-    success: bool
-    velocity_end: NDArray[np.float64]
-    """Velocity at the last reading, shape (joints,) [counts/ms]."""
-    recorded: Recorded
-    """All readings and commands, ready for a store."""
-
-    @property
-    def time_start(self) -> float:
-        """Arm time of the first reading [s]."""
-        return float(self.recorded.time[0])
-
-    @property
-    def time_end(self) -> float:
-        """Arm time of the last reading [s]."""
-        return float(self.recorded.time[-1])
 
 
 def move(

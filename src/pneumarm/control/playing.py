@@ -8,7 +8,7 @@ not wait for each other; an agent that learns on the arm alone needs 80,000 s of
 It is for virtual arms without faults or further sensors, and for agents of the thesis' kind.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,16 +34,6 @@ from pneumarm.task.begin import BeginParameters, draw_interval
 from pneumarm.task.movements import Movements, movements
 
 Array = NDArray[np.float64]
-
-
-class Played(NamedTuple):
-    """Movements that were made, an entry a movement."""
-
-    movements: Movements
-    time_start: Array
-    """Arm time of the first reading, shape (n,) [s]."""
-    time_end: Array
-    """Arm time of the last reading, shape (n,) [s]."""
 
 
 class _Watched(NamedTuple):
@@ -115,12 +105,6 @@ class _Aims(NamedTuple):
     near: BeginParameters
     """Distribution of goals around the angle at the begin, used where the deviation is finite."""
     random: NDArray[np.uint64]
-
-
-def part_of(made: Movements, first: int, end: int) -> Movements:
-    """Return the movements from number ``first`` up to ``end``."""
-    parts: Any = (array[first:end] for array in made)
-    return Movements(*parts)
 
 
 class Player:
@@ -209,7 +193,7 @@ class Player:
         self.performance = 0.0
         """Moving average of successes (thesis eq. 4.14) by the schedule of :meth:`play`."""
 
-    def play(self, goals: Array, durations: Array, schedule: Schedule | None = None) -> Played:
+    def play(self, goals: Array, durations: Array, schedule: Schedule | None = None) -> Movements:
         """Make movements, each from a begin state of its own; ends early where the schedule's demand is met.
 
         Args:
@@ -221,7 +205,6 @@ class Player:
         """
         goals, durations = np.ascontiguousarray(goals, np.float64), np.ascontiguousarray(durations, np.float64)
         record = movements(len(goals), goals.shape[1])
-        played = Played(record, np.zeros(len(goals)), np.zeros(len(goals)))
         aims = _Aims(goals, durations, self._near, self._aim_random)
         count, self.performance = _play(
             self.arm.plain,
@@ -229,10 +212,10 @@ class Player:
             (self._mind, schedule or self._schedule),
             self._rules,
             aims,
-            played,
+            record,
             float(self.performance),
         )
-        return Played(part_of(record, 0, count), played.time_start[:count], played.time_end[:count])
+        return record.part(slice(count))
 
     def visit(self, durations: Array) -> tuple[Array, Array]:
         """Bring the arm to rest once for each of ``durations`` (n, joints, 2) [s] and only look.
@@ -363,9 +346,9 @@ def _aim(aims: _Aims, watched: _Watched, deviation: float, goal: Array) -> None:
 
 
 @kernel
-def _move(body, watched, mind, schedule, rules, goal, played, e):  # type: ignore[no-untyped-def]
+def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignore[no-untyped-def]
     """Make movement ``e`` to ``goal``, as ``move`` does; return whether it succeeded."""
-    record, joints = played.movements, goal.size
+    joints = goal.size
     before, velocity = np.zeros(joints), np.zeros(joints)
     last, paid = np.zeros((joints, 2), np.int8), np.zeros(joints)
     place = mind.places
@@ -373,7 +356,7 @@ def _move(body, watched, mind, schedule, rules, goal, played, e):  # type: ignor
     while True:
         time = _read(body, watched)
         if record.actions[e] == 0:
-            played.time_start[e] = time
+            record.time_start[e] = time
             due = time
             for j in range(joints):
                 record.goal[e, j], record.angle_begin[e, j] = goal[j], watched.angle[j]
@@ -421,7 +404,7 @@ def _move(body, watched, mind, schedule, rules, goal, played, e):  # type: ignor
         pass_until(body, due)
     watched.asked[:] = 0
     _set(body, watched)
-    played.time_end[e] = time
+    record.time_end[e] = time
     record.success[e] = success
     for j in range(joints):
         record.angle_end[e, j], record.velocity_end[e, j] = watched.angle[j], velocity[j]
@@ -429,8 +412,8 @@ def _move(body, watched, mind, schedule, rules, goal, played, e):  # type: ignor
 
 
 @kernel
-def _play(body, watched, mind_schedule, rules, aims, played, performance):  # type: ignore[no-untyped-def]
-    """Fill ``played`` with movements; return how many, and the performance (thesis eq. 4.14) after them."""
+def _play(body, watched, mind_schedule, rules, aims, record, performance):  # type: ignore[no-untyped-def]
+    """Fill ``record`` with movements; return how many, and the performance (thesis eq. 4.14) after them."""
     mind, schedule = mind_schedule
     goal = np.zeros(aims.goals.shape[1])
     for e in range(aims.goals.shape[0]):
@@ -440,7 +423,7 @@ def _play(body, watched, mind_schedule, rules, aims, played, performance):  # ty
         if schedule.deviation < np.inf:
             _read(body, watched)
             _aim(aims, watched, schedule.deviation, goal)
-        success = _move(body, watched, mind, schedule, rules, goal, played, e)
+        success = _move(body, watched, mind, schedule, rules, goal, record, e)
         performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
         if performance >= schedule.enough:
             return e + 1, performance

@@ -1,16 +1,14 @@
 """Transfer: an agent moves onto an arm, is tested, goes on learning there, and is tested again (thesis 5.5)."""
 
-import csv
-import io
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pneumarm.adaptation import AdaptationSettings, adaptation
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
@@ -18,13 +16,13 @@ from pneumarm.arm.counts import Counts
 from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.found import Found
 from pneumarm.control.monitor import Monitor
-from pneumarm.control.movement import MOVEMENT, Movement, move
+from pneumarm.control.movement import MOVEMENT, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.files import require_folder, write_text
+from pneumarm.files import require_folder
 from pneumarm.learning import AnyAgent, fingerprint
 from pneumarm.settings import Settings, Valid
-from pneumarm.statistics import summarise
+from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
 from pneumarm.transitions.store import SequenceEntry
@@ -35,8 +33,6 @@ Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
 BEGIN = BeginState()
 """How the arm gets to a begin state between movements (thesis section 5.5)."""
-LONGEST_PAUSE = 120.0
-"""Movements that are farther apart on the arm's clock [s] were interrupted: none takes so long to begin."""
 _TOGETHER = 10
 """Movements that are stored in one transaction: at most these are made again after an interruption."""
 
@@ -75,40 +71,6 @@ class TransferSettings(Settings):
         return self.episodes if phase == "learning" else self.test_episodes
 
 
-@dataclass(frozen=True)
-class Episode:
-    """A movement on the arm as a row of ``episodes.csv``; one number a joint in ``goal`` to ``velocity_end``."""
-
-    phase: str
-    goal: list[float]
-    time_start: float
-    time_end: float
-    angle_begin: list[float]
-    angle_end: list[float]
-    velocity_end: list[float]
-    actions: int
-    switches: int
-    reward: float
-    success: bool
-
-    @classmethod
-    def of(cls, phase: str, movement: Movement) -> "Episode":
-        """Return the row of ``movement``."""
-        return cls(
-            phase=phase,
-            goal=movement.goal.tolist(),
-            time_start=round(movement.time_start, 4),
-            time_end=round(movement.time_end, 4),
-            angle_begin=movement.recorded.angle[0].tolist(),
-            angle_end=movement.recorded.angle[-1].tolist(),
-            velocity_end=np.round(movement.velocity_end, 4).tolist(),
-            actions=movement.actions,
-            switches=int(movement.switches.sum()),
-            reward=movement.reward,
-            success=movement.success,
-        )
-
-
 def begin_and_goal(
     agent: AnyAgent, seed: int, test: bool, number: int
 ) -> tuple[np.random.Generator, NDArray[np.float64]]:
@@ -132,8 +94,8 @@ def draw_movement(
 class Transferred:
     """What came of a transfer."""
 
-    episodes: list[Episode]
-    """All movements in order."""
+    movements: dict[str, Movements]
+    """Those of each phase in order."""
     agent: AnyAgent
     """The agent as it is after learning."""
     learning_rate: float
@@ -147,16 +109,12 @@ class Transferred:
         """How often a policy has adapted."""
         return 0 if self.adapted is None else sum(e.what == "accepted" for e in self.adapted.events)
 
-    def phase(self, phase: Phase) -> list[Episode]:
-        """Return the movements of a phase."""
-        return [episode for episode in self.episodes if episode.phase == phase]
-
     def results(self) -> dict[str, Any]:
         """Return the figures before and after learning, as in ``results.json``."""
         return {
-            "before": summary(self.phase("before")),
-            "after": summary(self.phase("after")),
-            "episodes": len(self.phase("learning")),
+            "before": self.movements["before"].results(),
+            "after": self.movements["after"].results(),
+            "episodes": self.movements["learning"].n,
             "learning_rate": self.learning_rate,
             "adaptations": self.adaptations,
             **self.found.results(),
@@ -201,9 +159,8 @@ def transfer(
     """
     check_fit(agent, arm)
     number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": fingerprint(agent)})
-    stored = [dict(entry.info) for entry in _movements(store, number)]
-    squares = [info.pop(_SQUARES) for info in stored if _SQUARES in info]
-    done = [Episode(**info) for info in stored]
+    done = [dict(entry.info) for entry in _movements(store, number)]
+    squares = [info[_SQUARES] for info in done if _SQUARES in info]
     arm_state = store.state("arm")
     if arm_state is not None and arm.get_state() is not None:
         arm.set_state(arm_state)
@@ -262,14 +219,13 @@ def transfer(
 
     def note(phase: Phase, movement: Movement) -> None:
         """Keep what came of a movement, and let the agent take notice of it."""
-        episode = Episode.of(phase, movement)
-        info = asdict(episode)
+        info = {_PHASE: phase, **movement.row()}
         if adapting is not None:
             judges, sound = adapts and phase == "learning", not watch.marks(movement.recorded)
             squares.append(adapting.saw(rows_of(movement.recorded), movement.reward, judges=judges, sound=sound))
             info[_SQUARES] = squares[-1]
             watch.judge_by(adapting.agent.simulation)
-        done.append(episode)
+        done.append(info)
         waiting.append(replace(movement.recorded, info=info))
 
     def adapt() -> None:
@@ -294,7 +250,7 @@ def transfer(
         for phase in PHASES:
             movements = settings.movements(phase)
             greedy = phase != "learning"
-            made = sum(e.phase == phase for e in done)
+            made = sum(info[_PHASE] == phase for info in done)
             if phase == "after" and settings.episodes > 0 and made == 0:
                 adapt()
             learns = adapting is None and not greedy
@@ -334,7 +290,9 @@ def transfer(
     if adapting is not None:
         adapted = Adapted(adapting.version, adapting.quantities, np.array(squares), adapting.events)
     found = Found(tuple(watch.findings), store.marked_rows(number), counted)
-    return Transferred(done, shown(), rate, adapted, found)
+    phases = {name: [info for info in done if info[_PHASE] == name] for name in PHASES}
+    made_in = {str(name): of_rows(rows, agent.window.joints) for name, rows in phases.items()}
+    return Transferred(made_in, shown(), rate, adapted, found)
 
 
 def _movements(store: Store, run: int) -> list[SequenceEntry]:
@@ -342,6 +300,7 @@ def _movements(store: Store, run: int) -> list[SequenceEntry]:
     return [entry for entry in store.catalogue(run) if entry.kind == MOVEMENT]
 
 
+_PHASE = "phase"  # place of a movement's phase beside its figures in the store
 _SQUARES = "squares"  # place of a movement's errors beside its figures in the store
 _COUNTS = "counts"  # place of what was counted, among the states in the store
 
@@ -398,7 +357,7 @@ def transfer_into(
         )
     moved.agent.save(folder / "adapted.safetensors")
     save_history(folder, moved.adapted)
-    write_episodes(folder / "episodes.csv", moved.episodes)
+    write_episodes(folder / "episodes.csv", moved.movements)
     return moved.results()
 
 
@@ -411,50 +370,3 @@ def check_fit(agent: AnyAgent, arm: Arm) -> None:
                 f"this agent was trained for an arm whose {name} is {trained}, that of {arm.spec.name} is {found}"
             )
     agent.window.require(arm.spec.further, arm.spec.name)
-
-
-def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
-    """Return means over ``episodes`` with their 95 % intervals, and the arm time that they took [s]."""
-    figures = summarise(
-        reward=np.array([e.reward for e in episodes]),
-        success=np.array([e.success for e in episodes], bool),
-        actions=np.array([e.actions for e in episodes]),
-        switches=np.array([e.switches for e in episodes]),
-    )
-    running = running_time([e.time_start for e in episodes], [e.time_end for e in episodes])
-    return {**figures, "seconds": float(running[-1]) if len(running) else 0.0}
-
-
-def running_time(time_start: ArrayLike, time_end: ArrayLike) -> NDArray[np.float64]:
-    """Return the arm time [s] from the begin of the first movement to the end of each, shape (n,).
-
-    Between two movements the arm is brought to a begin state, and an agent may adapt. What lies between them where
-    the arm's clock went back (a controller began anew), or where they are more than :data:`LONGEST_PAUSE` apart, was
-    an interruption, and is left out.
-
-    Args:
-        time_start: when each movement began on the arm's clock, shape (n,) [s].
-        time_end: when it ended [s].
-
-    """
-    start, end = np.asarray(time_start, np.float64), np.asarray(time_end, np.float64)
-    passed = end - start
-    pause = start[1:] - end[:-1]
-    passed[1:] += np.where((pause >= 0) & (pause <= LONGEST_PAUSE), pause, 0.0)
-    return np.cumsum(passed)
-
-
-def write_episodes(path: Path, episodes: Sequence[Episode]) -> None:
-    """Write ``episodes.csv``: a row a movement; with several joints a cell holds their numbers, spaces between."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([field.name for field in fields(Episode)])
-    for episode in episodes:
-        writer.writerow([_cell(getattr(episode, field.name)) for field in fields(Episode)])
-    write_text(path, text.getvalue())
-
-
-def _cell(value: Any) -> Any:
-    if isinstance(value, list):
-        return " ".join(str(number) for number in value)
-    return int(value) if isinstance(value, bool) else value

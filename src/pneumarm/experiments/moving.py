@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import ArmParameters, VirtualArm
-from pneumarm.control.playing import Played, Player, part_of
+from pneumarm.control.playing import Player
 from pneumarm.control.transfer import BEGIN, draw_movement
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.evidence import Column, mean, number
@@ -195,7 +195,7 @@ def simulated_test(
     settings = agent.settings if noise is None else replace(agent.settings, noise=noise)
     env = environment(of.simulated.simulation, of.simulated.begin, settings)
     tested = run_test(env, agent.weights(), agent.settings, episodes, (_TEST_SEED, TEST), exploration)
-    return means(Movements(**{name: getattr(tested, name) for name in Movements._fields}), prefix)
+    return means(tested, prefix)
 
 
 def greedy_test(
@@ -205,7 +205,7 @@ def greedy_test(
     run: int,
     laboratory: LaboratorySettings,
     arm: VirtualArm | None = None,
-) -> Played:
+) -> Movements:
     """Let ``agent`` move greedily on the arm, by default as it is in the morning; the same goals in all trials."""
     where = arm or new_arm(of, run, laboratory)
     return Player(agent, where).play(*draws(agent, run_seed(laboratory, run), episodes, TEST_MOVEMENTS))
@@ -225,7 +225,7 @@ def from_visits(agent: Agent, angle: Array, pressure: Array) -> BeginStates:
 
 def means(made: Movements, prefix: str = "") -> dict[str, float]:
     """Return the means of movements; actions and switches of successful ones, as in the thesis (5.5.1)."""
-    won, switches = made.success, made.switches.sum(axis=1)
+    won, switches = made.success, made.all_switches
     figures = {"reward": float(made.reward.mean()), "success_rate": float(won.mean())}
     if won.any():  # else there is nothing to take the mean of, and the row does not have it
         figures |= {"actions": float(made.actions[won].mean()), "switches": float(switches[won].mean())}
@@ -235,12 +235,7 @@ def means(made: Movements, prefix: str = "") -> dict[str, float]:
 def course(made: Movements, block: int) -> dict[str, float]:
     """Return the means of every ``block`` of movements, as ``NAME @BLOCK``, blocks from 1."""
     found: dict[str, float] = {}
-    for k in range(len(made.reward) // block):
-        part = means(part_of(made, k * block, (k + 1) * block))
+    for k in range(made.n // block):
+        part = means(made.part(slice(k * block, (k + 1) * block)))
         found |= {f"{name} @{k + 1}": value for name, value in part.items()}
     return found
-
-
-def joined(parts: list[Played]) -> Movements:
-    """Return the movements of several plays, one after the other."""
-    return Movements(*(np.concatenate(arrays) for arrays in zip(*(p.movements for p in parts), strict=True)))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
-from pneumarm.control import BEGIN, AgentController, Movement, move
+from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.control.transfer import draw_movement
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.evidence import Column
@@ -27,7 +27,7 @@ from pneumarm.learning import AnyAgent, TrainSettings, test
 from pneumarm.learning.online.training import train
 from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
 from pneumarm.simulation.quality import propagation
-from pneumarm.task import BeginStates, begin_states
+from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, QUANTITIES, CollectSettings, Store, collect
 from pneumarm.transitions.choice import joined
 

@@ -20,7 +20,7 @@ from pneumarm.learning.online.training import train
 from pneumarm.learning.online.values import learner
 from pneumarm.random import random_state
 from pneumarm.task.environment import Environment, environment, episode
-from pneumarm.task.movements import TEST, TestResult
+from pneumarm.task.movements import TEST, Movements
 
 CRITERIA = {
     "reward": "average cumulative reward per episode",
@@ -142,7 +142,7 @@ def _learning(env: Environment, weights: NDArray[np.float32], settings: TrainSet
     return float(performance / (1 - (1 - _NEWEST) ** count))
 
 
-def _means(tested: TestResult) -> dict[str, float]:
+def _means(tested: Movements) -> dict[str, float]:
     return {
         "reward": float(tested.reward.mean()),
         "success_rate": float(tested.success.mean()),

@@ -8,7 +8,18 @@ from numpy.typing import NDArray
 from pneumarm.kernels import kernel, part
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import SimulationState
-from pneumarm.task.environment import Environment, Episode, begin_episode, episode, take
+from pneumarm.task.environment import (
+    CUT_OFF,
+    GOES_ON,
+    REACHED,
+    Environment,
+    Episode,
+    begin_episode,
+    ending,
+    episode,
+    gained,
+    take,
+)
 
 
 class Batch(NamedTuple):
@@ -112,13 +123,11 @@ def act(environment, many, e, thread, actions, result):  # type: ignore[no-untyp
     one, task = movement(many, e, thread), environment.task
     is_reached = take(environment, one, actions[e])
     many.taken[e] += 1
-    paid = task.reward_goal if is_reached else task.reward_action
-    for j in range(actions.shape[1]):
-        paid += task.reward_switch * one.switched[j]
-    result.reward[e] = paid
-    result.terminated[e] = is_reached
-    result.truncated[e] = not is_reached and many.taken[e] >= task.cutoff
-    return is_reached or result.truncated[e]
+    ended = ending(task, is_reached, many.taken[e])
+    result.reward[e] = gained(task, one, is_reached)
+    result.terminated[e] = ended == REACHED
+    result.truncated[e] = ended == CUT_OFF
+    return ended != GOES_ON
 
 
 @part

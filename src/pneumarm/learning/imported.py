@@ -21,7 +21,7 @@ from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.acting import test_acting
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
-from pneumarm.task.movements import TestResult
+from pneumarm.task.movements import Movements
 from pneumarm.transitions.window import QUANTITIES, Window
 
 KIND = "pneumarm imported policy"
@@ -104,7 +104,7 @@ class ImportedPolicy:
         """Return it acting greedily; it neither learns nor explores, whatever is asked."""
         return ImportedActor(self)
 
-    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> TestResult:
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
         """Let it move in ``simulation``; ``seed`` decides begin states and goals."""
         return test_acting(self.actor(), environment(simulation, begin, self.settings), episodes, seed)
 

@@ -33,7 +33,7 @@ from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import TaskSettings
-from pneumarm.task.movements import TEST, TestResult
+from pneumarm.task.movements import TEST, Movements
 from pneumarm.transitions.window import Window
 
 Method = Literal["policy", "batched", "sarsa", "q-learning"]
@@ -134,7 +134,7 @@ class AnyAgent(Protocol):
     def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> Actor:
         """Return it acting: greedily, or exploring as at the end of training; learning by ``learning_rate``."""
 
-    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> TestResult:
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
         """Let it move greedily in ``simulation``; ``seed`` decides begin states and goals."""
 
     def save(self, path: Path) -> None:
@@ -207,7 +207,7 @@ def test(
     begin_states: BeginStates,
     episodes: int = 10_000,  # noqa: PT028 - this is no test case
     seed: int = 0,  # noqa: PT028
-) -> TestResult:
+) -> Movements:
     """Let ``agent`` move greedily and without learning, from all begin states to all goals.
 
     A policy moves as it says at once; what looking ahead adds on an arm is told by :func:`test_ahead`. Begin states
@@ -230,7 +230,7 @@ def test_ahead(
     begin_states: BeginStates,
     episodes: int = LOOKING_AHEAD,  # noqa: PT028 - this is no test case
     seed: int = 0,  # noqa: PT028
-) -> TestResult | None:
+) -> Movements | None:
     """Let ``agent`` make the first movements of :func:`test` as it makes them on an arm, looking ahead.
 
     None for an agent that acts on an arm as it does in :func:`test`: there is nothing to add.
@@ -248,7 +248,7 @@ def test_ahead(
 test_ahead.__test__ = False  # type: ignore[attr-defined]
 
 
-def results_with_lookahead(tested: TestResult, ahead: TestResult | None) -> dict[str, Any]:
+def results_with_lookahead(tested: Movements, ahead: Movements | None) -> dict[str, Any]:
     """Return what ``results.json`` holds of :func:`test` and, under ``lookahead``, of :func:`test_ahead`."""
     return {**tested.results(), "lookahead": None if ahead is None else ahead.results()}
 

@@ -22,7 +22,7 @@ from pneumarm.learning.online.training import Progress, cores
 from pneumarm.networks.layers import Trainable
 from pneumarm.task.environment import Environment
 from pneumarm.task.fleet import Fleet
-from pneumarm.task.movements import TestResult
+from pneumarm.task.movements import Movements
 
 _CHECKPOINT = "pneumarm fleet training"
 _CHECKPOINT_EVERY = 2.0  # s
@@ -55,7 +55,7 @@ class Learner(ABC):
         """Collect and learn once; return the episodes that ended, the successes and the sum of rewards."""
 
     @abstractmethod
-    def validate(self, episodes: int) -> TestResult:
+    def validate(self, episodes: int) -> Movements:
         """Return ``episodes`` greedy movements, the same begin states and goals for all learners."""
 
     def learn(self, updates: int) -> None:
@@ -99,7 +99,7 @@ class Trained(NamedTuple):
 
     best: int
     """Index of the best learner, by mean reward in its validation."""
-    validation: tuple[TestResult, ...]
+    validation: tuple[Movements, ...]
     seconds: float
     """Wall time with validation [s]."""
 

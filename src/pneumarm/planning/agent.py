@@ -23,7 +23,7 @@ from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.acting import test_acting
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
-from pneumarm.task.movements import TestResult
+from pneumarm.task.movements import Movements
 from pneumarm.transitions.window import Window
 
 
@@ -89,7 +89,7 @@ class PlanAgent:
         """Return it acting; it neither learns nor explores, whatever is asked."""
         return PlanActor(self)
 
-    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> TestResult:
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
         """Let it move in ``simulation``; ``seed`` decides begin states and goals."""
         return test_acting(self.actor(), environment(simulation, begin, self.settings), episodes, seed)
 

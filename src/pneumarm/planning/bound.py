@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ControlCycle, guarded
 from pneumarm.arm.virtual import VirtualArm, without_noise
 from pneumarm.control.movement import move
-from pneumarm.control.transfer import BEGIN, Episode, draw_movement, summary
+from pneumarm.control.transfer import BEGIN, draw_movement
 from pneumarm.errors import UnusableInput
 from pneumarm.planning.planner import Planner, physics_planner, simulated_planner
 from pneumarm.planning.search import PlanSettings
@@ -24,6 +24,7 @@ from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.statistics import FEWEST, mean_estimate
 from pneumarm.task import Reward
+from pneumarm.task.movements import Movements, of_rows
 from pneumarm.transitions import Store, collect
 
 Baseline = Literal["open_loop", "closed_loop", "simulated"]
@@ -49,7 +50,7 @@ class BoundSettings(Settings):
 class Planned:
     """Movements of a planner on an arm."""
 
-    episodes: list[Episode]
+    made: Movements
     seconds: NDArray[np.float64]
     """How long each decision took, shape (decisions,) [s]."""
     unproven: int
@@ -59,7 +60,7 @@ class Planned:
         """Return the figures as of a transfer, with the times of a decision [ms]."""
         milliseconds = 1e3 * self.seconds
         times = {"median": float(np.median(milliseconds)), "p99": float(np.quantile(milliseconds, 0.99))}
-        return {**summary(self.episodes), "decision_ms": times, "unproven_plans": self.unproven}
+        return {**self.made.results(), "decision_ms": times, "unproven_plans": self.unproven}
 
     def distance(self, reward: NDArray[np.float64]) -> dict[str, Any]:
         """Return how far another controller stays below, by its ``reward`` (n,) in the first of the same movements.
@@ -71,10 +72,10 @@ class Planned:
             UnusableInput: there is no movement to compare.
 
         """
-        n = min(len(reward), len(self.episodes))
+        n = min(len(reward), self.made.n)
         if n == 0:
             raise UnusableInput("a distance to the bound needs at least 1 movement, got none")
-        lost = np.array([episode.reward for episode in self.episodes[:n]]) - reward[:n]
+        lost = self.made.reward[:n] - reward[:n]
         estimate = mean_estimate(lost)
         return {
             "episodes": n,
@@ -143,14 +144,14 @@ def _movements(
     seed: int,
     report: Callable[[int], None],
 ) -> Planned:
-    cycle, episodes = ControlCycle(guarded(arm)), []
+    cycle, rows = ControlCycle(guarded(arm)), []
     for number in range(settings.episodes):
         random, goal = draw_movement(goal_range, seed, True, number)
         BEGIN.reach(cycle.arm, random)
         movement = move(cycle, planner, goal, planner.reward, settings.plan.cutoff)
-        episodes.append(Episode.of("bound", movement))
+        rows.append(movement.row())
         report(number + 1)
-    return Planned(episodes, np.array(planner.seconds), planner.unproven)
+    return Planned(of_rows(rows), np.array(planner.seconds), planner.unproven)
 
 
 def known_bound(

@@ -2,25 +2,22 @@
 
 from pneumarm.report.data import (
     CoverageData,
-    Episodes,
+    Demonstration,
     LearningData,
     MarkedData,
-    Movement,
     QualityData,
     TrainingData,
     TransferData,
-    read_episodes,
 )
 from pneumarm.report.page import Picture, Section, Table, render
-from pneumarm.report.run_report import read_run, run_page, save_movement, save_spec, write_analysis, write_report
+from pneumarm.report.run_report import read_run, run_page, save_demonstration, save_spec, write_analysis, write_report
 from pneumarm.report.sections import RunData
 
 __all__ = [
     "CoverageData",
-    "Episodes",
+    "Demonstration",
     "LearningData",
     "MarkedData",
-    "Movement",
     "Picture",
     "QualityData",
     "RunData",
@@ -28,11 +25,10 @@ __all__ = [
     "Table",
     "TrainingData",
     "TransferData",
-    "read_episodes",
     "read_run",
     "render",
     "run_page",
-    "save_movement",
+    "save_demonstration",
     "save_spec",
     "write_analysis",
     "write_report",

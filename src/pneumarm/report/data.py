@@ -4,22 +4,19 @@ A record is a frozen dataclass of arrays, checked when it is made, and kept as o
 may be large the record holds a sample; a few ten thousand rows are plenty for a figure.
 """
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
+from pneumarm.task.movements import Movements
 
 Array = NDArray[np.float64]
-
-_Settings = dict[str, Any]
-_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True)
@@ -246,85 +243,30 @@ class TrainingData(Record):
 
 
 @dataclass(frozen=True)
-class Episodes(Record):
-    """``n`` episodes, in the simulation or on an arm, one after the other."""
-
-    file = "test_episodes.safetensors"
-    shapes = {  # noqa: RUF012
-        "goal": "n joints",
-        "angle_begin": "n joints",
-        "actions": "n",
-        "switches": "n",
-        "reward": "n",
-        "success": "n",
-        "time_start": "n",
-        "time_end": "n",
-    }
-
-    goal: Array
-    """Shape (n, joints) [counts]."""
-    angle_begin: Array
-    """Shape (n, joints) [counts]."""
-    actions: Array
-    """Shape (n,)."""
-    switches: Array
-    """Shape (n,)."""
-    reward: Array
-    """Shape (n,)."""
-    success: NDArray[np.bool_]
-    """Shape (n,)."""
-    time_start: Array
-    """On the arm's clock, shape (n,) [s]; zeros where the episodes stand apart, as in the simulation."""
-    time_end: Array
-    """The same of the end."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "success", np.asarray(self.success) > 0)
-        for name in ("goal", "angle_begin", "actions", "switches", "reward", "time_start", "time_end"):
-            object.__setattr__(self, name, np.asarray(getattr(self, name), np.float64))
-
-    def __len__(self) -> int:
-        return len(self.reward)
-
-    @property
-    def distance(self) -> Array:
-        """|goal - angle at the begin|, shape (n, joints) [counts]."""
-        return np.abs(self.goal - self.angle_begin)
-
-    @classmethod
-    def none(cls, joints: int) -> Self:
-        """Return no episodes at all."""
-        empty = np.empty(0)
-        apart = np.empty((0, joints))
-        return cls(apart, apart, empty, empty, empty, np.empty(0, bool), empty, empty)
-
-
-@dataclass(frozen=True)
 class TransferData:
-    """The episodes on the arm, phase after phase."""
+    """The movements on the arm, phase after phase."""
 
-    before: Episodes
+    before: Movements
     """Greedy, on arrival."""
-    learning: Episodes
+    learning: Movements
     """While learning."""
-    after: Episodes
+    after: Movements
     """Greedy, after adaptation."""
     learning_rate: float = 0.0
     adaptations: int = 0
     """How often a policy adapted to the arm."""
 
     @property
-    def phases(self) -> dict[str, Episodes]:
+    def phases(self) -> dict[str, Movements]:
         """The phases by name, in order."""
         return {"before": self.before, "learning": self.learning, "after": self.after}
 
 
 @dataclass(frozen=True)
-class Movement(Record):
+class Demonstration(Record):
     """One movement on the arm, with what the arm does after it where that was recorded."""
 
-    file = "movement.safetensors"
+    file = "demonstration.safetensors"
     shapes = {  # noqa: RUF012
         "time": "n",
         "angle": "n joints",
@@ -347,64 +289,3 @@ class Movement(Record):
     """When the goal was reached [s], None if it was not."""
     name: str
     """What is typical of it, such as "large displacement"."""
-
-
-COLUMNS = (
-    "phase",
-    "goal",
-    "time_start",
-    "time_end",
-    "angle_begin",
-    "angle_end",
-    "velocity_end",
-    "actions",
-    "switches",
-    "reward",
-    "success",
-)
-"""Columns of ``episodes.csv``; with more joints a cell holds their numbers with spaces between."""
-
-
-def read_episodes(path: Path) -> dict[str, Episodes]:
-    """Return the episodes of each phase in the CSV file at ``path``.
-
-    Raises:
-        UnusableInput: no such file, missing columns, or a cell that is no number.
-
-    """
-    try:
-        with open(path, newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            missing = set(COLUMNS) - set(reader.fieldnames or ())
-            if missing:
-                raise UnusableInput(
-                    f"{path}: expected the columns {', '.join(COLUMNS)}; {sorted(missing)} are missing"
-                )
-            rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UnusableInput(
-            f"{path}: expected the episodes of a transfer as CSV, it cannot be read ({error})"
-        ) from error
-    phases: dict[str, list[_Settings]] = {}
-    for row in rows:
-        phases.setdefault(row["phase"], []).append(row)
-    try:
-        return {phase: _episodes(group) for phase, group in phases.items()}
-    except UnusableInput as error:
-        raise UnusableInput(f"{path}: {error}") from error
-    except (ValueError, TypeError, AttributeError) as error:
-        raise UnusableInput(f"{path}: a cell is not what its column says ({error})") from error
-
-
-def _episodes(rows: list[_Settings]) -> Episodes:
-    def numbers(name: str) -> Array:
-        return np.array([[float(word) for word in row[name].split()] for row in rows])
-
-    def number(name: str) -> Array:
-        return np.array([float(row[name]) for row in rows])
-
-    success = np.array([row["success"].strip().lower() in ("1", "1.0", "true") for row in rows])
-    return Episodes(
-        numbers("goal"), numbers("angle_begin"), number("actions"), number("switches"), number("reward"), success,
-        number("time_start"), number("time_end"),
-    )  # fmt: skip

@@ -7,19 +7,21 @@ from typing import Any
 import numpy as np
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.control.transfer import running_time
 from pneumarm.report import thesis
-from pneumarm.report.data import Episodes, QualityData, TransferData
+from pneumarm.report.data import QualityData, TransferData
 from pneumarm.report.figures import expectation
 from pneumarm.report.page import Table
 from pneumarm.statistics import Estimate, mean_estimate, rate_estimate
+from pneumarm.task import Movements
 
 MISSING = "–"
 _PHASES = {"before": "on arrival", "learning": "while learning", "after": "after adaptation"}
 _PLANNERS = {"open_loop": "open loop", "closed_loop": "closed loop"}
 
 
-def ledger(test: Episodes | None, transfer: TransferData | None, lookahead: Mapping[str, Any] | None = None) -> Table:
+def ledger(
+    test: Movements | None, transfer: TransferData | None, lookahead: Mapping[str, Any] | None = None
+) -> Table:
     """Return reward, success, actions and switches in the simulation and on the arm, with 95% intervals.
 
     ``lookahead`` holds the figures of a test in the simulation in which the controller looked ahead.
@@ -51,18 +53,18 @@ def ledger(test: Episodes | None, transfer: TransferData | None, lookahead: Mapp
     )
 
 
-def _ledger_row(name: str, episodes: Episodes, *, on_arm: bool) -> list[str]:
+def _ledger_row(name: str, episodes: Movements, *, on_arm: bool) -> list[str]:
     won = episodes.success
     return [
         name,
-        f"{len(episodes):,}",
+        f"{episodes.n:,}",
         with_interval(mean_estimate(episodes.reward), "{:.2f}"),
         with_interval(rate_estimate(won), "{:.1%}"),
         with_interval(mean_estimate(episodes.actions), "{:.1f}"),
         with_interval(mean_estimate(episodes.actions[won]), "{:.1f}"),
-        with_interval(mean_estimate(episodes.switches), "{:.2f}"),
-        with_interval(mean_estimate(episodes.switches[won]), "{:.2f}"),
-        duration(arm_time(episodes)) if on_arm else MISSING,
+        with_interval(mean_estimate(episodes.all_switches), "{:.2f}"),
+        with_interval(mean_estimate(episodes.all_switches[won]), "{:.2f}"),
+        duration(episodes.seconds) if on_arm else MISSING,
     ]
 
 
@@ -122,11 +124,6 @@ def bound_table(bound: Mapping[str, Any]) -> Table:
     )
 
 
-def arm_time(episodes: Episodes) -> float:
-    """Return the time [s] from the begin of the first episode to the end of the last, without interruptions."""
-    return float(running_time(episodes.time_start, episodes.time_end)[-1]) if len(episodes) else 0.0
-
-
 def with_interval(estimate: Estimate, form: str) -> str:
     """Return an estimate for people: mean and, where there is one, its interval."""
     if math.isnan(estimate.mean):
@@ -146,7 +143,7 @@ def duration(seconds: float) -> str:
 def beside_thesis(
     results: Mapping[str, Any],
     quality: QualityData | None,
-    test: Episodes | None,
+    test: Movements | None,
     transfer: TransferData | None,
     spec: ArmSpec,
 ) -> Table:
@@ -203,7 +200,7 @@ def _simulated(results: Mapping[str, Any], quality: QualityData | None, spec: Ar
     return rows
 
 
-def _learned(results: Mapping[str, Any], test: Episodes | None) -> list[list[str]]:
+def _learned(results: Mapping[str, Any], test: Movements | None) -> list[list[str]]:
     trained = results.get("training", {})
     best, optimal = thesis.REWARD_TRIAL_10, thesis.REWARD_OPTIMAL
     few, many = thesis.EPISODES_OPTIMAL.min(), thesis.EPISODES_OPTIMAL.max()
@@ -215,7 +212,7 @@ def _learned(results: Mapping[str, Any], test: Episodes | None) -> list[list[str
     if test is None:
         return rows
     reward, success = mean_estimate(test.reward), rate_estimate(test.success)
-    actions, switches = mean_estimate(test.actions), mean_estimate(test.switches)
+    actions, switches = mean_estimate(test.actions), mean_estimate(test.all_switches)
     best_actions, best_switches = thesis.ACTIONS_TRIAL_10, thesis.SWITCHES_TRIAL_10
     return [
         *rows,
@@ -227,8 +224,8 @@ def _learned(results: Mapping[str, Any], test: Episodes | None) -> list[list[str
     ]  # fmt: skip
 
 
-def _moved(test: Episodes | None, transfer: TransferData | None) -> list[list[str]]:
-    if test is None or transfer is None or len(transfer.before) == 0:
+def _moved(test: Movements | None, transfer: TransferData | None) -> list[list[str]]:
+    if test is None or transfer is None or transfer.before.n == 0:
         return []
     came, home = transfer.before, test
     least, most = thesis.SWITCHES_RISE
@@ -239,17 +236,17 @@ def _moved(test: Episodes | None, transfer: TransferData | None) -> list[list[st
         ["drop of the reward on arrival", _mean(home.reward, came.reward), f"over {thesis.REWARD_DROP:g}",
          "section 5.5.1"],
         ["rise of the switches of successes on arrival",
-         _mean(came.switches[came.success], home.switches[home.success]),
+         _mean(came.all_switches[came.success], home.all_switches[home.success]),
          f"{least:g} learning, {most:g} not", "section 5.5.1"],
         ["success on arrival", with_interval(rate_estimate(came.success), "{:.1%}"), thesis.SUCCESS, "section 5.6.1"],
     ]  # fmt: skip
-    if len(transfer.after):
+    if transfer.after.n:
         now = transfer.after
         rows += [
             ["success after adaptation", with_interval(rate_estimate(now.success), "{:.1%}"), thesis.SUCCESS,
              "section 5.6.1"],
             ["reward gained by adaptation", _mean(now.reward, came.reward), MISSING, "figure 5.9, not in numbers"],
-            ["learning on the arm", f"{len(transfer.learning):,} episodes, {duration(arm_time(transfer.learning))}",
+            ["learning on the arm", f"{transfer.learning.n:,} episodes, {duration(transfer.learning.seconds)}",
              f"about {thesis.EPISODES_TO_PROGRESS} episodes, an hour, to real progress; "
              f"{thesis.TRAIN_ON_ARM_HOURS:g} h estimated without any simulation", "sections 5.5 and 5.5.1"],
         ]  # fmt: skip

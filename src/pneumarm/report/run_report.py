@@ -14,26 +14,26 @@ from pneumarm.errors import UnusableInput
 from pneumarm.files import write_json, write_text
 from pneumarm.report.data import (
     CoverageData,
-    Episodes,
+    Demonstration,
     LearningData,
     MarkedData,
-    Movement,
     QualityData,
     Record,
     TrainingData,
     TransferData,
-    read_episodes,
 )
 from pneumarm.report.health import summary_of_health
 from pneumarm.report.page import render
 from pneumarm.report.sections import RunData, all_sections, collected, predicted, propagated
+from pneumarm.task.movements import Movements, movements, read_episodes
 
 REPORT = "report.html"
 ANALYSIS = "analysis.html"
 RESULTS = "results.json"
 EPISODES = "episodes.csv"
 SPEC = "arm.json"
-MOVEMENTS = "movement-*.safetensors"
+TEST = "test_episodes.safetensors"
+DEMONSTRATIONS = "demonstration-*.safetensors"
 
 _Record = TypeVar("_Record", bound=Record)
 
@@ -42,7 +42,7 @@ def write_report(folder: Path) -> Path:
     """Write ``report.html`` of the run in ``folder`` and return its path.
 
     The folder holds ``results.json`` and ``arm.json`` (:func:`save_spec`); what else there is of the records
-    (:class:`CoverageData`, ...), of ``episodes.csv`` and of movements (:func:`save_movement`) enters the report.
+    (:class:`CoverageData`, ...), of ``episodes.csv`` and of demonstrations (:func:`save_demonstration`) enters it.
 
     Raises:
         UnusableInput: a file is missing or is not what it should be.
@@ -74,9 +74,9 @@ def save_spec(folder: Path, spec: ArmSpec) -> None:
     write_json(folder / SPEC, asdict(spec))
 
 
-def save_movement(folder: Path, movement: Movement, number: int) -> None:
-    """Write a movement to ``folder``; the report shows movements in the order of their ``number``."""
-    movement.save(folder, MOVEMENTS.replace("*", f"{number:02d}"))
+def save_demonstration(folder: Path, shown: Demonstration, number: int) -> None:
+    """Write a demonstration to ``folder``; the report shows them in the order of their ``number``."""
+    shown.save(folder, DEMONSTRATIONS.replace("*", f"{number:02d}"))
 
 
 def read_run(folder: Path) -> RunData:
@@ -93,11 +93,11 @@ def read_run(folder: Path) -> RunData:
         coverage=_read(CoverageData, folder),
         quality=_read(QualityData, folder),
         training=_read(TrainingData, folder) or _read(LearningData, folder),
-        test=_read(Episodes, folder),
+        test=Movements.load(folder / TEST) if (folder / TEST).exists() else None,
         transfer=_read_transfer(folder / EPISODES, results),
         adaptation=read_history(folder) if (folder / HISTORY).exists() else None,
         marked=_read(MarkedData, folder),
-        movements=tuple(Movement.load(folder, path.name) for path in sorted(folder.glob(MOVEMENTS))),
+        demonstrations=tuple(Demonstration.load(folder, path.name) for path in sorted(folder.glob(DEMONSTRATIONS))),
     )
 
 
@@ -110,7 +110,7 @@ def _read_transfer(path: Path, results: dict[str, Any]) -> TransferData | None:
         return None
     phases = read_episodes(path)
     joints = next(iter(phases.values())).goal.shape[1] if phases else 1
-    before, learning, after = (phases.get(name) or Episodes.none(joints) for name in ("before", "learning", "after"))
+    before, learning, after = (phases.get(name) or movements(0, joints) for name in ("before", "learning", "after"))
     found = results.get("transfer", {})
     rate, adaptations = float(found.get("learning_rate", 0.0)), int(found.get("adaptations", 0))
     return TransferData(before, learning, after, rate, adaptations)
@@ -143,7 +143,7 @@ def _summary(run: RunData) -> list[str]:
     spec = run.spec
     joints = f"{spec.joints} joint{'s' if spec.joints > 1 else ''}"
     text = [f"{spec.name}: {joints}, {1 / spec.period:.3g} Hz, pressures up to {spec.max_pressure:g} bar."]
-    if run.test is not None and len(run.test):
+    if run.test is not None and run.test.n:
         text.append(
             f"In the simulation the controller reaches {run.test.success.mean():.2%} of its goals "
             "with a mean reward of "
@@ -153,7 +153,7 @@ def _summary(run: RunData) -> list[str]:
         parts = [
             f"{phase.success.mean():.1%} {words} (mean reward {phase.reward.mean():.2f})"
             for words, phase in (("on arrival", run.transfer.before), ("after adaptation", run.transfer.after))
-            if len(phase)
+            if phase.n
         ]
         if parts:
             text.append("On the arm it reaches " + " and ".join(parts) + ".")

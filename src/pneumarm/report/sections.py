@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from pneumarm.adaptation import WatchSettings
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
-from pneumarm.control.transfer import running_time
 from pneumarm.control.versions import Adapted
 from pneumarm.report import figures
 from pneumarm.report.data import (
     CoverageData,
-    Episodes,
+    Demonstration,
     LearningData,
     MarkedData,
-    Movement,
     QualityData,
     TrainingData,
     TransferData,
@@ -29,6 +27,7 @@ from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import of_joint, quantities
+from pneumarm.task import Movements, running_time
 
 
 @dataclass(frozen=True)
@@ -41,10 +40,10 @@ class RunData:
     coverage: CoverageData | None = None
     quality: QualityData | None = None
     training: TrainingData | LearningData | None = None
-    test: Episodes | None = None
+    test: Movements | None = None
     transfer: TransferData | None = None
     adaptation: Adapted | None = None
-    movements: tuple[Movement, ...] = ()
+    demonstrations: tuple[Demonstration, ...] = ()
     marked: MarkedData | None = None
 
 
@@ -69,8 +68,8 @@ def all_sections(run: RunData) -> list[Section]:
         if run.adaptation is not None:
             sections.append(adapted(run.adaptation))
         sections.append(by_displacement(run.transfer, run.test, run.spec))
-    if run.movements:
-        sections.append(moved(run.movements, run.spec))
+    if run.demonstrations:
+        sections.append(demonstrated(run.demonstrations, run.spec))
     if tells_of_health(run.results):
         sections.append(health(run.results, run.marked, run.spec))
     return sections
@@ -305,13 +304,13 @@ def learned(data: LearningData) -> Section:
     )
 
 
-def tested(test: Episodes) -> Section:
+def tested(test: Movements) -> Section:
     """Return the distribution of the test's episodes."""
-    numbers = (test.reward, test.actions, test.switches, test.success)
+    numbers = (test.reward, test.actions, test.all_switches, test.success)
     return Section(
         "Test in the simulation",
         (
-            f"{len(test):,} greedy movements from all begin states to all goals in the noisy "
+            f"{test.n:,} greedy movements from all begin states to all goals in the noisy "
             "simulation (thesis section 5.2).",
         ),
         (
@@ -326,7 +325,7 @@ def tested(test: Episodes) -> Section:
     )
 
 
-def transferred(data: TransferData, test: Episodes | None) -> Section:
+def transferred(data: TransferData, test: Movements | None) -> Section:
     """Return the curves of the transfer."""
     phases = phases_of(data)
     reference = levels(test) if test is not None else {}
@@ -380,34 +379,34 @@ def phases_of(data: TransferData) -> list[Phase]:
     """Return the phases with their time counted from the begin of the first episode, without interruptions."""
     phases = data.phases
     start, end = (np.concatenate([getattr(p, name) for p in phases.values()]) for name in ("time_start", "time_end"))
-    times = np.split(running_time(start, end), np.cumsum([len(p) for p in phases.values()])[:-1])
+    times = np.split(running_time(start, end), np.cumsum([p.n for p in phases.values()])[:-1])
     return [
-        Phase(name, p.reward, p.success, p.actions, p.switches, time)
+        Phase(name, p.reward, p.success, p.actions, p.all_switches, time)
         for (name, p), time in zip(phases.items(), times, strict=True)
     ]
 
 
-def levels(test: Episodes) -> dict[str, float]:
+def levels(test: Movements) -> dict[str, float]:
     """Return the levels of the simulation's test that the curves of the transfer are compared with."""
-    if len(test) == 0:
+    if test.n == 0:
         return {}
     won = test.success
     found = {"reward": float(test.reward.mean()), "success_rate": float(won.mean())}
     if won.any():
-        found |= {"actions": float(test.actions[won].mean()), "switches": float(test.switches[won].mean())}
+        found |= {"actions": float(test.actions[won].mean()), "switches": float(test.all_switches[won].mean())}
     return found
 
 
-def by_displacement(data: TransferData, test: Episodes | None, spec: ArmSpec) -> Section:
+def by_displacement(data: TransferData, test: Movements | None, spec: ArmSpec) -> Section:
     """Return actions and switches against displacement, on the arm and in the simulation."""
     pictures = []
-    arrived = data.after if len(data.after) else data.before
+    arrived = data.after if data.after.n else data.before
     for name, episodes in (("on the arm after adaptation", arrived), ("in the simulation's test", test)):
         if episodes is None:
             continue
         where = "on the arm on arrival" if episodes is data.before else name
         won = episodes.success
-        numbers = (episodes.distance[won], episodes.actions[won], episodes.switches[won])
+        numbers = (episodes.distance[won], episodes.actions[won], episodes.all_switches[won])
         pictures.append(
             Picture(
                 figures.against_displacement(*numbers, spec),
@@ -426,10 +425,10 @@ def by_displacement(data: TransferData, test: Episodes | None, spec: ArmSpec) ->
     )
 
 
-def moved(movements: tuple[Movement, ...], spec: ArmSpec) -> Section:
+def demonstrated(demonstrations: tuple[Demonstration, ...], spec: ArmSpec) -> Section:
     """Return the typical movements."""
     pictures = []
-    for m in movements:
+    for m in demonstrations:
         numbers = (m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec)
         pictures.append(
             Picture(

@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.random import random_state
-from pneumarm.task.environment import Environment, angle, begin_episode, episode, take, velocity
-from pneumarm.task.movements import NOISE, TestResult, movements
+from pneumarm.task.environment import Environment, begin_episode, episode, take
+from pneumarm.task.movements import NOISE, Movements, movements
+from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
 
 
 class Acting(Protocol):
@@ -26,22 +27,21 @@ class Acting(Protocol):
 
 
 @kernel
-def _begin(environment, episode, random, angles):  # type: ignore[no-untyped-def]
+def _begin(environment, episode, random, record, e):  # type: ignore[no-untyped-def]
     begin_episode(environment, episode, np.inf, random)
-    for joint in range(angles.shape[0]):
-        angles[joint] = angle(environment.task, episode, joint)
+    note_begin(environment.task, episode, record, e)
 
 
 @kernel
-def _take(environment, episode, actions, angles, velocities):  # type: ignore[no-untyped-def]
+def _take(environment, episode, actions, record, e):  # type: ignore[no-untyped-def]
+    """Take ``actions`` (joints,) in movement ``e``; return whether it goes on."""
     is_reached = take(environment, episode, actions)
-    for joint in range(angles.shape[0]):
-        angles[joint] = angle(environment.task, episode, joint)
-        velocities[joint] = velocity(environment.task, episode, joint)
-    return is_reached
+    note_action(environment.task.reward, episode.switched, is_reached, record, e)
+    note_end(environment.task, episode, is_reached, record, e)
+    return goes_on(environment.task, is_reached, record, e)
 
 
-def test_acting(actor: Acting, env: Environment, episodes: int, seed: tuple[int, ...]) -> TestResult:
+def test_acting(actor: Acting, env: Environment, episodes: int, seed: tuple[int, ...]) -> Movements:
     """Return movements of ``actor`` in ``env`` with the begin states and goals that any agent gets by ``seed``.
 
     Raises:
@@ -50,23 +50,15 @@ def test_acting(actor: Acting, env: Environment, episodes: int, seed: tuple[int,
     """
     if episodes < 1:
         raise UnusableInput(f"a test needs at least one episode, got {episodes}")
-    one, random, task = episode(env, random_state((*seed, NOISE))), random_state(seed), env.task
+    one, random = episode(env, random_state((*seed, NOISE))), random_state(seed)
     record = movements(episodes, one.goal.size)
     size = env.begin.states.shape[1]
     for e in range(episodes):
-        _begin(env, one, random, record.angle_begin[e])
-        record.goal[e] = one.goal
+        _begin(env, one, random, record, e)
         actor.begin(one.state.x[:size], one.goal)
-        while not record.success[e] and record.actions[e] < task.cutoff:
-            actions = actor.act()
-            is_reached = _take(env, one, actions, record.angle_end[e], record.velocity_end[e])
-            record.success[e] = is_reached
-            record.actions[e] += 1
-            record.switches[e] += one.switched
-            record.reward[e] += task.reward_goal if is_reached else task.reward_action
-            record.reward[e] += task.reward_switch * one.switched.sum()
+        while _take(env, one, actor.act(), record, e):
             actor.follow(one.state.x[:size])
-    return TestResult(*record)
+    return record
 
 
 test_acting.__test__ = False  # type: ignore[attr-defined]

@@ -25,7 +25,10 @@ from pneumarm.simulation.kernel import (
 from pneumarm.simulation.noise import NoiseParameters, NoiseSettings, noise_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginParameters, BeginStates, begin_parameters, draw_begin
-from pneumarm.task.reward import Reward
+from pneumarm.task.reward import Reward, RewardParameters, at_goal, is_switch, paid
+
+GOES_ON, REACHED, CUT_OFF = 0, 1, 2
+"""How an episode is after an action."""
 
 
 class TaskSettings(Protocol):
@@ -59,13 +62,7 @@ class Task(NamedTuple):
     """Scaled commands by action, shape (joints, 9, 2)."""
     goal_place: int
     """Place of the goals in the state vector."""
-    angle_tolerance: float
-    """[counts]"""
-    velocity_tolerance: float
-    """[counts/ms]"""
-    reward_goal: float
-    reward_action: float
-    reward_switch: float
+    reward: RewardParameters
     cutoff: int
 
 
@@ -105,7 +102,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
         )
     if begin.window != simulation.window:
         raise UnusableInput(f"begin states of {begin.window} cannot be used with a simulation of {simulation.window}")
-    window, scaling, reward = simulation.window, simulation.scaling, settings.reward
+    window, scaling = simulation.window, simulation.scaling
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     commands = VALVES[None] / scaling.command_scale.reshape(window.joints, 1, 2)
     task = Task(
@@ -113,11 +110,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
         unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
         commands=np.ascontiguousarray(commands, np.float32),
         goal_place=places(simulation.window).goal,
-        angle_tolerance=float(reward.angle_tolerance),
-        velocity_tolerance=float(reward.velocity_tolerance),
-        reward_goal=float(reward.goal),
-        reward_action=float(reward.action),
-        reward_switch=float(reward.switch),
+        reward=settings.reward.parameters,
         cutoff=int(settings.cutoff),
     )
     return Environment(
@@ -159,8 +152,8 @@ def begin_episode(environment, episode, deviation, random):  # type: ignore[no-u
 def order(task, episode, actions):  # type: ignore[no-untyped-def]
     """Make ``actions`` (joints,) the command of ``episode``. Notes who switched."""
     for joint in range(actions.shape[0]):
-        action, before = actions[joint], episode.actions[joint]
-        episode.switched[joint] = 1 if before >= 0 and before != action else 0
+        action = actions[joint]
+        episode.switched[joint] = 1 if is_switch(episode.actions[joint], action) else 0
         episode.actions[joint] = action
         episode.command[2 * joint] = task.commands[joint, action, 0]
         episode.command[2 * joint + 1] = task.commands[joint, action, 1]
@@ -190,14 +183,23 @@ def velocity(task, episode, joint):  # type: ignore[no-untyped-def]
 def reached(task, episode):  # type: ignore[no-untyped-def]
     """Return whether every joint is at its goal and slow (thesis eq. 5.1, 5.2)."""
     for joint in range(episode.goal.shape[0]):
-        if abs(angle(task, episode, joint) - episode.goal[joint]) > task.angle_tolerance:
-            return False
-        if abs(velocity(task, episode, joint)) > task.velocity_tolerance:
+        if not at_goal(task.reward, angle(task, episode, joint), velocity(task, episode, joint), episode.goal[joint]):
             return False
     return True
 
 
 @part
-def reward(task, is_reached, switched):  # type: ignore[no-untyped-def]
-    """Return what a joint is paid for an action (thesis eq. 4.2, with the price of a switch of section 5.4.1)."""
-    return (task.reward_goal if is_reached else task.reward_action) + task.reward_switch * switched
+def gained(task, episode, is_reached):  # type: ignore[no-untyped-def]
+    """Return what all joints together are paid for the last action of ``episode``."""
+    switches = 0
+    for joint in range(episode.switched.shape[0]):
+        switches += episode.switched[joint]
+    return paid(task.reward, is_reached, switches)
+
+
+@part
+def ending(task, is_reached, taken):  # type: ignore[no-untyped-def]
+    """Return how an episode is after ``taken`` actions: :data:`GOES_ON`, :data:`REACHED` or :data:`CUT_OFF`."""
+    if is_reached:
+        return REACHED
+    return CUT_OFF if taken >= task.cutoff else GOES_ON

@@ -26,6 +26,7 @@ from pneumarm.task.environment import (
     order,
     reached,
 )
+from pneumarm.task.reward import paid
 from pneumarm.transitions.window import Window
 
 
@@ -152,6 +153,15 @@ def begin_all(environment, fleet):  # type: ignore[no-untyped-def]
     """Let all arms begin episodes anywhere."""
     for e in range(fleet.taken.shape[0]):
         begin_one(environment, fleet, e)
+
+
+@part
+def gained_by(task, fleet, e, is_reached):  # type: ignore[no-untyped-def]
+    """Return what all joints of arm ``e`` together are paid for its last action."""
+    switches = 0
+    for joint in range(fleet.switched.shape[1]):
+        switches += fleet.switched[e, joint]
+    return paid(task.reward, is_reached, switches)
 
 
 @kernel

@@ -1,12 +1,28 @@
-"""When a goal is reached, and what is paid for an action (thesis sections 4.2.1, 5.1 and 5.4.1)."""
+"""When a goal is reached, what a switch is, and what is paid for an action (thesis sections 4.2.1, 5.1 and 5.4.1).
+
+The rules are the functions at the end of this module. Loops are compiled from them, and Python calls them as they
+are: they take a :class:`Reward` or its :class:`RewardParameters` alike.
+"""
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.kernels import part
 from pneumarm.settings import Settings, Valid
+
+
+class RewardParameters(NamedTuple):
+    """A :class:`Reward` as kernels take it; the fields are the same."""
+
+    goal: float
+    action: float
+    switch: float
+    angle_tolerance: float
+    velocity_tolerance: float
 
 
 @dataclass(frozen=True)
@@ -33,12 +49,35 @@ class Reward(Settings):
             "velocity_tolerance": 0 < self.velocity_tolerance < math.inf,
         }
 
+    @property
+    def parameters(self) -> RewardParameters:
+        """The same for kernels."""
+        return RewardParameters(*map(float, astuple(self)))
+
     def reached(self, angle: ArrayLike, velocity: ArrayLike, goal: ArrayLike) -> bool:
         """Return whether all joints are at their goals; all arguments (joints,) in [counts], [counts/ms]."""
-        distance = np.abs(np.asarray(angle, np.float64) - np.asarray(goal, np.float64))
-        slow = np.abs(np.asarray(velocity, np.float64)) <= self.velocity_tolerance
-        return bool((distance <= self.angle_tolerance).all() and slow.all())
+        joints = zip(np.ravel(angle), np.ravel(velocity), np.ravel(goal), strict=True)
+        return all(bool(at_goal.py_func(self, *joint)) for joint in joints)
 
     def of(self, reached: bool, switched: ArrayLike) -> NDArray[np.float64]:
         """Return what each joint is paid for an action (joints,), ``switched`` being whether it was a switch."""
-        return (self.goal if reached else self.action) + self.switch * np.asarray(switched, np.float64)
+        each: NDArray[np.float64] = paid.py_func(self, reached, np.asarray(switched, np.float64))
+        return each
+
+
+@part
+def at_goal(reward, angle, velocity, goal):  # type: ignore[no-untyped-def]
+    """Return whether a joint is at its ``goal`` and slow (thesis eq. 5.1, 5.2)."""
+    return abs(angle - goal) <= reward.angle_tolerance and abs(velocity) <= reward.velocity_tolerance
+
+
+@part
+def is_switch(before, action):  # type: ignore[no-untyped-def]
+    """Return whether a joint's ``action`` is a switch after the one ``before`` it, -1 where it is the first."""
+    return before >= 0 and before != action
+
+
+@part
+def paid(reward, reached, switched):  # type: ignore[no-untyped-def]
+    """Return what is paid for an action; ``switched`` is whether a joint, or how many joints, switched."""
+    return (reward.goal if reached else reward.action) + reward.switch * switched

@@ -122,8 +122,8 @@ class Displacement(OnTheArm):
         agent, arm = agent_of(material, self.agent, run, settings), new_arm(material, run, settings)
         player = Player(agent, arm, sizes.learning_rate, self.agent.exploration, seed)
         player.play(*draws(agent, seed, sizes.adapting, MOVEMENTS))
-        made = player.play(*draws(agent, seed, sizes.shown, MOVEMENTS, sizes.adapting)).movements
-        distance = np.abs(made.goal - made.angle_begin)[:, 0]
+        made = player.play(*draws(agent, seed, sizes.shown, MOVEMENTS, sizes.adapting))
+        distance = made.distance[:, 0]
         won, switches = made.success, made.switches.sum(axis=1)
         found = {
             **relations(distance[won], made.actions[won], switches[won]),

@@ -63,7 +63,7 @@ class GoalArea(AgentsByTrial):
         """Train, and move in the simulation and on the arm."""
         agent = agent_of(material, self.train_settings(trial), run, settings)
         before = simulated_test(material, agent, settings.test_episodes, prefix=SIMULATION)
-        made = greedy_test(material, agent, self.sizes.test, run, settings).movements
+        made = greedy_test(material, agent, self.sizes.test, run, settings)
         speed = np.abs(made.velocity_end).max(axis=1)[made.success]
         slow = {"half as fast at the end": float((speed <= AREAS[trial][1] / 2).mean())} if made.success.any() else {}
         return {**before, **means(made), **slow}

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.control.playing import Played, Player
+from pneumarm.control.playing import Player
 from pneumarm.control.transfer import BEGIN
 from pneumarm.experiments.differences import Interval, Verdict, above
 from pneumarm.experiments.evidence import (
@@ -122,13 +122,13 @@ class OnTheArmOnly(OnTheArm):
             arm = new_arm(material, run, settings)
             goals = look(arm, self.agent, self.sizes.looks, run_seed(settings, run)).goal_range
             same = replace(agent, goal_range=goals)  # it has learned goals in a wider range
-            made = greedy_test(material, same, self.sizes.test, run, settings).movements
+            made = greedy_test(material, same, self.sizes.test, run, settings)
             return {**means(made), "hours": settings.transitions * agent.spec.period / 3600}
         most = settings.max_episodes or self.agent.max_episodes
         chosen, arm = replace(self.agent, max_episodes=most), new_arm(material, run, settings)
         seed = run_seed(settings, run)
         found = learn_on(arm, look(arm, chosen, self.sizes.looks, seed), seed)
-        tested = greedy_test(material, found.agent, self.sizes.test, run, settings).movements
+        tested = greedy_test(material, found.agent, self.sizes.test, run, settings)
         hours, deviation, performance = zip(*found.course, strict=True)
         return {
             **means(tested),
@@ -269,9 +269,9 @@ def learn_on(arm: VirtualArm, agent: Agent, seed: int) -> Learned:
     while not met and made < settings.max_episodes:
         now = stage(deviation, settings, spec)
         chunk = min(settings.shaping.episodes if settings.shaping else _CHUNK, settings.max_episodes - made)
-        played: Played = player.play(*draws(agent, seed, chunk, MOVEMENTS, made), now.schedule)
-        made += len(played.time_end)
-        steps += int(played.movements.actions.sum())
+        played = player.play(*draws(agent, seed, chunk, MOVEMENTS, made), now.schedule)
+        made += played.n
+        steps += int(played.actions.sum())
         met = now.whole and player.performance >= now.criterion
         course.append((arm.time / 3600, deviation, player.performance))
         deviation = adjusted(deviation, player.performance, settings, spec)

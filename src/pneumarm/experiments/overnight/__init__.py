@@ -20,9 +20,10 @@ from pneumarm.control.playing import Player
 from pneumarm.experiments.differences import Interval, above
 from pneumarm.experiments.evidence import blocks, number, over_arms, plain, thesis
 from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows, run_seed
-from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, course, draws, joined, new_arm
+from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, course, draws, new_arm
 from pneumarm.experiments.pictures import Curve, courses
 from pneumarm.report.page import Picture, Section, Table
+from pneumarm.task.movements import joined
 
 
 class Days(NamedTuple):

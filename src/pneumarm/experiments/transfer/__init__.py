@@ -119,7 +119,7 @@ class Transfer(OnTheArm):
         played = player.play(*draws(agent, seed, self.sizes.learning, MOVEMENTS))
         return {
             **simulated_test(of, agent, laboratory.test_episodes, exploration=explores, prefix=_EXPLORING),
-            **course(played.movements, self.sizes.block),
+            **course(played, self.sizes.block),
             "hours": float(played.time_end[-1] / 3600),
         }
 
@@ -128,7 +128,7 @@ class Transfer(OnTheArm):
         arm = new_arm(of, run, laboratory, changed(of.parameters, trial))
         if trial in (WARM, ALL):
             Player(agent, arm).play(*draws(agent, seed, self.sizes.warming, MOVEMENTS))
-        found = means(greedy_test(of, agent, self.sizes.test, run, laboratory, arm).movements)
+        found = means(greedy_test(of, agent, self.sizes.test, run, laboratory, arm))
         if trial != AS_IT_IS:
             return found
         # What is simulated does not depend on the trial.

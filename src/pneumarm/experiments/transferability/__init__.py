@@ -73,7 +73,7 @@ class Transferability(AgentsByTrial):
         judged = replace(found, settings=replace(found.settings, reward=Reward()))  # all by the same reward
         before = simulated_test(material, judged, settings.test_episodes, noise=NoiseSettings(), prefix=SIMULATION)
         played = greedy_test(material, judged, self.sizes.test, run, settings)
-        return {**before, **means(played.movements)}
+        return {**before, **means(played)}
 
     def analyse(self, rows: Rows) -> Analysis:
         """Return what every kind of agent earns, and what it loses on the arm."""

@@ -22,7 +22,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
 from pneumarm.task.fleet import begin_all, fleet, limits
-from pneumarm.task.movements import TestResult
+from pneumarm.task.movements import Movements
 
 _WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
 _LAST_LAYER = 0.1  # the first values are small
@@ -87,6 +87,6 @@ class ValueLearner(FleetLearner[Agent]):
             simulation.spec, window, simulation.scaling, simulation.goal_range, networks, self._settings.online
         )
 
-    def validate(self, episodes: int) -> TestResult:
+    def validate(self, episodes: int) -> Movements:
         """Return greedy movements."""
         return self.agent().test(self._simulation, self._begin, episodes, (self._seed, _VALIDATION))

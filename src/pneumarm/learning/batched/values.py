@@ -23,8 +23,9 @@ from pneumarm.learning.online.values import Networks
 from pneumarm.learning.policy.inputs import write_inputs
 from pneumarm.networks.layers import adam, backward, forward, split
 from pneumarm.random import integer
-from pneumarm.task.environment import reward
-from pneumarm.task.fleet import begin_one, take_all
+from pneumarm.task.environment import CUT_OFF, GOES_ON, REACHED, ending
+from pneumarm.task.fleet import begin_one, gained_by, take_all
+from pneumarm.task.reward import paid
 from pneumarm.transitions.window import Window
 
 
@@ -38,7 +39,7 @@ class ValueBatch(NamedTuple):
     reward: NDArray[np.float64]
     """Shape (steps, n, joints), in units of the scale of returns."""
     ended: NDArray[np.int64]
-    """0 goes on, 1 goal reached, 2 cut off, shape (steps, n)."""
+    """How episodes are after each step, see :func:`~pneumarm.task.environment.ending`, shape (steps, n)."""
     best: NDArray[np.float64]
     """Highest action values, shape (steps + 1, n, joints), in units of the scale of returns."""
     target: NDArray[np.float64]
@@ -145,12 +146,11 @@ def collect_values(mind, rule, exploration, net, fleet, batch):  # type: ignore[
         take_all(environment, mind.limits, fleet, batch.actions[k], batch.is_reached)
         for e in range(n):
             is_reached = batch.is_reached[e]
-            total += task.reward_goal if is_reached else task.reward_action
+            total += gained_by(task, fleet, e, is_reached)
             for joint in range(joints):
-                batch.reward[k, e, joint] = part * reward(task, is_reached, fleet.switched[e, joint])
-                total += task.reward_switch * fleet.switched[e, joint]
-            batch.ended[k, e] = 1 if is_reached else (2 if fleet.taken[e] >= task.cutoff else 0)
-            if batch.ended[k, e] > 0:
+                batch.reward[k, e, joint] = part * paid(task.reward, is_reached, fleet.switched[e, joint])
+            batch.ended[k, e] = ending(task, is_reached, fleet.taken[e])
+            if batch.ended[k, e] != GOES_ON:
                 episodes += 1
                 successes += 1 if is_reached else 0
                 begin_one(environment, fleet, e)
@@ -166,9 +166,9 @@ def lambda_returns(reward, ended, best, discount, decay, target):  # type: ignor
             later = best[steps, e, joint]
             for back in range(steps):
                 k = steps - 1 - back
-                if ended[k, e] == 1:
+                if ended[k, e] == REACHED:
                     ahead = 0.0
-                elif ended[k, e] == 2:
+                elif ended[k, e] == CUT_OFF:
                     ahead = best[k, e, joint]
                 else:
                     ahead = (1.0 - decay) * best[k + 1, e, joint] + decay * later

@@ -17,7 +17,7 @@ from pneumarm.learning.online.values import Networks, network_shapes, pack, unpa
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
-from pneumarm.task.movements import TestResult
+from pneumarm.task.movements import Movements
 from pneumarm.transitions.window import Window
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Agent:
         exploration = self.settings.exploration if explores else None
         return OnlineLearner(self, learning_rate, exploration, seed)
 
-    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> TestResult:
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
         """Let the agent move greedily in ``simulation``."""
         env = environment(simulation, begin, self.settings)
         return run_test(env, self.weights(), self.settings, episodes, seed)

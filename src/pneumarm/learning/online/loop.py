@@ -17,7 +17,9 @@ from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import part
 from pneumarm.learning.online.exploration import choose, greedy
 from pneumarm.learning.online.values import action_values, forget_traces, td_target, update
-from pneumarm.task.environment import Episode, angle, begin_episode, reward, take, velocity
+from pneumarm.task.environment import Episode, begin_episode, gained, take
+from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
+from pneumarm.task.reward import paid
 
 
 class Workspace(NamedTuple):
@@ -101,11 +103,10 @@ def train_episode(environment, learner, schedule, episode, workspace):  # type: 
         is_reached = take(environment, episode, workspace.actions)
         if not is_reached:
             look_ahead(learner, schedule, x, workspace, random)
-        total += environment.task.reward_goal if is_reached else environment.task.reward_action
+        total += gained(environment.task, episode, is_reached)
         for joint in range(workspace.actions.shape[0]):
-            paid = reward(environment.task, is_reached, episode.switched[joint])
-            total += environment.task.reward_switch * episode.switched[joint]
-            target = td_target(paid, learner.discount, workspace.next_values[joint], is_reached)
+            reward = paid(environment.task.reward, is_reached, episode.switched[joint])
+            target = td_target(reward, learner.discount, workspace.next_values[joint], is_reached)
             update(learner, joint, workspace.before, workspace.actions[joint], target)
             if workspace.cut[joint]:
                 forget_traces(learner, joint)
@@ -136,11 +137,9 @@ def test_episodes(environment, learner, schedule, episode, workspace, random, re
     task, x = environment.task, episode.state.x
     for e in range(record.actions.shape[0]):
         begin_episode(environment, episode, np.inf, random)
-        for joint in range(episode.goal.shape[0]):
-            record.goal[e, joint] = episode.goal[joint]
-            record.angle_begin[e, joint] = angle(task, episode, joint)
+        note_begin(task, episode, record, e)
         is_reached = False
-        while not is_reached and record.actions[e] < task.cutoff:
+        while goes_on(task, is_reached, record, e):
             for joint in range(episode.goal.shape[0]):
                 action_values(learner, joint, x, workspace.values)
                 if schedule.epsilon == 0.0:
@@ -151,12 +150,5 @@ def test_episodes(environment, learner, schedule, episode, workspace, random, re
                         workspace.values, epsilon, temperature, workspace.odds, episode.state.random
                     )
             is_reached = take(environment, episode, workspace.actions)
-            record.actions[e] += 1
-            record.reward[e] += task.reward_goal if is_reached else task.reward_action
-            for joint in range(episode.goal.shape[0]):
-                record.switches[e, joint] += episode.switched[joint]
-                record.reward[e] += task.reward_switch * episode.switched[joint]
-        record.success[e] = is_reached
-        for joint in range(episode.goal.shape[0]):
-            record.angle_end[e, joint] = angle(task, episode, joint)
-            record.velocity_end[e, joint] = velocity(task, episode, joint)
+            note_action(task.reward, episode.switched, is_reached, record, e)
+        note_end(task, episode, is_reached, record, e)

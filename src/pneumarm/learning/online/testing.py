@@ -9,7 +9,7 @@ from pneumarm.learning.online.settings import Exploration, TrainSettings
 from pneumarm.learning.online.values import learner
 from pneumarm.random import random_state
 from pneumarm.task.environment import Environment, episode
-from pneumarm.task.movements import NOISE, TestResult, movements
+from pneumarm.task.movements import NOISE, Movements, movements
 
 GREEDY = Exploration(epsilon=0.0)
 """No exploration."""
@@ -22,7 +22,7 @@ def run_test(
     episodes: int,
     seed: tuple[int, ...],
     exploration: Exploration = GREEDY,
-) -> TestResult:
+) -> Movements:
     """Test the networks ``weights`` in ``env``; begin states and goals are drawn by ``seed``, and so is the noise."""
     if episodes < 1:
         raise UnusableInput(f"a test needs at least one episode, got {episodes}")
@@ -30,4 +30,4 @@ def run_test(
     record = movements(episodes, one.goal.size)
     schedule = Schedule(np.inf, float(exploration.epsilon), float(exploration.temperature), 0.0)
     test_episodes(env, learner(weights, settings), schedule, one, workspace(one), random_state(seed), record)
-    return TestResult(*record)
+    return record

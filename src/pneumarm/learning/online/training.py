@@ -31,7 +31,7 @@ from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import Environment, environment, episode
-from pneumarm.task.movements import TestResult
+from pneumarm.task.movements import Movements
 
 _WEIGHTS, _TRAINING, _VALIDATION = 0, 1, 2  # streams of random numbers
 _CHECKPOINT = "pneumarm training"
@@ -61,7 +61,7 @@ class Training:
     agent: Agent
     best: int
     """Index of the best agent, by mean reward in its validation."""
-    validation: tuple[TestResult, ...]
+    validation: tuple[Movements, ...]
     """Validation of every agent, with seeds of its own."""
     curves: tuple[NDArray[np.float64], ...]
     """By agent a row every 500 episodes, columns as in ``CURVES``; the deviation [counts] as it was until then."""
@@ -245,7 +245,7 @@ def _apart(value: Any) -> Any:
     return copy
 
 
-def _validate(env: Environment, agents: _Agents, settings: TrainSettings, seed: int, a: int) -> TestResult:
+def _validate(env: Environment, agents: _Agents, settings: TrainSettings, seed: int, a: int) -> Movements:
     return run_test(env, agents.weights[a], settings, settings.validation_episodes, (seed, _VALIDATION))
 
 

@@ -20,8 +20,9 @@ from pneumarm.learning.policy.proximal import FORBIDDEN, log_softmax, write_bias
 from pneumarm.networks.layers import Layers, forward, workspace
 from pneumarm.random import RandomState
 from pneumarm.simulation.noise import begin_noise
-from pneumarm.task.environment import Environment, reward
-from pneumarm.task.fleet import Fleet, Limits, fleet, take_alive, take_all
+from pneumarm.task.environment import Environment
+from pneumarm.task.fleet import Fleet, Limits, fleet, gained_by, one, take_alive, take_all
+from pneumarm.task.noting import goes_on, note_action, note_end
 
 
 class Mind(NamedTuple):
@@ -109,20 +110,11 @@ def run_lanes(mind, lanes, record, first, count):  # type: ignore[no-untyped-def
         for e in range(count):
             if not lanes.alive[e]:
                 continue
-            entry, switches = first + e, 0
-            for joint in range(lanes.actions.shape[1]):
-                record.switches[entry, joint] += arms.switched[e, joint]
-                switches += arms.switched[e, joint]
-            record.actions[entry] += 1
-            record.reward[entry] += reward(task, lanes.is_reached[e], switches)
-            if lanes.is_reached[e] or record.actions[entry] >= task.cutoff:
+            note_action(task.reward, arms.switched[e], lanes.is_reached[e], record, first + e)
+            if not goes_on(task, lanes.is_reached[e], record, first + e):
                 lanes.alive[e] = False
                 left -= 1
-                record.success[entry] = lanes.is_reached[e]
-                for joint in range(lanes.actions.shape[1]):
-                    unit = task.unit[joint]
-                    record.angle_end[entry, joint] = unit[0] + unit[1] * arms.x[4 * joint, e]
-                    record.velocity_end[entry, joint] = unit[2] + unit[3] * arms.x[4 * joint + 1, e]
+                note_end(task, one(arms, e), lanes.is_reached[e], record, first + e)
 
 
 @kernel
@@ -154,10 +146,7 @@ def move_all(mind, lanes, horizon):  # type: ignore[no-untyped-def]
         is_done = True
         for e in range(lanes.total.shape[0]):
             if lanes.alive[e]:
-                switches = 0
-                for joint in range(lanes.actions.shape[1]):
-                    switches += lanes.fleet.switched[e, joint]
-                lanes.total[e] += reward(mind.environment.task, lanes.is_reached[e], switches)
+                lanes.total[e] += gained_by(mind.environment.task, lanes.fleet, e, lanes.is_reached[e])
                 lanes.alive[e] = not lanes.is_reached[e]
                 is_done = is_done and not lanes.alive[e]
         if is_done:

@@ -24,7 +24,7 @@ from pneumarm.task.acting import test_acting
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
 from pneumarm.task.fleet import limits
-from pneumarm.task.movements import TestResult
+from pneumarm.task.movements import Movements
 from pneumarm.transitions.window import Window
 
 KIND = "pneumarm policy"
@@ -87,14 +87,14 @@ class PolicyAgent:
         """Return the policy acting greedily; it neither learns nor explores, so the arguments change nothing."""
         return PolicyActor(self.policy.copy(), self.mind(), self.sizes, self.settings)
 
-    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> TestResult:
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
         """Let the policy move greedily in ``simulation``, without lookahead."""
         decider = mind(simulation, begin, self.settings, self.policy)
         return run_policy(decider, self.sizes, episodes, seed)
 
     def test_ahead(
         self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]
-    ) -> TestResult | None:
+    ) -> Movements | None:
         """Let it move in ``simulation`` as on an arm, looking ahead; None where its settings have no lookahead.
 
         A decision takes a hundred times as long as in :meth:`test`, whose first movements these are.

@@ -31,8 +31,8 @@ from pneumarm.learning.policy.inputs import write_inputs
 from pneumarm.networks.layers import adam, backward, forward
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.random import integer, uniform
-from pneumarm.task.environment import reward
-from pneumarm.task.fleet import begin_one, is_useful, take_all
+from pneumarm.task.environment import CUT_OFF, GOES_ON, REACHED, ending
+from pneumarm.task.fleet import begin_one, gained_by, is_useful, take_all
 
 FORBIDDEN = np.float32(-1e9)
 """Added to the logit of an action that may not be taken."""
@@ -55,7 +55,7 @@ class Batch(NamedTuple):
     reward: NDArray[np.float32]
     """Shape (steps, n), in units of the scale of returns."""
     ended: NDArray[np.int64]
-    """0 goes on, 1 goal reached, 2 cut off, shape (steps, n)."""
+    """How episodes are after each step, see :func:`~pneumarm.task.environment.ending`, shape (steps, n)."""
     value: NDArray[np.float32]
     """Shape (steps + 1, n), in units of the scale of returns."""
     advantage: NDArray[np.float32]
@@ -198,15 +198,12 @@ def collect(environment, limits, inputs, rule, policy, fleet, batch):  # type: i
         act_all(limits, inputs, rule, policy, fleet, batch, k)
         take_all(environment, limits, fleet, batch.actions[k], batch.is_reached)
         for e in range(batch.reward.shape[1]):
-            switches = 0
-            for joint in range(fleet.switched.shape[1]):
-                switches += fleet.switched[e, joint]
             is_reached = batch.is_reached[e]
-            paid = reward(task, is_reached, switches)
-            total += paid
-            batch.reward[k, e] = paid * part
-            batch.ended[k, e] = 1 if is_reached else (2 if fleet.taken[e] >= task.cutoff else 0)
-            if batch.ended[k, e] > 0:
+            reward = gained_by(task, fleet, e, is_reached)
+            total += reward
+            batch.reward[k, e] = reward * part
+            batch.ended[k, e] = ending(task, is_reached, fleet.taken[e])
+            if batch.ended[k, e] != GOES_ON:
                 episodes += 1
                 successes += 1 if is_reached else 0
                 begin_one(environment, fleet, e)
@@ -245,9 +242,9 @@ def advantages(reward, ended, value, discount, decay, advantage):  # type: ignor
         later = 0.0
         for back in range(steps):
             k = steps - 1 - back
-            ahead = 0.0 if ended[k, e] == 1 else (value[k, e] if ended[k, e] == 2 else value[k + 1, e])
+            ahead = 0.0 if ended[k, e] == REACHED else (value[k, e] if ended[k, e] == CUT_OFF else value[k + 1, e])
             delta = reward[k, e] + discount * ahead - value[k, e]
-            later = delta if ended[k, e] > 0 else delta + discount * decay * later
+            later = delta if ended[k, e] != GOES_ON else delta + discount * decay * later
             advantage[k, e] = later
 
 

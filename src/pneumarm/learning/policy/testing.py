@@ -6,14 +6,15 @@ from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.learning.policy.acting import Mind, lanes, run_lanes
 from pneumarm.random import random_state, random_states
-from pneumarm.task.environment import angle, begin_episode
+from pneumarm.task.environment import begin_episode
 from pneumarm.task.fleet import one
-from pneumarm.task.movements import NOISE, TestResult, movements
+from pneumarm.task.movements import NOISE, Movements, movements
+from pneumarm.task.noting import note_begin
 
 _TOGETHER = 256
 
 
-def run_policy(mind: Mind, sizes: tuple[int, ...], episodes: int, seed: tuple[int, ...]) -> TestResult:
+def run_policy(mind: Mind, sizes: tuple[int, ...], episodes: int, seed: tuple[int, ...]) -> Movements:
     """Return ``episodes`` greedy movements of a policy of ``sizes``, without lookahead.
 
     ``seed`` decides begin states and goals alone, as in :func:`pneumarm.learning.test`.
@@ -27,7 +28,7 @@ def run_policy(mind: Mind, sizes: tuple[int, ...], episodes: int, seed: tuple[in
         count = min(_TOGETHER, episodes - first)
         _begin(mind, arms, random, record, first, count)
         run_lanes(mind, arms, record, first, count)
-    return TestResult(*record)
+    return record
 
 
 @kernel
@@ -40,5 +41,4 @@ def _begin(mind, lanes, random, record, first, count):  # type: ignore[no-untype
         arms.taken[e] = 0
         for joint in range(arm.goal.shape[0]):
             arms.still[e, joint] = 0
-            record.goal[first + e, joint] = arm.goal[joint]
-            record.angle_begin[first + e, joint] = angle(task, arm, joint)
+        note_begin(task, arm, record, first + e)

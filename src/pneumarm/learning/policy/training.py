@@ -21,7 +21,7 @@ from pneumarm.random import random_state, random_states
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.fleet import begin_all, fleet
-from pneumarm.task.movements import TestResult
+from pneumarm.task.movements import Movements
 
 _WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
 _FIRST_OUTPUT = 0.01  # the first policy chooses by its bonus for holding alone
@@ -35,7 +35,7 @@ class FleetTraining(Generic[AgentT]):
     agent: AgentT
     best: int
     """Index of the best learner, by mean reward in its validation."""
-    validation: tuple[TestResult, ...]
+    validation: tuple[Movements, ...]
     """Validation of every learner, without lookahead, with seeds of its own."""
     curves: NDArray[np.float64]
     """Columns as in ``FLEET_CURVES``, shape (agents, rows, columns)."""
@@ -155,7 +155,7 @@ class PolicyLearner(FleetLearner[PolicyAgent]):
         """Return the agent as it is now."""
         return PolicyAgent(self._simulation, self.policy.flat.copy(), self._settings)
 
-    def validate(self, episodes: int) -> TestResult:
+    def validate(self, episodes: int) -> Movements:
         """Return greedy movements, without lookahead."""
         return run_policy(self.mind, self.sizes, episodes, (self._seed, _VALIDATION))
 

@@ -1,5 +1,7 @@
 """Actions and switches against the angular displacement (thesis section 5.5.2, figures 5.15 and 5.16)."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -19,7 +21,7 @@ from pneumarm.report.style import (
 )
 from pneumarm.statistics import running_median
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 
 @styled

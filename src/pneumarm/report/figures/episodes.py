@@ -1,12 +1,14 @@
 """The distribution of the test's episodes: reward, actions, switches (thesis section 5.2)."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.report.style import DARK, INK, LIGHT, nothing, panels, styled, whole_ticks
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 
 @styled

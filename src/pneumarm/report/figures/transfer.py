@@ -1,7 +1,7 @@
 """What happens on the arm, episode after episode (thesis section 5.5.1, figures 5.9 to 5.12)."""
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ from pneumarm.report.style import (
 )
 from pneumarm.statistics import Moving, moving_mean, moving_rate
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 WINDOW = 100
 """Episodes in a moving average."""

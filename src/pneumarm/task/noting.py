@@ -1,0 +1,39 @@
+"""Parts of compiled loops that write movements into their record, action by action."""
+
+from pneumarm.kernels import part
+from pneumarm.task.environment import angle, velocity
+from pneumarm.task.reward import paid
+
+
+@part
+def note_begin(task, episode, record, e):  # type: ignore[no-untyped-def]
+    """Write where ``episode`` begins and its goal as movement ``e`` of ``record``."""
+    for joint in range(episode.goal.shape[0]):
+        record.goal[e, joint] = episode.goal[joint]
+        record.angle_begin[e, joint] = angle(task, episode, joint)
+
+
+@part
+def note_action(reward, switched, is_reached, record, e):  # type: ignore[no-untyped-def]
+    """Count an action of movement ``e``, whose joints ``switched`` (joints,), and what is paid for it."""
+    switches = 0
+    for joint in range(switched.shape[0]):
+        record.switches[e, joint] += switched[joint]
+        switches += switched[joint]
+    record.actions[e] += 1
+    record.reward[e] += paid(reward, is_reached, switches)
+
+
+@part
+def note_end(task, episode, is_reached, record, e):  # type: ignore[no-untyped-def]
+    """Write where ``episode`` is now as the end of movement ``e``."""
+    record.success[e] = is_reached
+    for joint in range(episode.goal.shape[0]):
+        record.angle_end[e, joint] = angle(task, episode, joint)
+        record.velocity_end[e, joint] = velocity(task, episode, joint)
+
+
+@part
+def goes_on(task, is_reached, record, e):  # type: ignore[no-untyped-def]
+    """Return whether movement ``e`` goes on: its goal is not reached and it is not cut off."""
+    return not is_reached and record.actions[e] < task.cutoff

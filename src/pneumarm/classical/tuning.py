@@ -21,7 +21,7 @@ from pneumarm.classical.search import Evolution
 from pneumarm.classical.tuned import KINDS, Tuned
 from pneumarm.errors import UnusableInput
 from pneumarm.moving import Moved, MoveSettings, at_period, move, track
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 from pneumarm.task.reference import parse_reference
 
 _STEP = 0.12
@@ -57,7 +57,7 @@ Report = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)
-class TuneSettings:
+class TuneSettings(Settings):
     """How a controller is tuned."""
 
     seconds: float = 1200.0
@@ -67,8 +67,11 @@ class TuneSettings:
     whole_periods: bool = False
     """Set valves for whole periods, also on an arm that can do pulses."""
 
-    def __post_init__(self) -> None:
-        check(self, seconds=0 < self.seconds <= 1e7, rate=self.rate == 0 or 1 <= self.rate <= 2000)
+    def _valid(self) -> Valid:
+        return {
+            "seconds": 0 < self.seconds <= 1e7 or "above 0 s",
+            "rate": self.rate == 0 or 1 <= self.rate <= 2000 or "1 to 2000 Hz, or 0 for that of the arm",
+        }
 
 
 def tune(

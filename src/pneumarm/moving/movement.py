@@ -16,7 +16,7 @@ from pneumarm.arm import Arm, ControlCycle, GuardedArm, Reading, guarded
 from pneumarm.arm.controller import Controller, TrackingController
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 from pneumarm.transitions.rows import Recorded
 from pneumarm.transitions.watch import Watch, watched
 
@@ -29,7 +29,7 @@ Seen = Callable[[Reading, NDArray[np.float64]], None]
 
 
 @dataclass(frozen=True)
-class MoveSettings:
+class MoveSettings(Settings):
     """How a goal is moved to."""
 
     hold: float = 2.0
@@ -41,14 +41,13 @@ class MoveSettings:
     pause: float = 2.0
     """Time between two tries, with closed valves [s] (thesis section 5.6.1)."""
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            hold=0 < self.hold <= 86400,
-            tries=1 <= self.tries <= 100,
-            tolerance=0 < self.tolerance < 360,
-            pause=0 <= self.pause <= 3600,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "hold": 0 < self.hold <= 86400 or "above 0 and at most 86400 s",
+            "tries": 1 <= self.tries <= 100 or "1 to 100",
+            "tolerance": 0 < self.tolerance < 360 or "above 0 and below 360 degrees",
+            "pause": 0 <= self.pause <= 3600 or "0 to 3600 s",
+        }
 
 
 @dataclass(frozen=True)

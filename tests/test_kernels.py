@@ -1,8 +1,9 @@
-"""The cache of compiled kernels serves neither stale nor broken code, and no code at all it cannot keep."""
+"""The cache of compiled kernels serves neither stale nor broken code, none it cannot keep, and always the same."""
 
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -137,3 +138,63 @@ def test_division_follows_numpy():
 
     assert divide(1.0, 0.0) == np.inf
     assert np.isnan(divide(0.0, 0.0))
+
+
+# Sums run in another order where a kernel calls another copy of a kernel than it did: the last bits show it.
+IMPROVED = """
+import hashlib
+import numpy as np
+from pneumarm.learning import PolicySettings
+from pneumarm.learning.policy.proximal import batch, improve
+from pneumarm.learning.policy.training import rule
+from pneumarm.networks.layers import initial_weights, trainable
+from pneumarm.random import random_state
+
+random, steps, arms, hidden = np.random.default_rng(1), 8, 16, (13, 32)
+policy = trainable(initial_weights((*hidden, 9), 1.0, random), (*hidden, 9), arms)
+value = trainable(initial_weights((*hidden, 1), 1.0, random), (*hidden, 1), arms)
+made_up = batch(steps, hidden[0], 1, arms)
+for part in (made_up.inputs, made_up.reward):
+    part[:] = random.normal(size=part.shape)
+improve(rule(PolicySettings()), policy, value, made_up, (1e-3, 1e-3), 0, random_state((1,)))
+print(hashlib.sha256(policy.flat.tobytes() + value.flat.tobytes()).hexdigest())
+"""
+TRAINED = """
+import hashlib, sys
+sys.path.insert(0, {learning!r})
+from synthetic_arm import synthetic_begin_states, synthetic_simulation
+from pneumarm.learning import BatchedSettings, PolicySettings, Shaping, TrainSettings, train
+
+simulation = synthetic_simulation()
+begin, small = synthetic_begin_states(simulation), {{"agents": 1, "validation_episodes": 10}}
+for settings in (
+    PolicySettings(updates=2, arms=16, steps=8, **small),
+    BatchedSettings(updates=2, arms=16, steps=8, **small),
+    TrainSettings(max_episodes=100, shaping=Shaping(episodes=10), **small),
+):
+    agent = train(simulation, begin, settings, seed=1).agent
+    print(hashlib.sha256(agent.weights().tobytes()).hexdigest())
+"""
+LEARNING = str(Path(__file__).parent / "learning")
+
+
+@pytest.mark.parametrize(
+    "script", [IMPROVED, pytest.param(TRAINED.format(learning=LEARNING), marks=pytest.mark.soak)], ids=["one", "all"]
+)
+def test_the_same_bits_come_whether_code_was_compiled_or_loaded(script, tmp_path):
+    def results(cache):
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            capture_output=True,
+            text=True,
+            timeout=600,
+            env={**os.environ, "PNEUMARM_CACHE": str(tmp_path / cache)},
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    with ThreadPoolExecutor() as pool:
+        compiled, again = pool.map(results, ["one", "other"])
+    loaded = results("one")
+    assert len(compiled.split()[0]) == 64
+    assert compiled == loaded == again

@@ -1,10 +1,13 @@
 """How pneumarm compiles its hot loops: one decorator, and a cache that cannot serve stale or broken code.
 
-Two traps of Numba's cache are closed here:
+Three traps of Numba are closed here:
 
 1. It does not see a change in a jitted function of *another* file. So the cache folder's name holds a hash
    of every source file that compiles anything and of Numba's version: any change starts a fresh folder.
 2. A truncated entry makes it crash. Here an entry that cannot be read is dropped and compiled again.
+3. A kernel's machine code holds copies of the kernels that it calls, optimised once more than the originals, so that
+   sums may run in another order. Numba lets a process call whichever it has loaded first, and results would depend
+   on what it has compiled or called before. Here every kernel calls its own copies.
 """
 
 import hashlib
@@ -15,10 +18,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import llvmlite.binding as llvm
 import numba
 from numba import config as numba_config
 from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import cpu_target
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _KEEP = 3  # folders of earlier sources kept, so that switching back and forth does not recompile
@@ -67,6 +73,24 @@ def _forget_old(root: Path) -> None:
 
 
 numba_config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
+
+
+class _OwnCopies(JITCodeLibrary):
+    """A kernel's machine code that calls its own copies of other kernels, whatever the process has loaded before."""
+
+    def _optimize_final_module(self) -> None:
+        super()._optimize_final_module()
+        # What callers link is as it comes from the cache: then their code is the same too.
+        self._shared_module = llvm.parse_bitcode(self._final_module.as_bitcode())
+        for function in self._shared_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.external:
+                function.linkage = "linkonce_odr"
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
+                function.linkage = "internal"
+
+
+cpu_target.target_context.codegen()._library_class = _OwnCopies
 
 
 class _ForgivingCache(FunctionCache):

@@ -1,7 +1,7 @@
 """Tuning on the arm itself: calibrate, then try gains on movements and go on from the better ones.
 
 What gains cost is measured as it will be used: for a movement the time until it has settled within a degree and
-within two, the error at rest, the overshoot and the valve changes; for sinusoids the error. Candidates come from a
+within two, the rest error, the overshoot and the valve changes; for sinusoids the error. Candidates come from a
 covariance matrix adaptation (:mod:`pneumarm.classical.search`); one that is clearly worse than the best after a few
 movements is broken off. In the end the best few are measured again on movements that none was chosen by.
 """
@@ -38,7 +38,7 @@ _AMPLITUDE = 20.0
 _SETTLED = ((1.0, 1.0), (2.2, 0.5))
 """Within how many degrees a movement is to settle, and what a second until then counts as."""
 _REST = 0.6
-"""What a degree of error at rest counts as [s]."""
+"""What a degree of rest error counts as [s]."""
 _OVERSHOOT = 0.02
 """What a degree of overshoot counts as [s]."""
 _CHANGE = 0.004

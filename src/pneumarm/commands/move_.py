@@ -50,7 +50,7 @@ def move_(
                 say(_told(one))
     # What is printed is printed even where one failed: it says which.
     result = {"movements": [one.results() for one in made]}
-    header = ("goal [deg]", "settled after [s]", "error at rest [deg]", "tries", "valve changes", "air [l]")
+    header = ("goal [deg]", "settled after [s]", "rest error [deg]", "tries", "valve changes", "air [l]")
     show(result, json, lambda: [table(header, [_row(one) for one in made], arm)])
     failed = [one for one in made if not one.success]
     if failed:
@@ -65,7 +65,7 @@ def _told(one: Moved) -> str:
         how = f"not settled in {one.tries} tries"
     else:
         how = f"settled after {one.time_settled - one.time_start:.2f} s"
-    return f"{_degrees(one)}: {how}, error at rest {', '.join(f'{e:.2f}' for e in one.rest_error)} deg"
+    return f"{_degrees(one)}: {how}, rest error {', '.join(f'{e:.2f}' for e in one.rest_error)} deg"
 
 
 def _degrees(one: Moved) -> str:

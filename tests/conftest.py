@@ -1,5 +1,6 @@
 """A small run of the whole job, made once and used by the tests of everything that comes after it."""
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,16 @@ def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "small"
     Run(folder, SMALL).do()
     return folder
+
+
+def pytest_configure() -> None:
+    """Start children with a terminal's signals, also in a script's background and under nohup.
+
+    There SIGINT or SIGHUP are ignored, which children inherit; what is handled they do not.
+    """
+    for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, lambda *_: None)):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -1,8 +1,6 @@
 import json
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -10,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from children import python
 from pneumarm.cli import COMMANDS, main
 from pneumarm.learning.imported import ImportedPolicy
 from pneumarm.simulation import Simulation
@@ -62,7 +61,7 @@ def test_help_answers_at_once_and_without_the_heavy_libraries() -> None:
         "import sys; from pneumarm.cli import app; app(['--help'], result_action='return_value');"
         "sys.exit(len({'numba', 'numpy', 'matplotlib', 'scipy'} & sys.modules.keys()))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+    done = python("-c", code, check=True)
     assert all(command.split()[0] in done.stdout for command in COMMANDS)
 
 
@@ -279,11 +278,9 @@ def test_the_commands_and_the_program_of_the_readme_run(tmp_path: Path) -> None:
     commands = [line for line in lines if line and line[0] == "pneumarm"]
     assert len(commands) >= 7
     for command in commands:
-        done = subprocess.run(
-            [sys.executable, "-m", "pneumarm", *command[1:]], cwd=tmp_path, capture_output=True, text=True
-        )
+        done = python("-m", "pneumarm", *command[1:], cwd=tmp_path)
         assert done.returncode == 0, (command, done.stderr)
     (program,) = blocks("python")
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = python("-c", program, cwd=tmp_path, check=True)
     degrees = float(np.asarray(re.findall(r"-?\d+\.\d+", done.stdout)[0]))
     assert abs(degrees - (650 - 511.5) / 11.378) < 15

@@ -1,14 +1,13 @@
 """The cache of compiled kernels serves neither stale nor broken code, none it cannot keep, and always the same."""
 
 import os
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from children import python
 from pneumarm.kernels import kernel, sources_hash
 
 LEFT = """
@@ -53,14 +52,8 @@ def run(package, tmp_path):
     """Call the kernel in a process of its own; returns its result, cache hits and misses."""
 
     def call(cache=tmp_path / "cache", **environment):
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT],
-            capture_output=True,
-            text=True,
-            timeout=120,
-            env={**os.environ, "PYTHONPATH": str(package.parent), "PNEUMARM_CACHE": str(cache), **environment},
-        )
-        assert done.returncode == 0, done.stderr
+        inside = {"PYTHONPATH": str(package.parent), "PNEUMARM_CACHE": str(cache), **environment}
+        done = python("-c", SCRIPT, env=os.environ | inside, check=True)
         value, hits, misses = done.stdout.split()
         return float(value), int(hits), int(misses)
 
@@ -183,15 +176,7 @@ LEARNING = str(Path(__file__).parent / "learning")
 )
 def test_the_same_bits_come_whether_code_was_compiled_or_loaded(script, tmp_path):
     def results(cache):
-        done = subprocess.run(
-            [sys.executable, "-c", script],
-            capture_output=True,
-            text=True,
-            timeout=600,
-            env={**os.environ, "PNEUMARM_CACHE": str(tmp_path / cache)},
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout
+        return python("-c", script, env=os.environ | {"PNEUMARM_CACHE": str(tmp_path / cache)}, check=True).stdout
 
     with ThreadPoolExecutor() as pool:
         compiled, again = pool.map(results, ["one", "other"])

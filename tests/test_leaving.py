@@ -2,18 +2,21 @@
 
 import os
 import signal
-import subprocess
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
-from time import monotonic, sleep
+from subprocess import Popen
+from time import sleep
 
 import pytest
 
+from children import child, end, wait_until
 from pneumarm.transitions import Store
 
 TESTS = Path(__file__).parent
 COMMANDS = ("collect", "transfer", "run")
 ARM = "python:logged_arm:logged"
+PNEUMARM = (sys.executable, "-m", "pneumarm.cli")
 
 
 def arguments(command: str, small_run: Path, out: Path) -> list[str]:
@@ -32,24 +35,21 @@ def store_of(command: str, out: Path) -> Path:
     return out if command == "collect" else out / "transitions.db"
 
 
-def moving(log: Path, process: subprocess.Popen[str], lines: int) -> None:
+def acknowledged(store: Path) -> int:
+    """Return how many transitions are in ``store``; none before there is a store."""
+    if not store.exists():
+        return 0
+    with Store.open(store) as opened:
+        return opened.transitions
+
+
+def wait_for_moves(log: Path, process: Popen[str], lines: int) -> None:
     """Wait until so many valve settings are logged."""
-    deadline = monotonic() + 60
-    while not log.exists() or log.read_text().count("\n") < lines:
-        assert process.poll() is None, process.communicate()
-        assert monotonic() < deadline, "the arm never moved"
-        sleep(0.02)
+    wait_until("moving", lambda: log.exists() and log.read_text().count("\n") >= lines, process)
 
 
-def environment(log: Path) -> dict[str, str]:
-    return os.environ | {"PNEUMARM_TEST_LOG": str(log)}
-
-
-def started(command: list[str], log: Path) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "pneumarm.cli", *command],
-        cwd=TESTS, env=environment(log), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+def started(log: Path, *command: str) -> AbstractContextManager[Popen[str]]:
+    return child(*command, cwd=TESTS, env=os.environ | {"PNEUMARM_TEST_LOG": str(log)})
 
 
 def check_closed(log: Path) -> None:
@@ -65,26 +65,22 @@ def test_a_signal_closes_the_valves_and_loses_nothing(
     command: str, number: signal.Signals, small_run: Path, tmp_path: Path
 ) -> None:
     log, out = tmp_path / "log", tmp_path / "out"
-    process = started(arguments(command, small_run, out), log)
-    moving(log, process, 700)
-    with Store.open(store_of(command, out)) as store:
-        acknowledged = store.transitions
-    process.send_signal(number)
-    sleep(0.05)
-    if process.poll() is None:
-        process.send_signal(number)  # an impatient person
-    _, told = process.communicate(timeout=20)
+    with started(log, *PNEUMARM, *arguments(command, small_run, out)) as process:
+        wait_until("a movement on disk", lambda: acknowledged(store_of(command, out)) > 0, process)
+        before = acknowledged(store_of(command, out))
+        process.send_signal(number)
+        sleep(0.05)
+        _, told = end(process, number)  # an impatient person
     assert process.returncode == 128 + number
     assert told.count("\n") == 1
     assert f"interrupted ({number.name}); the arm is closed" in told
     check_closed(log)
-    with Store.open(store_of(command, out)) as store:
-        assert store.transitions >= acknowledged > 0
+    assert acknowledged(store_of(command, out)) >= before
 
 
 PARENT = """
 import subprocess, sys, time
-child = subprocess.Popen([sys.executable, "-m", "pneumarm.cli", *sys.argv[1:]], stderr=open("/dev/null", "w"))
+child = subprocess.Popen(sys.argv[1:], stderr=open("/dev/null", "w"))
 print(child.pid, flush=True)
 time.sleep(100)
 """
@@ -93,30 +89,20 @@ time.sleep(100)
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells of the end of a parent")
 def test_the_end_of_the_parent_closes_the_valves(small_run: Path, tmp_path: Path) -> None:
     log = tmp_path / "log"
-    parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT, *arguments("collect", small_run, tmp_path / "out")],
-        cwd=TESTS, env=environment(log), stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    moving(log, parent, 300)
-    parent.kill()
-    parent.communicate()
-    deadline = monotonic() + 20
-    while not log.read_text().endswith("close\n"):
-        assert monotonic() < deadline, "the child goes on without its parent"
-        sleep(0.02)
+    command = [*PNEUMARM, *arguments("collect", small_run, tmp_path / "out")]
+    with started(log, sys.executable, "-c", PARENT, *command) as parent:
+        wait_for_moves(log, parent, 300)
+        parent.kill()
+        wait_until("the end of the parent's child", lambda: log.read_text().endswith("close\n"))
     check_closed(log)
 
 
 def test_nohup_is_left_alone(small_run: Path, tmp_path: Path) -> None:
     log = tmp_path / "log"
-    process = subprocess.Popen(
-        ["nohup", sys.executable, "-m", "pneumarm.cli", *arguments("collect", small_run, tmp_path / "out")],
-        cwd=TESTS, env=environment(log), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    moving(log, process, 300)
-    process.send_signal(signal.SIGHUP)
-    moving(log, process, log.read_text().count("\n") + 500)
-    process.terminate()
-    process.communicate(timeout=20)
+    with started(log, "nohup", *PNEUMARM, *arguments("collect", small_run, tmp_path / "out")) as process:
+        wait_for_moves(log, process, 300)
+        process.send_signal(signal.SIGHUP)
+        wait_for_moves(log, process, log.read_text().count("\n") + 500)
+        end(process, signal.SIGTERM)
     assert process.returncode == 128 + signal.SIGTERM
     check_closed(log)

@@ -1,8 +1,6 @@
 import csv
 import json
-import os
 import signal
-import subprocess
 import sys
 import time
 from dataclasses import replace
@@ -11,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from children import child, end, python, wait_until
 from pneumarm.errors import UnusableInput
 from pneumarm.run import Run
 from pneumarm.transitions import Store
@@ -124,34 +123,34 @@ def test_nothing_is_left_behind_by_settings_that_cannot_be_used(tmp_path: Path) 
     assert not list(tmp_path.iterdir())
 
 
-def started(folder: Path) -> subprocess.Popen[bytes]:
-    code = (
-        "import sys; sys.path.insert(0, sys.argv[1]); from small import SMALL; from pathlib import Path;"
-        "from pneumarm.run import Run; Run(Path(sys.argv[2]), SMALL).do()"
-    )
-    return subprocess.Popen([sys.executable, "-c", code, str(Path(__file__).parent), str(folder)])
+RUN = (
+    "-c",
+    "import sys; sys.path.insert(0, sys.argv[1]); from small import SMALL; from pathlib import Path;"
+    "from pneumarm.run import Run; Run(Path(sys.argv[2]), SMALL).do()",
+    Path(__file__).parent,
+)
 
 
 def killed_in(stage: str, folder: Path, after: float) -> None:
     """Start the run and kill it ``after`` seconds into ``stage``."""
-    process = started(folder)
     before = STAGES[: STAGES.index(stage)]
-    while process.poll() is None:
-        done = folder / "results.json"
-        reached = not before or (done.exists() and before[-1] in results_of(folder))
-        if reached and (before or (folder / "transitions.db").exists()):
-            break
-        time.sleep(0.01)
-    time.sleep(after)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
+
+    def is_reached() -> bool:
+        if not before:
+            return (folder / "transitions.db").exists()
+        return (folder / "results.json").exists() and before[-1] in results_of(folder)
+
+    with child(sys.executable, *RUN, folder) as process:
+        wait_until(stage, is_reached, process)
+        time.sleep(after)
+        end(process, signal.SIGKILL)
 
 
 def test_a_run_killed_in_every_stage_ends_as_if_nothing_had_happened(small_run: Path, tmp_path: Path) -> None:
     folder = tmp_path / "killed"
     for stage, after in zip(STAGES, (0.1, 0.3, 0.3, 0.05, 0.2, 0.1), strict=True):
         killed_in(stage, folder, after)
-    assert started(folder).wait() == 0
+    python(*RUN, folder, check=True)
     assert without_times(results_of(folder)) == without_times(results_of(small_run))
     assert (folder / "episodes.csv").read_text() == (small_run / "episodes.csv").read_text()
     for name in ("agent.safetensors", "adapted.safetensors", "simulation.safetensors"):

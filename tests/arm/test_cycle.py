@@ -117,7 +117,7 @@ def test_an_error_on_purpose_ends_at_once_with_closed_valves(smallest_arm):
 
 
 def real_time(smallest):
-    """Return an arm whose clock runs while somebody computes, as hardware's does, at a period of 5 ms."""
+    """Return an arm whose clock runs while somebody computes, as hardware's does, at a period of 50 ms."""
 
     class RealTime(smallest):
         def read(self):
@@ -129,7 +129,7 @@ def real_time(smallest):
         def wait(self, seconds):
             sleep(seconds)
 
-    return RealTime(period=0.005)
+    return RealTime(period=0.05)
 
 
 def test_late_decisions_are_held_then_vented_and_the_arm_goes_on_when_they_are_in_time(smallest_arm):
@@ -142,7 +142,7 @@ def test_late_decisions_are_held_then_vented_and_the_arm_goes_on_when_they_are_i
     def decide(reading):
         if not remaining:
             return None
-        sleep(remaining.pop(0) * 0.005)
+        sleep(remaining.pop(0) * 0.05)
         return decisions[len(thoughts) - len(remaining) - 1]
 
     guard = GuardedArm(arm)

@@ -3,12 +3,12 @@
 import json
 import os
 import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from subprocess import Popen
 from time import monotonic, sleep
 from typing import Any, TypeVar
 
@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from children import child, end, python
 from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
 from pneumarm.arm.serial.emulate import serve
 from pneumarm.arm.virtual import VirtualArm
@@ -31,19 +32,16 @@ START = "from pneumarm.cli import main; main()"
 
 
 @contextmanager
-def port(link: Path, arm: str = "virtual:seed=3") -> Iterator[subprocess.Popen[str]]:
+def port(link: Path, arm: str = "virtual:seed=3") -> Iterator[Popen[str]]:
     """Serve ``arm`` at ``link`` by the command; the port can be used within the block."""
     command = [sys.executable, "-c", START, "arm", "emulate", arm, "--link", str(link), "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            told = process.stdout.readline()
-            assert told, process.communicate()[1]
-            assert json.loads(told) == {"port": str(link), "arm": f"serial:{link}"}
-            yield process
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.wait(10)
+    with child(*command) as process:
+        assert process.stdout is not None
+        told = process.stdout.readline()
+        assert told, process.communicate()[1]
+        assert json.loads(told) == {"port": str(link), "arm": f"serial:{link}"}
+        yield process
+        end(process, signal.SIGINT)
 
 
 def test_an_arm_is_served_until_it_is_interrupted_and_leaves_nothing(tmp_path: Path) -> None:
@@ -52,11 +50,12 @@ def test_an_arm_is_served_until_it_is_interrupted_and_leaves_nothing(tmp_path: P
     with port(link) as process:
         for _ in range(2):  # who comes second finds it as the first one did
             with open_arm(f"serial:{link}") as arm:
-                begin, began = arm.read(), monotonic()
+                asked, begin, heard = monotonic(), arm.read(), monotonic()
                 arm.set_valves(np.array([[1, 0]], np.int8))
                 arm.wait(0.5)
-                later, passed = arm.read(), monotonic() - began
-                assert later.time - begin.time == pytest.approx(passed, abs=0.1)
+                asked_again, later, heard_again = monotonic(), arm.read(), monotonic()
+                tick = 0.01
+                assert asked_again - heard - tick < later.time - begin.time < heard_again - asked + tick
                 assert later.pressure[0, 0] > begin.pressure[0, 0] + 20
             sleep(0.05)
     assert process.returncode == 0
@@ -82,8 +81,8 @@ def test_a_controller_that_does_not_come_back_is_waited_for_with_the_arm_vented(
     assert pressures[10] > 40  # it was inflated,
     assert pressures[11] < 5  # and is empty when the controller is back,
     assert pressures[-1] > 40  # and goes on
-    assert guard.interventions.vented == 1
-    assert guard.link_counts()["requests"] > 60
+    assert guard.interventions.vented >= 1
+    assert guard.link_counts()["requests"] > 30
 
 
 def test_what_cannot_be_served_is_refused(tmp_path: Path) -> None:
@@ -91,8 +90,7 @@ def test_what_cannot_be_served_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match="cannot be made a link"):
         serve(VirtualArm(seed=1), pytest.fail, link=tmp_path / "mine")
     assert (tmp_path / "mine").read_text() == "mine"
-    command = [sys.executable, "-c", START, "arm", "emulate", "emulated:virtual"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = python("-c", START, "arm", "emulate", "emulated:virtual")
     assert done.returncode == 2
     assert "expected a virtual arm" in done.stderr
 

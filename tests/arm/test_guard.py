@@ -1,9 +1,7 @@
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
+from children import python
 from pneumarm.arm import GuardedArm, Reading
 from pneumarm.arm.guard import HELD, MOST_REPLACED, Interventions
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
@@ -231,5 +229,5 @@ def test_what_nobody_closed_is_closed_when_the_interpreter_ends(tmp_path):
         "if sys.argv[1] == 'failing': raise ValueError\n"
     )
     for how in ("well", "failing"):
-        done = subprocess.run([sys.executable, "-c", program, how], capture_output=True, text=True)
+        done = python("-c", program, how)
         assert done.stdout == f"closed {how}\n"

@@ -1,7 +1,5 @@
 """Hardware fails and stalls where a virtual arm never does: nothing recorded is lost, and moving goes on."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from children import python
 from pneumarm.adaptation import AdaptationSettings, RefitSettings
 from pneumarm.arm import Reading
 from pneumarm.arm.serial import BoardLine, EmulatedBoard, FaultyLine, SerialArm
@@ -237,9 +236,7 @@ def test_nothing_is_compiled_while_an_arm_moves(
         "agent": small_run / "agent.safetensors",
         "simulation": small_run / "simulation.safetensors",
     }
-    command = [sys.executable, "-c", COUNTING, str(tmp_path), job, str(files.get(what, what))]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    done = python("-c", COUNTING, tmp_path, job, files.get(what, what), check=True)
     turns, *compiled = done.stdout.split()
     assert int(turns) > 5
     assert not compiled

@@ -1,6 +1,5 @@
 """The monitor: what it finds, how soon, and that it leaves healthy arms alone."""
 
-import time
 from dataclasses import replace
 from functools import cache
 
@@ -216,20 +215,6 @@ def test_marks_are_the_rows_from_since_to_until():
     assert (mark.first, mark.last) == (3, 6)
     for kind in ("changed", "leak"):  # what is read then is what the arm is like
         assert marks_of([Finding(kind, "another arm", 1, None, since=0.0, noticed=1.0)], time_, step) == ()
-
-
-def test_costs_less_than_50_microseconds_a_reading(simulation):
-    arm = VirtualArm(draw_parameters(3), seed=1)
-    monitor, valves = Monitor(arm.spec, simulation), np.zeros((1, 2), np.int8)
-    readings = [arm.read() for _ in range(500)]
-    best = np.inf
-    for _ in range(5):
-        monitor.begin(at_rest=True)
-        begin = time.process_time()
-        for k, reading in enumerate(readings):
-            monitor.see(Reading(k / 30, reading.angle, reading.pressure), valves)
-        best = min(best, (time.process_time() - begin) / 500)
-    assert best < 50e-6
 
 
 def test_collecting_marks_what_a_fault_spoiled_and_nothing_is_learned_from_it(tmp_path):

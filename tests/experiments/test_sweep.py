@@ -2,15 +2,14 @@
 
 import os
 import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from toy import Toy
 
+from children import child, end, wait_until
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import LaboratorySettings, Row, run_seed, sorted_rows
@@ -123,13 +122,10 @@ def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
         f"sweep(Toy(pause=0.2), Path({str(tmp_path)!r}), workers=1)"
     )
     path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
-    process = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": path})
     file = tmp_path / "toy" / ROWS
-    while len(read_rows(file)) < 3:
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
+    with child(sys.executable, "-c", code, env={**os.environ, "PYTHONPATH": path}) as process:
+        wait_until("three rows", lambda: len(read_rows(file)) >= 3, process)
+        end(process, signal.SIGKILL)
     there = read_rows(file)
     assert 3 <= len(there) < 12
     done = sweep(Toy(), tmp_path)

@@ -3,7 +3,6 @@
 import os
 import random
 import select
-import subprocess
 import sys
 import tty
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from time import perf_counter, process_time, sleep
 from typing import NamedTuple
 
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from tests.children import child
 from tests.firmware import wire
 from tests.firmware.board import SimulatedBoard, single_conversions
 from tests.firmware.chip import FREQUENCY, Chip
@@ -157,12 +157,9 @@ def pseudo_terminal(arm: str = "virtual:seed=1") -> Iterator[str]:
     root = Path(__file__).parents[2]
     environment = {**os.environ, "PYTHONPATH": f"{root / 'src'}{os.pathsep}{root}"}
     command = [sys.executable, "-m", "tests.firmware.pty_board", "--arm", arm]
-    with subprocess.Popen(command, cwd=root, env=environment, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            yield process.stdout.readline().strip()
-        finally:
-            process.terminate()
+    with child(*command, cwd=root, env=environment, stderr=None) as process:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
 
 
 class Port:

@@ -50,7 +50,7 @@ class SecondChip:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._process.terminate()
+        self._process.kill()
         self._process.communicate()
 
     def _do(self, **command: Any) -> None:

@@ -115,8 +115,9 @@ def test_behind_a_pseudo_terminal_in_real_time() -> None:
     with pseudo_terminal("virtual:seed=1") as path:
         port = Port(path)
         assert port.ask("CONNECT", 1, CONSTANT["VERSION"], SESSION).session == SESSION
-        before, begin = port.ask("READ", 2), monotonic()
+        asked, before = monotonic(), port.ask("READ", 2)
         sleep(0.5)
-        after, passed = port.ask("READ", 3), monotonic() - begin
+        after, heard = port.ask("READ", 3), monotonic()
         port.close()
-        assert abs((after.time - before.time) * 1e-6 - passed) < 0.1
+        # On a busy machine the board lets time go.
+        assert 0.1 < (after.time - before.time) * 1e-6 < heard - asked + 0.01

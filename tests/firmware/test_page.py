@@ -2,12 +2,11 @@
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from children import python
 from tests.firmware import wire
 from tests.firmware.build import FIRMWARE
 
@@ -53,5 +52,5 @@ def test_flags_and_types_are_different() -> None:
 def test_drawing_is_the_one_of_the_page(tmp_path: Path) -> None:
     shutil.copy(FIRMWARE / "PROTOCOL.md", tmp_path)
     shutil.copy(FIRMWARE / "wiring.py", tmp_path)
-    subprocess.run([sys.executable, str(tmp_path / "wiring.py")], check=True)
+    python(tmp_path / "wiring.py", check=True)
     assert (tmp_path / "wiring.svg").read_text() == (FIRMWARE / "wiring.svg").read_text()

@@ -2,7 +2,6 @@
 
 import json
 import os
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
+from children import python
 from pneumarm.learning import TrainSettings
 from pneumarm.learning.online.loop import Schedule, train_episode, train_episodes, workspace
 from pneumarm.learning.online.values import draw_networks, learner, network_shapes, pack, unpack
@@ -94,9 +94,7 @@ def test_compiled_and_plain_python_agree(joints: int) -> None:
     code = f"import json, test_loop; print(json.dumps(test_loop._chunk({joints}, 4)))"
     environment_ = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     environment_["PYTHONPATH"] = os.pathsep.join([str(folder), *sys.path])
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", code], env=environment_, capture_output=True, text=True, check=True
-    )
+    done = python("-W", "ignore", "-c", code, env=environment_, check=True)
     plain, compiled = json.loads(done.stdout), _chunk(joints, 4)
     assert plain["random"] == compiled["random"]
     assert plain["numbers"] == pytest.approx(compiled["numbers"])

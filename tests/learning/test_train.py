@@ -2,9 +2,7 @@
 
 import os
 import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import numpy as np
 import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
+from children import child, end, wait_until
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning import CURVES, Shaping, Training, TrainSettings, test, train
@@ -141,12 +140,9 @@ def test_killed_process_resumes(simulation: Simulation, begin: BeginStates, tmp_
         "train(simulation, synthetic_begin_states(simulation), settings, seed=8, checkpoint=Path(sys.argv[1]))\n"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *sys.path])}
-    process = subprocess.Popen([sys.executable, "-c", code, str(path)], env=environment)
-    deadline = time.monotonic() + 60
-    while not path.exists() and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.005)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
+    with child(sys.executable, "-c", code, path, env=environment) as process:
+        wait_until("a checkpoint", path.exists, process)
+        end(process, signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
     _, arrays = read_arrays(path, "pneumarm training")
     assert 0 < arrays["episodes"].max() < 20_000  # it was killed in the middle

@@ -3,7 +3,6 @@
 import os
 import shutil
 import sqlite3
-import time
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ from stand_ins import make_recorded
 
 path, kills, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
 random.seed(seed)
-acknowledged, slowest = -1, 0.0
+acknowledged = -1
 
 def write(pipe):
     store = Store.append_to(path) if path.exists() else Store.create(path, ArmSpec())
@@ -51,12 +50,10 @@ for kill in range(kills):
     if not path.exists():
         assert acknowledged == -1
         continue
-    begun = time.perf_counter()
     with Store.append_to(path) as store:
         stored = store.sequences
         assert stored >= acknowledged, f"{acknowledged} acknowledged, {stored} stored"
         assert store.state() == (b"%d" % stored if stored else None)
-    slowest = max(slowest, time.perf_counter() - begun)
     if kill % 20 == 0 or kill == kills - 1:
         with Store.open(path) as store:
             store.check()
@@ -66,7 +63,7 @@ for kill in range(kills):
                     mine = block.sequence == number
                     assert (block.angle[mine] == expected.angle).all()
                     assert np.array_equal(block.command[mine], expected.command, equal_nan=True)
-print(kills, "kills", acknowledged, "acknowledged, slowest restart", round(slowest, 3), "s")
+print(kills, "kills", acknowledged, "acknowledged")
 """
 
 
@@ -252,9 +249,7 @@ def test_garbled_stores_are_refused_or_still_sound_and_never_crash(whole, tmp_pa
         garbled[begin : begin + 16] = random.bytes(16)
         path = tmp_path / "garbled.db"
         path.write_bytes(garbled[: len(data)])
-        begun = time.process_time()
         refused += refused_or_sound(path)
-        assert time.process_time() - begun < 1
     assert refused > 10
 
 
@@ -302,10 +297,8 @@ SELECT 1 AS sequence, n AS step, 0.0 AS time, 0.0 AS joint_1_angle, 0.0 AS joint
 )
 def test_altered_stores_are_refused(whole, statements, message):
     path = altered(whole, *statements)
-    begun = time.process_time()
     with pytest.raises(UnusableInput, match=message), Store.open(path) as store:
         store.check()
-    assert time.process_time() - begun < 1
 
 
 def test_things_that_are_no_files_are_refused_at_once(tmp_path):
@@ -321,7 +314,7 @@ def test_things_that_are_no_files_are_refused_at_once(tmp_path):
 
 
 LIMITED = """
-import resource, sys, time
+import resource, sys
 from pneumarm.transitions import Store, import_recording
 from pneumarm.errors import UnusableInput
 import sqlite3, csv, tomllib, msgspec
@@ -331,25 +324,24 @@ with open("/proc/self/statm") as file:
 limit = used + (64 << 20)
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 for argument in sys.argv[1:]:
-    begun = time.process_time()
     try:
         ACTION
     except UnusableInput as error:
-        print(time.process_time() - begun, repr(str(error)))
+        print(repr(str(error)))
 """
 
 
 @pytest.fixture
 def limited(python):
-    """Run an action on each of the arguments that must be refused within 64 MB and 1 s; returns the messages."""
+    """Run an action on each of the arguments that must be refused within 64 MB; returns the messages."""
 
     def run(action, *arguments):
         done = python(LIMITED.replace("ACTION", action), *arguments)
         assert done.returncode == 0, done.stderr
-        lines = [line.split(maxsplit=1) for line in done.stdout.splitlines()]
-        assert len(lines) == len(arguments)
-        assert all(float(seconds) < 1 and len(message) < 1000 for seconds, message in lines)
-        return [message for _, message in lines]
+        messages = done.stdout.splitlines()
+        assert len(messages) == len(arguments)
+        assert all(len(message) < 1000 for message in messages)
+        return messages
 
     return run
 

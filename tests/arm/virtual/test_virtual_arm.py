@@ -1,13 +1,12 @@
 import json
 import math
 import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from children import python
 from pneumarm.arm.virtual import ArmParameters, JointParameters, MuscleParameters, VirtualArm, draw_parameters
 from pneumarm.errors import PneumarmError, UnusableInput
 
@@ -192,7 +191,6 @@ def test_kernels_say_the_same_as_plain_python():
     for plain in (False, True):
         environment = {**os.environ, "NUMBA_DISABLE_JIT": str(int(plain))}
         script = PLAIN.format(plain=plain)
-        done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
+        done = python("-c", script, env=environment, check=True)
         outputs.append(json.loads(done.stdout))
     assert outputs[0] == pytest.approx(outputs[1], rel=1e-9, abs=1e-9)

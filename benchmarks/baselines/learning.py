@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pneumarm.learning import AnyAgent, LearnSettings, Settings, TrainSettings, test, train
+from pneumarm.learning import AnyAgent, LearnSettings, MethodSettings, TrainSettings, test, train
 from pneumarm.planning import PlanAgent
 from pneumarm.simulation import Simulation
 from pneumarm.task import BeginStates
@@ -44,7 +44,7 @@ def learn(method: str, simulation: Simulation, begin: BeginStates, seed: int, st
     return learn_stable(method, simulation, begin, seed, steps)
 
 
-def shortened(settings: Settings) -> Settings:
+def shortened(settings: MethodSettings) -> MethodSettings:
     """Return settings of the same training, hardly begun: it compiles all that the whole one needs."""
     if isinstance(settings, TrainSettings):
         return replace(settings, agents=1, max_episodes=100, validation_episodes=10)

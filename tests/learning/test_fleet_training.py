@@ -14,9 +14,9 @@ from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning import (
     BatchedSettings,
     FleetTraining,
+    MethodSettings,
     PolicyAgent,
     PolicySettings,
-    Settings,
     TrainSettings,
     load_agent,
     results_with_lookahead,
@@ -219,7 +219,7 @@ def test_two_joints(tmp_path: Path) -> None:
         (BatchedSettings, "trace_decay", 1.1),
     ],
 )
-def test_impossible_settings_are_refused(kind: type[Settings], name: str, value: object) -> None:
+def test_impossible_settings_are_refused(kind: type[MethodSettings], name: str, value: object) -> None:
     with pytest.raises(UnusableInput, match=name):
         kind(**{name: value})  # type: ignore[arg-type]
 

@@ -12,7 +12,8 @@ from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task import BeginStates
-from pneumarm.task.environment import begin_episode, environment, episode, reached, reward, take
+from pneumarm.task.environment import begin_episode, environment, episode, reached, take
+from pneumarm.task.reward import paid
 
 
 def an_agent(simulation: Simulation, **settings: object) -> Agent:
@@ -42,8 +43,8 @@ def test_learns_what_the_training_loop_learns(joints: int, settings: dict) -> No
         for _ in range(12):
             is_reached = take(env, other, online.act())
             assert is_reached == reached(env.task, other)
-            paid = [reward(env.task, is_reached, switched) for switched in other.switched]
-            online.observe(paid, other.state.x[:size], is_reached)
+            rewards = [paid(env.task.reward, is_reached, switched) for switched in other.switched]
+            online.observe(rewards, other.state.x[:size], is_reached)
             if is_reached:
                 break
             other.state.random[:] = _draws(other.state.random, joints)

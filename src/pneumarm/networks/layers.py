@@ -157,12 +157,12 @@ def add_slopes(x, error, slope):  # type: ignore[no-untyped-def]
 
 
 @kernel(fastmath=FASTMATH)
-def through_layer(weights, error, units, below):  # type: ignore[no-untyped-def]
-    """Set ``below`` (inputs, n) to the derivatives by what enters the tansig ``units`` (inputs, n)."""
+def through_weights(weights, error, below):  # type: ignore[no-untyped-def]
+    """Set ``below`` (inputs, n) to the derivatives by a layer's inputs, from those by its outputs, ``error``."""
     outputs, n = np.uint64(error.shape[0]), np.uint64(error.shape[1])
     blocks = outputs - outputs % np.uint64(4)
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    for i in range(np.uint64(units.shape[0])):
+    for i in range(np.uint64(below.shape[0])):
         for e in range(n):
             below[i, e] = np.float32(0.0)
         for o in range(np.uint64(0), blocks, np.uint64(4)):
@@ -174,7 +174,14 @@ def through_layer(weights, error, units, below):  # type: ignore[no-untyped-def]
             a = weights[i, o]
             for e in range(n):
                 below[i, e] += a * error[o, e]
-        for e in range(n):
+
+
+@kernel(fastmath=FASTMATH)
+def through_layer(weights, error, units, below):  # type: ignore[no-untyped-def]
+    """Set ``below`` (inputs, n) to the derivatives by what enters the tansig ``units`` (inputs, n)."""
+    through_weights(weights, error, below)
+    for i in range(units.shape[0]):
+        for e in range(units.shape[1]):
             below[i, e] *= np.float32(1.0) - units[i, e] * units[i, e]
 
 

@@ -1,0 +1,109 @@
+"""A trained servo and its file, which holds all it needs to act; and the servo as a controller."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.errors import UnusableInput
+from pneumarm.files import read_arrays, write_arrays
+from pneumarm.learning.servo.commands import command_parameters, shortest_share
+from pneumarm.learning.servo.controller import ServoController
+from pneumarm.learning.servo.gradient import ServoTask
+from pneumarm.learning.servo.inputs import input_parameters, input_size
+from pneumarm.learning.servo.price import PriceParameters
+from pneumarm.learning.servo.settings import ServoSettings
+from pneumarm.networks.layers import weight_count
+from pneumarm.simulation.kernel import simulation_parameters
+from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.transitions.window import Window
+
+KIND = "pneumarm servo"
+_WEIGHTS = "servo_weights"
+
+
+@dataclass(frozen=True)
+class ServoAgent:
+    """A policy over pulses by state and reference, and the simulation that it was trained in."""
+
+    simulation: Simulation
+    policy: NDArray[np.float32]
+    """Weights of its network, layer after layer, shape (size,)."""
+    settings: ServoSettings
+
+    @property
+    def spec(self) -> ArmSpec:
+        """The arm that it was trained for."""
+        return self.simulation.spec
+
+    @property
+    def window(self) -> Window:
+        """Of its state."""
+        return self.simulation.window
+
+    @property
+    def scaling(self) -> Scaling:
+        """Of its state."""
+        return self.simulation.scaling
+
+    @property
+    def goal_range(self) -> NDArray[np.float64]:
+        """Goals that it has learned to hold, shape (joints, 2) [counts]."""
+        return self.simulation.goal_range
+
+    def controller(self) -> ServoController:
+        """Return it as a controller of an arm."""
+        return ServoController(self)
+
+    def save(self, path: Path) -> None:
+        """Write the agent to ``path``, whole or not at all.
+
+        Raises:
+            UnusableInput: ``path`` cannot be written.
+
+        """
+        header, arrays = self.simulation.parts()
+        settings = {"simulation": header, "settings": msgspec.to_builtins(self.settings)}
+        write_arrays(path, KIND, settings, arrays | {_WEIGHTS: self.policy})
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Return the agent in ``path``.
+
+        Raises:
+            UnusableInput: ``path`` is no such agent, is damaged, or does not fit together.
+
+        """
+        read, arrays = read_arrays(path, KIND)
+        try:
+            settings = msgspec.convert(read["settings"], ServoSettings)
+            policy = arrays.pop(_WEIGHTS)
+            simulation = Simulation.of_parts(read["simulation"], arrays)
+        except (msgspec.ValidationError, UnusableInput, ValueError, KeyError, TypeError) as error:
+            raise UnusableInput(f"{path}: is no usable agent ({error}); train it again") from error
+        size = weight_count(servo_sizes(simulation, settings))
+        if policy.shape != (size,) or policy.dtype != np.float32:
+            raise UnusableInput(
+                f"{path}: expected {size} policy weights of type float32, got {policy.shape} of {policy.dtype}"
+            )
+        return cls(simulation, policy, settings)
+
+
+def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:
+    """Return what does not change while a servo learns or acts."""
+    return ServoTask(
+        simulation=simulation_parameters(simulation),
+        inputs=input_parameters(simulation, settings.preview, settings.tolerance),
+        commands=command_parameters(simulation, settings.dead, shortest_share(simulation.spec)),
+        prices=PriceParameters(settings.precision, settings.far, settings.flat, settings.change),
+    )
+
+
+def servo_sizes(simulation: Simulation, settings: ServoSettings) -> tuple[int, ...]:
+    """Return the units of each layer of the policy, inputs first."""
+    inputs = input_parameters(simulation, settings.preview, settings.tolerance)
+    return (input_size(inputs), *settings.hidden, 2 * simulation.window.joints)

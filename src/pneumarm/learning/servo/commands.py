@@ -1,0 +1,82 @@
+"""From what the policy says to what the valves do: pulses, none for a little, the whole period for a lot.
+
+With z the policy's output, v = 1.25 tanh(z) and dead the share of it that keeps a valve closed,
+
+    command = sign(v) clip((|v| - dead) / (1 - dead), 0, 1),   rounded where the valve can be no faster.
+
+The gradient goes through the rounding as if it were not there (a straight-through estimate: Bengio, Leonard and
+Courville, arXiv:1308.3432) and through the dead zone, in which the first policy lies, and stops where a valve is open
+for the whole period already and where the guard would keep an inlet closed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.kernels import kernel, part
+from pneumarm.networks.tansig import FASTMATH, tansig
+from pneumarm.simulation.simulation import Simulation
+
+_GAIN = np.float32(1.25)
+_ONE, _ZERO = np.float32(1.0), np.float32(0.0)
+
+
+class CommandParameters(NamedTuple):
+    """How commands are made. Made by :func:`command_parameters`."""
+
+    dead: float
+    """Share of the policy's output around 0 that keeps a valve closed."""
+    shortest: float
+    """Shortest pulse, in periods."""
+    inlet: NDArray[np.float32]
+    """Pressure over which an inlet stays closed, shape (joints, 2) [scaled]."""
+
+
+def command_parameters(simulation: Simulation, dead: float, shortest: float) -> CommandParameters:
+    """Return the parameters for pulses of at least ``shortest`` periods."""
+    scaling, window, spec = simulation.scaling, simulation.window, simulation.spec
+    offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+    inlet = (spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:]
+    return CommandParameters(float(dead), float(shortest), np.ascontiguousarray(inlet, np.float32))
+
+
+def shortest_share(spec: ArmSpec) -> float:
+    """Return the shortest pulse of an arm in periods; 1 where it has none."""
+    shortest = getattr(spec, "shortest_pulse", None)
+    return 1.0 if not shortest else min(shortest / spec.period, 1.0)
+
+
+@part
+def rounded(size, shortest):  # type: ignore[no-untyped-def]
+    """Return a pulse of ``size`` periods as the valve can make it: none, or between ``shortest`` and the period."""
+    if size < np.float32(0.5) * shortest:
+        return _ZERO
+    if size > _ONE - np.float32(0.5) * shortest:
+        return _ONE
+    return max(size, shortest)
+
+
+@kernel(fastmath=FASTMATH)
+def write_commands(parameters, x, said, slope, command):  # type: ignore[no-untyped-def]
+    """Make ``command`` (2 joints, n) of the policy's outputs ``said``, ``slope`` to the derivatives by them.
+
+    ``x`` (size, n) are the states, in which the pressures are read; ``said`` is replaced by its hyperbolic tangent.
+    """
+    dead, shortest = np.float32(parameters.dead), np.float32(parameters.shortest)
+    stretch = _ONE / (_ONE - dead)
+    for c in range(command.shape[0]):
+        tansig(said[c])
+        joint, muscle = c // 2, c % 2
+        place, limit = 4 * joint + 2 + muscle, parameters.inlet[joint, muscle]
+        for e in range(command.shape[1]):
+            bent = said[c, e]
+            v = _GAIN * bent
+            size = (abs(v) - dead) * stretch
+            moves = _ZERO < size < _ONE
+            if v > _ZERO and x[place, e] > limit:
+                size, moves = _ZERO, False
+            pulse = rounded(min(max(size, _ZERO), _ONE), shortest)
+            command[c, e] = pulse if v > _ZERO else -pulse
+            slope[c, e] = _GAIN * (_ONE - bent * bent) * stretch if moves else _ZERO

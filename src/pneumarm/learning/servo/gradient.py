@@ -1,0 +1,178 @@
+"""Movements in the simulation, and the gradient of what they cost through all of their steps.
+
+    forward:   u_k = pi(s_k + noise, r),  s_{k+1} = simulation(s_k, u_k),
+               cost = sum_k price(s_{k+1}, r_{k+1}, u_k, u_{k-1})
+    backward:  the derivatives by s_{k+1} give those by u_k and s_k; those by u_k go through pi, whose weights
+               gather them, to s_k as well
+
+The simulation is differentiable and fast, so the policy's gradient is had exactly instead of being sampled: an
+analytic policy gradient, or back-propagation through time (P. J. Werbos, Proc. IEEE 78(10), 1990).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.kernels import kernel
+from pneumarm.learning.servo.commands import CommandParameters, write_commands
+from pneumarm.learning.servo.inputs import InputParameters, input_size, inputs_back, write_inputs
+from pneumarm.learning.servo.price import PriceParameters, price_of_changes, price_of_error
+from pneumarm.networks.layers import Trainable, backward, forward, through_weights
+from pneumarm.networks.tansig import FASTMATH
+from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
+from pneumarm.simulation.kernel import SimulationParameters
+
+_ZERO = np.float32(0.0)
+
+
+class ServoTask(NamedTuple):
+    """What does not change while a servo learns."""
+
+    simulation: SimulationParameters
+    inputs: InputParameters
+    commands: CommandParameters
+    prices: PriceParameters
+
+
+class Tape(NamedTuple):
+    """Movements of ``n`` arms over some ``steps``, and what the gradient needs of them. Made by :func:`tape`."""
+
+    x: NDArray[np.float32]
+    """States with their commands in place, shape (steps + 1, size, n) [scaled]."""
+    hidden: NDArray[np.float32]
+    """Hidden units of the simulation, shape (steps, units, n)."""
+    free: NDArray[np.float32]
+    """Which predictions were not cut off, shape (steps, outputs, n)."""
+    inputs: NDArray[np.float32]
+    """What the policy saw, shape (steps, inputs, n)."""
+    slope: NDArray[np.float32]
+    """Derivatives of the commands by the policy's outputs, shape (steps, 2 joints, n)."""
+    noise: NDArray[np.float32]
+    """Of readings of angle and pressures, shape (steps + history - 1, 3 joints, n) [scaled]."""
+    reference: NDArray[np.float32]
+    """What is asked for at each step, shape (steps + 1, joints, n) [scaled]."""
+    preview: NDArray[np.float32]
+    """What the policy is shown of it, shape (steps, previews, joints, n) [scaled]."""
+    work: StepWorkspace
+    later: NDArray[np.float32]
+    """Workspace, shape (size, n)."""
+    sooner: NDArray[np.float32]
+    """Workspace, shape (size, n)."""
+    seen: NDArray[np.float32]
+    """Derivatives by the policy's inputs, shape (inputs, n)."""
+    row: NDArray[np.float32]
+    """Workspace, shape (3, n)."""
+
+
+def tape(task: ServoTask, steps: int, n: int) -> Tape:
+    """Return room for movements of ``n`` arms over ``steps``."""
+    simulation, joints = task.simulation, task.simulation.joints
+    (size, units), outputs = simulation.hidden.shape, simulation.output_bias.size
+    inputs, previews = input_size(task.inputs), task.inputs.steps.size
+
+    def zeros(*shape: int) -> NDArray[np.float32]:
+        return np.zeros((*shape, n), np.float32)
+
+    return Tape(
+        x=zeros(steps + 1, size),
+        hidden=zeros(steps, units),
+        free=zeros(steps, outputs),
+        inputs=zeros(steps, inputs),
+        slope=zeros(steps, 2 * joints),
+        noise=zeros(steps + simulation.history - 1, 3 * joints),
+        reference=zeros(steps + 1, joints),
+        preview=zeros(steps, previews, joints),
+        work=step_workspace(simulation, n),
+        later=zeros(size),
+        sooner=zeros(size),
+        seen=zeros(inputs),
+        row=zeros(3),
+    )
+
+
+@kernel(fastmath=FASTMATH)
+def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
+    """Let the policy ``net`` move all arms from ``tape.x[0]`` on."""
+    simulation = task.simulation
+    commanded = 2 * simulation.joints
+    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    for t in range(tape.slope.shape[0]):
+        x = tape.x[t]
+        write_inputs(task.inputs, x, tape.noise, t + simulation.history - 1, tape.preview[t], tape.inputs[t])
+        forward(net.layers, tape.inputs[t], net.units)
+        write_commands(task.commands, x, net.units[-1], tape.slope[t], x[first : first + commanded])
+        step_all(simulation, x, tape.x[t + 1], tape.work)
+        tape.hidden[t] = tape.work.hidden
+        tape.free[t] = tape.work.free
+
+
+@kernel(fastmath=FASTMATH)
+def errors_at(task, tape, t, joint, error):  # type: ignore[no-untyped-def]
+    """Set ``error`` (n,) to how far ``joint`` is from what is asked for at step ``t`` [tolerances]."""
+    scale = task.inputs.tolerances[joint]
+    for e in range(error.shape[0]):
+        error[e] = (tape.x[t, 4 * joint, e] - tape.reference[t, joint, e]) * scale
+
+
+@kernel(fastmath=FASTMATH)
+def move_back(task, net, tape):  # type: ignore[no-untyped-def]
+    """Add the gradient of the mean cost a step to ``net.gradient``, after :func:`move_forward`; return the cost."""
+    simulation = task.simulation
+    commanded, joints = 2 * simulation.joints, simulation.joints
+    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    steps, n = tape.slope.shape[0], tape.slope.shape[2]
+    share = np.float32(1.0 / (steps * n))
+    later, sooner, row = tape.later, tape.sooner, tape.row
+    later[:] = _ZERO
+    total = 0.0
+    for back in range(steps):
+        t = steps - 1 - back
+        for joint in range(joints):
+            errors_at(task, tape, t + 1, joint, row[0])
+            total += price_of_error(task.prices, row[0], row[1])
+            scale = task.inputs.tolerances[joint] * share
+            for e in range(n):
+                later[4 * joint, e] += row[1, e] * scale
+        tape.work.hidden[:] = tape.hidden[t]
+        tape.work.free[:] = tape.free[t]
+        step_back(simulation, later, sooner, tape.work)
+        for c in range(commanded):
+            command, before = tape.x[t, first + c], row[0]
+            before[:] = _ZERO
+            if simulation.history > 1:
+                before[:] = tape.x[t, first - (simulation.history - 1) * commanded + c]
+            total += price_of_changes(task.prices, command, before, row[1], row[2])
+            for e in range(n):
+                sooner[first + c, e] += row[1, e] * share
+            if simulation.history > 1:
+                for e in range(n):
+                    sooner[first - (simulation.history - 1) * commanded + c, e] += row[2, e] * share
+        forward(net.layers, tape.inputs[t], net.units)
+        for c in range(commanded):
+            for e in range(n):
+                net.errors[-1][c, e] = sooner[first + c, e] * tape.slope[t, c, e]
+                sooner[first + c, e] = _ZERO
+        backward(net, tape.inputs[t])
+        through_weights(net.layers[0], net.errors[0], tape.seen)
+        inputs_back(task.inputs, tape.inputs[t], tape.seen, sooner)
+        later[:] = sooner
+    return total * share
+
+
+@kernel
+def learn_once(task, net, tape):  # type: ignore[no-untyped-def]
+    """Move forward and back; return the mean cost of a step."""
+    move_forward(task, net, tape)
+    return move_back(task, net, tape)
+
+
+def errors_of(task: ServoTask, tape: Tape) -> NDArray[np.float32]:
+    """Return the errors (steps, joints, n) of the movements on ``tape`` [tolerances]."""
+    joints = task.simulation.joints
+    angle = tape.x[1:, 0 : 4 * joints : 4]
+    difference: NDArray[np.float32] = (angle - tape.reference[1:]) * task.inputs.tolerances[:, None]
+    return difference
+
+
+__all__ = ["ServoTask", "Tape", "Trainable", "errors_of", "learn_once", "move_back", "move_forward", "tape"]

@@ -1,0 +1,79 @@
+"""What a movement costs: errors, and valves that open and close; with the derivatives.
+
+    error:   log(1 + (max(|e| - flat, 0) / precision)^2) / 2 + far |e|          e in tolerances
+    valves:  change (o (1 - o' same) + o (1 - held) + o' (1 - same)(1 - o))
+
+where o tells whether a valve opens in a period, held whether it is still open at its end, o' held of the period
+before, and same whether it was the same valve. Counts have no slope, so o and held are smooth stand-ins:
+o = 1.1 m / (m + 0.1) and held = max(m - 0.8, 0) / 0.2 of a pulse of m periods.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pneumarm.kernels import kernel, part
+from pneumarm.networks.tansig import FASTMATH
+
+_ONE, _ZERO = np.float32(1.0), np.float32(0.0)
+_SOFT, _LONG = np.float32(0.1), np.float32(0.8)
+
+
+class PriceParameters(NamedTuple):
+    """Prices, see the module."""
+
+    precision: float
+    far: float
+    flat: float
+    change: float
+
+
+@kernel(fastmath=FASTMATH)
+def price_of_error(prices, error, slope):  # type: ignore[no-untyped-def]
+    """Return the sum of the prices of the ``error`` (n,) in tolerances; set ``slope`` (n,) to its derivatives."""
+    far, flat, sharp = np.float32(prices.far), np.float32(prices.flat), _ONE / np.float32(prices.precision)
+    total = _ZERO
+    for e in range(error.shape[0]):
+        size = abs(error[e])
+        sign = _ONE if error[e] > _ZERO else -_ONE
+        beyond = max(size - flat, _ZERO) * sharp
+        square = _ONE + beyond * beyond
+        total += np.float32(0.5) * np.log(square) + far * size
+        slope[e] = sign * (sharp * beyond / square + far)
+    return total
+
+
+@part
+def opening(size):  # type: ignore[no-untyped-def]
+    """Return o of a pulse of ``size`` periods and its slope."""
+    below = _ONE / (size + _SOFT)
+    return (_ONE + _SOFT) * size * below, (_ONE + _SOFT) * _SOFT * below * below
+
+
+@part
+def holding(size):  # type: ignore[no-untyped-def]
+    """Return held of a pulse of ``size`` periods and its slope."""
+    if size > _LONG:
+        return (size - _LONG) / (_ONE - _LONG), _ONE / (_ONE - _LONG)
+    return _ZERO, _ZERO
+
+
+@kernel(fastmath=FASTMATH)
+def price_of_changes(prices, command, before, slope, slope_before):  # type: ignore[no-untyped-def]
+    """Return the price of the commands (n,) of one muscle after those ``before``; set the slopes by both, signed."""
+    change, total = np.float32(prices.change), _ZERO
+    for e in range(command.shape[0]):
+        sign = _ONE if command[e] >= _ZERO else -_ONE
+        sign_before = _ONE if before[e] >= _ZERO else -_ONE
+        o, o_slope = opening(abs(command[e]))
+        held, held_slope = holding(abs(command[e]))
+        old, old_slope = holding(abs(before[e]))
+        if command[e] * before[e] > _ZERO:
+            total += o * (_ONE - old) + o * (_ONE - held)
+            by_o, by_old = (_ONE - old) + (_ONE - held), -o
+        else:
+            total += o + o * (_ONE - held) + old * (_ONE - o)
+            by_o, by_old = _ONE + (_ONE - held) - old, _ONE - o
+        slope[e] = change * sign * (by_o * o_slope - o * held_slope)
+        slope_before[e] = change * sign_before * by_old * old_slope
+    return change * total

@@ -1,0 +1,74 @@
+"""What a user can choose about a servo and its training."""
+
+import math
+from dataclasses import dataclass
+
+from pneumarm.settings import check
+
+
+@dataclass(frozen=True)
+class ServoSettings:
+    """A policy over pulses that settles, holds and tracks; angles and errors in degrees, times in seconds."""
+
+    agents: int = 2
+    """Agents trained at once from different weights, of which the best is kept; one a core takes no longer."""
+    updates: int = 500
+    """How often movements are made and learned from."""
+    arms: int = 96
+    """Simulated arms that move at once."""
+    duration: float = 1.7
+    """Length of a movement in simulation, through which the gradient goes [s]."""
+    learning_rate: float = 4e-3
+    """Of Adam at the start; falls linearly to 0."""
+    largest_gradient: float = 1.0
+    """Longer gradients are cut to this length."""
+    hidden: tuple[int, ...] = (48, 48)
+    """Hidden units of each layer."""
+    preview: tuple[float, ...] = (0.034, 0.067, 0.1, 0.167, 0.234, 0.334)
+    """How far ahead the reference is looked at [s]; no nearer than one control period."""
+    tolerance: float = 1.0
+    """Error that counts as settled [degrees]; the prices of errors are in units of it."""
+    precision: float = 0.3
+    """Error, in tolerances, below which there is little left to gain."""
+    flat: float = 0.1
+    """Error, in tolerances, that costs nothing but ``far``."""
+    far: float = 0.06
+    """Price of an error for each tolerance, besides the logarithmic one of being out of precision."""
+    change: float = 0.06
+    """Price of opening or closing a valve."""
+    dead: float = 0.15
+    """Share of the policy's output around 0 that keeps a valve closed."""
+    known: float = 0.6
+    """Share of movements in which the reference is known ahead; in the others it is forecast from its past."""
+    reading_noise: float = 0.6
+    """Noise of a reading in standard deviations of the one-step error, most of which is such noise."""
+    quiet: float = 0.15
+    """Mean error, in tolerances, below which a still arm with a constant goal is left alone with closed valves."""
+    alert: float = 0.4
+    """Mean error, in tolerances, from which on it no longer is."""
+    validation_movements: int = 400
+    """Movements in simulation on which the best agent is chosen."""
+
+    def __post_init__(self) -> None:
+        check(
+            self,
+            agents=1 <= self.agents <= 256,
+            updates=self.updates >= 1,
+            arms=1 <= self.arms <= 65_536,
+            duration=0 < self.duration <= 60,
+            learning_rate=0 < self.learning_rate < math.inf,
+            largest_gradient=0 < self.largest_gradient < math.inf,
+            hidden=1 <= len(self.hidden) <= 8 and all(1 <= size <= 1024 for size in self.hidden),
+            preview=1 <= len(self.preview) <= 64 and all(0 < ahead <= 10 for ahead in self.preview),
+            tolerance=0 < self.tolerance < math.inf,
+            precision=0 < self.precision < math.inf,
+            flat=0 <= self.flat < math.inf,
+            far=0 <= self.far < math.inf,
+            change=0 <= self.change < math.inf,
+            dead=0 <= self.dead < 1,
+            known=0 <= self.known <= 1,
+            reading_noise=0 <= self.reading_noise < math.inf,
+            quiet=0 <= self.quiet <= self.alert,
+            alert=0 <= self.alert < math.inf,
+            validation_movements=self.validation_movements >= 1,
+        )

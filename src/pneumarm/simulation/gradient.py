@@ -1,0 +1,143 @@
+"""The simulation's step over many states at once, without noise, and the derivatives by state and command.
+
+A state is a column of ``x`` (size, n), laid out as in :mod:`pneumarm.simulation.kernel`. One step is
+
+    h = tansig(W1^T x),  change = W2 h + D x + b2,  o' = clip(o + change),  sigma' = (o', o, ..., a, a_{k-1}, ...)
+
+and its transpose carries the derivatives of a later cost by sigma' back to those by sigma and a.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.kernels import kernel
+from pneumarm.networks.layers import weighted_sums
+from pneumarm.networks.tansig import FASTMATH, tansig
+from pneumarm.simulation.kernel import SimulationParameters
+
+
+class StepWorkspace(NamedTuple):
+    """What one step of ``n`` states computes on its way. Made by :func:`step_workspace`."""
+
+    hidden: NDArray[np.float32]
+    """Hidden units, shape (units, n)."""
+    change: NDArray[np.float32]
+    """Predicted changes, shape (outputs, n)."""
+    free: NDArray[np.float32]
+    """1 where a prediction was not cut off at the limits of its sensor, else 0, shape (outputs, n)."""
+    slope: NDArray[np.float32]
+    """Derivatives by what enters the hidden units, shape (units, n)."""
+
+
+def step_workspace(simulation: SimulationParameters, n: int) -> StepWorkspace:
+    """Return workspace for steps of ``n`` states."""
+    units, outputs = simulation.hidden.shape[1], simulation.output_bias.size
+    return StepWorkspace(*(np.zeros((rows, n), np.float32) for rows in (units, outputs, outputs, units)))
+
+
+@kernel(fastmath=FASTMATH)
+def predict_all(simulation, x, work):  # type: ignore[no-untyped-def]
+    """Set ``work.hidden`` and ``work.change`` to what the networks make of ``x`` (size, n), commands in place."""
+    hidden, change = work.hidden, work.change
+    weighted_sums(simulation.hidden, x, hidden)
+    for u in range(hidden.shape[0]):
+        tansig(hidden[u])
+    for o in range(change.shape[0]):
+        row = change[o]
+        for e in range(row.shape[0]):
+            row[e] = simulation.output_bias[o]
+        for u in range(hidden.shape[0]):
+            weight = simulation.output[o, u]
+            if weight != np.float32(0.0):  # the unit of another network
+                for e in range(row.shape[0]):
+                    row[e] += weight * hidden[u, e]
+    for o in range(simulation.direct.shape[0]):
+        for i in range(x.shape[0]):
+            weight = simulation.direct[o, i]
+            for e in range(x.shape[1]):
+                change[o, e] += weight * x[i, e]
+
+
+@kernel(fastmath=FASTMATH)
+def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
+    """Set ``following`` (size, n) to the states one period after ``x`` (size, n), whose commands are in place."""
+    predict_all(simulation, x, work)
+    observed, commanded, n = simulation.observed, 2 * simulation.joints, x.shape[1]
+    newest = simulation.history * observed
+    command = newest + (simulation.history - 1) * commanded
+    for i in range(observed, newest):
+        following[i] = x[i - observed]
+    for i in range(newest + commanded, command):
+        following[i] = x[i - commanded]
+    if simulation.history > 1:
+        for i in range(commanded):
+            following[newest + i] = x[command + i]
+    for i in range(command, x.shape[0]):
+        following[i] = x[i]
+    for i in range(observed):
+        following[i] = x[i]
+    for o in range(work.change.shape[0]):
+        place, lowest, highest = simulation.place[o], simulation.lowest[o], simulation.highest[o]
+        for e in range(n):
+            value = x[place, e] + work.change[o, e]
+            work.free[o, e] = np.float32(1.0) if lowest < value < highest else np.float32(0.0)
+            following[place, e] = min(max(value, lowest), highest)
+    for joint in range(simulation.velocity.shape[0]):
+        angle, rate, rest = 4 * joint, simulation.velocity[joint, 0], simulation.velocity[joint, 1]
+        for e in range(n):
+            following[angle + 1, e] = (following[angle, e] - x[angle, e]) * rate + rest
+
+
+@kernel(fastmath=FASTMATH)
+def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
+    """Set ``sooner`` (size, n) to the derivatives by ``x``, those by ``following`` being ``later`` (size, n).
+
+    ``work`` must be that of :func:`step_all` for this step; ``later`` is used up. In the places of the command are
+    then the derivatives by the command.
+    """
+    observed, commanded, n = simulation.observed, 2 * simulation.joints, later.shape[1]
+    newest = simulation.history * observed
+    command = newest + (simulation.history - 1) * commanded
+    sooner[:] = np.float32(0.0)
+    for i in range(observed, newest):
+        sooner[i - observed] = later[i]
+    for i in range(newest + commanded, command):
+        sooner[i - commanded] = later[i]
+    if simulation.history > 1:
+        for i in range(commanded):
+            sooner[command + i] = later[newest + i]
+    for joint in range(simulation.velocity.shape[0]):
+        angle, rate = 4 * joint, simulation.velocity[joint, 0]
+        for e in range(n):
+            later[angle, e] += rate * later[angle + 1, e]
+            sooner[angle, e] -= rate * later[angle + 1, e]
+    for o in range(work.change.shape[0]):
+        place = simulation.place[o]
+        for e in range(n):
+            work.change[o, e] = work.free[o, e] * later[place, e]
+            sooner[place, e] += work.change[o, e]
+    slope, hidden = work.slope, work.hidden
+    for u in range(slope.shape[0]):
+        for e in range(n):
+            slope[u, e] = np.float32(0.0)
+        for o in range(work.change.shape[0]):
+            weight = simulation.output[o, u]
+            if weight != np.float32(0.0):
+                for e in range(n):
+                    slope[u, e] += weight * work.change[o, e]
+        for e in range(n):
+            slope[u, e] *= np.float32(1.0) - hidden[u, e] * hidden[u, e]
+    last = command + commanded  # beyond are the goal, the 1 and nothing, which no command changes
+    for i in range(last):
+        row = sooner[i]
+        for u in range(slope.shape[0]):
+            weight = simulation.hidden[i, u]
+            for e in range(n):
+                row[e] += weight * slope[u, e]
+    for o in range(simulation.direct.shape[0]):
+        for i in range(last):
+            weight = simulation.direct[o, i]
+            for e in range(n):
+                sooner[i, e] += weight * work.change[o, e]

@@ -1,0 +1,78 @@
+"""Forecasts of a reference whose future is not known, from what was asked for so far.
+
+Three forecasters run side by side, and that one is believed which has lately been nearest to what came:
+
+    hold:            r_{k+p} = r_k
+    line:            r_{k+p} = r_k + p (r_k - r_{k-1})
+    autoregression:  differences d_{k+1} = w_1 d_k + ... + w_m d_{k-m+1}, the weights by ridge regression over the
+                     last second or so, towards d_{k+1} = d_k; it continues sinusoids and smooth moves
+"""
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+_ORDER = 3
+_MEMORY = 24  # differences that the weights are found from
+_FORGETTING = 0.8  # of a forecaster's error, in a step
+_JUDGED = 5  # steps ahead at which forecasters are judged
+_RIDGE = 1e-6  # in parts of the largest difference squared
+_FASTEST = 1.5  # largest forecast difference, in parts of the largest one seen
+
+
+class Forecast:
+    """The forecast of one reference; ``see`` it once every control period."""
+
+    def __init__(self) -> None:
+        self._seen: deque[Array] = deque(maxlen=_MEMORY + _ORDER + 1)
+        self._ahead: deque[Array] = deque(maxlen=_JUDGED)
+        self._errors = np.zeros(0)
+
+    def see(self, value: ArrayLike) -> None:
+        """Take in what is asked for now, shape (joints,)."""
+        value = np.atleast_1d(np.asarray(value, np.float64))
+        self._seen.append(value)
+        if self._errors.size == 0:
+            self._errors = np.array([[0.0], [1e-3], [2e-3]]) + np.zeros(value.size)  # the plainer, the rather
+        if len(self._ahead) == _JUDGED:
+            self._errors = _FORGETTING * self._errors + np.abs(self._ahead[0] - value)
+        self._ahead.append(self._all(np.array([_JUDGED]))[:, 0])
+
+    def ahead(self, steps: NDArray[np.int64]) -> Array:
+        """Return what will be asked for so many ``steps`` (previews,) from now, shape (previews, joints)."""
+        best = self._errors.argmin(axis=0)
+        return np.take_along_axis(self._all(steps), best[None, None], axis=0)[0]
+
+    def _all(self, steps: NDArray[np.int64]) -> Array:
+        """Return all forecasts, shape (forecasters, previews, joints)."""
+        seen = np.stack(self._seen)
+        now = seen[-1]
+        slope = now - seen[-2] if len(seen) > 1 else np.zeros_like(now)
+        hold = np.broadcast_to(now, (len(steps), now.size))
+        line = now + steps[:, None] * slope
+        continued = np.stack([_continued(seen[:, j], steps) for j in range(now.size)], axis=1)
+        return np.stack([hold, line, continued])
+
+
+def _continued(seen: Array, steps: NDArray[np.int64]) -> Array:
+    """Return the autoregression's forecast (previews,) of the numbers ``seen`` (n,)."""
+    change = np.diff(seen)
+    largest = np.abs(change).max() if change.size else 0.0
+    rows = len(change) - _ORDER
+    if rows < 2 or largest == 0.0:
+        return seen[-1] + steps * (change[-1] if change.size else 0.0)
+    change = change / largest
+    before = np.stack([change[_ORDER - 1 - i : len(change) - 1 - i] for i in range(_ORDER)], axis=1)
+    prior = np.eye(_ORDER)[0]
+    normal = before.T @ before + _RIDGE * np.eye(_ORDER)
+    weights = prior + np.linalg.solve(normal, before.T @ (change[_ORDER:] - before @ prior))
+    state, value, values = change[::-1][:_ORDER].copy(), seen[-1], []
+    for _ in range(int(steps.max())):
+        following = float(np.clip(weights @ state, -_FASTEST, _FASTEST))
+        state = np.concatenate([[following], state[:-1]])
+        value += following * largest
+        values.append(value)
+    return np.array(values)[steps - 1]

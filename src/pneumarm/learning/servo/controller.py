@@ -21,16 +21,21 @@ from pneumarm.task.tracker import StateTracker
 if TYPE_CHECKING:
     from pneumarm.learning.servo.agent import ServoAgent
 
-_LOOK = 0.134  # s over which readings are averaged before an arm is left alone, or no longer
-_STILL = 0.1  # tolerances that the average of half of them may differ from that of the other half
+_LOOK = 0.2  # s over which readings are averaged where the arm is nearly at rest
+_STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
+_LEAVING = 2.5  # as many times the error and drift of coming to rest end it
+_NEAR = 1.0  # tolerances within which an arm can be nearly at rest
+_INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
 class ServoController:
     """Maps readings to pulses with a :class:`~.agent.ServoAgent`.
 
-    Where the goal stays the same and the arm stands still near to it, all valves stay closed: closed muscles are
-    springs of air that hold the joint, nothing wears, and no noise of the sensors is answered. That ends as soon as
-    the mean of the last readings is off by more than ``alert`` tolerances.
+    Where the goal stays the same and a joint is nearly at rest near to it, it moves by single pulses, and looks at
+    what each did before the next; what is left of the error is added to what is asked for (integral action), so that
+    no bias of the simulation remains. Where the mean of the readings is off by less than ``quiet`` tolerances its
+    valves stay closed, until it is off by more than ``alert``: closed muscles are springs of air that hold the joint,
+    nothing wears, and no noise of the sensors is answered.
     """
 
     def __init__(self, agent: ServoAgent) -> None:
@@ -57,7 +62,8 @@ class ServoController:
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
-        self._quiet = np.zeros(window.joints, bool)
+        self._near = _NEAR * tolerance
+        self._rest = [_Rest() for _ in range(window.joints)]
 
     def reset(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts], to be held; the arm is at rest with its valves closed."""
@@ -71,7 +77,8 @@ class ServoController:
         """Follow ``reference``, which begins at the time of the next reading, from whatever the arm is doing."""
         self._reference, self._begin = reference, None
         self._forecast = Forecast()
-        self._quiet[:] = False
+        for rest in self._rest:
+            rest.leave()
 
     def act(self, reading: Reading) -> NDArray[np.float64]:
         """Return the commands (joints, 2) after ``reading``, shares of the period for which a valve is open."""
@@ -87,13 +94,15 @@ class ServoController:
         state = self._tracker.reading(reading)
         self._angles.append(np.asarray(reading.angle, np.float64))
         now, preview = self._preview(reading.time - self._begin)
+        acts = self._which_act(now, preview)
+        bias = np.array([rest.bias for rest in self._rest])
         self._x[: state.size, 0] = state
-        scaled = ((preview - self._offset) / self._scale).astype(np.float32)[:, :, None]
+        scaled = ((preview + bias - self._offset) / self._scale).astype(np.float32)[:, :, None]
         write_inputs(self._task.inputs, self._x, self._no_noise, len(self._no_noise) - 1, scaled, self._inputs)
         forward(self._layers, self._inputs, self._units)
         write_commands(self._task.commands, self._x, self._units[-1], self._slope, self._command)
         command = self._command.astype(np.float64).reshape(-1, 2)
-        command[self._is_quiet(now, preview)] = 0.0
+        command[~acts] = 0.0
         self._tracker.commanded(command)
         return command
 
@@ -106,13 +115,34 @@ class ServoController:
         self._forecast.see(now)
         return now, self._forecast.ahead(steps)
 
-    def _is_quiet(self, now: NDArray[np.float64], preview: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which joints (joints,) are left alone."""
+    def _which_act(self, now: NDArray[np.float64], preview: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which joints (joints,) may open valves now, and note which are nearly at rest."""
         read = np.array(self._angles)
-        error = np.abs(read.mean(axis=0) - now)
-        half = len(read) // 2
-        is_still = np.abs(read[:half].mean(axis=0) - read[half:].mean(axis=0)) < self._still if half else False
-        settles = (error < self._quiet_below) & is_still & (len(read) == self._angles.maxlen)
-        stays = self._quiet & (error < self._alert_above)
-        self._quiet = (settles | stays) & (np.ptp(preview, axis=0) == 0) & (preview[0] == now)
-        return self._quiet
+        error, half = now - read.mean(axis=0), len(read) // 2
+        drift = np.abs(read[:half].mean(axis=0) - read[half:].mean(axis=0)) if half else np.full(now.size, np.inf)
+        known = (len(read) == self._angles.maxlen) & (np.ptp(preview, axis=0) == 0) & (preview[0] == now)
+        acts = np.ones(now.size, bool)
+        for j, rest in enumerate(self._rest):
+            wide = _LEAVING if rest.calm else 1.0
+            if not known[j] or abs(error[j]) > wide * self._near or drift[j] > wide * self._still:
+                rest.leave()
+                continue
+            rest.calm = True
+            rest.quiet = abs(error[j]) < (self._alert_above if rest.quiet else self._quiet_below)
+            rest.look = max(rest.look - 1, 0)
+            acts[j] = not rest.quiet and rest.look == 0
+            if acts[j]:
+                rest.look = len(read)
+                rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._near, self._near))
+        return acts
+
+
+class _Rest:
+    """How one joint is nearly at rest."""
+
+    def __init__(self) -> None:
+        self.leave()
+
+    def leave(self) -> None:
+        """Note that it is not."""
+        self.calm, self.quiet, self.look, self.bias = False, False, 0, 0.0

@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass
 
-from pneumarm.settings import check
+from pneumarm.settings import Settings, Valid
 
 
 @dataclass(frozen=True)
-class ServoSettings:
+class ServoSettings(Settings):
     """A policy over pulses that settles, holds and tracks; angles and errors in degrees, times in seconds."""
 
     agents: int = 2
@@ -49,26 +49,25 @@ class ServoSettings:
     validation_movements: int = 400
     """Movements in simulation on which the best agent is chosen."""
 
-    def __post_init__(self) -> None:
-        check(
-            self,
-            agents=1 <= self.agents <= 256,
-            updates=self.updates >= 1,
-            arms=1 <= self.arms <= 65_536,
-            duration=0 < self.duration <= 60,
-            learning_rate=0 < self.learning_rate < math.inf,
-            largest_gradient=0 < self.largest_gradient < math.inf,
-            hidden=1 <= len(self.hidden) <= 8 and all(1 <= size <= 1024 for size in self.hidden),
-            preview=1 <= len(self.preview) <= 64 and all(0 < ahead <= 10 for ahead in self.preview),
-            tolerance=0 < self.tolerance < math.inf,
-            precision=0 < self.precision < math.inf,
-            flat=0 <= self.flat < math.inf,
-            far=0 <= self.far < math.inf,
-            change=0 <= self.change < math.inf,
-            dead=0 <= self.dead < 1,
-            known=0 <= self.known <= 1,
-            reading_noise=0 <= self.reading_noise < math.inf,
-            quiet=0 <= self.quiet <= self.alert,
-            alert=0 <= self.alert < math.inf,
-            validation_movements=self.validation_movements >= 1,
-        )
+    def _valid(self) -> Valid:
+        return {
+            "agents": 1 <= self.agents <= 256,
+            "updates": self.updates >= 1,
+            "arms": 1 <= self.arms <= 65_536,
+            "duration": 0 < self.duration <= 60,
+            "learning_rate": 0 < self.learning_rate < math.inf,
+            "largest_gradient": 0 < self.largest_gradient < math.inf,
+            "hidden": 1 <= len(self.hidden) <= 8 and all(1 <= size <= 1024 for size in self.hidden),
+            "preview": 1 <= len(self.preview) <= 64 and all(0 < ahead <= 10 for ahead in self.preview),
+            "tolerance": 0 < self.tolerance < math.inf,
+            "precision": 0 < self.precision < math.inf,
+            "flat": 0 <= self.flat < math.inf,
+            "far": 0 <= self.far < math.inf,
+            "change": 0 <= self.change < math.inf,
+            "dead": 0 <= self.dead < 1,
+            "known": 0 <= self.known <= 1,
+            "reading_noise": 0 <= self.reading_noise < math.inf,
+            "quiet": 0 <= self.quiet <= self.alert,
+            "alert": 0 <= self.alert < math.inf,
+            "validation_movements": self.validation_movements >= 1,
+        }

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pneumarm.learning.online.training import Progress, cores
 from pneumarm.learning.servo.agent import ServoAgent, servo_sizes, servo_task
-from pneumarm.learning.servo.gradient import errors_of, learn_once, move_forward, tape
+from pneumarm.learning.servo.gradient import ServoTask, errors_of, learn_once, tape
 from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.networks.layers import adam, initial_weights, trainable
@@ -23,6 +23,7 @@ _WEIGHTS, _MOVEMENTS, _VALIDATION = 0, 1, 2  # streams of random numbers
 _CHUNK = 25  # updates between two rows of the curves
 _FIRST_OUTPUT = 1.0
 _RENEWED = 0.5  # share of arms that begin anew at rest; the others go on from where they are
+_FREE = 0.6  # share of the updates in which the price of changes rises to what it is
 _FASTEST = 4.0  # highest speed of a reference, in scaled velocities
 SERVO_CURVES = ("updates", "price", "settled")
 """Columns of the training curves: updates so far, mean price of a step, share of the last third within tolerance."""
@@ -84,7 +85,7 @@ class ServoLearner:
         updates -= self.updates
         for _ in range(updates):
             self._prepare(self._random)
-            price += learn_once(self.task, self.net, self._tape)
+            price += learn_once(self._task_now(), self.net, self._tape)
             rate = wanted.learning_rate * (1 - self.updates / wanted.updates)
             self.updates += 1
             adam(self.net, rate, wanted.largest_gradient, self.updates)
@@ -103,6 +104,11 @@ class ServoLearner:
             self.net.gradient[:] = gradient
             settled.append(self._settled())
         return {"price": float(np.mean(prices)), "settled": float(np.mean(settled))}
+
+    def _task_now(self) -> ServoTask:
+        """Return the task with the price of changes of this update: who pays for them first never learns to move."""
+        paid = min(self.updates / (_FREE * self.settings.updates), 1.0) * self.settings.change
+        return self.task._replace(prices=self.task.prices._replace(change=paid))
 
     def agent(self) -> ServoAgent:
         """Return the servo as it is now."""
@@ -190,4 +196,4 @@ def train_servo(
     )
 
 
-__all__ = ["SERVO_CURVES", "ServoLearner", "ServoTraining", "move_forward", "train_servo"]
+__all__ = ["SERVO_CURVES", "ServoLearner", "ServoTraining", "train_servo"]

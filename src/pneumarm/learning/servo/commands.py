@@ -5,8 +5,8 @@ With z the policy's output, v = 1.25 tanh(z) and dead the share of it that keeps
     command = sign(v) clip((|v| - dead) / (1 - dead), 0, 1),   rounded where the valve can be no faster.
 
 The gradient goes through the rounding as if it were not there (a straight-through estimate: Bengio, Leonard and
-Courville, arXiv:1308.3432) and through the dead zone, in which the first policy lies, and stops where a valve is open
-for the whole period already and where the guard would keep an inlet closed.
+Courville, arXiv:1308.3432). Where the command is clipped or kept closed it has none, but a small share of it passes,
+or a policy that keeps its valves closed would never learn to open them.
 """
 
 from typing import NamedTuple
@@ -20,6 +20,7 @@ from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.simulation import Simulation
 
 _GAIN = np.float32(1.25)
+_LEAK = 0.05
 _ONE, _ZERO = np.float32(1.0), np.float32(0.0)
 
 
@@ -30,6 +31,8 @@ class CommandParameters(NamedTuple):
     """Share of the policy's output around 0 that keeps a valve closed."""
     shortest: float
     """Shortest pulse, in periods."""
+    leak: float
+    """Share of the gradient that passes where the command does not change."""
     inlet: NDArray[np.float32]
     """Pressure over which an inlet stays closed, shape (joints, 2) [scaled]."""
 
@@ -39,7 +42,7 @@ def command_parameters(simulation: Simulation, dead: float, shortest: float) -> 
     scaling, window, spec = simulation.scaling, simulation.window, simulation.spec
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     inlet = (spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:]
-    return CommandParameters(float(dead), float(shortest), np.ascontiguousarray(inlet, np.float32))
+    return CommandParameters(float(dead), float(shortest), _LEAK, np.ascontiguousarray(inlet, np.float32))
 
 
 def shortest_share(spec: ArmSpec) -> float:
@@ -65,6 +68,7 @@ def write_commands(parameters, x, said, slope, command):  # type: ignore[no-unty
     ``x`` (size, n) are the states, in which the pressures are read; ``said`` is replaced by its hyperbolic tangent.
     """
     dead, shortest = np.float32(parameters.dead), np.float32(parameters.shortest)
+    leak = np.float32(parameters.leak)
     stretch = _ONE / (_ONE - dead)
     for c in range(command.shape[0]):
         tansig(said[c])
@@ -79,4 +83,4 @@ def write_commands(parameters, x, said, slope, command):  # type: ignore[no-unty
                 size, moves = _ZERO, False
             pulse = rounded(min(max(size, _ZERO), _ONE), shortest)
             command[c, e] = pulse if v > _ZERO else -pulse
-            slope[c, e] = _GAIN * (_ONE - bent * bent) * stretch if moves else _ZERO
+            slope[c, e] = _GAIN * (_ONE - bent * bent) * stretch * (_ONE if moves else leak)

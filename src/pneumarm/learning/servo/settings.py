@@ -12,7 +12,7 @@ class ServoSettings(Settings):
 
     agents: int = 2
     """Agents trained at once from different weights, of which the best is kept; one a core takes no longer."""
-    updates: int = 500
+    updates: int = 800
     """How often movements are made and learned from."""
     arms: int = 96
     """Simulated arms that move at once."""
@@ -34,7 +34,7 @@ class ServoSettings(Settings):
     """Error, in tolerances, that costs nothing but ``far``."""
     far: float = 0.06
     """Price of an error for each tolerance, besides the logarithmic one of being out of precision."""
-    change: float = 0.06
+    change: float = 0.15
     """Price of opening or closing a valve."""
     dead: float = 0.15
     """Share of the policy's output around 0 that keeps a valve closed."""

@@ -1,0 +1,153 @@
+"""A servo: its gradient, its commands, its prices, and that it settles and tracks after seconds of training."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from learning.synthetic_arm import synthetic_begin_states, synthetic_simulation
+from pneumarm.arm import guarded
+from pneumarm.arm.reference import Reference, constant
+from pneumarm.errors import UnusableInput
+from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
+from pneumarm.learning.servo.commands import rounded
+from pneumarm.learning.servo.gradient import learn_once
+from pneumarm.learning.servo.price import PriceParameters, price_of_changes, price_of_error
+from pneumarm.learning.servo.references import draw_references
+from pneumarm.learning.servo.training import ServoLearner
+from pneumarm.moving import MoveSettings, move, track
+from pneumarm.simulation.arm import SimulationArm
+from pneumarm.simulation.simulation import Simulation
+
+SMALL = ServoSettings(arms=8, updates=4, agents=1, duration=0.3, hidden=(8, 8), validation_movements=8)
+
+
+def learner(simulation: Simulation, settings: ServoSettings = SMALL, number: int = 0) -> ServoLearner:
+    return ServoLearner(simulation, synthetic_begin_states(simulation), settings, 0, number)
+
+
+@pytest.mark.parametrize(("joints", "history", "direct"), [(1, 3, False), (2, 2, True), (1, 1, True)])
+def test_the_gradient_is_that_of_the_price(joints: int, history: int, direct: bool):
+    one = learner(synthetic_simulation(joints, history, direct=direct))
+    one._prepare(np.random.default_rng(1))
+    weights, random = one.net.flat, np.random.default_rng(2)
+    weights[:] = random.normal(0, 0.3, weights.size)
+    task = one.task._replace(commands=one.task.commands._replace(shortest=1e-6, leak=0.0))  # what has no slope
+    learn_once(task, one.net, one._tape)
+    gradient = one.net.gradient.copy()
+    way = gradient / np.linalg.norm(gradient)
+    found = []
+    for distance in (2e-3, -2e-3):
+        weights += np.float32(distance) * way
+        found.append(learn_once(task, one.net, one._tape))
+        weights -= np.float32(distance) * way
+    assert (found[0] - found[1]) / 4e-3 == pytest.approx(np.linalg.norm(gradient), rel=0.02)
+
+
+def test_prices_have_the_slopes_that_they_say():
+    prices, step = PriceParameters(precision=0.3, far=0.06, flat=0.1, change=0.5), 1e-3
+    error, slope = np.linspace(-5, 5, 40, dtype=np.float32), np.zeros(40, np.float32)
+    price_of_error(prices, error, slope)
+    for e in (3, 17, 30):
+        one = [price_of_error(prices, error[e : e + 1] + np.float32(d), slope[:1].copy()) for d in (step, -step)]
+        assert (one[0] - one[1]) / (2 * step) == pytest.approx(slope[e], abs=0.02)
+    for now, before in ((0.3, 0.9), (0.95, 0.9), (-0.5, 1.0), (-0.9, -0.95), (0.4, 0.0)):
+        at, slopes = [], (np.zeros(1, np.float32), np.zeros(1, np.float32))
+        for d, b in ((step, 0), (-step, 0), (0, step), (0, -step)):
+            command, last = (np.array([x], np.float32) for x in (now + d, before + b))
+            at.append(price_of_changes(prices, command, last, np.zeros(1, np.float32), np.zeros(1, np.float32)))
+        price_of_changes(prices, np.array([now], np.float32), np.array([before], np.float32), *slopes)
+        assert (at[0] - at[1]) / (2 * step) == pytest.approx(slopes[0][0], abs=0.02)
+        if before:
+            assert (at[2] - at[3]) / (2 * step) == pytest.approx(slopes[1][0], abs=0.02)
+
+
+def test_a_valve_that_stays_open_is_cheaper_than_one_that_pulses():
+    prices = PriceParameters(precision=0.3, far=0.06, flat=0.1, change=1.0)
+
+    def price(now: float, before: float) -> float:
+        rows = [np.array([x], np.float32) for x in (now, before)]
+        return float(price_of_changes(prices, *rows, np.zeros(1, np.float32), np.zeros(1, np.float32)))
+
+    assert price(1, 1) == pytest.approx(0)
+    assert price(0, 0) == pytest.approx(0)
+    assert price(1, 0) == pytest.approx(1)  # opens
+    assert price(0, 1) == pytest.approx(1)  # closes
+    assert price(0.5, 0.5) > 1.8  # opens and closes
+
+
+@pytest.mark.parametrize(
+    ("size", "shortest", "pulse"),
+    [(0.04, 0.1, 0.0), (0.06, 0.1, 0.1), (0.5, 0.1, 0.5), (0.97, 0.1, 1.0), (0.4, 1.0, 0.0), (0.6, 1.0, 1.0)],
+)
+def test_pulses_are_none_or_as_long_as_the_valve_needs(size: float, shortest: float, pulse: float):
+    assert rounded(np.float32(size), np.float32(shortest)) == pytest.approx(pulse)
+
+
+def test_references_stay_in_the_range_of_goals_and_are_no_faster_than_asked():
+    simulation = synthetic_simulation(2)
+    spec, random = simulation.spec, np.random.default_rng(0)
+    angle, fastest = np.full((2, 300), 500.0), np.array([900.0, 500.0])
+    drawn = draw_references(random, simulation.goal_range, angle, 60, spec, fastest)
+    assert drawn.shape == (60, 2, 300)
+    assert drawn.min() >= simulation.goal_range.min()
+    assert drawn.max() <= simulation.goal_range.max()
+    is_smooth = np.abs(np.diff(drawn, 2, axis=0)).max(axis=0) < 60
+    assert 0.5 < is_smooth.mean() < 1
+    assert (np.ptp(drawn, axis=0) == 0).mean() == pytest.approx(0.45, abs=0.1)
+
+
+def test_training_is_the_same_with_any_number_of_threads():
+    simulation = synthetic_simulation()
+    begin, settings = synthetic_begin_states(simulation), replace(SMALL, agents=2)
+    one, two = (train_servo(simulation, begin, settings, 3, threads=threads) for threads in (1, 2))
+    np.testing.assert_array_equal(one.agent.policy, two.agent.policy)
+    other = train_servo(simulation, begin, settings, 4)
+    assert not np.array_equal(one.agent.policy, other.agent.policy)
+
+
+def test_a_file_holds_all_that_it_needs(tmp_path: Path):
+    simulation = synthetic_simulation()
+    agent = train_servo(simulation, synthetic_begin_states(simulation), SMALL).agent
+    agent.save(tmp_path / "servo")
+    again = ServoAgent.load(tmp_path / "servo")
+    np.testing.assert_array_equal(again.policy, agent.policy)
+    assert again.settings == agent.settings
+    broken = replace(agent, policy=agent.policy[:-1])
+    broken.save(tmp_path / "broken")
+    with pytest.raises(UnusableInput, match="policy weights"):
+        ServoAgent.load(tmp_path / "broken")
+
+
+@pytest.fixture(scope="module")
+def trained() -> ServoAgent:
+    simulation = synthetic_simulation()
+    settings = ServoSettings(arms=48, updates=400, agents=1, hidden=(24, 24), validation_movements=48)
+    return train_servo(simulation, synthetic_begin_states(simulation), settings).agent
+
+
+def test_it_settles_and_holds_with_closed_valves(trained: ServoAgent):
+    with guarded(SimulationArm(trained.simulation, seed=1)) as arm:
+        goals = [[420.0], [600.0], [512.0]]
+        made = list(move(arm, trained.controller(), goals, MoveSettings(hold=3.0, tries=1, tolerance=2.5)))
+    assert [one.success for one in made] == [True, True, True]
+    assert max(one.rest_error[0] for one in made) < 0.6
+    last = np.concatenate([one.recorded.command[-30:-1] for one in made])
+    assert (last != 0).any(axis=(1, 2)).mean() < 0.2  # quiet, nearly always
+
+
+def test_it_follows_what_it_knows_ahead_and_what_it_does_not(trained: ServoAgent):
+    spec = trained.spec
+    middle, amplitude = 512.0, 8 * spec.counts_per_degree
+    with guarded(SimulationArm(trained.simulation, seed=2)) as arm:
+        for known in (True, False):
+            wave = Reference(lambda t: np.array([middle + amplitude * np.sin(np.pi * t)]), known_ahead=known)
+            assert track(arm, trained.controller(), wave, 6.0).rms_error[0] < 2.5
+
+
+def test_a_goal_must_be_one_of_the_arm(trained: ServoAgent):
+    controller = trained.controller()
+    with pytest.raises(UnusableInput, match="1 finite angle"):
+        controller.reset(np.array([1.0, 2.0]))
+    controller.track(constant([500.0]))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
+from pneumarm.arm.valves import Command
 from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.learning import AnyAgent, FleetTraining, Trained
 from pneumarm.report.data import Demonstration, LearningData, MarkedData, TrainingData
@@ -128,10 +129,10 @@ def _times(steps: list[Step]) -> NDArray[np.float64]:
     return np.array([step.reading.time for step in steps])
 
 
-def _closed_for(turns: int, applied: NDArray[np.int8]) -> Callable[[Reading], NDArray[np.int8] | None]:
+def _closed_for(turns: int, applied: Command) -> Callable[[Reading], NDArray[np.int8] | None]:
     left = iter(range(turns))
 
     def decide(reading: Reading) -> NDArray[np.int8] | None:
-        return np.zeros_like(applied) if next(left, None) is not None else None
+        return np.zeros(applied.shape, np.int8) if next(left, None) is not None else None
 
     return decide

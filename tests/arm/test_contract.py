@@ -137,6 +137,41 @@ def test_the_guard_keeps_inlets_of_full_muscles_closed(arm):
         assert (safe.peak_pressure >= reading.pressure).all()
 
 
+def filled(arm, command, turns=12):
+    """Return the pressures after ``turns`` control periods under a muscle's ``command``, then at rest."""
+    safe = guarded(arm)
+    safe.set_valves(all_valves(arm, -1))
+    safe.wait(2.0)
+    safe.set_valves(all_valves(arm, 0))
+    shares = np.zeros((arm.spec.joints, 2))
+    shares[0, 0] = command
+    remaining = iter(range(turns))
+    for _ in ControlCycle(safe).run(lambda reading: None if next(remaining, None) is None else shares):
+        pass
+    safe.wait(0.5)
+    return safe.read().pressure
+
+
+def test_a_pulse_lets_in_air_for_its_share_of_the_period(arm):
+    quarter, half, whole = (filled(arm, share)[0, 0] for share in (0.25, 0.5, 1.0))
+    assert quarter == pytest.approx(whole / 4, rel=0.25, abs=8)
+    assert half == pytest.approx(whole / 2, rel=0.2, abs=8)
+
+
+def test_pulses_too_short_for_a_valve_are_none_or_the_shortest(arm):
+    shortest = arm.spec.shortest_pulse / arm.spec.period
+    safe = guarded(arm)
+    command = np.zeros((arm.spec.joints, 2))
+    command[0] = 0.49 * shortest, -0.51 * shortest
+    safe.decide(command)
+    assert safe.applied[0].tolist() == [0.0, -shortest]
+    safe.wait(arm.spec.period)
+    command[0] = np.nextafter(1.0, 0.0), -1.0
+    safe.decide(command)
+    assert safe.applied[0].tolist() == command[0].tolist()
+    safe.set_valves(all_valves(arm, 0))
+
+
 @pytest.mark.parametrize("wrong", [2, -2, 0.5, np.nan])
 def test_impossible_valves_are_refused_before_anything_is_set(arm, wrong):
     safe = guarded(arm)

@@ -231,3 +231,100 @@ def test_what_nobody_closed_is_closed_when_the_interpreter_ends(tmp_path):
     for how in ("well", "failing"):
         done = python("-c", program, how)
         assert done.stdout == f"closed {how}\n"
+
+
+def test_the_guard_times_the_pulses_of_an_arm_that_cannot(smallest_arm):
+    arm = smallest_arm(joints=2, period=0.1, shortest_pulse=0.01)
+    safe = GuardedArm(arm)
+    safe.read()
+    arm.calls.clear()
+    safe.decide(np.array([[0.25, -0.5], [1.0, 0.25]]))
+    safe.wait(0.1)
+    waits = pytest.approx(0.025), pytest.approx(0.025), pytest.approx(0.05)
+    assert arm.calls == [
+        ("valves", [[1, -1], [1, 1]]),
+        ("wait", waits[0]),
+        ("valves", [[0, -1], [1, 0]]),
+        ("wait", waits[1]),
+        ("valves", [[0, 0], [1, 0]]),
+        ("wait", waits[2]),
+    ]
+    assert safe.applied.tolist() == [[0.25, -0.5], [1.0, 0.25]]
+    safe.decide(np.array([[0.5, 0.0], [-0.5, 0.0]]))
+    safe.wait_until(0.12)  # in the middle of a pulse
+    assert arm.valves == [[1, 0], [-1, 0]]
+    safe.read()
+    safe.wait_until(0.2)
+    assert arm.valves == [[0, 0], [0, 0]]
+    assert arm.time == pytest.approx(0.2)
+
+
+def test_pulses_of_the_whole_period_are_valves(smallest_arm):
+    arm = smallest_arm()
+    safe = GuardedArm(arm)
+    safe.decide(np.array([[1.0, -1.0]]))
+    assert safe.applied.dtype == np.int8
+    assert arm.calls == [("valves", [[1, -1]])]
+
+
+def test_an_arm_without_pulses_gets_whole_periods(smallest_arm):
+    arm = smallest_arm(pulses=False)
+    safe = GuardedArm(arm)
+    for command, applied in (([[0.6, -0.4]], [[1, 0]]), ([[0.5, -0.5]], [[1, -1]])):
+        safe.decide(np.array(command))
+        assert safe.applied.tolist() == arm.valves == applied
+        assert safe.applied.dtype == np.int8
+
+
+@pytest.mark.parametrize(
+    "nonsense", [[[1.001, 0.0]], [[np.nan, 0.5]], [[0.5, 0.5, 0.5]], [["0.5", "0"]], [[0.5j, 0]]]
+)
+def test_impossible_pulses_never_reach_the_arm(smallest_arm, nonsense):
+    arm = smallest_arm()
+    safe = GuardedArm(arm)
+    safe.decide(nonsense)
+    assert safe.interventions == Interventions(nonsense=1)
+    assert arm.valves == [[0, 0]]
+
+
+def test_limits_hold_for_pulses(smallest_arm):
+    arm = smallest_arm(max_pressure=1.0, angle_limits=(100.0, 900.0))
+    safe = GuardedArm(arm)
+    arm.pressure, arm.angle = [[170, 10]], [500]
+    safe.read()
+    safe.decide(np.array([[0.5, 0.25]]))
+    assert safe.applied.tolist() == [[0.0, 0.25]]
+    arm.pressure, arm.angle = [[10, 10]], [950]
+    safe.read()
+    safe.decide(np.array([[0.5, -0.25]]))
+    assert arm.valves == [[0, 0]]
+    assert safe.interventions == Interventions(pressure=1, angle=2)
+
+
+def test_the_time_of_pulses_counts_as_inflation(smallest_arm):
+    arm = smallest_arm(max_inflation=1.0, max_pressure=1e6, period=0.1)
+    safe = GuardedArm(arm)
+    turns = 0
+    while not safe.interventions.inflation:
+        safe.read()
+        safe.decide(np.array([[0.8, -0.5]]))
+        safe.wait(0.1)
+        turns += 1
+    # 80 ms in and 20 ms of rest a turn, until 1 s is full and the next decision is limited.
+    assert turns - 1 == pytest.approx(1.0 / 0.06, abs=1)
+
+
+def test_a_pulse_is_held_as_it_was_given_and_ends_while_a_controller_thinks(smallest_arm):
+    arm = smallest_arm(period=0.1)
+    safe = GuardedArm(arm)
+    reading = safe.read()
+    safe.decide(np.array([[0.5, 0.0]]))
+    arm.wait(0.1)  # nobody looks, as while a controller computes
+    assert arm.valves == [[1, 0]]
+    assert safe.stand_in(reading)
+    assert arm.valves == [[0, 0]]
+    safe.replace("late", "late")
+    assert safe.applied.tolist() == [[0.5, 0.0]]
+    assert arm.valves == [[1, 0]]
+    safe.wait(0.1)
+    assert arm.valves == [[0, 0]]

@@ -42,7 +42,7 @@ def test_only_these_files_set_valves():
     for path in SOURCE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             # Also a mere mention, such as ``partial(arm.set_valves, ...)``.
-            if isinstance(node, ast.Attribute) and node.attr == "set_valves":
+            if isinstance(node, ast.Attribute) and node.attr in ("set_valves", "set_pulses"):
                 calling.add(path.relative_to(SOURCE).as_posix())
     assert calling == set(GUARDED)
 

@@ -76,3 +76,19 @@ def test_options_come_in_any_order(tmp_path):
 def test_options_that_cannot_be_are_refused(name, said):
     with pytest.raises(UnusableInput, match=said):
         open_arm(name)
+
+
+def test_a_virtual_arm_is_opened_at_another_rate(tmp_path):
+    usual = open_arm("virtual:seed=7")
+    for name in ("virtual:seed=7,rate=200", "virtual:period=0.005,seed=7"):
+        arm = open_arm(name)
+        assert arm.spec.period == pytest.approx(0.005)
+        assert arm.spec.latency == pytest.approx(usual.spec.latency * 0.15)
+        assert arm.parameters == usual.parameters
+    assert open_arm("virtual:rate=10").spec.latency == usual.spec.latency
+    known = tmp_path / "arm.toml"
+    save_spec(arm.spec, known)
+    assert open_arm(f"virtual:seed=7,spec={known}").arm.spec.period == arm.spec.period
+    for wrong in ("rate=0", "rate=fast", "period=-1", "period=0.1,rate=10", "rate=nan"):
+        with pytest.raises(UnusableInput, match="expected a period"):
+            open_arm(f"virtual:{wrong}")

@@ -72,7 +72,7 @@ def test_verdicts_add_up(tmp_path: Path) -> None:
 def test_a_claim_about_nothing_listed_is_not_lost(tmp_path: Path) -> None:
     results(tmp_path, "all-goals", [("something else", "holds")])
     found = judged(tmp_path)["all-goals"]
-    assert found.conclusion.says == ALL_GOALS.question
+    assert found.conclusion.says == ALL_GOALS.words.question
     assert [claim.claim for _, claim in found.claims] == ["something else"]
 
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import spearmanr
 
-from pneumarm.experiments import overnight
 from pneumarm.experiments.differences import Interval, interval, within
 from pneumarm.experiments.evidence import (
     Column,
@@ -19,16 +18,15 @@ from pneumarm.experiments.evidence import (
     mean,
     numbers,
     over_arms,
-    plain,
     samples,
     series,
-    signed,
     table,
 )
 from pneumarm.experiments.experiment import Row, Rows, sorted_rows
 from pneumarm.experiments.factorial import rank_correlation
-from pneumarm.experiments.moving import SIMULATION, in_both
+from pneumarm.experiments.overnight.analysis import answer
 from pneumarm.experiments.pictures import Axis, Curve, against, courses, dots
+from pneumarm.experiments.words import ClaimWords, Words
 
 TRIALS = {1: "one", 2: "the second of them"}
 VALUES = {("a", 1): (1.0, 3.0), ("a", 2): (2.0, 6.0), ("b", 1): (5.0, 5.0), ("b", 2): (8.0, 10.0)}
@@ -60,9 +58,9 @@ def test_what_is_missing_in_a_row_does_not_count() -> None:
 
     two = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0), row("b", 1, x=8.0), row("b", 2)))
     assert mean(two, "x", 1)[::2] == (5.0, 2)
-    assert plain(mean(two, "x", 1), 0, factor=-1) == "-5 ± 38"  # half is t(0.975, 1) 12.7 times 3
+    assert f"{mean(two, 'x', 1).times(-1):.0f}" == "-5 ± 38"  # half is t(0.975, 1) 12.7 times 3
     one = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0)))
-    assert plain(mean(one, "y", 1)) == "none"
+    assert f"{mean(one, 'y', 1):.2f}" == "none"
     assert difference(one, "x", 1, 1).half == 0
 
 
@@ -82,8 +80,10 @@ def test_series_of_figures() -> None:
 
 
 def test_values_and_differences_in_words() -> None:
-    assert (plain(Interval(1.25, 0.5, 3), 1), signed(Interval(1.25, 0.5, 3))) == ("1.2 ± 0.5", "+1.25 ± 0.50")
-    assert signed(Interval(-1.0, math.inf, 1)) == "-1.00"
+    found = Interval(1.25, 0.5, 3)
+    assert (f"{found:.1f}", f"{found:+.2f}", f"{found:.0%}") == ("1.2 ± 0.5", "+1.25 ± 0.50", "125 ± 50 %")
+    assert f"{Interval(-1.0, math.inf, 1):+.2f}" == "-1.00"
+    assert f"{found}" == str(found) == "+1.25 ± 0.50"
 
 
 def test_within_a_margin() -> None:
@@ -93,20 +93,30 @@ def test_within_a_margin() -> None:
 
 
 def test_a_table_says_what_programs_are_told() -> None:
-    columns = [Column("x", "x [%]", 1, 100.0, thesis={2: 0.5}), Column("x", "x")]
+    columns = [Column("x", "x [%]", 1, 100.0, thesis={TRIALS[2]: 0.5}), Column("x", "x")]
     made = table(ROWS, TRIALS, columns, "Means.")
     assert made.header == ["trial", "x [%]", "thesis", "x"]
     told = numbers(ROWS, TRIALS, columns)["ours"]["x"]
     for line, words, thesis in zip(made.rows, TRIALS.values(), ("", "0.5"), strict=True):
         found = Interval(told[words]["mean"], told[words]["half"], 2)
-        assert line[1:] == [plain(found, 1, 100.0), thesis, plain(found)]
+        assert line[1:] == [f"{found.times(100):.1f}", thesis, f"{found:.2f}"]
         assert line[0].replace("\N{NO-BREAK SPACE}", " ") == words
 
 
-def test_a_figure_in_the_simulation_and_on_the_arm() -> None:
-    there, here = in_both("success_rate", " [%]", 1, 100.0)
-    assert (there.figure, there.words) == (SIMULATION + "success_rate", "success, simulation [%]")
-    assert (here.figure, here.words, here.digits, here.factor) == ("success_rate", "success, arm [%]", 1, 100.0)
+def test_words_are_filled_with_what_was_found_and_claims_judged_by_it() -> None:
+    found = {"sure": Interval(5.0, 1.0, 5), "vague": Interval(0.0, 9.0, 5), "verdict": "open", "unknown": None}
+    rules = {
+        "sure > 0": "holds", "sure < 0": "does not hold", "sure > 5.5": "open", "|sure| < 7": "holds",
+        "|vague| < 1": "open", "sure > 0 and vague < 0": "open", "verdict": "open", "unknown > 0": None,
+    }  # fmt: skip
+    claims = tuple(ClaimWords("it", "says {sure:.1f}", "yes", "{vague:.0f}", rule) for rule in rules)
+    words = Words("title", "question", "source", ("{sure:+.2f}",), claims=claims).filled(found)
+    made = words.analysis(found, {}, [])
+    assert made.summary == ["question", "+5.00 ± 1.00"]
+    assert [claim.verdict for claim in made.claims] == [verdict for verdict in rules.values() if verdict]
+    assert {(claim.text, claim.ours) for claim in made.claims} == {("says 5.0 ± 1.0", "0 ± 9")}
+    with pytest.raises(ValueError, match="expected a rule"):
+        ClaimWords("it", "says", "yes", "no", "sure <> 0").judged(found)
 
 
 def test_pictures_say_in_words_what_they_draw() -> None:
@@ -117,7 +127,7 @@ def test_pictures_say_in_words_what_they_draw() -> None:
     assert [tick.get_text() for tick in ticks] == ["0.5", "2"]
     found = [mean(ROWS, "x", trial) for trial in TRIALS]
     lines = dots(list(TRIALS.values()), {"x\n[-]": found}, "X.", zero=True, reference=1)
-    assert lines.alt == f"x [-]: one {plain(found[0])}, the second of them {plain(found[1])}."
+    assert lines.alt == f"x [-]: one {found[0]:.2f}, the second of them {found[1]:.2f}."
     drawn = [line.get_xdata()[0] for line in lines.figure.axes[0].lines[:2]]
     assert drawn == [0, found[1].mean]
     course = courses({"x [-]": [Curve("agent", np.arange(12.0).reshape(2, 2, 3))]}, 10, "X.", {15.0: "rest"})
@@ -136,6 +146,6 @@ def test_rank_correlation(first: np.ndarray, second: np.ndarray) -> None:
 
 def test_the_answer_about_the_night() -> None:
     nothing, much, by_chance = Interval(0.1, 1.0, 5), Interval(9.0, 2.0, 5), Interval(9.0, 20.0, 5)
-    assert overnight.answer(much, by_chance) == "The night costs an agent that learns reward."
-    assert "one that never learns reward" in overnight.answer(nothing, much)
-    assert overnight.answer(nothing, by_chance).startswith("No drop is shown")
+    assert answer(much, by_chance) == "The night costs an agent that learns reward."
+    assert "one that never learns reward" in answer(nothing, much)
+    assert answer(nothing, by_chance).startswith("No drop is shown")

@@ -1,6 +1,5 @@
 """The list of the thesis' figures: each has a counterpart, whose command and section exist."""
 
-import importlib
 import inspect
 import re
 import shlex
@@ -11,7 +10,7 @@ import pytest
 import pneumarm.report.sections
 from pneumarm.cli import COMMANDS
 from pneumarm.experiments.factorial import Factorial
-from pneumarm.experiments.registry import PLACES, experiment
+from pneumarm.experiments.registry import experiment
 
 LIST = Path(__file__).parents[2] / "docs" / "figures.md"
 WANTED = (
@@ -49,4 +48,4 @@ def test_its_command_and_section_exist(row: list[str]) -> None:
         assert criterion in made.criteria
         assert len(made.thesis) >= 4
     else:
-        assert f'"{section}"' in inspect.getsource(importlib.import_module(f"pneumarm.experiments.{PLACES[chosen]}"))
+        assert section in [words.title for words in made.words.sections]

@@ -4,7 +4,8 @@ import numpy as np
 
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.experiment import Row, Rows, sorted_rows
-from pneumarm.experiments.fine_tuning import EXPERIMENT, returns_figure
+from pneumarm.experiments.fine_tuning import EXPERIMENT
+from pneumarm.experiments.fine_tuning.analysis import confirmation, returns_figure
 from pneumarm.experiments.registry import experiment
 from pneumarm.learning import TrainSettings
 
@@ -35,7 +36,7 @@ def rows(odd: dict[int, float], even: dict[int, float], runs: int = 6) -> Rows:
 def test_what_was_chosen_is_confirmed_by_other_runs() -> None:
     """A trial that shone in the runs that chose it and nowhere else confirms nothing."""
     said = {
-        name: EXPERIMENT.confirmation(rows(*given))[0]
+        name: confirmation(EXPERIMENT, rows(*given))
         for name, given in {
             "better": ({4: 9.0}, {4: 9.0}),
             "lucky": ({4: 9.0}, {LAST: 5.0}),
@@ -43,11 +44,11 @@ def test_what_was_chosen_is_confirmed_by_other_runs() -> None:
             "once": ({4: 9.0}, {}),
         }.items()
     }
-    assert said["better"].verdict == "holds"
-    assert said["better"].ours.startswith(("+9.", "+8.9"))
-    assert said["lucky"].verdict == "does not hold"
-    assert abs(float(said["other"].ours.split()[0])) < 0.5
-    assert EXPERIMENT.confirmation(rows({4: 9.0}, {}, runs=1))[0].verdict == "open"
+    assert said["better"]["verdict"] == "holds"
+    assert said["better"]["ours"].startswith(("+9.", "+8.9"))
+    assert said["lucky"]["verdict"] == "does not hold"
+    assert abs(float(said["other"]["ours"].split()[0])) < 0.5
+    assert confirmation(EXPERIMENT, rows({4: 9.0}, {}, runs=1))["verdict"] == "open"
 
 
 def test_the_page_has_the_array_and_trial_10() -> None:

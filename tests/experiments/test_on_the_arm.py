@@ -12,25 +12,25 @@ from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.arm.virtual.parameters import without_noise
 from pneumarm.control.playing import Player
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments import displacement, goal_area, on_the_arm_only, overnight, transfer, transferability
+from pneumarm.experiments import registry
 from pneumarm.experiments.claims import keys_of
-from pneumarm.experiments.evidence import (
-    blocks,
-    values,
-)
+from pneumarm.experiments.displacement import typical
+from pneumarm.experiments.evidence import blocks, values
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, run_seed, sorted_rows
 from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,
     Material,
-    Sizes,
     agent_of,
     draws,
     from_visits,
     material,
 )
+from pneumarm.experiments.on_the_arm_only import from_scratch
+from pneumarm.experiments.overnight.days import DAYS
 from pneumarm.experiments.page import write_page
 from pneumarm.experiments.preparation import Simulated
+from pneumarm.experiments.transfer import conditions
 from pneumarm.learning import Shaping
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.kernel import raw_observation
@@ -40,19 +40,21 @@ from small import SMALL
 
 LABORATORY = LaboratorySettings(test_episodes=30, max_episodes=300)
 AGENT = replace(THESIS, agents=2, validation_episodes=20)
-SMALL_ONES: dict[str, Any] = {
-    "transfer": replace(
-        transfer.EXPERIMENT, agent=AGENT, sizes=transfer.Sizes(learning=40, block=10, test=10, warming=10)
-    ),
-    "transferability": replace(transferability.EXPERIMENT, agent=AGENT, sizes=Sizes(test=10)),
-    "goal-area": replace(goal_area.EXPERIMENT, agent=AGENT, sizes=Sizes(test=10)),
-    "overnight": replace(
-        overnight.EXPERIMENT, agent=AGENT, sizes=overnight.Sizes(first=20, second=20, block=10, hours=2.0)
-    ),
-    "on-the-arm-only": replace(on_the_arm_only.EXPERIMENT, sizes=on_the_arm_only.Sizes(looks=20, test=10)),
-    "displacement": replace(
-        displacement.EXPERIMENT, agent=AGENT, sizes=displacement.Sizes(adapting=10, shown=40, typical=2)
-    ),
+
+
+def small_one(name: str, **sizes: Any) -> Any:
+    found: Any = registry.experiment(name)
+    learned = {} if name == "on-the-arm-only" else {"agent": AGENT}
+    return replace(found, **learned, sizes=replace(found.sizes, **sizes))
+
+
+SMALL_ONES = {
+    "transfer": small_one("transfer", learning=40, block=10, test=10, warming=10),
+    "transferability": small_one("transferability", test=10),
+    "goal-area": small_one("goal-area", test=10),
+    "overnight": small_one("overnight", first=20, second=20, block=10, hours=2.0),
+    "on-the-arm-only": small_one("on-the-arm-only", looks=20, test=10),
+    "displacement": small_one("displacement", adapting=10, shown=40, typical=2),
 }
 
 
@@ -94,10 +96,10 @@ def test_the_agents_that_are_compared_come_from_the_same_training(small_material
     """The test in the simulation is of the agent as it arrives, whatever it will learn with, and another a run."""
     experiment = SMALL_ONES["transfer"]
     rows = rows_of(experiment, small_material)
-    before = np.stack([values(rows, "simulation, exploring: reward", trial) for trial in transfer.RATES])
+    before = np.stack([values(rows, "simulation, exploring: reward", trial) for trial in conditions.RATES])
     assert (before == before[0]).all()
     assert before[0, 0, 0] != before[0, 0, 1]
-    courses = [blocks(rows, "reward", trial) for trial in transfer.RATES]
+    courses = [blocks(rows, "reward", trial) for trial in conditions.RATES]
     assert courses[0].shape == (1, 2, 4)
     assert not np.array_equal(courses[0], courses[1])
 
@@ -105,17 +107,17 @@ def test_the_agents_that_are_compared_come_from_the_same_training(small_material
 def test_conditions_change_what_they_say() -> None:
     parameters = draw_parameters(3)
     ideal = without_noise(parameters)
-    changed = {trial: transfer.changed(parameters, trial) for trial in transfer.CONDITIONS}
-    assert changed[transfer.AS_IT_IS] == changed[transfer.WARM] == parameters
-    assert changed[transfer.NO_NOISE] == replace(parameters, sensors=ideal.sensors) != parameters
-    assert changed[transfer.PUNCTUAL] == replace(parameters, jitter=0.0) != parameters
-    assert changed[transfer.ALL] == ideal
+    changed = {trial: conditions.changed(parameters, trial) for trial in conditions.CONDITIONS}
+    assert changed[conditions.AS_IT_IS] == changed[conditions.WARM] == parameters
+    assert changed[conditions.NO_NOISE] == replace(parameters, sensors=ideal.sensors) != parameters
+    assert changed[conditions.PUNCTUAL] == replace(parameters, jitter=0.0) != parameters
+    assert changed[conditions.ALL] == ideal
 
 
 def test_days_are_alike_until_they_differ(small_material: Material) -> None:
     rows = rows_of(SMALL_ONES["overnight"], small_material, runs=1)
-    learning, first_day, frozen, no_night = (blocks(rows, "actions", trial)[0, 0] for trial in overnight.DAYS)
-    rewards = [blocks(rows, "reward", trial)[0, 0] for trial in overnight.DAYS]
+    learning, first_day, frozen, no_night = (blocks(rows, "actions", trial)[0, 0] for trial in DAYS)
+    rewards = [blocks(rows, "reward", trial)[0, 0] for trial in DAYS]
     for other in (1, 3):
         np.testing.assert_array_equal(rewards[0][:2], rewards[other][:2])
         assert not np.array_equal(rewards[0][2:], rewards[other][2:])
@@ -125,7 +127,7 @@ def test_days_are_alike_until_they_differ(small_material: Material) -> None:
 
 def test_looking_tells_goals_and_scales() -> None:
     arm = VirtualArm(draw_parameters(2), seed=1)
-    agent = on_the_arm_only.look(arm, on_the_arm_only.ONE, 60, seed=3)
+    agent = from_scratch.look(arm, from_scratch.ONE, 60, seed=3)
     low, high = agent.goal_range[0]
     assert high - low > 400
     durations = np.random.default_rng(8).uniform(0, 1.5, (40, 1, 2))
@@ -144,10 +146,10 @@ def test_learning_on_the_arm_ends_when_the_criterion_is_met() -> None:
     """With a goal area as wide as the range every movement succeeds, so shaping grows the deviation every time."""
     wide = Reward(angle_tolerance=1e4, velocity_tolerance=1e4)
     shaping = Shaping(initial_deviation=30.0, episodes=10, performance_rate=0.2, grow=0.5)
-    settings = replace(on_the_arm_only.ONE, reward=wide, shaping=shaping)
+    settings = replace(from_scratch.ONE, reward=wide, shaping=shaping)
     arm = VirtualArm(draw_parameters(2), seed=1)
-    agent = on_the_arm_only.look(arm, settings, 10, seed=3)
-    found = on_the_arm_only.learn_on(arm, agent, 3)
+    agent = from_scratch.look(arm, settings, 10, seed=3)
+    found = from_scratch.learn_on(arm, agent, 3)
     hours, deviation, performance = np.array(found.course).T
     assert found.met
     assert deviation[-1] == 1023
@@ -157,27 +159,27 @@ def test_learning_on_the_arm_ends_when_the_criterion_is_met() -> None:
     assert hours[-1] * 3600 == found.seconds == arm.time
     assert (np.diff(hours) > 10 * 3.0 / 3600).all()  # venting and settling alone take 3 s
     assert not np.array_equal(found.agent.weights(), agent.weights())
-    cut = on_the_arm_only.learn_on(VirtualArm(), replace(agent, settings=replace(settings, max_episodes=15)), 3)
+    cut = from_scratch.learn_on(VirtualArm(), replace(agent, settings=replace(settings, max_episodes=15)), 3)
     assert (cut.movements, cut.met) == (15, False)
 
 
 def test_movements_of_a_given_displacement(small_material: Material) -> None:
     agent = agent_of(small_material, AGENT, 1, LABORATORY)
     arm = VirtualArm(small_material.parameters, seed=2)
-    made = displacement.typical_movement(agent, arm, 20.0, np.random.default_rng(1))
+    made = typical.typical_movement(agent, arm, 20.0, np.random.default_rng(1))
     assert made is not None
     step = 20.0 * arm.spec.counts_per_degree
     assert abs(abs(made.goal[0] - made.angle[0, 0]) - step) <= 10  # the noise of two readings
     assert len(made.time) == len(made.angle) == len(made.pressure) == len(made.valves)
     assert made.time[-1] >= (made.end or made.time[-1] - 0.8) + 0.8 - 1e-9
-    assert displacement.typical_movement(agent, arm, 120.0, np.random.default_rng(1)) is None
+    assert typical.typical_movement(agent, arm, 120.0, np.random.default_rng(1)) is None
 
 
 def test_out_of_the_way_and_ringing_by_hand() -> None:
     angle = np.array([100.0, 80.0, 150.0, 210.0, 190.0, 260.0, 205.0])[:, None]
     time = np.arange(7.0)
     nothing = np.zeros((7, 1, 2))
-    made = displacement.Typical(time, angle, nothing, nothing, np.array([200.0]), 4.0)
+    made = typical.TypicalMovement(time, angle, nothing, nothing, np.array([200.0]), 4.0)
     assert made.beyond == 20.0
     assert made.ringing == 60.0
     missed = replace(made, end=None)
@@ -189,11 +191,11 @@ def test_thirds_and_relations_by_hand() -> None:
     distance = np.arange(9.0)
     actions, switches = (10 * distance).astype(np.int64) + 2, np.full(9, 3)
     won = np.arange(9) != 0
-    found = displacement.thirds(distance, actions, switches, won)
+    found = typical.thirds(distance, actions, switches, won)
     assert found["success, short"] == pytest.approx(2 / 3)
     assert found["ratio, short"] == pytest.approx(6 / (12 + 22))
     assert found["ratio, long"] == pytest.approx(9 / (62 + 72 + 82))
-    related = displacement.relations(distance, actions, switches)
+    related = typical.relations(distance, actions, switches)
     assert related["correlation of actions"] == pytest.approx(1.0)
     assert "correlation of switches" not in related  # they do not vary
     assert related["few switches"] == 1.0

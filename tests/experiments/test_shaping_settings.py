@@ -12,7 +12,9 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.experiment import LaboratorySettings, Row, Rows, sorted_rows
 from pneumarm.experiments.preparation import PLAN, Simulated, simulated
-from pneumarm.experiments.shaping_settings import EXPERIMENT, Material, strategy_figure
+from pneumarm.experiments.shaping_settings import EXPERIMENT
+from pneumarm.experiments.shaping_settings.analysis import strategy_figure
+from pneumarm.experiments.shaping_settings.shapings import WholeAndWorn
 from pneumarm.learning import Shaping, TrainSettings
 
 SHORT = LaboratorySettings(test_episodes=100, max_episodes=1000)
@@ -53,9 +55,9 @@ def test_worn_trials_are_measured_on_the_worn_arm() -> None:
     here = Simulated(simulation, synthetic_begin_states(simulation))
     noisy = replace(simulation, error_std=3 * simulation.error_std)
     there = Simulated(noisy, here.begin)
-    found = EXPERIMENT.measure(Material(here, there), WORN, 1, SHORT)
-    assert found == EXPERIMENT.measure(Material(there, here), THESIS, 1, SHORT)
-    assert found != EXPERIMENT.measure(Material(here, there), THESIS, 1, SHORT)
+    found = EXPERIMENT.measure(WholeAndWorn(here, there), WORN, 1, SHORT)
+    assert found == EXPERIMENT.measure(WholeAndWorn(there, here), THESIS, 1, SHORT)
+    assert found != EXPERIMENT.measure(WholeAndWorn(here, there), THESIS, 1, SHORT)
 
 
 def rows(met: dict[int, float], arms: int = 5, runs: int = 4) -> Rows:

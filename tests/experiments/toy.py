@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from pneumarm.experiments.experiment import Analysis, Experiment, Figures, LaboratorySettings, Report, Rows, run_seed
+from pneumarm.experiments.words import Words
 
 
 @dataclass(frozen=True)
 class Toy(Experiment):
     """Six trials whose figures are numbers of the trial, the run and the arm."""
 
-    name: str = "toy"
-    title: str = "A toy"
-    question: str = "Does every row come once?"
-    source: str = "Nowhere"
+    name = "toy"
+    words = Words("A toy", "Does every row come once?", "Nowhere")
     runs: int = 2
     factor: float = 10.0
     pause: float = 0.0

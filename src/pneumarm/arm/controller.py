@@ -1,22 +1,23 @@
 """The seam between pneumarm and any controller."""
 
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.reference import Reference
 from pneumarm.arm.seam import Reading
+from pneumarm.arm.valves import Command
 
 
 class Controller(Protocol):
-    """What acts: maps what was read so far to valves."""
+    """What acts: maps what was read so far to commands."""
 
     def reset(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts]; the arm is at rest with its valves closed."""
 
-    def act(self, reading: Reading) -> NDArray[Any]:
-        """Return the valves (joints, 2) to set after ``reading``."""
+    def act(self, reading: Reading) -> Command:
+        """Return the valves or pulses (joints, 2) to set after ``reading``."""
 
 
 @runtime_checkable

@@ -44,6 +44,14 @@ class CorrectedArm(Arm):
         """Set the valves."""
         self.arm.set_valves(valves)
 
+    def set_pulses(self, command: NDArray[np.float64]) -> bool:
+        """Set pulses, of an arm whose control period is that of the file."""
+        return self.spec.period == self.arm.spec.period and self.arm.set_pulses(command)
+
+    def air_used(self) -> float | None:
+        """Return the air that the arm has used."""
+        return self.arm.air_used()
+
     def wait(self, seconds: float) -> None:
         """Let time pass [s]."""
         self.arm.wait(seconds)

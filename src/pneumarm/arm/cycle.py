@@ -7,21 +7,21 @@ from time import monotonic
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pneumarm.arm.guard import GuardedArm
 from pneumarm.arm.seam import Reading
+from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import PATIENCE
 from pneumarm.errors import PneumarmError
 
-Decide = Callable[[Reading], NDArray[np.int8] | None]
+Decide = Callable[[Reading], Command | None]
 
 
 class Step(NamedTuple):
-    """One turn of the cycle: what was read and the valves as applied, None where the decision was to stop."""
+    """One turn of the cycle: what was read and the command as applied, None where the decision was to stop."""
 
     reading: Reading
-    valves: NDArray[np.int8] | None
+    valves: Command | None
 
 
 @dataclass
@@ -43,8 +43,8 @@ class ControlCycle:
     """Time [s] after which a controller that does not decide is stopped."""
     missed_deadlines: int = field(default=0, init=False)
     """Points of the grid that passed without a turn within half a period."""
-    applied: NDArray[np.int8] = field(init=False)
-    """The valves of the last turn as applied, shape (joints, 2); what they led to is read in the next turn."""
+    applied: Command = field(init=False)
+    """The command of the last turn as applied, shape (joints, 2); what they led to is read in the next turn."""
 
     def __post_init__(self) -> None:
         self.applied = np.zeros_like(self.arm.applied)
@@ -60,7 +60,7 @@ class ControlCycle:
 
         """
         arm, period, latency = self.arm, self.arm.spec.period, self.arm.spec.latency
-        closed = np.zeros_like(arm.applied)
+        closed = np.zeros(arm.applied.shape, np.int8)
         due: float | None = None
         try:
             while True:
@@ -74,14 +74,14 @@ class ControlCycle:
                 began, raised = monotonic(), None
                 try:
                     arm.watchdog.begin(reading, self.patience)
-                    valves = decide(reading)
+                    command = decide(reading)
                 except PneumarmError:
                     raise
                 except Exception as error:
-                    valves, raised = arm.applied, error
+                    command, raised = arm.applied, error
                 finally:
                     arm.watchdog.end()
-                if valves is None:
+                if command is None:
                     yield Step(reading, None)
                     break
                 late = arm.lateness(reading) if monotonic() - began > period else 0.0
@@ -92,8 +92,9 @@ class ControlCycle:
                 elif late > 1:
                     arm.replace("late", f"{late:.1f} periods after its reading", late)
                 else:
-                    arm.decide(valves)
+                    arm.decide(command)
                 self.applied = arm.applied
+                arm.end_pulses(due)  # before anybody is given the turn, who may take his time
                 yield Step(reading, arm.applied)
                 arm.wait_until(due)
         except Exception:
@@ -125,7 +126,7 @@ class BeginState:
 
     def reach(self, arm: GuardedArm, random: np.random.Generator) -> None:
         """Vent, inflate every muscle for a time uniform in 0..``inflate``, and wait."""
-        valves = np.full_like(arm.applied, -1)
+        valves = np.full(arm.applied.shape, -1, np.int8)
         arm.make_ready()
         arm.read()
         arm.set_valves(valves)

@@ -2,15 +2,18 @@
 
 What is asked for passes four rules, in this order:
 
-1. *Sense*: valves are (joints, 2) of -1, 0, +1. A controller that gives anything else, that raises, or that takes
-   longer than a control period is replaced: what was last applied is held, then everything is vented, in the end the
-   controller is stopped (:meth:`GuardedArm.decide`, :meth:`GuardedArm.replace`).
+1. *Sense*: valves are (joints, 2) of -1, 0, +1, pulses of -1 to +1. A controller that gives anything else, that
+   raises, or that takes longer than a control period is replaced: what was last applied is held, then everything is
+   vented, in the end the controller is stopped (:meth:`GuardedArm.decide`, :meth:`GuardedArm.replace`).
 2. *Pressure*: an inlet stays closed while its muscle reads over ``spec.max_pressure``.
 3. *Time of inflation*: an inlet that was open for ``spec.max_inflation`` stays closed until its muscle has rested as
    long, or has been vented for a tenth of it. A muscle that takes air for so long without reaching its limit is
    unplugged, burst, or its pressure sensor does not see it.
 4. *Angle*: at an end of ``spec.angle_limits``, valves that push further out (air into the muscle that pulls there,
    air out of the other) stay closed. A joint may always be vented whole.
+
+Pulses are rounded to what the arm can do (:meth:`ArmSpec.possible`). On an arm that cannot time them itself
+(:meth:`Arm.set_pulses`) the guard does: it cuts the wait after them where one ends, and closes its valve.
 
 While a controller does not come back with a decision, the guard stands in for it (:meth:`GuardedArm.stand_in`, called
 by the :class:`~pneumarm.arm.watchdog.Watchdog`): it holds, then vents, and in the end the controller is interrupted.
@@ -27,6 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Arm, Reading, checked
+from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import Watchdog
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
 
@@ -100,14 +104,19 @@ class GuardedArm(Arm):
     """An arm behind the guard: its readings are checked and its limits hold, whoever sets its valves.
 
     Waits with an open inlet are cut into control periods with a reading between them, so that the limits also
-    hold during a long inflation. ``applied`` are the valves as they were really set. An arm that nobody closed is
-    closed when the interpreter ends.
+    hold during a long inflation. ``applied`` is the command as it was really given to the arm: int8 valves, or
+    float64 pulses where one of them ends before its period does. An arm that nobody closed is closed when the
+    interpreter ends.
     """
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self.spec = arm.spec
-        self.applied: NDArray[np.int8] = np.zeros((arm.spec.joints, 2), np.int8)
+        self._valves: NDArray[np.int8] = np.zeros((arm.spec.joints, 2), np.int8)  # as they are now
+        self._closing: dict[int, float] = {}  # when pulses end, by flat place [s]
+        self._times_pulses = False  # whether the arm ends them itself
+        self._now = 0.0  # the arm's clock, as of the last reading and the waits since [s]
+        self.applied: Command = self._valves
         self.peak_pressure = np.zeros((arm.spec.joints, 2))
         """Highest pressures read, shape (joints, 2) [counts]."""
         self._interventions = Interventions()
@@ -148,6 +157,9 @@ class GuardedArm(Arm):
         np.maximum(self.peak_pressure, reading.pressure, out=self.peak_pressure)
         if self.spec.angle_limits is not None:
             self._outward = _outward(reading.angle, *self.spec.angle_limits)
+        self._now = reading.time
+        if self._closing:
+            self._close_ended()
         self._inflation.pass_until(reading.time)
         self._time = reading.time
         return reading
@@ -159,21 +171,25 @@ class GuardedArm(Arm):
             PneumarmError: other values or another shape; nothing is set then.
 
         """
-        asked = self._sensible(valves)
+        asked = self._as_valves(valves)
         if asked is None:
             raise PneumarmError(f"valves must be {self.applied.shape} of -1, 0 or +1, got {valves!r}")
         self._set(self._within_limits(asked))
 
-    def decide(self, valves: object) -> None:
-        """Set the ``valves`` that a controller decided on, or replace the decision where they are none.
+    def decide(self, command: object) -> None:
+        """Set the valves or pulses that a controller decided on, or replace the decision where they are none.
+
+        Args:
+            command: (joints, 2) of -1, 0, +1, or numbers from -1 to +1: the sign is the valve, the magnitude the
+                share of the control period for which it is open.
 
         Raises:
             ControllerFailure: too many decisions in a row had to be replaced; everything is vented then.
 
         """
-        asked = self._sensible(valves)
+        asked = self._sensible(command)
         if asked is None:
-            self.replace("nonsense", f"it gave {valves!r}")
+            self.replace("nonsense", f"it gave {command!r}")
             return
         self._replaced, self._undecided = 0, 0.0
         self._set(self._within_limits(asked))
@@ -199,7 +215,7 @@ class GuardedArm(Arm):
             self._set(self._within_limits(self.applied.copy()))
             return
         counts.vented += 1
-        self._set(np.full_like(self.applied, -1))  # no limit forbids to vent
+        self._set(np.full_like(self._valves, -1))  # no limit forbids to vent
         if self._replaced > MOST_REPLACED:
             raise ControllerFailure(
                 f"{self.spec.name}: stopped and vented, because {self._replaced} decisions in a row could not be "
@@ -230,7 +246,7 @@ class GuardedArm(Arm):
         if late < 1 / 2:
             return False
         if self._undecided + late > HELD:
-            self._set(np.full_like(self.applied, -1))  # over and over: so hardware knows that we are there
+            self._set(np.full_like(self._valves, -1))  # over and over: so hardware knows that we are there
         return True
 
     def give_up(self, patience: float) -> ControllerFailure:
@@ -238,39 +254,87 @@ class GuardedArm(Arm):
         self._interventions.late += 1
         self._interventions.vented += 1
         with suppress(PneumarmError, OSError):  # the first failure is the one to tell of
-            self._set(np.full_like(self.applied, -1))
+            self._set(np.full_like(self._valves, -1))
         return ControllerFailure(
             f"{self.spec.name}: stopped and vented, because the controller had not decided for {patience:g} s; mend "
             "the controller and run the same command again"
         )
 
-    def _sensible(self, valves: object) -> NDArray[np.int8] | None:
+    def _as_valves(self, valves: object) -> NDArray[np.int8] | None:
         """Return a copy of ``valves`` if they are valves, else None."""
         try:
             asked = np.asarray(valves)
-            if asked.shape == self.applied.shape and _SETTINGS.issuperset(asked.ravel().tolist()):
+            if asked.shape == self._valves.shape and _SETTINGS.issuperset(asked.ravel().tolist()):
                 return asked.astype(np.int8)
         except Exception:  # whatever a foreign object does when it is made an array
             return None
         return None
 
-    def _within_limits(self, valves: NDArray[np.int8]) -> NDArray[np.int8]:
-        """Close those of ``valves`` that break a limit, and return them."""
+    def _sensible(self, command: object) -> Command | None:
+        """Return a copy of ``command`` as the arm can carry it out if it is one, else None."""
+        valves = self._as_valves(command)
+        if valves is not None:
+            return valves
+        try:
+            asked = np.asarray(command)
+            if asked.shape == self._valves.shape and asked.dtype.kind == "f" and (np.abs(asked) <= 1).all():
+                pulses = self.spec.possible(asked.astype(np.float64))
+                whole = self._as_valves(pulses)
+                return pulses if whole is None else whole
+        except Exception:
+            return None
+        return None
+
+    def _within_limits(self, command: Command) -> Command:
+        """Close those valves of ``command`` that break a limit, and return it."""
         counts = self._interventions
         if self._over is not None:
-            counts.pressure += _close(valves, (valves > 0) & self._over)
+            counts.pressure += _close(command, (command > 0) & self._over)
         if self._inflation.spent:
-            counts.inflation += _close(valves, (valves > 0) & np.reshape(self._inflation.blocked, valves.shape))
+            counts.inflation += _close(command, (command > 0) & np.reshape(self._inflation.blocked, command.shape))
         if self._outward is not None:
-            vented = (valves < 0).all(axis=1, keepdims=True)
-            counts.angle += _close(valves, (valves != 0) & (valves == self._outward) & ~vented)
-        return valves
+            vented = (command < 0).all(axis=1, keepdims=True)
+            counts.angle += _close(command, (command != 0) & (np.sign(command) == self._outward) & ~vented)
+        return command
 
-    def _set(self, valves: NDArray[np.int8]) -> None:
-        self.arm.set_valves(valves)
-        self.applied = valves
+    def _set(self, command: Command) -> None:
+        """Give ``command`` to the arm, and note when its pulses end."""
+        self._closing, self._times_pulses = {}, False
+        shares = [] if command.dtype == np.int8 else np.abs(command).ravel().tolist()
+        if any(0 < share < 1 for share in shares):
+            if self._time == -math.inf:
+                self.read()  # the clock that pulses end on
+            period = self.spec.period
+            self._closing = {i: self._now + share * period for i, share in enumerate(shares) if 0 < share < 1}
+            self._times_pulses = self.arm.set_pulses(command.astype(np.float64))
+            valves = np.sign(command).astype(np.int8)
+        else:
+            command = valves = command.astype(np.int8, copy=False)
+        if not self._times_pulses:
+            self.arm.set_valves(valves)
+        self.applied = command
+        self._note(valves)
+
+    def _note(self, valves: NDArray[np.int8]) -> None:
+        """Note how the valves are now."""
+        self._valves = valves
         self._inflation.valves = values = valves.ravel().tolist()
         self._inflating = 1 in values
+
+    def _close_ended(self) -> None:
+        """Close the valves whose pulses have ended by now."""
+        ended = sorted((due, i) for i, due in self._closing.items() if due <= self._now)
+        if not ended:
+            return
+        valves = self._valves.copy()
+        for due, i in ended:
+            self._inflation.pass_until(due)
+            del self._closing[i]
+            valves.flat[i] = 0
+            self._inflation.valves[i] = 0
+        if not self._times_pulses:
+            self.arm.set_valves(valves)
+        self._note(valves)
 
     def watch(self) -> Reading:
         """Return a reading, after closing the valves that are at a limit now."""
@@ -278,27 +342,63 @@ class GuardedArm(Arm):
         if self._over is not None or self._outward is not None or self._inflation.spent:
             before = self._interventions
             self._interventions = replace(before)
-            now = self._within_limits(self.applied.copy())
-            if np.array_equal(now, self.applied):
+            now = self._within_limits(self._valves.copy()).astype(np.int8, copy=False)
+            if np.array_equal(now, self._valves):
                 self._interventions = before
             else:
-                self._set(now)
+                self._keep_closed(now)
         return reading
+
+    def _keep_closed(self, now: NDArray[np.int8]) -> None:
+        """Set the valves to ``now``, some of which are closed at a limit; pulses of others end when they were to."""
+        self.arm.set_valves(now)
+        self.applied = now if not self._closing else np.where(now == self._valves, self.applied, 0.0)
+        self._closing = {i: due for i, due in self._closing.items() if now.flat[i]}
+        self._times_pulses = False
+        self._note(now)
+
+    def end_pulses(self, before: float) -> None:
+        """Let time pass until the pulses have ended that the guard times and that end ``before`` a time [s]."""
+        while not self._times_pulses and self._closing and (due := min(self._closing.values())) <= before:
+            if due > self._now:
+                self.arm.wait(due - self._now)
+                self._now = due
+            self._close_ended()
+
+    def _pass(self, seconds: float) -> None:
+        """Let time pass [s], with the pulses that end in it."""
+        end = self._now + seconds
+        if self._closing:
+            self.end_pulses(end)
+            seconds = end - self._now
+        self.arm.wait(seconds)
+        self._now = end
+        if self._closing:
+            self._close_ended()
 
     def wait(self, seconds: float) -> None:
         """Let time pass, looking at the limits every control period while an inlet is open."""
         while seconds > self.spec.period and self._inflating:
-            self.arm.wait(self.spec.period)
+            self._pass(self.spec.period)
             seconds -= self.spec.period
             self.watch()
-        self.arm.wait(seconds)
+        self._pass(seconds)
 
     def wait_until(self, time: float) -> None:
         """Let time pass until the arm's clock shows ``time`` [s], looking at the limits as :meth:`wait` does."""
         while time - self._time > 2 * self.spec.period and self._inflating:
-            self.arm.wait(self.spec.period)
+            self._pass(self.spec.period)
             self.watch()
+        if self._closing:
+            self.end_pulses(time)
         self.arm.wait_until(time)
+        self._now = max(time, self._now)
+        if self._closing:
+            self._close_ended()
+
+    def air_used(self) -> float | None:
+        """Return the air that the arm behind has used [normal litres]."""
+        return self.arm.air_used()
 
     def make_ready(self) -> None:
         """Prepare to move after a pause."""
@@ -315,7 +415,8 @@ class GuardedArm(Arm):
     def set_state(self, state: bytes) -> None:
         """Restore the state of the arm behind."""
         self.arm.set_state(state)
-        self.applied = np.zeros_like(self.applied)
+        self.applied = self._valves = np.zeros_like(self._valves)
+        self._closing, self._times_pulses = {}, False
         self._inflation = _Inflation(self.spec.max_inflation, self.applied.size)
         self._inflating, self._time, self._replaced, self._undecided = False, -math.inf, 0, 0.0
 
@@ -330,9 +431,9 @@ def guarded(arm: Arm) -> GuardedArm:
     return arm if isinstance(arm, GuardedArm) else GuardedArm(arm)
 
 
-def _close(valves: NDArray[np.int8], which: NDArray[np.bool_]) -> int:
-    """Close ``which`` of the ``valves``; return how many."""
-    valves[which] = 0
+def _close(command: Command, which: NDArray[np.bool_]) -> int:
+    """Close ``which`` valves of ``command``; return how many."""
+    command[which] = 0
     return int(which.sum())
 
 

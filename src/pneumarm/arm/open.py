@@ -1,6 +1,7 @@
 """Open an arm by its name on the command line."""
 
 import importlib
+import math
 import re
 import sys
 from collections.abc import Mapping
@@ -11,11 +12,11 @@ from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.errors import UnusableInput
 
 _FORMS = (
-    "virtual, virtual:seed=7, virtual:preset=A, virtual:seed=7,sensors=velocity+temperature, "
-    "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, emulated:ARM or python:module:callable, "
-    "each with ,spec=arm.toml if you like"
+    "virtual, virtual:seed=7, virtual:preset=A, virtual:seed=7,rate=200, "
+    "virtual:seed=7,sensors=velocity+temperature, virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
+    "emulated:ARM or python:module:callable, each with ,spec=arm.toml if you like"
 )
-_OPTION = re.compile(r"[:,](?=(?:seed|preset|sensors|faults|spec)=)")
+_OPTION = re.compile(r"[:,](?=(?:seed|preset|period|rate|sensors|faults|spec)=)")
 """Stands before an option; files may have commas in their names."""
 
 
@@ -25,7 +26,8 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     ``virtual`` is the nominal virtual arm, ``virtual:seed=N`` another one from the distribution of arms,
     ``virtual:seed=N,sensors=velocity+acceleration+temperature`` one with further sensors, any of these
     (:mod:`pneumarm.arm.virtual.further`), ``virtual:seed=N,faults=PLAN.toml`` one with faults
-    (:mod:`pneumarm.arm.virtual.faults`);
+    (:mod:`pneumarm.arm.virtual.faults`), ``virtual:seed=N,rate=200`` or ``period=0.005`` one that is controlled at
+    200 Hz, not at 30;
     ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
     ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
     ``python:module:callable`` calls ``callable()`` for the arm.
@@ -89,11 +91,11 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
 
 
 def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None) -> Arm:
-    """Return the virtual arm with ``options``: a seed or a preset, kinds of sensors, a file of faults.
+    """Return the virtual arm with ``options``: a seed or a preset, a rate, kinds of sensors, a file of faults.
 
-    Without ``sensors`` it has the further sensors that its ``spec`` names, if it has one.
+    Without them it has the rate and the further sensors of its ``spec``, if it has one.
     """
-    from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, read_plan, usual_sensors
+    from pneumarm.arm.virtual import PERIOD, VirtualArm, draw_parameters, preset_parameters, read_plan, usual_sensors
 
     drawn, preset = options.get("seed"), options.get("preset")
     if (drawn is not None and preset is not None) or not (drawn is None or drawn.isdecimal()):
@@ -107,7 +109,29 @@ def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | N
     else:
         velocity, sensors = (spec.velocity_sensor, spec.sensors) if spec is not None else (False, ())
     faults = read_plan(options["faults"]) if "faults" in options else ()
-    return VirtualArm(parameters, seed=seed, name=name, faults=faults, velocity_sensor=velocity, sensors=sensors)
+    return VirtualArm(
+        parameters,
+        seed=seed,
+        name=name,
+        faults=faults,
+        period=_period(name, options, PERIOD if spec is None else spec.period),
+        velocity_sensor=velocity,
+        sensors=sensors,
+    )
+
+
+def _period(name: str, options: Mapping[str, str], usual: float) -> float:
+    """Return the control period [s] that ``options`` ask for."""
+    given = [key for key in ("period", "rate") if key in options]
+    if not given:
+        return usual
+    try:
+        value = float(options[given[0]])
+    except ValueError:
+        value = 0.0
+    if len(given) > 1 or not 0 < value < math.inf:
+        raise UnusableInput(f"arm {name!r}: expected a period [s] or a rate [Hz] above 0, not both")
+    return value if given == ["period"] else 1 / value
 
 
 def _from_python(place: str) -> Arm:

@@ -87,6 +87,11 @@ class ArmSpec(Settings):
     """An inlet that was open for so long [s] stays closed until its muscle has rested (:mod:`pneumarm.arm.guard`)."""
     angle_limits: tuple[float, float] | None = None
     """At these angles [counts] valves that push further out stay closed; None where the end stops bear that."""
+    pulses: bool = True
+    """Whether valves may be open for a part of a control period; where not, commands are rounded to whole periods."""
+    shortest_pulse: float = 0.003
+    """Shortest time that a valve is open [s]; what is shorter is rounded to none or to this (thesis section 2.2:
+    valves switch at 330 Hz)."""
     velocity_sensor: bool = False
     """Whether readings carry the velocity that the arm measures itself, as a board does that samples faster
     (thesis sections 5.1 and 7.3)."""
@@ -105,6 +110,8 @@ class ArmSpec(Settings):
         return {
             "joints": isinstance(self.joints, int) and self.joints >= 1,
             "velocity_sensor": isinstance(self.velocity_sensor, bool),
+            "pulses": isinstance(self.pulses, bool),
+            "shortest_pulse": _positive(self.shortest_pulse),
             "period": _positive(self.period),
             "counts_per_degree": _positive(self.counts_per_degree),
             "counts_per_bar": _positive(self.counts_per_bar),
@@ -122,6 +129,13 @@ class ArmSpec(Settings):
     def max_pressure_counts(self) -> float:
         """The pressure limit [counts]."""
         return self.max_pressure * self.counts_per_bar
+
+    def possible(self, command: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pulses (joints, 2) nearest to ``command`` that the arm can carry out, shares of a period."""
+        shortest = min(self.shortest_pulse / self.period, 1.0) if self.pulses else 1.0
+        share = np.abs(command)
+        rounded = np.where(2 * share < shortest, 0.0, np.maximum(share, shortest))
+        return np.sign(command) * rounded + 0.0  # no -0.0
 
     @cached_property
     def further(self) -> tuple[str, ...]:
@@ -244,6 +258,23 @@ class Arm(ABC):
     @abstractmethod
     def wait(self, seconds: float) -> None:
         """Let time pass [s]: real on hardware, simulated on a virtual arm."""
+
+    def set_pulses(self, command: NDArray[np.float64]) -> bool:
+        """Open the valves (joints, 2) now and close each after its share of the control period.
+
+        For arms that can time this by themselves. The sign of a ``command`` is the valve, its magnitude the share,
+        one that :meth:`ArmSpec.possible` gives; +-1 holds until the next call. The next call, also of
+        :meth:`set_valves`, ends what is left of it.
+
+        Returns:
+            Whether it was done. Where not, as by default, nothing is set and the guard times the pulses.
+
+        """
+        return False
+
+    def air_used(self) -> float | None:
+        """Return the air that the muscles have taken so far [normal litres]; None where nobody knows."""
+        return None
 
     @abstractmethod
     def close(self) -> None:

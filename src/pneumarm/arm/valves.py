@@ -1,12 +1,17 @@
-"""The coding of valves and actions (thesis table 2.1 and section 2.4.1).
+"""The coding of valves, actions and commands (thesis table 2.1 and section 2.4.1).
 
 Per muscle -1 lets air out, 0 keeps both valves closed, +1 lets air in. The nine combinations of a joint's two
 muscles are its actions 0..8: ``action = 3 * (valve_1 + 1) + (valve_2 + 1)``.
+
+A command is valves, which hold until the next one, or *pulses*: numbers from -1 to +1 whose sign is the valve and
+whose magnitude the share of the control period for which it is open; then it closes. +-1 holds until the next one.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Command = NDArray[np.int8] | NDArray[np.float64]
+"""Valves (joints, 2) of -1, 0, +1 as integers, or pulses (joints, 2) from -1 to +1 as floating-point numbers."""
 ACTIONS = 9
 """Actions of one joint."""
 CLOSED = 4

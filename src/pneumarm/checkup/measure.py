@@ -205,13 +205,13 @@ class _Bench:
 
     def valves(self, joint: int, first: int, second: int) -> NDArray[np.int8]:
         """Return the valves of ``joint``; those of all others closed."""
-        valves = np.zeros_like(self.guard.applied)
+        valves = np.zeros(self.guard.applied.shape, np.int8)
         valves[joint] = first, second
         return valves
 
     def alone(self, joint: int, muscle: int, value: int = 1) -> NDArray[np.int8]:
         """Return the valves of one muscle set to ``value``; those of all others closed."""
-        valves = np.zeros_like(self.guard.applied)
+        valves = np.zeros(self.guard.applied.shape, np.int8)
         valves[joint, muscle] = value
         return valves
 

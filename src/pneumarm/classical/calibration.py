@@ -81,7 +81,7 @@ def calibrate(arm: GuardedArm, report: Report | None = None) -> Calibration:
             raise ArmFailure(f"{arm.spec.name}: joint {joint + 1} does not move with its pressures; check the arm")
         maps.append(fit_map(pressures, angles, [share * highest for share in _SUMS], _RATIOS, highest))
         ranges.append((low, high))
-    arm.set_valves(np.zeros_like(arm.applied))
+    arm.set_valves(np.zeros(arm.applied.shape, np.int8))
     return Calibration(tuple(maps), rates, tuple(ranges), arm.read().time - begin)
 
 
@@ -101,7 +101,7 @@ def _watch(arm: GuardedArm, valves: NDArray[np.int8], seconds: float) -> _Watche
 
 
 def _measure_rates(arm: GuardedArm) -> tuple[tuple[Rates, Rates], ...]:
-    full = np.ones_like(arm.applied)
+    full = np.ones(arm.applied.shape, np.int8)
     _watch(arm, -full, _VENT)
     filled, vented = [], []
     for _ in range(2):
@@ -188,7 +188,7 @@ def _rest_point(
 ) -> tuple[NDArray[np.float64], float]:
     spec = arm.spec
     loops = [PressureLoop(one, spec.period, 0.0, None, 1.0, 0.0, 1.0) for one in rates]
-    valves = np.zeros_like(arm.applied)
+    valves = np.zeros(arm.applied.shape, np.int8)
     for _ in range(round(_SETTING / spec.period)):
         pressure = spec.bar(arm.watch().pressure[joint])
         for m, loop in enumerate(loops):

@@ -101,8 +101,8 @@ def tune(
             report(min(passed(), settings.seconds), settings.seconds)
 
     calibration = calibrate(guard, tell)
-    pulses = KINDS[kind].pulses and not settings.whole_periods
-    shortest = getattr(arm.spec, "shortest_pulse", None) if pulses else None
+    pulses = KINDS[kind].pulses and arm.spec.pulses and not settings.whole_periods
+    shortest = arm.spec.shortest_pulse if pulses else None
     space = RANGES[kind]
     start = Tuned(kind, arm.spec, calibration, KINDS[kind].gains(), shortest, 0.0, np.inf)
     trials = _Trials(guard, start, space, lambda: settings.seconds - passed(), tell)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import Reading, checked
-from pneumarm.arm.valves import to_valves
+from pneumarm.arm.valves import Command, to_valves
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Actor, AnyAgent
 from pneumarm.task import StateTracker
@@ -50,9 +50,7 @@ class AgentController:
         self._tracker.commanded(valves)
         return valves
 
-    def observe(
-        self, reading: Reading, applied: NDArray[np.int8], reward: NDArray[np.float64], terminal: bool
-    ) -> None:
+    def observe(self, reading: Reading, applied: Command, reward: NDArray[np.float64], terminal: bool) -> None:
         """Learn from ``reading``, to which the valves as ``applied`` led with ``reward`` (joints,)."""
         self._tracker.commanded(applied)
         state = self._tracker.reading(reading)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, Controller, Reading, Step
+from pneumarm.arm.valves import Command
 from pneumarm.errors import ArmFailure
 from pneumarm.task import Movement, Reward
 from pneumarm.transitions.rows import Recorded, broken_off
@@ -22,9 +23,7 @@ BROKEN = "broken episode"
 class LearningController(Controller, Protocol):
     """A controller that also learns from what its actions led to."""
 
-    def observe(
-        self, reading: Reading, applied: NDArray[np.int8], reward: NDArray[np.float64], terminal: bool
-    ) -> None:
+    def observe(self, reading: Reading, applied: Command, reward: NDArray[np.float64], terminal: bool) -> None:
         """Learn from ``reading``, to which the valves as ``applied`` (joints, 2) led with ``reward`` (joints,).
 
         ``terminal`` says that the goal is reached; a movement that is merely cut off is not terminal.
@@ -99,9 +98,9 @@ class _Count:
         self.velocity = np.zeros(goal.shape)
         self.total = 0.0
         self.success = False
-        self._last_applied: NDArray[np.int8] | None = None
+        self._last_applied: Command | None = None
 
-    def decide(self, reading: Reading) -> NDArray[np.int8] | None:
+    def decide(self, reading: Reading) -> Command | None:
         """Count what the last action led to; then return the valves of the next, or None at the end."""
         if self.before is not None:
             gained = self._count(self.before, reading)

@@ -267,7 +267,7 @@ def _set(body: Body, watched: _Watched) -> None:
             if valve > 0 and (watched.pressure[j, m] > watched.limit or watched.blocked[j, m]):
                 valve = 0
             watched.applied[j, m] = valve
-    command(body, watched.applied)
+    command(body, watched.applied, watched.period)
 
 
 @kernel

@@ -11,13 +11,14 @@ All experiments of a laboratory share a folder:
 
 To add an experiment, make a folder (a package) here and name it in :mod:`.registry`. The folder holds
 
-- ``__init__.py``, whose docstring is the question, the factors, the command and the answer in two sentences, and
-  whose ``EXPERIMENT`` is an :class:`~.experiment.Experiment`: trials in words, ``settings`` (JSON that decides the
-  rows), ``prepare`` (what is needed of an arm; :func:`~.preparation.simulated` collects and fits), ``measure`` (a
-  row: pure, seeded by :func:`~.experiment.run_seed`, so that all trials of a run begin alike) and ``analyse`` (rows
-  to sections, figures and claims; runs nothing);
-- its settings as data: a ``design.toml`` where there is an orthogonal array;
-- the thesis' results as ``thesis_*.csv``, trials by runs.
+- ``__init__.py``: the question, the factors, the command and the answer in two sentences, and ``EXPERIMENT``;
+- a module named for what is varied: the trials, ``settings`` (JSON that decides the rows), ``prepare`` (what is
+  needed of an arm; :func:`~.preparation.simulated` collects and fits) and ``measure`` (a row: pure, seeded by
+  :func:`~.experiment.run_seed`, so that all trials of a run begin alike);
+- ``analysis.py``: pure functions from rows to intervals, tables and pictures; runs nothing;
+- ``words.toml``: the words that go with them, and the claims of the thesis with the rule each is judged by
+  (:mod:`.words`);
+- a ``design.toml`` where there is an orthogonal array, and the thesis' tables as ``thesis_*.csv``, trials by runs.
 
 What experiments have in common is in the class that theirs are of: trainings in an arm's simulation
 (:class:`~.trainings.Trainings`), an agent that moves the arm or agents that are compared on it

@@ -30,6 +30,20 @@ class Interval(NamedTuple):
         digits = 0 if max(abs(self.mean), self.half if known else 0.0) >= _HUNDREDS else 2
         return f"{self.mean:+.{digits}f}" + (f" ± {self.half:.{digits}f}" if known else "")
 
+    def __format__(self, form: str) -> str:
+        """Return it for people, with the form of both numbers: ``.2f``, ``+.2f``, ``.1%``; "none" of no samples."""
+        if not form:
+            return str(self)
+        if not self.samples:
+            return "none"
+        if form.endswith("%"):
+            return f"{self.times(100):{form[:-1]}f} %"
+        return f"{self.mean:{form}}" + (f" ± {self.half:{form.lstrip('+')}}" if math.isfinite(self.half) else "")
+
+    def times(self, factor: float) -> "Interval":
+        """Return the interval of ``factor`` times what is estimated."""
+        return Interval(factor * self.mean, abs(factor) * self.half, self.samples)
+
     @property
     def low(self) -> float:
         """Lower end."""
@@ -66,7 +80,7 @@ def above(found: Interval, threshold: float = 0.0) -> Verdict:
 
 def below(found: Interval, threshold: float = 0.0) -> Verdict:
     """Return whether what is estimated is below ``threshold``; open while the interval includes it."""
-    return above(Interval(-found.mean, found.half, found.samples), -threshold)
+    return above(found.times(-1), -threshold)
 
 
 def within(found: Interval, margin: float) -> Verdict:

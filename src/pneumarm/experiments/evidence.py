@@ -5,12 +5,10 @@ first. Where there is one arm alone its runs are the sample, and what is found i
 """
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from importlib import resources
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -20,11 +18,6 @@ from pneumarm.report.page import Table
 
 Array = NDArray[np.float64]
 _SHORT = 12  # letters that are not broken over lines
-
-
-def thesis(package: str) -> dict[str, Any]:
-    """Return the thesis' numbers in ``package``/thesis.toml."""
-    return tomllib.loads((resources.files(package) / "thesis.toml").read_text(encoding="utf-8"))
 
 
 # Rows -----------------------------------------------------------------------------------------------------------
@@ -115,26 +108,7 @@ def change(rows: Rows, figure: str, trial: int, reference: int) -> Interval:
 # For people and programs ----------------------------------------------------------------------------------------
 
 
-def plain(found: Interval, digits: int = 2, factor: float = 1.0) -> str:
-    """Return ``factor`` times a mean and its interval for people; "none" of no samples."""
-    if found.samples == 0:
-        return "none"
-    half = f" ± {abs(factor) * found.half:.{digits}f}" if math.isfinite(found.half) else ""
-    return f"{factor * found.mean:.{digits}f}{half}"
-
-
-def signed(found: Interval, digits: int = 2) -> str:
-    """Return a difference for people, always with a sign."""
-    return f"{'+' if found.mean >= 0 else ''}{plain(found, digits)}"
-
-
-def number(found: Interval) -> dict[str, Any]:
-    """Return an interval for programs."""
-    return found._asdict()
-
-
-@dataclass(frozen=True)
-class Column:
+class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A figure of the rows, shown in a table or a picture."""
 
     figure: str
@@ -144,8 +118,8 @@ class Column:
     digits: int = 2
     factor: float = 1.0
     """That it is multiplied by to be shown."""
-    thesis: Mapping[int, float] | None = None
-    """What the thesis has, by trial."""
+    thesis: Mapping[str, float] | None = None
+    """What the thesis has, by the words of the trial."""
 
     def interval(self, rows: Rows, trial: int) -> Interval:
         """Return the mean in ``trial`` as it is shown."""
@@ -153,7 +127,7 @@ class Column:
 
     def text(self, rows: Rows, trial: int) -> str:
         """Return the mean in ``trial`` for people."""
-        return plain(self.interval(rows, trial), self.digits)
+        return f"{self.interval(rows, trial):.{self.digits}f}"
 
 
 def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], caption: str) -> Table:
@@ -167,9 +141,14 @@ def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], capt
         for column in columns:
             line.append(column.text(rows, trial))
             if column.thesis:
-                line.append(f"{column.thesis[trial]:.{column.digits}f}" if trial in column.thesis else "")
+                line.append(f"{column.thesis[words]:.{column.digits}f}" if words in column.thesis else "")
         lines.append(line)
     return Table(header, lines, caption)
+
+
+def by_trial(rows: Rows, trials: Mapping[int, str], figure: str) -> dict[str, Any]:
+    """Return the means of ``figure`` by trial for programs."""
+    return {words: mean(rows, figure, trial)._asdict() for trial, words in trials.items()}
 
 
 def numbers(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column]) -> dict[str, Any]:

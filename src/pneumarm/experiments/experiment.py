@@ -1,5 +1,6 @@
 """What an experiment is: trials as data, a measurement of one trial in one run, and an analysis of the rows."""
 
+import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.settings import Settings, Valid
 
 if TYPE_CHECKING:
+    from pneumarm.experiments.words import Words
     from pneumarm.report.page import Section
 
 Figures = Mapping[str, float]
@@ -147,11 +149,7 @@ class Experiment(ABC):
 
     name: str
     """On the command line."""
-    title: str
-    question: str
-    """A sentence."""
-    source: str
-    """Where in the thesis."""
+    words: "Words"
     runs: int
     """By default."""
     arms: tuple[str, ...] = ("virtual",)
@@ -178,9 +176,15 @@ class Experiment(ABC):
     def measure(self, material: Any, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Return the figures of ``trial`` in ``run``. The same arguments give the same figures, bit for bit."""
 
-    @abstractmethod
     def analyse(self, rows: Rows) -> Analysis:
-        """Return what the complete ``rows`` say; runs nothing."""
+        """Return what the complete ``rows`` say; runs nothing.
+
+        By default the module ``analysis`` beside that of the experiment knows; it is imported here, so that processes
+        that compute rows need no pictures.
+        """
+        package = type(self).__module__.rpartition(".")[0]
+        found: Analysis = importlib.import_module(f"{package}.analysis").analysis(self, rows)
+        return found
 
 
 def run_seed(settings: LaboratorySettings, run: int) -> int:

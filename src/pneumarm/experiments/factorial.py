@@ -16,10 +16,10 @@ from pneumarm.experiments.design.assignment import Design, Factor
 from pneumarm.experiments.design.effects import effects
 from pneumarm.experiments.design.loss import loss
 from pneumarm.experiments.differences import Interval, above, below, interval
-from pneumarm.experiments.evidence import plain
 from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, Trainings, train_and_test, with_settings
+from pneumarm.experiments.words import Words
 from pneumarm.learning import TrainSettings
 
 Array = NDArray[Any]
@@ -31,6 +31,7 @@ def _goal(criterion: str) -> Goal:
     return "larger" if criterion.removeprefix(EXPLORING) in ("reward", "gain") else "smaller"
 
 
+_IN_WORDS = {**CRITERIA, "gain": "change of the reward by training on"}
 Analyses = Mapping[str, TableAnalysis]
 """By criterion."""
 Finding = Callable[["Factorial", Rows, Analyses, Analyses], Claim]
@@ -59,9 +60,7 @@ class Factorial(Trainings):
     """Trainings by an orthogonal array, each tested; all criteria of section 5.2."""
 
     name: str
-    title: str
-    question: str
-    source: str
+    words: Words
     runs: int
     design: Design
     base: TrainSettings
@@ -113,13 +112,13 @@ class Factorial(Trainings):
 
         ours, theirs = self.analyses(rows)
         results = {n: a.results for n, a in ours.items()}
-        sections = [side_by_side(self.trials, results, self.thesis, self.words, self.labels)]
+        sections = [side_by_side(self.trials, results, self.thesis, _IN_WORDS, self.labels)]
         for name, analysis in ours.items():
             if name.startswith(EXPLORING):
                 continue  # these are in the table above; their pictures would double the page
-            sections += table_sections(analysis, self.words.get(name, name), name)
+            sections += table_sections(analysis, _IN_WORDS.get(name, name), name)
         return Analysis(
-            summary=[self.question, *self._answer(rows, ours)],
+            summary=[self.words.question, *self._answer(rows, ours)],
             figures={
                 "rows": len(rows.rows),
                 "arms": list(rows.arms),
@@ -140,11 +139,6 @@ class Factorial(Trainings):
         """What the letters of the factors mean."""
         return "; ".join(f"{factor.label}: {factor.name}" for factor in self.design.factors) + "."
 
-    @property
-    def words(self) -> Mapping[str, str]:
-        """Criteria in words."""
-        return {**CRITERIA, "gain": "change of the reward by training on"}
-
     def analyses(self, rows: Rows) -> tuple[Analyses, Analyses]:
         """Return the analyses of ``rows`` and of the thesis' tables."""
         names = [name for name in self.criteria if name in rows.figures]
@@ -163,7 +157,7 @@ class Factorial(Trainings):
                 # One run says nothing of the spread.
                 if name in ours and (said.loss == "mean" or rows.runs > 1):
                     effect = self.effect(rows, name, said.column, ours[name], said.loss)
-                    found.append(_effect_claim(said, self.words[name], theirs[said.criterion], ours[name], effect))
+                    found.append(_effect_claim(said, _IN_WORDS[name], theirs[said.criterion], ours[name], effect))
         return (*found, *(find(self, rows, ours, theirs) for find in self.findings))
 
     def effect(
@@ -193,7 +187,7 @@ class Factorial(Trainings):
                 if abs(effect.mean) > effect.half
             ]
             text.append(
-                f"What surely has an effect on the {self.words[name]}: {', '.join(surely) or 'none of the factors'}."
+                f"What surely has an effect on the {_IN_WORDS[name]}: {', '.join(surely) or 'none of the factors'}."
             )
             means = analysis.results.mean(axis=1)
             far = int(np.argmax(np.abs(means - np.median(means))))
@@ -204,7 +198,7 @@ class Factorial(Trainings):
             )
         text.insert(0, self._averages(rows, ours) + self._met(rows))
         best = "reward" if "reward" in ours else name
-        return [*text, self._best(ours[best], self.words[best])] if judged_alike else text
+        return [*text, self._best(ours[best], _IN_WORDS[best])] if judged_alike else text
 
     def _averages(self, rows: Rows, ours: Analyses) -> str:
         """Return in words the means over all trials, and beside them the thesis' where it has some."""
@@ -213,7 +207,7 @@ class Factorial(Trainings):
             found = interval(rows.samples(ours[name].results.mean(axis=0)))
             digits = 0 if abs(found.mean) >= _THOUSANDS else 2
             theirs = f" ({self.thesis[name].mean():.{digits}f})" if self.thesis else ""
-            said.append(f"{self.words[name]} {plain(found, digits)}{theirs}")
+            said.append(f"{_IN_WORDS[name]} {found:.{digits}f}{theirs}")
         beside = ", in brackets the thesis'" if self.thesis else ""
         return f"Means over all trials{beside}: {'; '.join(said)}."
 

@@ -5,7 +5,6 @@ from numpy.typing import NDArray
 
 from pneumarm.experiments.design.anova import Source, anova
 from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best, within
-from pneumarm.experiments.evidence import plain
 from pneumarm.experiments.experiment import Claim, Rows
 from pneumarm.experiments.factorial import Analyses, Factorial
 from pneumarm.experiments.trainings import LEARNING
@@ -26,7 +25,7 @@ def weights_matter_more_than_settings(made: Factorial, rows: Rows, ours: Analyse
     if rows.runs < 2:
         return Claim(claim, thesis, "one run", "open", "initial-weights")
     found = interval([_within_settings(table) for table in tables])
-    return Claim(claim, thesis, f"{_percent(found)} of the variance", above(found, 0.5), "initial-weights")
+    return Claim(claim, thesis, f"{found:.1%} of the variance", above(found, 0.5), "initial-weights")
 
 
 def _within_settings(table: NDArray[np.float64]) -> float:
@@ -76,8 +75,8 @@ def _dominance(shares: list[dict[str, float]]) -> tuple[str, Verdict]:
     by_source = {name: np.array([each[name] for each in shares]) for name in shares[0]}
     weights = by_source.pop("runs")
     largest = max(by_source, key=lambda name: float(by_source[name].mean()))
-    text = f"weights {_percent(interval(weights))} of the variance, the largest column ({largest}) "
-    text += _percent(interval(by_source[largest]))
+    text = f"weights {interval(weights):.1%} of the variance, the largest column ({largest}) "
+    text += f"{interval(by_source[largest]):.1%}"
     return text, above(interval(weights - by_source[largest], of_the_best(len(by_source))))
 
 
@@ -104,7 +103,7 @@ def nearly_all_succeed(made: Factorial, rows: Rows, ours: Analyses, theirs: Anal
     return Claim(
         "Nearly all episodes of the test are successful",
         "nearly 100 % (section 5.4.2, no numbers)",
-        f"{_percent(greedy)}; the same agents while they learn on {_percent(learning)}",
+        f"{greedy:.1%}; the same agents while they learn on {learning:.1%}",
         above(greedy, _NEARLY_ALL),
         "success",
     )
@@ -125,7 +124,7 @@ def fewest_switches(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyse
     return Claim(
         text,
         f"at least {their:.2f} (table C.9)",
-        f"the fewest of any agent, mean over arms: {plain(found)}",
+        f"the fewest of any agent, mean over arms: {found:.2f}",
         above(found, _FEWEST),
         "fewest-switches",
     )
@@ -179,7 +178,7 @@ def agents_meet_the_criterion(made: Factorial, rows: Rows, ours: Analyses, their
     return Claim(
         f"Without shaping nearly all agents ({100 * _NEARLY_ALL:.0f} %) meet the criterion of training",
         f"all {count} (table C.22)",
-        f"{_percent(found)}: {int(met.sum())} of {met.size}",
+        f"{found:.1%}: {int(met.sum())} of {met.size}",
         above(found, _NEARLY_ALL),
         "shaping-not-indispensable",
     )
@@ -218,7 +217,7 @@ def punishment_halves_switches(made: Factorial, rows: Rows, ours: Analyses, thei
     return Claim(
         "Without the punishment there are more than twice as many switches",
         f"{interval(their).mean:.2f} times (appendix C.1)",
-        f"{plain(found)} times",
+        f"{found:.2f} times",
         above(found, 2.0),
         "punishment",
     )
@@ -227,7 +226,3 @@ def punishment_halves_switches(made: Factorial, rows: Rows, ours: Analyses, thei
 def _ratio(switches: NDArray[np.float64], level: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return how many times the switches (trials, runs) at the last level are those at the first, by run."""
     return np.asarray(switches[level == level.max()].mean(axis=0) / switches[level == level.min()].mean(axis=0))
-
-
-def _percent(found: Interval) -> str:
-    return f"{plain(found, 1, 100)} %"

@@ -16,8 +16,7 @@ from pneumarm.arm.virtual import ArmParameters, VirtualArm
 from pneumarm.control.playing import Player
 from pneumarm.control.transfer import BEGIN, draw_movement
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.evidence import Column, mean, number
-from pneumarm.experiments.experiment import ARMS, Experiment, LaboratorySettings, Report, Rows, run_seed
+from pneumarm.experiments.experiment import ARMS, Experiment, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import Agent, Exploration, TrainSettings
 from pneumarm.learning.online.testing import GREEDY, run_test
@@ -95,13 +94,9 @@ class OnTheArm(Experiment):
         """Return the arm and its simulation."""
         return material(arm, folder, settings, progress)
 
-    def by_trial(self, rows: Rows, figure: str) -> dict[str, Any]:
-        """Return ``figure`` by trial, for programs."""
-        return {words: number(mean(rows, figure, trial)) for trial, words in self.trials.items()}
-
 
 @dataclass(frozen=True)
-class Sizes:
+class TestSizes:
     """How much agents are tested in a row."""
 
     test: int = 300
@@ -112,7 +107,7 @@ class Sizes:
 class AgentsByTrial(OnTheArm):
     """An experiment in which every trial has an agent of its own, tested in the simulation and on the arm."""
 
-    sizes: Sizes = Sizes()
+    sizes: TestSizes = TestSizes()
 
     @abstractmethod
     def train_settings(self, trial: int) -> TrainSettings:
@@ -122,14 +117,6 @@ class AgentsByTrial(OnTheArm):
         """Return the settings of all agents and the sizes."""
         agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
         return {"agents": agents, "sizes": asdict(self.sizes)}
-
-
-def in_both(figure: str, unit: str = "", digits: int = 2, factor: float = 1.0) -> tuple[Column, Column]:
-    """Return the columns of ``figure`` in the simulation and on the arm."""
-    name = figure.removesuffix("_rate")
-    places = ((SIMULATION, "simulation"), ("", "arm"))
-    first, second = (Column(prefix + figure, f"{name}, {place}{unit}", digits, factor) for prefix, place in places)
-    return first, second
 
 
 def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Any:

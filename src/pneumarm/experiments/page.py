@@ -20,9 +20,8 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     ]
     of = {"experiment": experiment.name, "arms": list(arms), "runs": runs}
     write_json(folder / RESULTS, jsonable({**analysis.figures, **of, "claims": claims}))
-    where = (
-        f"{experiment.source}. {_many(runs, 'run')} of {_many(len(experiment.trials), 'trial')} on {', '.join(arms)}."
-    )
+    of_trials = f"{_many(runs, 'run')} of {_many(len(experiment.trials), 'trial')}"
+    where = f"{experiment.words.source}. {of_trials} on {', '.join(arms)}."
     sections = [*analysis.sections]
     summary = [where, *analysis.summary]
     if analysis.claims:
@@ -33,7 +32,7 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
         )
         sections.insert(0, Section("Claims", tables=[table]))
     page = folder / PAGE
-    write_text(page, render(experiment.title, summary, sections))
+    write_text(page, render(experiment.words.title, summary, sections))
     return page
 
 

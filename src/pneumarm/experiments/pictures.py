@@ -5,13 +5,15 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.evidence import Array, Column, over_arms, plain, samples
+from pneumarm.experiments.evidence import Array, Column, over_arms, samples, table
 from pneumarm.experiments.experiment import Rows
-from pneumarm.report.page import Picture
+from pneumarm.experiments.words import SectionWords
+from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, key, legend_below, panels, styled
 
 _INKS = ((DARK, "-", "o"), (MIDDLE, "--", "s"), (GREY, "-.", "^"), (LIGHT, ":", "D"), (INK, (0, (1, 1)), "v"))
@@ -50,7 +52,7 @@ def courses(
     """
     said = []
     for label, curves in quantities.items():
-        ends = [f"{c.name} from {plain(c.intervals[0])} to {plain(c.intervals[-1])}" for c in curves]
+        ends = [f"{c.name} from {c.intervals[0]:.2f} to {c.intervals[-1]:.2f}" for c in curves]
         said.append(f"{_line(label)}: {', '.join(ends)}")
     return Picture(_courses(quantities, block, marks or {}), caption, ". ".join(said) + ".")
 
@@ -103,7 +105,7 @@ def dots(
 
     """
     said = [
-        f"{_line(label)}: " + ", ".join(f"{name} {plain(one)}" for name, one in zip(names, found, strict=True))
+        f"{_line(label)}: " + ", ".join(f"{name} {one:.2f}" for name, one in zip(names, found, strict=True))
         for label, found in quantities.items()
     ]
     return Picture(_dots(names, quantities, zero, reference), caption, ". ".join(said) + ".")
@@ -157,11 +159,11 @@ def against(rows: Rows, trials: Mapping[int, str], axis: Axis, columns: Sequence
         f"{column.words}: " + ", ".join(f"{column.text(rows, trial)} ({words})" for trial, words in trials.items())
         for column in columns
     ]
-    return Picture(_against(rows, list(trials), axis, columns), caption, ". ".join(said) + ".")
+    return Picture(_against(rows, trials, axis, columns), caption, ". ".join(said) + ".")
 
 
 @styled
-def _against(rows: Rows, trials: Sequence[int], along: Axis, columns: Sequence[Column]) -> Figure:
+def _against(rows: Rows, trials: Mapping[int, str], along: Axis, columns: Sequence[Column]) -> Figure:
     height = -(-len(columns) // _WIDE)
     width = -(-len(columns) // height)
     figure, axes = panels(height, width, 0.4 + 2.5 * height)
@@ -176,7 +178,8 @@ def _against(rows: Rows, trials: Sequence[int], along: Axis, columns: Sequence[C
         axis.errorbar(places, means, _halves(found), color=DARK, marker="o", lw=1.6, capsize=3)
         if column.thesis:
             compared = True
-            there = [(places[i], column.thesis[t]) for i, t in enumerate(trials) if t in column.thesis]
+            named = zip(places, trials.values(), strict=True)
+            there = [(place, column.thesis[words]) for place, words in named if words in column.thesis]
             axis.plot(*zip(*there, strict=True), color=MIDDLE, marker="s", ls="none")  # not of one arm: no line
         axis.set_title(textwrap.fill(column.words, _TITLE))
         axis.set_xlabel(along.label)
@@ -193,6 +196,36 @@ def _against(rows: Rows, trials: Sequence[int], along: Axis, columns: Sequence[C
         names.append("thesis")
     legend_below(figure, handles, names)
     return figure
+
+
+def section(
+    words: SectionWords,
+    rows: Rows,
+    trials: Mapping[int, str],
+    axis: Axis | None = None,
+    *,
+    compared: bool = True,
+    figures: Sequence[Picture] = (),
+    tables: Sequence[Table] = (),
+) -> Section:
+    """Return a section of these ``words``.
+
+    Args:
+        words: its title and text, the columns of its table, and captions of what there is.
+        rows: of all arms.
+        trials: in words.
+        axis: along which the columns are drawn too, where there is one.
+        compared: whether the thesis' numbers are drawn; they stand in the table in any case.
+        figures: further ones.
+        tables: further ones.
+
+    """
+    of_columns = [table(rows, trials, words.columns, words.table)] if words.table and words.columns else []
+    drawn = []
+    if axis is not None and words.figure:
+        columns = words.columns if compared else [msgspec.structs.replace(c, thesis=None) for c in words.columns]
+        drawn.append(against(rows, trials, axis, columns, words.figure))
+    return Section(words.title, words.text, [*drawn, *figures], [*of_columns, *tables])
 
 
 def _halves(found: Sequence[Interval]) -> list[float]:

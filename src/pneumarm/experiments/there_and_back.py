@@ -19,7 +19,6 @@ from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
 from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.control.transfer import draw_movement
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.evidence import Column
 from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
 from pneumarm.files import write_json
@@ -57,22 +56,6 @@ class ThereAndBack(Experiment):
     def settings(self) -> Any:
         """Return the training of a row, and the transitions and movements that it rests on."""
         return {"transitions": TRANSITIONS, "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
-
-
-def agent_columns(*others: str) -> list[Column]:
-    """Return what :func:`trained_and_moved` finds as columns, ``others`` of the arm after reward and success."""
-    words = {
-        "actions": "actions on the arm [-]",
-        "switches": "switches on the arm [-]",
-        "seconds": "time of a movement [s]",
-    }
-    return [
-        Column("reward", "reward on the arm [-]"),
-        Column("success_rate", "success on the arm [%]", 1, 100.0),
-        *(Column(name, words[name]) for name in others),
-        Column(BEFORE + "reward", "reward in simulation [-]"),
-        Column("episodes", "episodes of training [-]", 0),
-    ]
 
 
 def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:

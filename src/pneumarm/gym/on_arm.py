@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, Reading, guarded
 from pneumarm.arm.cycle import missed_turns
-from pneumarm.arm.valves import to_valves
+from pneumarm.arm.valves import Command, to_valves
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.spaces import action_space, observation_space, scaled_goal, sensor_ranges
 from pneumarm.simulation.simulation import Scaling
@@ -56,7 +56,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._closed = np.zeros((arm.spec.joints, 2), np.int8)
         self._over = True
         self._goal = goals.mean(axis=1)
-        self._applied: NDArray[np.int8] | None = None
+        self._applied: Command | None = None
         self._reading: Reading
         self._asked = 0.0  # when the agent was last asked for an action [s]
         self._due = 0.0
@@ -115,7 +115,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         paid = (self._reward.goal if reached else self._reward.action) + self._reward.switch * switched
         return observation, paid, reached, truncated, {"is_success": reached}
 
-    def _turn(self, valves: NDArray[np.int8]) -> NDArray[np.int8]:
+    def _turn(self, valves: Command) -> Command:
         """Let a turn pass with ``valves`` (joints, 2); return them as applied."""
         spec = self.arm.spec
         late = self.arm.lateness(self._reading) if monotonic() - self._asked > spec.period else 0.0

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import Arm, Reading, with_measured
+from pneumarm.arm.valves import Command
 from pneumarm.errors import UnusableInput
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
@@ -44,7 +45,7 @@ class SimulationArm(Arm):
         self._parameters = simulation_parameters(simulation)
         self._noise = noise_parameters(noise or NoiseSettings(), simulation)
         self._state = simulation_state(self._parameters, random_state(seed))
-        self._valves = np.zeros((self.spec.joints, 2), np.int8)
+        self._commanded = np.zeros((self.spec.joints, 2))
         self._periods = 0
         self._since = 0.0
         self._settle()
@@ -63,7 +64,7 @@ class SimulationArm(Arm):
             step(self._parameters, quiet, self._state, self._command())
 
     def _command(self) -> NDArray[np.float32]:
-        return (self._valves.ravel() / self._simulation.scaling.command_scale).astype(np.float32)
+        return (self._commanded.ravel() / self._simulation.scaling.command_scale).astype(np.float32)
 
     def read(self) -> Reading:
         """Return the newest simulated observation."""
@@ -75,27 +76,32 @@ class SimulationArm(Arm):
         velocity = observation[:, 1] if self.spec.velocity_sensor else ()
         return with_measured(reading, self.spec, [*velocity, *further])
 
-    def set_valves(self, valves: NDArray[np.int8]) -> None:
+    def set_valves(self, valves: Command) -> None:
         """Set the valves; they take effect at the end of the running period."""
-        self._valves = np.array(valves, np.int8).reshape(self.spec.joints, 2)
+        self._commanded = np.array(valves, np.float64).reshape(self.spec.joints, 2)
+
+    def set_pulses(self, command: NDArray[np.float64]) -> bool:
+        """Set pulses; they take effect at the end of the running period, and are over then."""
+        self._commanded = command.copy()
+        return True
 
     def wait(self, seconds: float) -> None:
         """Let time pass, a step of the simulation at the end of every control period."""
         self._since += max(seconds, 0.0)
-        command = self._command()
         while self._since >= self.spec.period - _EARLY:
             self._since = max(self._since - self.spec.period, 0.0)
             self._periods += 1
-            step(self._parameters, self._noise, self._state, command)
+            step(self._parameters, self._noise, self._state, self._command())
+            self._commanded = np.where(np.abs(self._commanded) < 1, 0.0, self._commanded)
 
     def close(self) -> None:
         """Close all valves."""
-        self._valves = np.zeros_like(self._valves)
+        self._commanded = np.zeros_like(self._commanded)
 
     def get_state(self) -> bytes:
         """Return the whole state, bit for bit."""
         state = {name: getattr(self._state, name).tolist() for name in ("x", "average", "random")}
-        clock = {"valves": self._valves.tolist(), "periods": self._periods, "since": self._since}
+        clock = {"commanded": self._commanded.tolist(), "periods": self._periods, "since": self._since}
         return json.dumps(state | clock).encode()
 
     def set_state(self, state: bytes) -> None:
@@ -113,7 +119,7 @@ class SimulationArm(Arm):
                 )
                 for name in ("x", "average", "random")
             }
-            valves = np.array(saved["valves"], np.int8).reshape(self._valves.shape)
+            commanded = np.array(saved["commanded"], np.float64).reshape(self._commanded.shape)
             periods, since = int(saved["periods"]), float(saved["since"])
         except (ValueError, KeyError, TypeError, OverflowError) as error:
             raise UnusableInput(
@@ -121,4 +127,4 @@ class SimulationArm(Arm):
             ) from error
         for name, array in arrays.items():
             getattr(self._state, name)[:] = array
-        self._valves, self._periods, self._since = valves, periods, since
+        self._commanded, self._periods, self._since = commanded, periods, since

@@ -30,7 +30,7 @@ from pneumarm.arm.counts import Counts
 from pneumarm.arm.cycle import BeginState, ControlCycle, Step
 from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, Reading
-from pneumarm.arm.valves import ACTIONS, to_valves
+from pneumarm.arm.valves import ACTIONS, Command, to_valves
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.settings import Settings, Valid
 from pneumarm.transitions.players import Trajectory
@@ -313,7 +313,7 @@ def _sequence(
         _told(actor, goal)
     remaining = iter(range(settings.actions))
 
-    def decide(reading: Reading) -> NDArray[np.int8] | None:
+    def decide(reading: Reading) -> Command | None:
         return None if next(remaining, None) is None else actor.act(reading)
 
     def broken(steps: list[Step], why: BaseException) -> None:

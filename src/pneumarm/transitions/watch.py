@@ -6,10 +6,10 @@ from contextlib import closing
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pneumarm.arm.cycle import Step
 from pneumarm.arm.seam import ArmSpec, Reading, with_measured
+from pneumarm.arm.valves import Command
 from pneumarm.transitions.rows import Mark, Recorded
 from pneumarm.transitions.store import Store
 
@@ -20,8 +20,8 @@ class Watch(Protocol):
     def begin(self, *, at_rest: bool) -> None:
         """Begin a new sequence; ``at_rest`` says that the arm stood still with closed valves before."""
 
-    def see(self, reading: Reading, valves: NDArray[np.int8] | None) -> None:
-        """Take in a reading and the valves (joints, 2) as applied after it, None after the last one."""
+    def see(self, reading: Reading, valves: Command | None) -> None:
+        """Take in a reading and the command (joints, 2) as applied after it, None after the last one."""
 
     def marks(self, recorded: Recorded) -> tuple[Mark, ...]:
         """Return what of a sequence, whole in the past, nothing may be learned from, as far as is known now."""

@@ -174,7 +174,7 @@ body = body._replace(muscles=muscles, joints=joints, surroundings=air,
                      constants=Constants(*(view(a) for a in body.constants)))
 start(body)
 for i, valves in enumerate([[1, -1], [0, 1], [-1, 0], [0, 0]]):
-    command(body, np.array([valves], np.int8))
+    command(body, np.array([valves], np.int8), 1 / 30)
     integrate(body, 0.04 * (i + 1), 0.5e-3)
 angle, pressure = np.zeros(1), np.zeros((1, 2))
 sense(body, angle, pressure)

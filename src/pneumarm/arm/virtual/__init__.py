@@ -1,6 +1,6 @@
 """The virtual arm: real pneumatics without an arm."""
 
-from pneumarm.arm.virtual.arm import VirtualArm, resting_angle
+from pneumarm.arm.virtual.arm import PERIOD, VirtualArm, resting_angle
 from pneumarm.arm.virtual.distribution import Figures, draw_parameters, figures
 from pneumarm.arm.virtual.faults import (
     Cold,
@@ -34,6 +34,7 @@ from pneumarm.arm.virtual.parameters import (
 )
 
 __all__ = [
+    "PERIOD",
     "AirParameters",
     "ArmParameters",
     "Cold",

@@ -3,12 +3,14 @@
 import hashlib
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Arm, ArmSpec, Reading, Sensor, with_measured
+from pneumarm.arm.valves import Command
 from pneumarm.arm.virtual.body import Body, body_of
 from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, constants
 from pneumarm.arm.virtual.faults import Fault, Plan, check_plan
@@ -24,11 +26,14 @@ from pneumarm.arm.virtual.valve import command, command_sides
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import direct
 
+PERIOD = 1 / 30
+"""Control period [s] (thesis section 5.1: 30 Hz)."""
 LATENCY = 0.007
 """Time between reading and acting [s] (thesis section 5.1: about 7 ms)."""
 LONGEST_WAIT = 1e8
 """Longest wait [s], three years."""
-_sense, _command, _pass_for, _pass_until = direct(sense), direct(command), direct(pass_for), direct(pass_until)
+_sense, _pass_for, _pass_until = direct(sense), direct(pass_for), direct(pass_until)
+_open_valves, _open_pulses = direct(command), direct(command)
 _HEADER = struct.Struct("<8sI16s")
 _MAGIC, _VERSION = b"pneumarm", 2
 
@@ -48,6 +53,8 @@ class VirtualArm(Arm):
         seed: seeds the noise of the sensors, the jitter, and the fluctuation of the supply.
         name: what reports call the arm.
         faults: what goes wrong with it, and when; see :mod:`pneumarm.arm.virtual.faults`.
+        period: of its control [s]. What is controlled at a higher rate than the thesis' 30 Hz is so by a faster
+            computer: latency and jitter are shorter in proportion.
         velocity_sensor: whether it also reads the velocity, from faster samples of its angle.
         sensors: accelerometers and thermometers that it has besides; see :mod:`pneumarm.arm.virtual.further`.
 
@@ -63,25 +70,28 @@ class VirtualArm(Arm):
         seed: int = 0,
         name: str = "virtual",
         faults: Sequence[Fault] = (),
+        period: float = PERIOD,
         velocity_sensor: bool = False,
         sensors: Sequence[Sensor] = (),
     ) -> None:
         self.parameters = parameters if parameters is not None else ArmParameters()
         joints = len(self.parameters.joints)
+        faster = min(1.0, period / PERIOD)
         self.spec = ArmSpec(
             joints=joints,
+            period=period,
             counts_per_degree=COUNTS_PER_DEGREE,
             counts_per_bar=COUNTS_PER_BAR,
             angle_range=(0.0, HIGHEST_COUNT),
             max_pressure=self.parameters.max_pressure / BAR,
-            latency=LATENCY,
+            latency=LATENCY * faster,
             name=name,
             velocity_sensor=velocity_sensor,
             sensors=tuple(sensors),
         )
         if seed < 0:
             raise UnusableInput(f"the seed of a virtual arm must be 0 or more, got {seed}")
-        self.body = body_of(self.parameters, seed)
+        self.body = body_of(replace(self.parameters, jitter=self.parameters.jitter * faster), seed)
         """The arm itself, not a copy, for kernels; read it, and leave it alone."""
         start(self.body)
         self._player: FaultPlayer | None = None
@@ -101,12 +111,12 @@ class VirtualArm(Arm):
         asked, before = self._asked(), self._player
         if before is not None:
             before.restore()
-        self._player = FaultPlayer(plan, self.parameters, self.body, asked) if plan else None
+        self._player = FaultPlayer(plan, self.parameters, self.body, self.spec.period) if plan else None
         if before is not None or plan:
-            self.set_valves(asked)
+            self._command(asked)
 
-    def _asked(self) -> NDArray[np.int8]:
-        """Return the valves (joints, 2) as they were last asked for."""
+    def _asked(self) -> Command:
+        """Return the command (joints, 2) that was last asked for; of pulses of a sound arm how they end."""
         if self._player is not None:
             return self._player.asked.copy()
         sides = (self.body.muscles["open"] + self.body.muscles["pending"]) % 2
@@ -172,12 +182,36 @@ class VirtualArm(Arm):
         asked = np.asarray(valves)
         if asked.shape == self.body.muscles.shape:
             exact = asked if asked.dtype == np.int8 else _as_int8(asked)
-            if self._player is not None and np.isin(exact, (-1, 0, 1)).all():
-                self._route(self._player, exact)
-                return
-            if _command(self.body, np.ascontiguousarray(exact)):
+            if self._command(np.ascontiguousarray(exact)):
                 return
         raise PneumarmError(f"valves must be {self.body.muscles.shape} of -1, 0 or +1, got {valves!r}")
+
+    def set_pulses(self, command: NDArray[np.float64]) -> bool:
+        """Open the valves now and close each after its share of the control period, to the microsecond.
+
+        Raises:
+            PneumarmError: shares beyond -1 to +1, or another shape.
+
+        """
+        shape = self.body.muscles.shape
+        if command.shape != shape or not self._command(np.ascontiguousarray(command, np.float64)):
+            raise PneumarmError(f"pulses must be {shape} of numbers from -1 to +1, got {command!r}")
+        return True
+
+    def _command(self, command: Command) -> bool:
+        """Give ``command`` to the valves; return False, with nothing done, where it is none."""
+        if self._player is None:
+            opened = _open_valves if command.dtype == np.int8 else _open_pulses
+            return bool(opened(self.body, command, self.spec.period))
+        if not ((command >= -1) & (command <= 1)).all():
+            return False
+        self._player.ask(command.astype(np.float64))
+        command_sides(self.body, self._player.route())
+        return True
+
+    def air_used(self) -> float:
+        """Return the air that came in through the inlets so far [normal litres, ISO 8778: 1 bar, 20 Celsius]."""
+        return 1e3 * float(self.body.muscles["taken"].sum())
 
     def wait(self, seconds: float) -> None:
         """Let exactly ``seconds`` [s] pass.
@@ -238,10 +272,7 @@ class VirtualArm(Arm):
 
     def _update(self, player: FaultPlayer) -> None:
         if player.update(self.time):
-            self._route(player, player.asked.copy())
-
-    def _route(self, player: FaultPlayer, asked: NDArray[np.int8]) -> None:
-        command_sides(self.body, player.route(asked))
+            command_sides(self.body, player.route())
 
     def rest(self, seconds: float) -> None:
         """Vent all muscles for ``seconds`` [s] and close the valves again; a night costs milliseconds."""

@@ -51,19 +51,18 @@ class FaultPlayer:
         plan: the faults, checked.
         parameters: of the arm.
         body: its; the constants are changed in place, and put back by :meth:`restore`.
-        asked: the valves (joints, 2) as they were last asked for.
+        period: the control period, which pulses are shares of [s].
 
     """
 
-    def __init__(self, plan: Plan, parameters: ArmParameters, body: Body, asked: NDArray[np.int8]) -> None:
+    def __init__(self, plan: Plan, parameters: ArmParameters, body: Body, period: float) -> None:
         count = len(parameters.joints)
         self.plan = plan
         self._parameters = parameters
-        self._body = body
+        self._body, self._period = body, period
         self.sound = Constants(*(record.copy() for record in body.constants))
         """The constants as they are without faults."""
         self._state = np.zeros(1, _state_dtype(count, len(self.plan)))
-        self._state["asked"] = asked
         self._state["frozen"] = np.nan
         self._now: list[Fault] = []
         self.update(self.time)
@@ -74,10 +73,10 @@ class FaultPlayer:
         return float(self._body.surroundings["time"][0])
 
     @property
-    def asked(self) -> NDArray[np.int8]:
-        """The valves as they were last asked for, shape (joints, 2)."""
-        valves: NDArray[np.int8] = self._state["asked"][0]
-        return valves
+    def asked(self) -> NDArray[np.float64]:
+        """The command (joints, 2) that was last asked for."""
+        command: NDArray[np.float64] = self._state["asked"][0]
+        return command
 
     def digest(self) -> bytes:
         """Return what distinguishes this plan from others."""
@@ -92,21 +91,25 @@ class FaultPlayer:
         for record, sound in zip(self._body.constants, self.sound, strict=True):
             record[...] = sound
 
-    def route(self, asked: NDArray[np.int8]) -> NDArray[np.int64]:
-        """Return which valves open, (joints, 2, inlet and outlet) of 0 or 1, when ``asked`` for (joints, 2)."""
-        self._state["asked"] = asked
-        told = asked.astype(np.int64)
+    def ask(self, command: NDArray[np.float64]) -> None:
+        """Note the ``command`` (joints, 2), asked for now."""
+        self._state["asked"], self._state["asked_at"] = command, self.time
+
+    def route(self) -> NDArray[np.float64]:
+        """Return until when which valves are open by what was asked for, (joints, 2, inlet and outlet) [s]."""
+        told = self.asked.copy()
         for fault in self._now:
             if isinstance(fault, SwappedMuscles):
                 told[fault.index], told[fault.other] = told[fault.other], told[fault.index]
         for fault in self._now:
             if isinstance(fault, SwappedValves):
                 told[fault.index] = -told[fault.index]
-        sides = np.stack([told == 1, told == -1], axis=-1).astype(np.int64)
+        share = np.stack([told, -told], axis=-1)
+        until = np.where(share >= 1, np.inf, float(self._state["asked_at"][0]) + share * self._period)
         for fault in self._now:
             if isinstance(fault, StuckValve):
-                sides[(*fault.index, _SIDES[fault.valve])] = fault.position == "open"
-        return np.ascontiguousarray(sides)
+                until[(*fault.index, _SIDES[fault.valve])] = np.inf if fault.position == "open" else -np.inf
+        return until
 
     def next_change(self) -> float:
         """Return when :meth:`update` must be called next [s]."""
@@ -254,8 +257,8 @@ class FaultPlayer:
 
         """
         found: NDArray[Any] = np.frombuffer(state, self._state.dtype)
-        finite = all(np.isfinite(found[name]).all() for name in ("time", "excess"))
-        if found.shape != (1,) or not finite or not np.isin(found["asked"], (-1, 0, 1)).all():
+        finite = all(np.isfinite(found[name]).all() for name in ("time", "excess", "asked_at"))
+        if found.shape != (1,) or not finite or not (np.abs(found["asked"]) <= 1).all():
             raise UnusableInput(f"{name}: the saved state is damaged: that of its faults holds impossible numbers")
         return found
 
@@ -272,7 +275,8 @@ def _state_dtype(joints: int, faults: int) -> np.dtype[Any]:
             ("time", "f8"),  # of the last update [s]
             ("excess", "f8"),  # pressure that a leaking reducer added to the supply [Pa]
             ("frozen", "f8", (joints,)),  # [counts]
-            ("asked", "i1", (joints, 2)),  # valves
+            ("asked", "f8", (joints, 2)),  # the last command
+            ("asked_at", "f8"),  # [s]
             ("begun", "i1", (faults,)),
         ]
     )

@@ -149,7 +149,7 @@ def advance_physics(physics, states, i, valves):  # type: ignore[no-untyped-def]
     states.due[i] += physics.period
     acted = begin + physics.latency
     pass_time(body, acted)
-    command(body, valves)
+    command(body, valves, physics.period)
     pass_time(body, max(states.due[i], acted))
     for j in range(states.angle.shape[1]):
         states.velocity[i, j] = states.angle[i, j]  # kept until the new angle is read

@@ -6,7 +6,7 @@ times at which a valve toggles, so that every edge falls exactly between two sub
 
 import math
 
-from pneumarm.arm.virtual.state import INLET, OUTLET, QUEUE
+from pneumarm.arm.virtual.state import INLET, QUEUE
 from pneumarm.kernels import kernel
 
 
@@ -29,33 +29,39 @@ def switch(muscle, side, wanted, time):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def command(body, valves):  # type: ignore[no-untyped-def]
-    """Set ``valves`` (joints, 2); return False, with nothing set, if one of them is not -1, 0 or +1."""
+def command(body, shares, period):  # type: ignore[no-untyped-def]
+    """Open valves for ``shares`` (joints, 2) of the ``period`` [s]: -1 to +1, with +-1 until the next command.
+
+    Returns False, with nothing set, if one of them is something else.
+    """
     for j in range(len(body.joints)):
         for m in range(2):
-            if not -1 <= valves[j, m] <= 1:
+            if not -1 <= shares[j, m] <= 1:
                 return False
     now, c = body.surroundings[0].time, body.constants.surroundings[0]
     opened, closed = now + c.opening_delay, now + c.closing_delay
     for j in range(len(body.joints)):
         for m in range(2):
-            wanted = 1 if valves[j, m] == 1 else 0
-            switch(body.muscles[j, m], INLET, wanted, opened if wanted else closed)
-            wanted = 1 if valves[j, m] == -1 else 0
-            switch(body.muscles[j, m], OUTLET, wanted, opened if wanted else closed)
+            muscle, share = body.muscles[j, m], shares[j, m]
+            for side in range(2):
+                wanted = share if side == INLET else -share
+                switch(muscle, side, 1 if wanted > 0 else 0, opened if wanted > 0 else closed)
+                if 0 < wanted < 1:
+                    switch(muscle, side, 0, closed + wanted * period)
     return True
 
 
 @kernel
-def command_sides(body, sides):  # type: ignore[no-untyped-def]
-    """Set inlets and outlets apart, ``sides`` (joints, 2, 2) of 0 or 1: what faults make of a command."""
+def command_sides(body, until):  # type: ignore[no-untyped-def]
+    """Open inlets and outlets ``until`` a time (joints, 2, 2) [s], or not at all: what faults make of a command."""
     now, c = body.surroundings[0].time, body.constants.surroundings[0]
-    opened, closed = now + c.opening_delay, now + c.closing_delay
     for j in range(len(body.joints)):
         for m in range(2):
             for side in range(2):
-                wanted = sides[j, m, side]
-                switch(body.muscles[j, m], side, wanted, opened if wanted else closed)
+                wanted = until[j, m, side] > now
+                switch(body.muscles[j, m], side, int(wanted), now + (c.opening_delay if wanted else c.closing_delay))
+                if wanted and until[j, m, side] < math.inf:
+                    switch(body.muscles[j, m], side, 0, until[j, m, side] + c.closing_delay)
 
 
 @kernel

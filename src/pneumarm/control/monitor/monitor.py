@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, Reading, measured
+from pneumarm.arm.valves import Command
 from pneumarm.control.monitor.evidence import (
     ZONES,
     Memory,
@@ -260,7 +261,7 @@ class Monitor:
             if ("dead-potentiometer", j + 1) not in broken:
                 memory.rail[j] = 0.0
 
-    def see(self, reading: Reading, valves: NDArray[np.int8] | None) -> None:
+    def see(self, reading: Reading, valves: Command | None) -> None:
         """Weigh a reading and remember the ``valves`` (joints, 2) as applied after it."""
         memory = self._memory
         if reading.time < memory.clock[0]:

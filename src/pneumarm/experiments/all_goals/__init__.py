@@ -15,7 +15,7 @@ stuck.
 from dataclasses import replace
 
 from pneumarm.experiments.design.assignment import thesis_design
-from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import Factorial, Said
 from pneumarm.experiments.findings import (
     fewest_switches,
@@ -25,6 +25,7 @@ from pneumarm.experiments.findings import (
     weights_dominate,
     weights_matter_more_than_settings,
 )
+from pneumarm.experiments.words import Words
 from pneumarm.learning import TrainSettings
 
 LONGEST = 50_000
@@ -34,15 +35,15 @@ BASE = replace(TrainSettings(), max_episodes=LONGEST)
 
 EXPERIMENT = Factorial(
     name="all-goals",
-    title="All goal angles",
-    question="Which settings of the learning method matter when all goals are learned, and which are best?",
-    source="Thesis section 5.4.2, appendix C.2",
+    words=Words(
+        "All goal angles",
+        "Which settings of the learning method matter when all goals are learned, and which are best?",
+        "Thesis section 5.4.2, appendix C.2",
+    ),
     runs=8,
     design=thesis_design(),
     base=BASE,
-    thesis={
-        name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
-    },
+    thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),
     said=(
         Said("reward", 4, raises=False, about="sarsa"),
         Said("reward", 4, raises=True, loss="std", about="sarsa"),

@@ -178,7 +178,7 @@ def judge(results: Mapping[str, Results]) -> list[Judged]:
         left = tuple((found, claim) for claim in found.claims if id(claim) not in shown)
         if left and name in PLACES:
             chosen = experiment(name)
-            judged.append(Judged(Conclusion(name, chosen.source, chosen.question, (name,)), left, ()))
+            judged.append(Judged(Conclusion(name, chosen.words.source, chosen.words.question, (name,)), left, ()))
     return judged
 
 

@@ -80,3 +80,8 @@ def packaged_table(package: str, name: str) -> NDArray[np.float64]:
     """Return the table ``name``.csv that lies in ``package``, shape (trials, runs)."""
     file = resources.files(package) / f"{name}.csv"
     return parse_table(file.read_text(encoding="utf-8"), f"{package}/{name}.csv").results
+
+
+def packaged_results(package: str, *names: str) -> dict[str, NDArray[np.float64]]:
+    """Return the thesis' results in ``package``, the tables thesis_NAME.csv, by name."""
+    return {name: packaged_table(package, f"thesis_{name}") for name in names}

@@ -11,19 +11,22 @@ the fast ones: the rank correlation of the episodes until the criterion with the
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
-from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import ALL, Factorial, Said
 from pneumarm.experiments.findings import training_on_improves, training_on_improves_little, trial_10_is_good
+from pneumarm.experiments.words import Words
 
 EXPERIMENT = Factorial(
     name="long-training",
-    title="All goal angles with 50,000 episodes",
-    question="Do agents that learn slowly outperform the fast ones in the end, and who gains by training on?",
-    source="Thesis section 5.4.3, appendix C.3",
+    words=Words(
+        "All goal angles with 50,000 episodes",
+        "Do agents that learn slowly outperform the fast ones in the end, and who gains by training on?",
+        "Thesis section 5.4.3, appendix C.3",
+    ),
     runs=3,
     design=thesis_design(),
     base=BASE,
-    thesis={name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "gain", "actions", "switches")},
+    thesis=packaged_results(__name__, "reward", "gain", "actions", "switches"),
     continued=50_000,
     criteria=("gain", *ALL),
     said=(Said("gain", 4, raises=True, loss="std", about="q-fluctuates"),),

@@ -14,21 +14,22 @@ from dataclasses import replace
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
-from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import Factorial
 from pneumarm.experiments.findings import agents_meet_the_criterion
+from pneumarm.experiments.words import Words
 from pneumarm.learning import Exploration
 
 EXPERIMENT = Factorial(
     name="no-shaping",
-    title="No shaping",
-    question="Is shaping needed to learn the task at all, and which settings are best without it?",
-    source="Thesis section 5.4.4, appendix C.5",
+    words=Words(
+        "No shaping",
+        "Is shaping needed to learn the task at all, and which settings are best without it?",
+        "Thesis section 5.4.4, appendix C.5",
+    ),
     runs=3,
     design=thesis_design(),
     base=replace(BASE, shaping=None, exploration=Exploration(0.09, 10.0)),
-    thesis={
-        name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
-    },
+    thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),
     findings=(agents_meet_the_criterion,),
 )

@@ -12,21 +12,22 @@ range.
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
-from pneumarm.experiments.design.table import packaged_table
+from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import Factorial, Said
 from pneumarm.experiments.findings import punishment_costs_actions, punishment_halves_switches
+from pneumarm.experiments.words import Words
 
 EXPERIMENT = Factorial(
     name="switch-punishment",
-    title="Punishing a switch",
-    question="What does a punishment of -8 for a switch do to the movements, and to the training?",
-    source="Thesis section 5.4.1, appendix C.1",
+    words=Words(
+        "Punishing a switch",
+        "What does a punishment of -8 for a switch do to the movements, and to the training?",
+        "Thesis section 5.4.1, appendix C.1",
+    ),
     runs=3,
     design=packaged_design(__name__),
     base=BASE,
-    thesis={
-        name: packaged_table(__name__, f"thesis_{name}") for name in ("reward", "actions", "switches", "episodes")
-    },
+    thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),
     goal=650.0,
     said=(
         Said("switches", 12, raises=True, about="punishment"),

@@ -1,0 +1,89 @@
+"""Minutes of collecting: parts of one collection, each with its simulation."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.preparation import STORE
+from pneumarm.experiments.there_and_back import (
+    MOVEMENTS,
+    TRAINING,
+    Prepared,
+    Recipe,
+    ThereAndBack,
+    collected,
+    place,
+    quality,
+    trained_and_moved,
+)
+from pneumarm.experiments.words import words_of
+from pneumarm.files import write_json
+from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.task import begin_states
+from pneumarm.transitions import KINDS, Store, enough_data
+
+_MINUTES = (1.7, 5.0, 10.0, 20.0, 50.0, 110.0, 220.0)
+_MUCH = 0.1  # share of cells filled anew from which on the distribution has improved
+
+
+@dataclass(frozen=True)
+class EnoughData(ThereAndBack):
+    """The whole job after more and more minutes of collecting."""
+
+    minutes: tuple[float, ...] = _MINUTES
+    """That collecting may take, in ascending order [min]."""
+    name = "enough-data"
+    words = words_of(__package__)
+
+    @property
+    def trials(self) -> Mapping[int, str]:
+        """The minutes."""
+        return {trial: f"{minutes:g} min" for trial, minutes in enumerate(self.minutes, 1)}
+
+    def settings(self) -> Any:
+        """Return minutes and training."""
+        return {"minutes": list(self.minutes), "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
+        """Return a simulation of every part of one collection, which goes on between the fits.
+
+        Minutes that the laboratory's number of transitions does not reach are not shortened by it: they are the
+        question.
+        """
+        seed = settings.seed
+        whole = place(folder, {"arm": arm, "seed": seed, "minutes": list(self.minutes)})
+        made = []
+        for number, minutes in enumerate(self.minutes):
+            recipe = Recipe(minutes=minutes)
+            kept, file = whole / f"{number}.json", whole / f"{number}.safetensors"
+            if not kept.exists():
+                transitions, took = collected(whole / STORE, arm, seed, recipe, progress)
+                with Store.open(whole / STORE) as store:
+                    fitted = fit_store(store, FitSettings(seed=seed))
+                    enough = enough_data(store, fitted.simulation.window, much=_MUCH)
+                    sequences = store.sequences
+                    judged = quality(fitted)
+                fitted.simulation.save(file)
+                figures = {"transitions": transitions, "minutes": took, "new": enough.share, **judged}
+                write_json(kept, {"sequences": sequences, "figures": figures})
+            found = json.loads(kept.read_text(encoding="utf-8"))
+            simulation = Simulation.load(file)
+            with Store.open(whole / STORE) as store:
+                first = [entry.number for entry in store.catalogue()][: found["sequences"]]
+                part = store.blocks(kinds=KINDS, sequences=partial(np.isin, test_elements=first))
+                begin = begin_states(part, simulation.window, simulation.scaling)
+            made.append(Prepared(arm, recipe, whole, simulation, begin, found["figures"]))
+        return made
+
+    def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Train an agent on the part of ``trial`` and move the arm with it, to goals in the range of all data."""
+        chosen = material[trial - 1]
+        goals = material[-1].simulation.goal_range
+        return {**chosen.figures, **trained_and_moved(chosen, TRAINING, run, settings, goals)}

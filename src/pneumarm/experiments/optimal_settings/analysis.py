@@ -1,0 +1,39 @@
+"""What the rows say of the two learning rates."""
+
+from collections.abc import Sequence
+
+from pneumarm.experiments.comparison import side_by_side
+from pneumarm.experiments.design.table import packaged_results
+from pneumarm.experiments.differences import interval
+from pneumarm.experiments.evidence import Array
+from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.optimal_settings.confirmation import DerivedSettings
+from pneumarm.experiments.trainings import CRITERIA
+
+_CRITERIA = ("reward", "actions", "switches", "episodes")
+_TRIAL_10 = 10
+
+
+def analysis(experiment: DerivedSettings, rows: Rows) -> Analysis:
+    """Return both settings beside the thesis', and the difference within the runs."""
+    trials = experiment.trials
+    ours = {name: rows.table(name, list(trials)) for name in _CRITERIA}
+    printed, arrayed = (
+        packaged_results(f"pneumarm.experiments.{one}", *_CRITERIA) for one in ("optimal_settings", "all_goals")
+    )
+    thesis = {name: [printed[name][0], arrayed[name][_TRIAL_10 - 1]] for name in _CRITERIA}
+    # Runs on one arm share its simulation, so where there are several arms they are the sample.
+    found = {
+        "difference": interval(rows.samples(ours["reward"][1] - ours["reward"][0])),
+        "theirs": interval(thesis["reward"][1] - thesis["reward"][0]),
+    }
+    means = {"our_means": _against(ours["reward"]), "their_means": _against(thesis["reward"])}
+    return experiment.words.filled(found | means).analysis(
+        found,
+        {name: {"mean": table.mean(axis=1).tolist(), "runs": table.tolist()} for name, table in ours.items()},
+        [side_by_side(trials, ours, thesis, CRITERIA)],
+    )
+
+
+def _against(reward: Sequence[Array] | Array) -> str:
+    return f"{reward[1].mean():.2f} against {reward[0].mean():.2f}"

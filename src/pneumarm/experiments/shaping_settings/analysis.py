@@ -1,0 +1,181 @@
+"""What the rows say of the settings of shaping: differences from the thesis' within runs."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pneumarm.arm import ArmSpec
+from pneumarm.experiments.comparison import mean_and_spread
+from pneumarm.experiments.design.table import packaged_results
+from pneumarm.experiments.differences import Interval, Verdict, below, interval
+from pneumarm.experiments.evidence import Array
+from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.pictures import dots
+from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
+from pneumarm.experiments.trainings import CRITERIA, LEARNING
+from pneumarm.experiments.words import SectionWords
+from pneumarm.learning import TrainSettings
+from pneumarm.learning.online.shaping import initial_deviation, stage
+from pneumarm.report.page import Picture, Section, Table
+from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
+
+_CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episodes", "met")
+_SHOWN = ("reward", "success_rate", "episodes")
+
+Tables = Mapping[str, NDArray[np.float64]]
+"""By figure, shapes (trials, runs)."""
+Differences = Mapping[str, list[Interval | None]]
+"""By figure, each trial's difference from its reference, None for a reference itself."""
+
+
+def analysis(experiment: ShapingSettings, rows: Rows) -> Analysis:
+    """Return every trial's results and its difference from the thesis' settings within runs."""
+    tables = {name: rows.table(name, list(experiment.trials)) for name in _CRITERIA}
+    # From here on columns are samples: runs where there is one arm, else the arms.
+    samples = {name: np.stack([rows.samples(line) for line in table]) for name, table in tables.items()}
+    differences = {name: _differences(experiment, table) for name, table in samples.items()}
+    found = measured(experiment, tables, samples, len(rows.arms))
+    surely = {f"surely_{name}": _surely(experiment, name, differences) for name in ("reward", "episodes")}
+    words = experiment.words.filled(found | surely)
+    strategy, results = words.sections
+    drawn = Picture(
+        strategy_figure(experiment.train_settings(1), ArmSpec()),
+        strategy.figure,
+        "Exploration falls from 0.5 to 0.05 and temperature from 20 to 1; the criterion rises to 0.95.",
+    )
+    return words.analysis(
+        found,
+        {
+            "rows": len(rows.rows),
+            "results": {name: table.mean(axis=1).tolist() for name, table in tables.items()},
+            "differences": {
+                name: [[each.mean, each.half] if each else None for each in ones]
+                for name, ones in differences.items()
+            },
+        },
+        [
+            Section(strategy.title, strategy.text, [drawn]),
+            _results(experiment, results, tables, samples, differences),
+        ],
+    )
+
+
+def measured(experiment: ShapingSettings, tables: Tables, samples: Tables, arms: int) -> dict[str, Any]:
+    """Return what claims are judged by, and the thesis' numbers beside it."""
+    by_name = {name: number - 1 for number, name in experiment.trials.items()}
+    shaped, without = by_name["as in the thesis"], by_name["no shaping"]
+    worn, worn_without = by_name["worn, as in the thesis"], by_name["worn, no shaping"]
+    reward, episodes, met = (samples[name] for name in ("reward", "episodes", "met"))
+    # The thesis made runs 1 to 3 with shaping and without.
+    with_it, without_it = (
+        {name: table[:, :3] for name, table in packaged_results(f"pneumarm.experiments.{one}", *_THEIRS).items()}
+        for one in ("all_goals", "no_shaping")
+    )
+    spreads = (one["reward"].std(axis=1, ddof=1).mean() for one in (with_it, without_it))
+    spread, narrower = _spread(tables["reward"][shaped], tables["reward"][without], arms)
+    return {
+        "gain": interval(reward[shaped] - reward[without]),
+        "solved": interval(met[without]),
+        "worn_solved": interval(met[worn_without]),
+        "sooner": interval(episodes[without] - episodes[shaped]),
+        "fewer": interval(episodes[by_name["adjusted every 100 episodes"]] - episodes[shaped]),
+        "spread": spread,
+        "narrower": narrower,
+        "share": _share(tables["met"][without]),
+        "share_worn": _share(tables["met"][worn_without]),
+        "share_shaped": _share(tables["met"][worn]),
+        "their_reward": interval((with_it["reward"] - without_it["reward"]).ravel()),
+        "their_episodes": -float((with_it["episodes"] - without_it["episodes"]).mean()),
+        "their_spread": " against ".join(f"{one:.2f}" for one in spreads),
+    }
+
+
+_THEIRS = ("reward", "episodes")
+
+
+def _differences(experiment: ShapingSettings, table: Array) -> list[Interval | None]:
+    references = {n: experiment.reference(n) for n in experiment.trials}
+    return [None if n == of else interval(table[n - 1] - table[of - 1]) for n, of in references.items()]
+
+
+def _surely(experiment: ShapingSettings, name: str, differences: Differences) -> str:
+    """Return in words what matters beyond chance."""
+    named = zip(experiment.trials.values(), differences[name], strict=True)
+    surely = [
+        f"{words} ({each if name == 'reward' else _whole(each)})"
+        for words, each in named
+        if each and abs(each.mean) > each.half
+    ]
+    return "; ".join(surely) or "none"
+
+
+def _results(
+    experiment: ShapingSettings, words: SectionWords, tables: Tables, samples: Tables, differences: Differences
+) -> Section:
+    header = ["settings", "reward", "difference within runs", "greedy success", "success, learning on"]
+    header += ["episodes", "difference within runs", "criterion met"]
+    lines = [
+        [
+            f"{trial} {name}",
+            mean_and_spread(tables["reward"][place]),
+            str(differences["reward"][place] or "reference"),
+            *(f"{100 * tables[n][place].mean():.1f} %" for n in ("success_rate", LEARNING)),
+            mean_and_spread(tables["episodes"][place]),
+            _whole(differences["episodes"][place]),
+            f"{100 * tables['met'][place].mean():.0f} %",
+        ]
+        for place, (trial, name) in enumerate(experiment.trials.items())
+    ]
+    shown = {CRITERIA[name]: [interval(values) for values in samples[name]] for name in _SHOWN}
+    picture = dots(list(experiment.trials.values()), shown, words.figure, reference=0)
+    return Section(words.title, figures=[picture], tables=[Table(header, lines, words.table)])
+
+
+def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Verdict]:
+    """Return both standard deviations on an arm, and whether the first is surely smaller (Pitman and Morgan).
+
+    Runs are pairs; the variances differ where sum and difference of the pairs are correlated.
+    """
+    apart = [values.reshape(arms, -1) for values in (shaped, without)]
+    x, y = ((values - values.mean(axis=1, keepdims=True)).ravel() for values in apart)
+    freedom = len(x) - arms
+    if freedom < 1:
+        return "one run", "open"
+    text = " against ".join(f"{np.sqrt((v * v).sum() / freedom):.2f}" for v in (x, y))
+    less, more = x - y, x + y
+    if freedom < 4 or less.std() == 0 or more.std() == 0:
+        return text, "open"
+    correlation = np.clip(np.corrcoef(less, more)[0, 1], -1 + 1e-12, 1 - 1e-12)
+    # Fisher's transform makes the correlation about normal, with this standard deviation.
+    return text, below(Interval(float(np.arctanh(correlation)), 1.96 / math.sqrt(freedom - 2), freedom))
+
+
+def _share(met: NDArray[np.float64]) -> str:
+    return f"{int(met.sum())} of {len(met)} agents"
+
+
+def _whole(found: Interval | None) -> str:
+    return "reference" if found is None else f"{found:+.0f}"
+
+
+@styled
+def strategy_figure(settings: TrainSettings, spec: ArmSpec) -> Figure:
+    """Draw exploration, temperature and criterion against the deviation (thesis fig. 4.3)."""
+    low, high = spec.angle_range
+    deviations = np.linspace(initial_deviation(settings, spec), high - low, 50)
+    stages = [stage(float(d), settings, spec) for d in deviations]
+    figure, axes = panels(1, 3, 2.2)
+    for axis, values, label, colour in (
+        (axes[0, 0], [s.schedule.epsilon for s in stages], "exploration ε", DARK),
+        (axes[0, 1], [s.schedule.temperature for s in stages], "temperature T [reward]", MIDDLE),
+        (axes[0, 2], [s.criterion for s in stages], "criterion (success rate)", GREY),
+    ):
+        axis.plot(deviations, values, color=colour)
+        axis.set_xlabel("deviation [counts]")
+        axis.set_ylabel(label)
+        axis.set_ylim(0, None)
+    return figure

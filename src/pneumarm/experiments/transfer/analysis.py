@@ -1,0 +1,134 @@
+"""What the rows say of the drop on arrival, its causes, and what learning brings back."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from pneumarm.experiments.differences import Interval
+from pneumarm.experiments.evidence import Array, blocks, difference, mean, over_arms, values
+from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.moving import SIMULATION
+from pneumarm.experiments.pictures import Curve, courses, dots, section
+from pneumarm.experiments.transfer.conditions import (
+    ALL,
+    AS_IT_IS,
+    CONDITIONS,
+    EXPLORING,
+    FROM_ARM,
+    NO_NOISE,
+    PUNCTUAL,
+    RATES,
+    WARM,
+    WITHOUT_NOISE,
+    TransferToTheArm,
+)
+from pneumarm.experiments.words import SectionWords
+from pneumarm.report.page import Section
+
+_ALL_THREE, _MODEL, _COLD = "noise, lateness and cold together", "error of the model", "cold arm"
+_PROGRESS = 750  # movements until the thesis sees real progress, about an hour
+_SIMULATIONS = (
+    ("simulation", SIMULATION),
+    ("simulation, from the arm's begin states", FROM_ARM),
+    ("the same without noise", WITHOUT_NOISE),
+)
+
+
+def analysis(experiment: TransferToTheArm, rows: Rows) -> Analysis:
+    """Return the courses beside the thesis', the causes, and what holds of section 5.5.1."""
+    causes = causes_of_the_drop(rows)
+    largest = max((name for name in causes if name != _ALL_THREE), key=lambda name: causes[name].mean)
+    found = {
+        **measured(rows, _PROGRESS // experiment.sizes.block),
+        "model": causes[_MODEL],
+        "cold": causes[_COLD],
+        "largest": largest,
+        "taken": causes[largest],
+        "block": experiment.sizes.block,
+    }
+    words = experiment.words.filled(found)
+    last = {experiment.trials[t]: over_arms(blocks(rows, "reward", t)[:, :, -1])._asdict() for t in RATES}
+    return words.analysis(
+        found,
+        figures={
+            "drop": found["drop"]._asdict(),
+            "causes": {name: one._asdict() for name, one in causes.items()},
+            "last": last,
+        },
+        sections=[
+            _on_the_arm(words.sections[0], rows, experiment.sizes.block),
+            _causes(words.sections[1], rows, causes),
+        ],
+    )
+
+
+def measured(rows: Rows, progress: int) -> dict[str, Any]:
+    """Return what claims are judged by; ``progress`` is the block in which the thesis sees some."""
+    frozen, slow = (blocks(rows, "reward", trial) for trial in (1, 2))
+    return {
+        "drop": over_arms(_arrival(rows, 1, "reward")),
+        "success": over_arms(np.mean([blocks(rows, "success_rate", t).mean(axis=-1) for t in RATES], axis=0)),
+        "actions": over_arms(-_arrival(rows, 1, "actions")),
+        **{f"switches_{trial}": over_arms(-_arrival(rows, trial, "switches")) for trial in (1, 2)},
+        "warmed": over_arms(_last(frozen) - frozen[:, :, 0]),
+        **{
+            f"better_{trial}": over_arms(_last(blocks(rows, "reward", trial)) - _last(frozen))
+            for trial in RATES
+            if RATES[trial]
+        },
+        "progress": over_arms(slow[:, :, progress] - slow[:, :, 0]) if progress < slow.shape[-1] else None,
+    }
+
+
+def _arrival(rows: Rows, trial: int, figure: str) -> Array:
+    """Return by how much ``figure`` is lower in the first block than in the simulation, shape (arms, runs)."""
+    return values(rows, EXPLORING + figure, trial) - values(rows, f"{figure} @1", trial)
+
+
+def _last(course: Array) -> Array:
+    """Return the mean of the last quarter of courses (arms, runs, blocks)."""
+    return np.asarray(course[:, :, -max(1, course.shape[-1] // 4) :].mean(axis=-1))
+
+
+def causes_of_the_drop(rows: Rows) -> dict[str, Interval]:
+    """Return what each cause takes from the reward of a greedy agent."""
+    from_arm, quiet = (values(rows, prefix + "reward", AS_IT_IS) for prefix in (FROM_ARM, WITHOUT_NOISE))
+    return {
+        "begin states of movements on the arm": over_arms(values(rows, SIMULATION + "reward", AS_IT_IS) - from_arm),
+        "noise of the sensors": difference(rows, "reward", NO_NOISE, AS_IT_IS),
+        "control that is late": difference(rows, "reward", PUNCTUAL, AS_IT_IS),
+        _COLD: difference(rows, "reward", WARM, AS_IT_IS),
+        _ALL_THREE: difference(rows, "reward", ALL, AS_IT_IS),
+        _MODEL: over_arms(quiet - values(rows, "reward", ALL)),
+        "noise that the simulation adds (a gain)": over_arms(from_arm - quiet),
+    }
+
+
+def _on_the_arm(words: SectionWords, rows: Rows, block: int) -> Section:
+    shown = {}
+    for figure, label, factor in (
+        ("reward", "reward [-]", 1.0),
+        ("success_rate", "success [%]", 100.0),
+        ("actions", "actions of\nsuccesses [-]", 1.0),
+        ("switches", "switches of\nsuccesses [-]", 1.0),
+    ):
+        level = factor * mean(rows, EXPLORING + figure, 1).mean
+        shown[label] = [
+            Curve(f"learning rate {rate:.2f}", factor * blocks(rows, figure, trial), level)
+            for trial, rate in RATES.items()
+        ]
+    return section(words, rows, {}, figures=[courses(shown, block, words.figure)])
+
+
+def _causes(words: SectionWords, rows: Rows, causes: Mapping[str, Interval]) -> Section:
+    drawn = dots(list(causes), {"lost reward [-]": list(causes.values())}, words.figure, zero=True)
+    made = section(words, rows, CONDITIONS, figures=[drawn])
+    simulated = [
+        [name, *(msgspec.structs.replace(c, figure=prefix + c.figure).text(rows, AS_IT_IS) for c in words.columns)]
+        for name, prefix in _SIMULATIONS
+    ]
+    (on_arm,) = made.tables
+    return replace(made, tables=[replace(on_arm, rows=[*simulated, *on_arm.rows])])

@@ -171,6 +171,7 @@ class Run:
                 self._begin_states(simulation),
                 self.settings.chosen,
                 seed=self.settings.seed,
+                method=self.settings.found,
                 progress=lambda now: report(100 * now.share, 100),
                 checkpoint=self.folder / "training.checkpoint",
             )

@@ -20,7 +20,7 @@ from pneumarm.control.movement import MOVEMENT, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
-from pneumarm.learning import AnyAgent, fingerprint
+from pneumarm.learning import AnyAgent, Learns, SimulationAgent, fingerprint
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import Store
@@ -164,14 +164,12 @@ def transfer(
     arm_state = store.state("arm")
     if arm_state is not None and arm.get_state() is not None:
         arm.set_state(arm_state)
-    rate = settings.learning_rate if agent.learns else 0.0
-    learner = agent.actor(rate, explores=agent.learns, seed=seed)
-    mean = _Mean(agent)
+    learning = _Learning(agent, settings.learning_rate, seed) if isinstance(agent, Learns) else None
     adapting = adaptation(agent, settings.adaptation, seed)
     adapts = settings.learning_rate > 0
     if done:
-        learner.set_state(store.state("learner") or learner.get_state())
-        mean.set_state(store.state("mean") or mean.get_state())
+        if learning is not None:
+            learning.set_states(store)
         if adapting is not None:
             adapting.set_state(store.state("adaptation") or adapting.get_state())
     elif keep_version is not None and adapting is not None:
@@ -181,13 +179,13 @@ def transfer(
     cycle = ControlCycle(guarded(arm), settings.close_while_computing)
     waiting: list[Recorded] = []
     broken: list[Recorded] = []
-    watch = watch or Monitor(arm.spec, getattr(agent, "simulation", None))  # not every kind of agent keeps one
+    watch = watch or Monitor(arm.spec, agent.simulation if isinstance(agent, SimulationAgent) else None)
     if adapting is not None:
         watch.judge_by(adapting.agent.simulation)
     warm_up_watch(watch, arm.spec)
     warm_up(agent)
-    if agent.learns:
-        warm_up(agent, rate, explores=True)
+    if isinstance(agent, Learns):
+        warm_up(agent, agent.learner(settings.learning_rate))
     if done and (seen := store.state("watch")) is not None:
         watch.set_state(seen)
     counted = {phase: Counts.of(saved) for phase, saved in json.loads(store.state(_COUNTS) or b"{}").items()}
@@ -200,8 +198,9 @@ def transfer(
         counted[phase] = counted.get(phase, Counts()) + (until - before)
 
     def keep() -> None:
-        state = {"learner": learner.get_state(), "mean": mean.get_state(), "arm": arm.get_state()}
-        state["watch"] = watch.get_state()
+        state = {"arm": arm.get_state(), "watch": watch.get_state()}
+        if learning is not None:
+            state |= learning.get_states()
         state[_COUNTS] = json.dumps({phase: counts.as_dict() for phase, counts in counted.items()}).encode()
         keep_watch(store, watch, number)
         if adapting is not None:
@@ -222,7 +221,7 @@ def transfer(
         info = {_PHASE: phase, **movement.row()}
         if adapting is not None:
             judges, sound = adapts and phase == "learning", not watch.marks(movement.recorded)
-            squares.append(adapting.saw(rows_of(movement.recorded), movement.reward, judges=judges, sound=sound))
+            squares.append(adapting.observe(rows_of(movement.recorded), movement.reward, judges=judges, sound=sound))
             info[_SQUARES] = squares[-1]
             watch.judge_by(adapting.agent.simulation)
         done.append(info)
@@ -243,7 +242,7 @@ def transfer(
     def shown() -> AnyAgent:
         if adapting is not None:
             return adapting.agent
-        return mean.agent if mean.count else agent.with_weights(learner.weights())
+        return agent if learning is None else learning.agent
 
     phase: Phase = PHASES[0]
     try:
@@ -253,9 +252,9 @@ def transfer(
             made = sum(info[_PHASE] == phase for info in done)
             if phase == "after" and settings.episodes > 0 and made == 0:
                 adapt()
-            learns = adapting is None and not greedy
-            moving = agent if learns else shown()
-            controller = AgentController(moving, learner if learns else None)
+            moving = agent if adapting is None and not greedy else shown()
+            learner = None if learning is None or greedy else learning.learner
+            controller = AgentController(moving, learner)
             for i in range(made, movements):
                 if phase == "learning":
                     adapt()
@@ -267,8 +266,8 @@ def transfer(
                 movement = move(
                     cycle, controller, goal, task.reward, task.cutoff, watch, broken.append, agent.window.velocity
                 )
-                if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * movements:
-                    mean.add(learner.weights())
+                if learning is not None and not greedy and i >= (1 - settings.averaged) * movements:
+                    learning.remember()
                 note(phase, movement)
                 count(phase)
                 if len(waiting) == _TOGETHER or i == movements - 1:
@@ -290,6 +289,7 @@ def transfer(
     if adapting is not None:
         adapted = Adapted(adapting.version, adapting.quantities, np.array(squares), adapting.events)
     found = Found(tuple(watch.findings), store.marked_rows(number), counted)
+    rate = 0.0 if learning is None else settings.learning_rate
     phases = {name: [info for info in done if info[_PHASE] == name] for name in PHASES}
     made_in = {str(name): of_rows(rows, agent.window.joints) for name, rows in phases.items()}
     return Transferred(made_in, shown(), rate, adapted, found)
@@ -305,29 +305,39 @@ _SQUARES = "squares"  # place of a movement's errors beside its figures in the s
 _COUNTS = "counts"  # place of what was counted, among the states in the store
 
 
-class _Mean:
-    """The mean of an agent's weights over movements."""
+class _Learning:
+    """An agent that learns on the arm, and the mean of its weights over movements."""
 
-    def __init__(self, agent: AnyAgent) -> None:
+    def __init__(self, agent: Learns, learning_rate: float, seed: int) -> None:
         self._agent = agent
+        self.learner = agent.learner(learning_rate, seed)
         self._sum = np.zeros(agent.weights().shape)
-        self.count = 0
+        self._count = 0
 
-    def add(self, weights: NDArray[np.float32]) -> None:
-        self._sum += weights
-        self.count += 1
+    def remember(self) -> None:
+        """Count the weights as they are now."""
+        self._sum += self.learner.weights()
+        self._count += 1
 
     @property
-    def agent(self) -> AnyAgent:
-        """The agent with the mean weights."""
-        return self._agent.with_weights((self._sum / self.count).astype(np.float32))
+    def agent(self) -> Learns:
+        """The agent with the mean of the weights that count, or with those that it has now."""
+        if self._count:
+            return self._agent.with_weights((self._sum / self._count).astype(np.float32))
+        return self._agent.with_weights(self.learner.weights())
 
-    def get_state(self) -> bytes:
-        return np.int64(self.count).tobytes() + self._sum.tobytes()
+    def get_states(self) -> dict[str, bytes]:
+        """Return all that its future depends on, by its name in a store."""
+        mean = np.int64(self._count).tobytes() + self._sum.tobytes()
+        return {"learner": self.learner.get_state(), "mean": mean}
 
-    def set_state(self, state: bytes) -> None:
-        self.count = int(np.frombuffer(state[:8], np.int64)[0])
-        self._sum = np.frombuffer(state[8:]).reshape(self._sum.shape).copy()
+    def set_states(self, store: Store) -> None:
+        """Take up what :meth:`get_states` returned, if ``store`` has it."""
+        learner, mean = store.state("learner"), store.state("mean")
+        if learner is not None and mean is not None:
+            self.learner.set_state(learner)
+            self._count = int(np.frombuffer(mean[:8], np.int64)[0])
+            self._sum = np.frombuffer(mean[8:]).reshape(self._sum.shape).copy()
 
 
 def transfer_into(

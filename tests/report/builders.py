@@ -9,7 +9,7 @@ from pneumarm.arm.counts import Counts
 from pneumarm.arm.guard import Interventions
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control import Adapted, Finding
-from pneumarm.control.found import Found
+from pneumarm.control.condition import Condition
 from pneumarm.learning import CURVES
 from pneumarm.report import (
     CoverageData,
@@ -198,7 +198,7 @@ def found(*findings, late=0, missed=0, link=None, phases=("collecting",)):
     """What was wrong, as a stage's results hold it."""
     counts = Counts(Interventions(pressure=30, late=late, vented=late // 2), missed, link or {})
     marked = {str(replace(one, until=None)): 474 for one in findings}
-    return Found(findings, marked, dict.fromkeys(phases, counts)).results()
+    return Condition(findings, marked, dict.fromkeys(phases, counts)).results()
 
 
 def results():

@@ -7,7 +7,7 @@ from pneumarm.arm import ArmSpec, open_arm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import Monitor, open_controller
-from pneumarm.control.found import LINK, collected_results, said
+from pneumarm.control.condition import LINK, collected_results, complaints
 from pneumarm.transitions import CollectResult, CollectSettings, Store, collect, require_enough
 
 
@@ -51,7 +51,7 @@ def collect_(
             opened, store, transitions, seed, progress=report, settings=settings, controller=player, watch=watch
         )
     results = collected_results(result, watch)
-    for line in said(results, "collecting"):
+    for line in complaints(results, "collecting"):
         say(line)
     show(results, json, lambda: [table(("collected", ""), _rows(result, opened.spec))])
 

@@ -8,7 +8,7 @@ from pneumarm.commands.common import COLUMNS, Json, OwnMethod, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
-from pneumarm.control.found import said
+from pneumarm.control.condition import complaints
 
 
 def transfer_(
@@ -43,7 +43,7 @@ def transfer_(
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
         result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
     say_history(out)
-    for line in said(result, "moving"):
+    for line in complaints(result, "moving"):
         say(line)
     say(f"adapted agent: {out / 'adapted.safetensors'}")
     show(

@@ -30,7 +30,7 @@ from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
 from pneumarm.errors import UnusableInput
-from pneumarm.planning.search import CERTAIN, Found, PlanSettings, Uncertainty, find, problem, tree, workspace_of
+from pneumarm.planning.search import CERTAIN, Plan, PlanSettings, Uncertainty, find, problem, tree, workspace_of
 from pneumarm.random import random_state
 from pneumarm.simulation.rollout import look_simulated, simulated_states, simulated_world
 from pneumarm.simulation.simulation import Simulation
@@ -176,7 +176,7 @@ class Planner:
     """How long each decision took [s]."""
     unproven: int = field(default=0, init=False)
     """Plans of which it is not proven that none is better."""
-    found: Found | None = field(default=None, init=False)
+    found: Plan | None = field(default=None, init=False)
     """The last plan."""
 
     def __post_init__(self) -> None:

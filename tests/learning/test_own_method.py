@@ -4,6 +4,7 @@ The tests run it as part of a run, from Python and, as ``my_module.py`` in the c
 """
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import msgspec
 import numpy as np
 import pytest
 
+import pneumarm as pneumarm_itself
 from pneumarm.control import TransferSettings, open_agent
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings
@@ -157,7 +159,9 @@ def test_it_works_from_the_current_folder(done: Path, tmp_path: Path) -> None:
 
     def pneumarm(*arguments: object) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "pneumarm.cli", *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        places = [str(Path(pneumarm_itself.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(places)}
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
 
     mine = ("--method", "my_module:MINE")
     trained = pneumarm("train", *files, "--out", agent, *mine, "--own.trials", 2, "--json")

@@ -10,6 +10,7 @@ from pneumarm.learning.agents import (
     Saved,
     SelfTesting,
     SimulationAgent,
+    Tracks,
     fingerprint,
 )
 from pneumarm.learning.batched.settings import BatchedSettings
@@ -57,6 +58,7 @@ __all__ = [
     "SelfTesting",
     "Shaping",
     "SimulationAgent",
+    "Tracks",
     "TrainSettings",
     "Training",
     "find_method",

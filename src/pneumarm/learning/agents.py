@@ -2,7 +2,8 @@
 
 Whatever kind an agent is of, it is tested, transferred, saved, loaded and used as a controller by the same commands.
 What only some can do is asked for by the class that says so, never by the kind: :class:`Learns`,
-:class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`.
+:class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`,
+:class:`Tracks`.
 """
 
 import hashlib
@@ -14,6 +15,7 @@ from typing import Protocol, Self, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.arm.controller import TrackingController
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.acting import Acting
@@ -111,6 +113,14 @@ class LooksAhead(Protocol):
         self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]
     ) -> Movements | None:
         """Let it move as on an arm; None where it does not look ahead."""
+
+
+@runtime_checkable
+class Tracks(Protocol):
+    """An agent that settles at goals, holds them and follows references, with a controller of its own."""
+
+    def controller(self) -> TrackingController:
+        """Return what moves the arm, ready: it waits for nothing to be compiled."""
 
 
 @runtime_checkable

@@ -255,14 +255,14 @@ def trained(data: TrainingData, spec: ArmSpec) -> Section:
     if "deviation" in data.columns:
         text.append(
             "Shaping lets begin states lie farther from the goal as the agent meets its criterion (thesis section "
-            "4.3.2; figure 4.3 shows performance, exploration and temperature over the deviation)."
+            "4.3.2)."
         )
     pictures = []
     if len(data.columns) > 1:
         pictures.append(
             Picture(
                 figures.training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec),
-                "How the agents learned; while they explore they earn less than in the test.",
+                "How the agents learned; exploring they earn less than in the test (over deviations: thesis figure 4.3).",
                 figures.training_curves_alt(data.curves, data.columns, data.evaluated, data.chosen),
             )
         )

@@ -40,7 +40,7 @@ from scipy.stats import t as student
 
 from benchmarks.agents import prepared
 from pneumarm.adaptation import AdaptationSettings, TrialSettings, WatchSettings
-from pneumarm.adaptation.change import Watch
+from pneumarm.adaptation.change import ChangeDetector
 from pneumarm.adaptation.trial import lower_by
 from pneumarm.arm import guarded
 from pneumarm.arm.virtual import ArmParameters, VirtualArm, draw_parameters
@@ -276,10 +276,10 @@ def rates(found: Mapping[str, list[dict[str, dict[str, Any]]]]) -> Iterator[str]
         return
     alarms = movements = 0
     for row in calm:
-        watch = Watch(WatchSettings(), len(row["squares"][0]))
+        watch = ChangeDetector(WatchSettings(), len(row["squares"][0]))
         for squares in row["squares"]:
             movements += 1
-            if watch.saw(squares):
+            if watch.observe(squares):
                 alarms += 1
                 watch.reset()
     yield f"false alarms: {alarms} in {movements} movements of arms that have not, or hardly, changed"

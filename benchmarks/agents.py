@@ -16,7 +16,6 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
 from pneumarm.control import BEGIN, AgentController, move
 from pneumarm.control.transfer import begin_and_goal
-from pneumarm.learning import AnyAgent, LearnSettings, PolicyAgent, Trained, test, train
+from pneumarm.learning import AnyAgent, LearnSettings, PolicySettings, Training, test, train
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.statistics import summarise
 from pneumarm.task import BeginStates, Movement, begin_states
@@ -47,7 +46,7 @@ def listed(name: str, default: str) -> list[str]:
 def measure() -> Iterator[str]:
     movements = int(os.environ.get("PNEUMARM_AGENTS_MOVEMENTS", "500"))
     methods, seeds = listed("METHODS", "policy,batched,sarsa"), listed("SEEDS", "1,2")
-    found: dict[str, list[tuple[dict[str, Any], Trained]]] = {method: [] for method in methods}
+    found: dict[str, list[tuple[dict[str, Any], Training[Any]]]] = {method: [] for method in methods}
     failures: dict[str, Counter[str]] = {method: Counter() for method in methods}
     yield HEADER
     with tempfile.TemporaryDirectory() as temporary:
@@ -81,14 +80,10 @@ def prepared(folder: Path, arm: int) -> tuple[Simulation, BeginStates]:
         return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
 
 
-def train_by(method: str, simulation: Simulation, begin: BeginStates, seed: int) -> Trained:
-    plain = method == "policy-greedy"
-    settings = LearnSettings(method="policy" if plain else method).chosen  # type: ignore[arg-type]
-    trained = train(simulation, begin, settings, seed)
-    if plain and isinstance(trained.agent, PolicyAgent):
-        agent = replace(trained.agent, settings=replace(trained.agent.settings, lookahead=0))
-        return replace(trained, agent=agent)  # type: ignore[arg-type]
-    return trained
+def train_by(method: str, simulation: Simulation, begin: BeginStates, seed: int) -> Training[Any]:
+    if method == "policy-greedy":
+        return train(simulation, begin, PolicySettings(lookahead=0), seed)
+    return train(simulation, begin, LearnSettings(method=method).chosen, seed)
 
 
 class Timed(AgentController):
@@ -139,7 +134,7 @@ def summary(made: list[Movement]) -> dict[str, Any]:
 
 
 def row(
-    arm: str, seed: str, method: str, trained: Trained, simulated: float, figures: dict[str, Any], p99: float
+    arm: str, seed: str, method: str, trained: Training[Any], simulated: float, figures: dict[str, Any], p99: float
 ) -> str:
     low, high = figures["intervals"]["reward"]
     worst, best = figures["intervals"]["success_rate"]
@@ -151,7 +146,7 @@ def row(
     )
 
 
-def total(method: str, each: list[tuple[dict[str, Any], Trained]], failures: Counter[str]) -> str:
+def total(method: str, each: list[tuple[dict[str, Any], Training[Any]]], failures: Counter[str]) -> str:
     rewards = np.array([figures["reward"] for figures, _ in each])
     rates = [figures["success_rate"] for figures, _ in each]
     seconds = [trained.seconds for _, trained in each]

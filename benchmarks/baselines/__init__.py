@@ -44,7 +44,7 @@ from pneumarm.console import jsonable, peak_memory
 from pneumarm.control import BEGIN, move
 from pneumarm.control.transfer import begin_and_goal
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import AnyAgent, PolicyAgent, load_agent, test, test_ahead
+from pneumarm.learning import AnyAgent, load_agent, test, test_ahead
 from pneumarm.planning import PlanAgent
 from pneumarm.planning.bound import BoundSettings, Planned, measure_bound
 from pneumarm.simulation import Simulation
@@ -185,7 +185,7 @@ def tested(agent: AnyAgent, simulation: Simulation, begin: BeginStates, episodes
     slow = max(1, episodes // 10)
     if isinstance(agent, PlanAgent):
         return test(agent, simulation, begin, slow, SEED).results()
-    if isinstance(agent, PolicyAgent) and (ahead := test_ahead(agent, simulation, begin, slow, SEED)) is not None:
+    if (ahead := test_ahead(agent, simulation, begin, slow, SEED)) is not None:
         return ahead.results()
     return test(agent, simulation, begin, episodes, SEED).results()
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pneumarm.learning import AnyAgent, LearnSettings, MethodSettings, TrainSettings, test, train
+from pneumarm.learning import AnyAgent, LearnSettings, TrainSettings, test, train
 from pneumarm.planning import PlanAgent
 from pneumarm.simulation import Simulation
 from pneumarm.task import BeginStates
@@ -38,13 +38,13 @@ def learn(method: str, simulation: Simulation, begin: BeginStates, seed: int, st
     if method == PLANNING:
         return Learned(PlanAgent(simulation), 0.0, 0.0, [])
     if method in OURS:
-        settings = LearnSettings(method=method).chosen  # type: ignore[arg-type]
+        settings = LearnSettings(method=method).chosen
         train(simulation, begin, shortened(settings), seed)
         return timed(lambda: train(simulation, begin, settings, seed).agent)
     return learn_stable(method, simulation, begin, seed, steps)
 
 
-def shortened(settings: MethodSettings) -> MethodSettings:
+def shortened(settings: Any) -> Any:
     """Return settings of the same training, hardly begun: it compiles all that the whole one needs."""
     if isinstance(settings, TrainSettings):
         return replace(settings, agents=1, max_episodes=100, validation_episodes=10)

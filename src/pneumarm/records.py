@@ -1,6 +1,7 @@
 """What the stages of a run leave for its report."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +9,8 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.arm.valves import Command
 from pneumarm.control import BEGIN, AgentController, move
-from pneumarm.learning import AnyAgent, FleetTraining, Trained
-from pneumarm.report.data import Demonstration, LearningData, MarkedData, TrainingData
+from pneumarm.learning import AnyAgent, Training
+from pneumarm.report.data import Demonstration, MarkedData, TrainingData
 from pneumarm.task import Movement
 from pneumarm.transitions import Store
 
@@ -18,34 +19,19 @@ DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large 
 _TAIL = 1.0  # s recorded after a movement, in which the arm swings out
 
 
-def training_record(training: Trained) -> TrainingData | LearningData:
-    """Return the curves and the validation of all agents."""
-    if isinstance(training, FleetTraining):
-        episodes, reward, success = training.curves.transpose(2, 0, 1)
-        return LearningData(
-            episodes=episodes,
-            reward_learning=reward,
-            success_learning=success,
-            reward=np.array([result.reward.mean() for result in training.validation]),
-            success=np.array([result.success.mean() for result in training.validation]),
-            chosen=training.best,
-        )
-    longest = max(training.curves, key=len)
-    agents, evaluations = len(training.curves), len(longest)
-    curves = np.zeros((6, agents, evaluations))
-    for agent, curve in enumerate(training.curves):
-        curves[:, agent, : len(curve)] = curve.T
+def training_record(training: Training[Any]) -> TrainingData:
+    """Return the curves and the validation of all learners."""
+    rows = [len(curve) for curve in training.curves]
+    curves = np.zeros((len(rows), max(rows, default=0), len(training.columns)))
+    for learner, curve in enumerate(training.curves):
+        curves[learner, : len(curve)] = curve
     return TrainingData(
-        episodes=longest[:, 0],
-        deviation=curves[1],
-        criterion=curves[2],
-        performance=curves[3],
-        epsilon=curves[4],
-        temperature=curves[5],
-        evaluated=np.array([len(curve) for curve in training.curves]),
+        curves=curves,
+        evaluated=np.array(rows, np.int64),
         reward=np.array([result.reward.mean() for result in training.validation]),
         success=np.array([result.success.mean() for result in training.validation]),
         chosen=training.best,
+        columns=training.columns,
     )
 
 

@@ -18,7 +18,7 @@ from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
 from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper
-from pneumarm.control.found import collected_results
+from pneumarm.control.condition import collected_results
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
 from pneumarm.learning import LOOKING_AHEAD, LearnSettings, load_agent, results_with_lookahead, test_ahead, train
@@ -171,6 +171,7 @@ class Run:
                 self._begin_states(simulation),
                 self.settings.chosen,
                 seed=self.settings.seed,
+                method=self.settings.found,
                 progress=lambda now: report(100 * now.share, 100),
                 checkpoint=self.folder / "training.checkpoint",
             )

@@ -61,8 +61,13 @@ class Clumsy(Agent):
 
     failures: ClassVar[list[int]] = []
 
-    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> Any:
-        actor = super().actor(learning_rate, explores, seed)
+    def actor(self) -> Any:
+        return self._clumsy(super().actor())
+
+    def learner(self, learning_rate: float, seed: int = 0) -> Any:
+        return self._clumsy(super().learner(learning_rate, seed))
+
+    def _clumsy(self, actor: Any) -> Any:
         turns, act = itertools.count(), actor.act
 
         def acting() -> NDArray[np.int64]:

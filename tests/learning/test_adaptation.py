@@ -15,7 +15,7 @@ from pneumarm.adaptation import (
     TrialSettings,
     WatchSettings,
     adaptation,
-    told,
+    sentences,
 )
 from pneumarm.adaptation.refit import _outputs_fitted, refit, rehearse
 from pneumarm.arm import BeginState, ControlCycle, Reading, guarded
@@ -182,7 +182,7 @@ def told_of(adapting: Adaptation, rows: Rows, rewards: float | Iterable[float]) 
     numbers = np.unique(rows.sequence)
     each = repeat(rewards) if isinstance(rewards, int | float) else rewards
     for number, reward in zip(numbers, each, strict=False):
-        adapting.saw(movement(rows, number), reward)
+        adapting.observe(movement(rows, number), reward)
 
 
 def test_a_change_is_noticed_and_only_movements_since_then_are_used(agent: PolicyAgent) -> None:
@@ -199,14 +199,14 @@ def test_a_change_is_noticed_and_only_movements_since_then_are_used(agent: Polic
     assert 28 <= event.figures["since"] <= 31
     assert adapting.usable == 60 - event.figures["since"]
     assert adapting.is_due()
-    assert "changed" in told(adapting.events, adapting.quantities)[0]
+    assert "changed" in sentences(adapting.events, adapting.quantities)[0]
 
 
 def test_when_to_adapt_is_after_ever_more_movements(agent: PolicyAgent, changed_rows: Rows) -> None:
     adapting = Adaptation(agent, replace(SETTINGS, first=4, growth=2.0, every=10))
     due = []
     for number in range(40):
-        adapting.saw(movement(changed_rows, number), 30.0)
+        adapting.observe(movement(changed_rows, number), 30.0)
         if adapting.is_due():
             due.append(adapting.movements)
             adapting._tried = adapting.movements
@@ -236,14 +236,14 @@ def test_an_agent_that_earns_less_is_taken_back(agent: PolicyAgent, adapted: byt
     assert adapting.agent.policy is not agent.policy
     told_of(adapting, changed_rows, [*np.linspace(0, 20, 9)])
     assert adapting.version == 1  # nobody has looked yet
-    adapting.saw(movement(changed_rows, 50), 10.0)
+    adapting.observe(movement(changed_rows, 50), 10.0)
     assert adapting.version == 0
     np.testing.assert_array_equal(adapting.agent.policy, agent.policy)
     for mine, was in zip(adapting.agent.simulation.networks, agent.simulation.networks, strict=True):
         np.testing.assert_array_equal(mine.output_weights, was.output_weights)
     assert adapting.events[-1].what == "rolled back"
     assert not adapting.is_due()
-    assert "taken back" in told(adapting.events, adapting.quantities)[-1]
+    assert "taken back" in sentences(adapting.events, adapting.quantities)[-1]
 
 
 def test_an_agent_that_earns_no_less_becomes_the_one_to_go_back_to(
@@ -252,7 +252,7 @@ def test_an_agent_that_earns_no_less_becomes_the_one_to_go_back_to(
     adapting = resumed(agent, adapted)
     rewards = np.random.default_rng(0).normal(31, 2, SETTINGS.trial.looks[-1])
     for number, reward in enumerate(rewards):
-        adapting.saw(movement(changed_rows, number % 60), float(reward))
+        adapting.observe(movement(changed_rows, number % 60), float(reward))
     assert adapting.version == 1
     assert adapting._trusted is adapting.agent
 
@@ -260,7 +260,7 @@ def test_an_agent_that_earns_no_less_becomes_the_one_to_go_back_to(
 def test_movements_of_a_test_take_nothing_back(agent: PolicyAgent, adapted: bytes, changed_rows: Rows) -> None:
     adapting = resumed(agent, adapted)
     for number in range(40):
-        adapting.saw(movement(changed_rows, number), -100.0, judges=False)
+        adapting.observe(movement(changed_rows, number), -100.0, judges=False)
     assert adapting.version == 1
 
 
@@ -271,7 +271,7 @@ def test_movements_of_an_arm_with_a_fault_are_counted_and_tell_nothing(
     known = adapting.movements, len(adapting.events)
     broken = moved(changed(agent.simulation, 10.0), 20, seed=2)
     for number in range(20):
-        adapting.saw(movement(broken, number), -100.0, sound=False)
+        adapting.observe(movement(broken, number), -100.0, sound=False)
     assert (adapting.movements, len(adapting.events)) == (known[0] + 20, known[1])
     assert adapting.version == 1
     told_of(adapting, broken, -100.0)
@@ -325,6 +325,6 @@ def test_only_what_can_adapt_does(agent: PolicyAgent) -> None:
 def test_a_fingerprint_tells_agents_by_their_simulation_too(agent: PolicyAgent) -> None:
     other = replace(agent, simulation=changed(agent.simulation))
     narrower = replace(agent, simulation=replace(agent.simulation, goal_range=agent.goal_range + 1))
-    found = [fingerprint(one) for one in (agent, other, narrower, agent.with_weights(agent.weights() + 1))]
+    found = [fingerprint(one) for one in (agent, other, narrower, replace(agent, policy=agent.policy + 1))]
     assert len(set(found)) == 4
     assert fingerprint(replace(agent)) == found[0]

@@ -117,7 +117,7 @@ def stop_after(rounds: int):  # type: ignore[no-untyped-def]
 def test_resumed_training_is_the_same(
     simulation: Simulation, begin: BeginStates, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pneumarm.learning.online.training._CHECKPOINT_EVERY", -1.0)
+    monkeypatch.setattr("pneumarm.learning.training._CHECKPOINT_EVERY", -1.0)
     path, whole = tmp_path / "training", train(simulation, begin, SHORT, seed=5)
     for _ in range(3):
         with pytest.raises(Killed):
@@ -133,7 +133,7 @@ def test_killed_process_resumes(simulation: Simulation, begin: BeginStates, tmp_
     folder, path = Path(__file__).parent, tmp_path / "training"
     code = (
         "import sys; from pathlib import Path; from synthetic_arm import *; from pneumarm.learning import *\n"
-        "import pneumarm.learning.online.training as module; module._CHECKPOINT_EVERY = 0.0\n"
+        "import pneumarm.learning.training as module; module._CHECKPOINT_EVERY = 0.0\n"
         "simulation = synthetic_simulation()\n"
         "settings = TrainSettings(agents=2, max_episodes=20_000, validation_episodes=50,\n"
         "    shaping=Shaping(criterion=1.0))\n"
@@ -145,7 +145,7 @@ def test_killed_process_resumes(simulation: Simulation, begin: BeginStates, tmp_
         end(process, signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
     _, arrays = read_arrays(path, "pneumarm training")
-    assert 0 < arrays["episodes"].max() < 20_000  # it was killed in the middle
+    assert 0 < arrays["0.counts"][0] < 20_000  # it was killed in the middle
     resumed = train(simulation, begin, settings, seed=8, checkpoint=path)
     assert same(resumed, train(simulation, begin, settings, seed=8))
 
@@ -160,9 +160,11 @@ def test_a_checkpoint_of_another_training_is_refused(
         with pytest.raises(UnusableInput, match="another training"):
             train(simulation, states, settings, seed=seed, checkpoint=path)
     settings, arrays = read_arrays(path, "pneumarm training")
-    for name, array in [("weights", arrays["weights"][:, :, :-1]), ("curves", arrays["curves"][0]), ("steps", None)]:
-        broken = {key: value for key, value in arrays.items() if key != name}
-        write_arrays(path, "pneumarm training", settings, broken if array is None else broken | {name: array})
+    weights, curve = arrays["1.weights"], arrays["1.curve"]
+    for name, array in [("weights", weights[:, :-1]), ("curve", curve[0]), ("counts", None)]:
+        broken = {key: value for key, value in arrays.items() if key != f"1.{name}"}
+        broken |= {} if array is None else {f"1.{name}": array}
+        write_arrays(path, "pneumarm training", settings, broken)
         with pytest.raises(UnusableInput, match=name):
             train(simulation, begin, tiny, seed=5, checkpoint=path)
 

@@ -6,27 +6,27 @@ import numpy as np
 import pytest
 
 from pneumarm.adaptation import TrialSettings, WatchSettings
-from pneumarm.adaptation.change import Watch
+from pneumarm.adaptation.change import ChangeDetector
 from pneumarm.adaptation.trial import lower_by, verdict
 from pneumarm.errors import UnusableInput
 
 
 def test_sums_are_those_of_page() -> None:
-    watch = Watch(WatchSettings(allowance=1.5, alarm=3.0, largest=4.0), 2)
+    watch = ChangeDetector(WatchSettings(allowance=1.5, alarm=3.0, largest=4.0), 2)
     # S_1: 0, 0   then 0.5, 0   then 3.0 (cut at 4, less 1.5), 0   then 3.5, 0.5: over 3
     for squares in ([1.0, 1.0], [2.0, 1.2], [9.0, 0.5]):
-        assert not watch.saw(squares)
-    assert watch.saw([2.0, 2.0])
+        assert not watch.observe(squares)
+    assert watch.observe([2.0, 2.0])
     assert watch.alarmed
     assert watch.since == 1  # the sum was last 0 after the first movement
-    assert not watch.saw([9.0, 9.0])  # it has been said
+    assert not watch.observe([9.0, 9.0])  # it has been said
     np.testing.assert_allclose(watch.ratio[0], math.sqrt((1 + 2 + 9 + 2 + 9) / 5))
     watch.reset()
     assert not watch.alarmed
     assert np.isnan(watch.ratio).all()
     assert watch.movements == 5
     for _ in range(2):
-        watch.saw([9.0, 1.0])
+        watch.observe([9.0, 1.0])
     assert watch.alarmed
     assert watch.since == 5
 
@@ -38,9 +38,9 @@ def squares(movements: int, ratio: float, seed: int) -> np.ndarray:
 
 
 def test_an_unchanged_arm_is_seldom_taken_for_another() -> None:
-    watch, alarms = Watch(WatchSettings(), 3), 0
+    watch, alarms = ChangeDetector(WatchSettings(), 3), 0
     for one in squares(20_000, 1.0, 0):
-        if watch.saw(one):
+        if watch.observe(one):
             alarms += 1
             watch.reset()
     assert alarms <= 20
@@ -49,27 +49,27 @@ def test_an_unchanged_arm_is_seldom_taken_for_another() -> None:
 @pytest.mark.parametrize(("ratio", "within"), [(1.3, 150), (1.6, 30), (3.0, 8)])
 def test_the_larger_a_change_the_sooner_it_is_noticed(ratio: float, within: int) -> None:
     for seed in range(5):
-        watch = Watch(WatchSettings(), 3)
+        watch = ChangeDetector(WatchSettings(), 3)
         for one in squares(100, 0.95, seed):
-            watch.saw(one)
+            watch.observe(one)
         assert not watch.alarmed
-        noticed = [watch.saw(one) for one in squares(within, ratio, 50 + seed)]
+        noticed = [watch.observe(one) for one in squares(within, ratio, 50 + seed)]
         assert any(noticed)
         assert 75 <= watch.since <= 100 + noticed.index(True)
 
 
 def test_a_watch_goes_on_from_its_state() -> None:
-    one, other = Watch(WatchSettings(), 3), Watch(WatchSettings(), 3)
+    one, other = ChangeDetector(WatchSettings(), 3), ChangeDetector(WatchSettings(), 3)
     for x in squares(30, 1.2, 1):
-        one.saw(x)
+        one.observe(x)
     other.set_state(one.get_state())
     for x in squares(30, 1.5, 2):
-        assert one.saw(x) == other.saw(x)
+        assert one.observe(x) == other.observe(x)
     assert one.get_state() == other.get_state()
     with pytest.raises(UnusableInput, match="another simulation"):
-        Watch(WatchSettings(), 2).set_state(one.get_state())
+        ChangeDetector(WatchSettings(), 2).set_state(one.get_state())
     with pytest.raises(UnusableInput, match="damaged"):
-        Watch(WatchSettings(), 3).set_state({"movements": "many"})
+        ChangeDetector(WatchSettings(), 3).set_state({"movements": "many"})
 
 
 def test_rewards_are_compared_in_standard_errors() -> None:

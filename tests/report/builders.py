@@ -9,7 +9,8 @@ from pneumarm.arm.counts import Counts
 from pneumarm.arm.guard import Interventions
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control import Adapted, Finding
-from pneumarm.control.found import Found
+from pneumarm.control.condition import Condition
+from pneumarm.learning import CURVES
 from pneumarm.report import (
     CoverageData,
     Demonstration,
@@ -93,13 +94,11 @@ def training(agents=16, evaluations=44, seed=0):
             now = min(800.0, now * 1.1) if performance[a, e] > asked else now * 0.97
     share = (deviation - 60) / 740
     reward = 9.5 - random.exponential(2.5, agents)
+    episodes = np.tile(500.0 * np.arange(1, evaluations + 1), (agents, 1))
+    curves = (episodes, deviation, 0.5 + 0.45 * share, performance, 0.5 - 0.45 * share, 20 - 19 * share)
     return TrainingData(
-        episodes=500.0 * np.arange(1, evaluations + 1),
-        deviation=deviation,
-        criterion=0.5 + 0.45 * share,
-        performance=performance,
-        epsilon=0.5 - 0.45 * share,
-        temperature=20 - 19 * share,
+        curves=np.stack(curves, axis=2),
+        columns=CURVES,
         evaluated=evaluated,
         reward=reward,
         success=np.clip(1 - random.exponential(0.004, agents), 0, 1),
@@ -199,7 +198,7 @@ def found(*findings, late=0, missed=0, link=None, phases=("collecting",)):
     """What was wrong, as a stage's results hold it."""
     counts = Counts(Interventions(pressure=30, late=late, vented=late // 2), missed, link or {})
     marked = {str(replace(one, until=None)): 474 for one in findings}
-    return Found(findings, marked, dict.fromkeys(phases, counts)).results()
+    return Condition(findings, marked, dict.fromkeys(phases, counts)).results()
 
 
 def results():

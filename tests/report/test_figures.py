@@ -50,8 +50,11 @@ def figures_of(n, joints):
         "movement": figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
     }
     if t is not None:
-        curves = (t.episodes, t.deviation, t.criterion, t.performance, t.epsilon, t.temperature)
-        made["shaping"] = figures.shaping_curves(*curves, t.evaluated, t.chosen, spec)
+        made["shaping"] = figures.training_curves(t.curves, t.columns, t.evaluated, t.chosen, spec)
+        learned = t.curves[:, :, [0, 3, 4]]
+        made["learning"] = figures.training_curves(
+            learned, ("episodes", "reward", "success"), t.evaluated, t.chosen, spec
+        )
         made["spread"] = figures.spread_of_agents(t.reward, t.success, t.chosen)
     return made
 

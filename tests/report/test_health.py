@@ -5,7 +5,7 @@ import json
 import builders
 
 from pneumarm.arm import ArmSpec
-from pneumarm.control.found import said
+from pneumarm.control.condition import complaints
 from pneumarm.report import read_run
 from pneumarm.report.health import health, summary_of_health
 
@@ -45,13 +45,13 @@ def test_results_of_older_versions_are_told_as_far_as_they_go():
     section = health({"transfer": {"findings": ["leak: joint 1 (a large leak) since 3.0 s"]}}, None, SPEC)
     assert section.tables[0].rows[0][0] == "leak: joint 1 (a large leak) since 3.0 s"
     assert "was not recorded" in section.text[0]
-    assert said({"findings": ["text"]}, "moving") == []
+    assert complaints({"findings": ["text"]}, "moving") == []
 
 
 def test_commands_tell_what_was_found_and_not_what_any_arm_does():
-    assert said(builders.found(), "collecting") == []
+    assert complaints(builders.found(), "collecting") == []
     results = json.loads(json.dumps(builders.found(builders.FOUND, late=3, missed=2)))
-    assert said(results, "moving") == [
+    assert complaints(results, "moving") == [
         f"found while moving: {builders.FOUND}; 474 rows are marked and nothing is learned from them",
         "guard while moving: 30 x pressure, 3 x late, 1 x vented",
         "late while moving: 2 control periods",

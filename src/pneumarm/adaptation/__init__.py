@@ -1,7 +1,8 @@
 """Adaptation: an agent goes on learning from the arm that it moves."""
 
-from pneumarm.adaptation.adaptation import Adaptation, AdaptationSettings, Event, adaptation, told
+from pneumarm.adaptation.adaptation import Adaptation, AdaptationSettings, adaptation
 from pneumarm.adaptation.change import WatchSettings
+from pneumarm.adaptation.events import Event, sentences
 from pneumarm.adaptation.refit import RefitSettings
 from pneumarm.adaptation.trial import TrialSettings
 
@@ -13,5 +14,5 @@ __all__ = [
     "TrialSettings",
     "WatchSettings",
     "adaptation",
-    "told",
+    "sentences",
 ]

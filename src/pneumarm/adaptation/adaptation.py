@@ -1,9 +1,9 @@
-"""A policy adapts to the arm that it moves: its simulation is fitted anew, and it goes on learning in that.
+"""An agent adapts to the arm that it moves: its simulation is fitted anew, and it goes on learning in that.
 
     after every movement:  does the simulation still predict the arm?         no: the arm has changed, notice when
-                           does the adapted policy earn less than before?     yes: the one before it is put back
+                           does the adapted agent earn less than before?     yes: the one before it is put back
     now and then:          what the arm did since it changed -> the simulation fits it better?
-                           no: all stays as it is.  yes: the policy goes on learning there, and is kept if better
+                           no: all stays as it is.  yes: the agent goes on learning there, and is kept if better
 
 The three questions are answered by :mod:`~pneumarm.adaptation.change`, :mod:`~pneumarm.adaptation.trial` and
 :mod:`~pneumarm.adaptation.refit`. "Now and then" is after few movements at first, and then each time that their
@@ -13,35 +13,33 @@ that is noticed begins this anew.
 
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.adaptation.change import Watch, WatchSettings, error_squares, output_names, standardised_squares
+from pneumarm.adaptation.change import (
+    ChangeDetector,
+    WatchSettings,
+    error_squares,
+    output_names,
+    standardised_squares,
+)
+from pneumarm.adaptation.events import Event, What
+from pneumarm.adaptation.plastic import plastic, with_plastic
 from pneumarm.adaptation.refit import Refit, RefitSettings, refit
 from pneumarm.adaptation.trial import TrialSettings, verdict
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.fleet_settings import PolicySettings
-from pneumarm.learning.methods import AnyAgent
-from pneumarm.learning.policy.agent import PolicyAgent
-from pneumarm.learning.policy.training import PolicyLearner
-from pneumarm.networks import Network
+from pneumarm.learning.agents import Acts, Adapts
 from pneumarm.settings import Settings, Valid
-from pneumarm.simulation.simulation import Simulation
-from pneumarm.task.begin import BeginStates, begin_states
+from pneumarm.task.begin import begin_states
 from pneumarm.transitions.rows import Rows
-
-_LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias")
-_KNOWN = ("error_std", "pressure_range", "further_std", "further_range")
-What = Literal["noticed", "accepted", "refused", "rolled back"]
 
 
 @dataclass(frozen=True)
 class AdaptationSettings(Settings):
-    """How a policy adapts to an arm between movements."""
+    """How an agent adapts to an arm between movements."""
 
     first: int = 10
     """Movements until the first adaptation, on arrival and after a change that was noticed."""
@@ -73,29 +71,14 @@ class AdaptationSettings(Settings):
         }
 
 
-@dataclass(frozen=True)
-class Event:
-    """Something that happened to an adapting agent."""
-
-    what: What
-    movement: int
-    """Movements made on the arm by then, those of tests counted."""
-    version: int
-    """Of the agent after it; 0 is the one that arrived."""
-    figures: Mapping[str, Any]
-    """``noticed``: since (the movement) and ratio; ``accepted``, ``refused``: movements, and the errors before and
-    after over those of the fit; ``rolled back``: the mean rewards before and after, and the version taken back.
-    Ratios are of angle, pressure 1, pressure 2, joint after joint."""
-
-
 class Adaptation:
-    """A policy agent adapting to an arm. It depends on nothing but its arguments and what it is told.
+    """An agent adapting to an arm. It depends on nothing but its arguments and what it is told.
 
-    It is told of every movement by :meth:`saw`. :meth:`learn` makes a new version of the agent, which :meth:`saw` may
-    take back.
+    It is told of every movement by :meth:`observe`. :meth:`learn` makes a new version of the agent, which
+    :meth:`observe` may take back.
     """
 
-    def __init__(self, agent: PolicyAgent, settings: AdaptationSettings, seed: int = 0) -> None:
+    def __init__(self, agent: Adapts, settings: AdaptationSettings, seed: int = 0) -> None:
         self._origin, self._settings, self._seed = agent, settings, seed
         self.agent = agent
         """The agent as it is now."""
@@ -104,7 +87,7 @@ class Adaptation:
         self.versions = 1
         """Versions so far, the one that arrived and those taken back counted."""
         self.events: list[Event] = []
-        self._watch = Watch(settings.watch, len(agent.simulation.outputs))
+        self._watch = ChangeDetector(settings.watch, len(agent.simulation.outputs))
         self._began = 0  # movement since which the arm is as it is now
         self._tried = -1  # movement of the last attempt to learn
         self._trusted, self._trusted_version = agent, 0  # what is put back if the agent is worse
@@ -133,7 +116,7 @@ class Adaptation:
         """Error of the simulation in the last movements over that of its fit, shape (outputs,)."""
         return self._watch.ratio
 
-    def saw(self, rows: Rows, reward: float, *, judges: bool = True, sound: bool = True) -> list[list[float]]:
+    def observe(self, rows: Rows, reward: float, *, judges: bool = True, sound: bool = True) -> list[list[float]]:
         """Take notice of a movement: its ``rows`` and its ``reward``; with ``judges`` an agent may be taken back.
 
         A movement that is not ``sound``, of an arm with a fault, is counted and nothing else: it tells neither how
@@ -147,7 +130,7 @@ class Adaptation:
         if not sound:
             self._watch.skip()
             return [arrived.tolist(), now.tolist()]
-        if self._watch.saw(now):
+        if self._watch.observe(now):
             self._notice()
         if self.version == self._trusted_version:
             self._old = [*self._old, reward][-self._settings.trial.remembered :]
@@ -159,7 +142,7 @@ class Adaptation:
 
     def _notice(self) -> None:
         since = self._watch.since
-        self._tell("noticed", since=since, ratio=self.ratio.tolist())
+        self._add("noticed", since=since, ratio=self.ratio.tolist())
         if since > self._began + self._settings.trial.fewest:
             # Rewards on the arm as it was say nothing about agents on the arm as it is.
             self._began = since
@@ -174,7 +157,7 @@ class Adaptation:
             self.agent, self.version, self._new = self._trusted, self._trusted_version, []
             self._watch.reset()
             self._tried = self.movements
-            self._tell("rolled back", taken_back=worse, reward_before=means[0], reward_after=means[1])
+            self._add("rolled back", taken_back=worse, reward_before=means[0], reward_after=means[1])
 
     def _trust(self) -> None:
         """Count the agent as proven."""
@@ -202,15 +185,17 @@ class Adaptation:
         if found.better:
             simulation = found.simulation
             begin = begin_states(rows, simulation.window, simulation.scaling)
-            policy = adapted_policy(self.agent, simulation, begin, self._settings, self._seed + self.movements)
-            self.agent = replace(self.agent, simulation=simulation, policy=policy)
+            tuned = self._settings
+            self.agent = self.agent.adapted(
+                simulation, begin, tuned.updates, tuned.warm_up, tuned.learning_rate, self._seed + self.movements
+            )
             self.version, self.versions = self.versions, self.versions + 1
             self._new = []
             self._watch.reset()
-        self._tell("accepted" if found.better else "refused", **self._told(found))
+        self._add("accepted" if found.better else "refused", **self._figures(found))
         return found.better
 
-    def _told(self, found: Refit) -> dict[str, Any]:
+    def _figures(self, found: Refit) -> dict[str, Any]:
         unit = np.sqrt(error_squares(self._origin.simulation))
         return {
             "movements": found.movements,
@@ -218,7 +203,7 @@ class Adaptation:
             "after": (found.after / unit).tolist(),
         }
 
-    def _tell(self, what: What, **figures: Any) -> None:
+    def _add(self, what: What, **figures: Any) -> None:
         self.events.append(Event(what, self.movements, self.version, figures))
 
     def get_state(self) -> bytes:
@@ -235,10 +220,8 @@ class Adaptation:
             "watch": self._watch.get_state(),
         }
         text = json.dumps(head).encode()
-        arrays = [part for agent in (self.agent, self._trusted) for part in _plastic(agent)]
-        return b"".join(
-            [np.int64(len(text)).tobytes(), text, *(part.astype(np.float64).tobytes() for part in arrays)]
-        )
+        numbers = [plastic(agent).tobytes() for agent in (self.agent, self._trusted)]
+        return b"".join([np.int64(len(text)).tobytes(), text, *numbers])
 
     def set_state(self, state: bytes) -> None:
         """Take up a state of :meth:`get_state`, bit for bit.
@@ -261,98 +244,18 @@ class Adaptation:
             raise UnusableInput(
                 f"the state of the adaptation is damaged or of another agent ({error}); begin another folder"
             ) from error
-        size = sum(part.size for part in _plastic(self._origin))
+        size = plastic(self._origin).size
         if numbers.size != 2 * size or not np.isfinite(numbers).all():
             raise UnusableInput("the state of the adaptation is damaged or of another agent; begin another folder")
-        self.agent, self._trusted = (_with_plastic(self._origin, part) for part in np.split(numbers, 2))
+        self.agent, self._trusted = (with_plastic(self._origin, part) for part in np.split(numbers, 2))
 
 
-def _plastic(agent: PolicyAgent) -> list[NDArray[np.floating]]:
-    """Return all arrays that an adaptation changes."""
-    simulation = agent.simulation
-    layers = [getattr(network, name) for network in simulation.networks for name in _LAYERS]
-    return [agent.policy, *(getattr(simulation, name) for name in _KNOWN), *layers]
+def adaptation(agent: Acts, settings: AdaptationSettings, seed: int = 0) -> Adaptation | None:
+    """Return how ``agent`` adapts to an arm between movements; None for agents that do not.
 
-
-def _with_plastic(agent: PolicyAgent, numbers: NDArray[np.float64]) -> PolicyAgent:
-    """Return ``agent`` with other :func:`_plastic` arrays, one after the other in ``numbers``."""
-    parts = _plastic(agent)
-    ends = np.cumsum([part.size for part in parts])
-    taken = [numbers[e - p.size : e].reshape(p.shape).copy() for e, p in zip(ends, parts, strict=True)]
-    policy, known, layers = taken[0], taken[1 : 1 + len(_KNOWN)], taken[1 + len(_KNOWN) :]
-    size = len(_LAYERS)
-    networks = tuple(Network(*layers[i : i + size]) for i in range(0, len(layers), size))
-    changed: dict[str, Any] = dict(zip(_KNOWN, known, strict=True))
-    simulation = replace(agent.simulation, networks=networks, **changed)
-    return replace(agent, simulation=simulation, policy=policy.astype(np.float32))
-
-
-def can_adapt(agent: PolicyAgent) -> bool:
-    """Whether the simulation of ``agent`` can be fitted further: a linear one, without hidden units, cannot."""
-    return all(network.direct is None for network in agent.simulation.networks)
-
-
-def adapted_policy(
-    agent: PolicyAgent, simulation: Simulation, begin: BeginStates, settings: AdaptationSettings, seed: int
-) -> NDArray[np.float32]:
-    """Return the weights of ``agent`` after learning in ``simulation``, or as they were where those are better."""
-    updates = settings.warm_up + settings.updates
-    tuned = replace(agent.settings, updates=updates, learning_rate=settings.learning_rate)
-    learner = _Tuner(simulation, begin, tuned, seed, settings.warm_up)
-    learner.policy.flat[:] = agent.policy
-    before = learner.validate(agent.settings.validation_episodes).reward.mean()
-    learner.learn(updates)
-    after = learner.validate(agent.settings.validation_episodes).reward.mean()
-    return learner.policy.flat if after > before else agent.policy
-
-
-class _Tuner(PolicyLearner):
-    """A policy that is kept as it is until the values of states are known."""
-
-    def __init__(
-        self, simulation: Simulation, begin: BeginStates, settings: PolicySettings, seed: int, warm_up: int
-    ) -> None:
-        super().__init__(simulation, begin, settings, seed, 0)
-        self._warm_up = warm_up
-
-    def rates(self) -> tuple[float, float]:
-        """Return the learning rates of policy and values."""
-        done, updates = int(self.counts[0]), self._settings.updates
-        left = 1 - max(done - self._warm_up, 0) / (updates - self._warm_up)
-        return (self._settings.learning_rate * left if done >= self._warm_up else 0.0), _VALUE_RATE * left
-
-
-_VALUE_RATE = 4e-3  # of a policy's training, whose values begin at random, too
-
-
-def told(events: Sequence[Event], quantities: Sequence[str]) -> list[str]:
-    """Return the ``events`` that matter to people as sentences; attempts that changed nothing are left out."""
-    lines = []
-    for event in events:
-        found = event.figures
-        if event.what == "noticed":
-            ratio = np.array(found["ratio"])
-            worst = int(ratio.argmax())
-            lines.append(
-                f"the arm has changed: noticed after movement {event.movement}, since about movement "
-                f"{found['since'] + 1} (error of {quantities[worst].replace('_', ' ')} {ratio[worst]:.1f} times that "
-                "of the fit)"
-            )
-        elif event.what == "accepted":
-            before, after = (float(np.exp(np.log(found[name]).mean())) for name in ("before", "after"))
-            lines.append(
-                f"version {event.version} after movement {event.movement}: fitted to {found['movements']} movements, "
-                f"error {before:.2f} -> {after:.2f} times that of the fit"
-            )
-        elif event.what == "rolled back":
-            lines.append(
-                f"version {found['taken_back']} taken back after movement {event.movement}: reward "
-                f"{found['reward_before']:.1f} -> {found['reward_after']:.1f}; again version {event.version}"
-            )
-    return lines
-
-
-def adaptation(agent: AnyAgent, settings: AdaptationSettings, seed: int = 0) -> Adaptation | None:
-    """Return how ``agent`` adapts to an arm between movements; None for kinds that do not, or learn while moving."""
-    adapts = isinstance(agent, PolicyAgent) and settings.every > 0 and can_adapt(agent)
-    return Adaptation(agent, settings, seed) if isinstance(agent, PolicyAgent) and adapts else None
+    A linear simulation, without hidden units, cannot be fitted further.
+    """
+    if settings.every == 0 or not isinstance(agent, Adapts):
+        return None
+    linear = any(network.direct is not None for network in agent.simulation.networks)
+    return None if linear else Adaptation(agent, settings, seed)

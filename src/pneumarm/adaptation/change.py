@@ -49,7 +49,7 @@ class WatchSettings(Settings):
         }
 
 
-class Watch:
+class ChangeDetector:
     """Cumulative sums of a simulation's errors, one for each of its outputs."""
 
     def __init__(self, settings: WatchSettings, outputs: int) -> None:
@@ -65,7 +65,7 @@ class Watch:
         self._began = np.zeros(outputs, np.int64)
         self._recent: list[list[float]] = []
 
-    def saw(self, squares: ArrayLike) -> bool:
+    def observe(self, squares: ArrayLike) -> bool:
         """Count a movement with the mean standardised ``squares`` (outputs,); whether a change is noticed now."""
         x = np.asarray(squares, np.float64)
         self._recent = [*self._recent, x.tolist()][-self._settings.window :]
@@ -122,9 +122,9 @@ class Watch:
             self._began = np.array(state["began"], np.int64)
             self._recent = [[float(x) for x in one] for one in state["recent"]]
         except (KeyError, TypeError, ValueError) as error:
-            raise UnusableInput(f"the state of the watch is damaged ({error}); begin another folder") from error
+            raise UnusableInput(f"the state of the detector is damaged ({error}); begin another folder") from error
         if self._sums.shape != (self._outputs,) or self._began.shape != (self._outputs,):
-            raise UnusableInput("the state of the watch is of another simulation; begin another folder")
+            raise UnusableInput("the state of the detector is of another simulation; begin another folder")
 
 
 def standardised_squares(simulation: Simulation, rows: Rows) -> NDArray[np.float64]:

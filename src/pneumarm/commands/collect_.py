@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import ArmSpec, open_arm
-from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.common import Json, OwnMethod, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import Monitor, open_controller
-from pneumarm.control.found import LINK, collected_results, said
+from pneumarm.control.condition import LINK, collected_results, complaints
 from pneumarm.transitions import CollectResult, CollectSettings, Store, collect, require_enough
 
 
@@ -19,6 +19,7 @@ def collect_(
     transitions: int = 200_000,
     seed: int = 0,
     controller: str = "random",
+    method: OwnMethod = None,
     settings: Annotated[CollectSettings, Settings] = CollectSettings(),
     json: Json = False,
 ) -> None:
@@ -36,13 +37,15 @@ def collect_(
         Seed of the random begin states and actions, and of a virtual arm's noise.
     controller
         What acts: random, keyboard, a CSV file of valves, or an agent (thesis section 3.2.2).
+    method
+        The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     json
         Print one JSON object on stdout and nothing else there.
     """
     require_enough(transitions)
     with (
         open_arm(arm, seed) as opened,
-        open_controller(controller, opened) as player,
+        open_controller(controller, opened, method) as player,
         Store.for_arm(db, opened.spec) as store,
         progress("collecting") as report,
     ):
@@ -51,7 +54,7 @@ def collect_(
             opened, store, transitions, seed, progress=report, settings=settings, controller=player, watch=watch
         )
     results = collected_results(result, watch)
-    for line in said(results, "collecting"):
+    for line in complaints(results, "collecting"):
         say(line)
     show(results, json, lambda: [table(("collected", ""), _rows(result, opened.spec))])
 

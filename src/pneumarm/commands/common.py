@@ -8,5 +8,7 @@ Json = Annotated[bool, Parameter(name="--json", negative="")]
 """The flag that every command has: print one JSON object on stdout and nothing else there."""
 Settings = Parameter(name="*")
 """Marks a dataclass of settings whose fields become options."""
+OwnMethod = Annotated[str | None, Parameter(name="--method")]
+"""The option of commands that open an agent: MODULE:NAME of the method that trained it, whose code may run."""
 COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
 """Figures of movements that tables show."""

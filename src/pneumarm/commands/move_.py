@@ -5,7 +5,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.common import Json, OwnMethod, Settings
 from pneumarm.commands.goals import read_goals
 from pneumarm.console import live, say, show, table
 from pneumarm.control.named import open_tracking
@@ -19,6 +19,7 @@ def move_(
     *goals: Annotated[str, Parameter(allow_leading_hyphen=True)],
     arm: str,
     seed: int = 0,
+    method: OwnMethod = None,
     settings: Annotated[MoveSettings, Settings] = MoveSettings(),
     json: Json = False,
 ) -> None:
@@ -37,11 +38,13 @@ def move_(
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
         Of a virtual arm's noise.
+    method
+        The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     json
         Print one JSON object on stdout and nothing else there.
     """
     with open_arm(arm, seed) as opened:
-        mover, spec, goal_range = open_tracking(controller, opened, settings.tolerance)
+        mover, spec, goal_range = open_tracking(controller, opened, settings.tolerance, method=method)
         wanted = read_goals(goals, spec, goal_range)
         made: list[Moved] = []
         with live(spec) as seen:

@@ -6,7 +6,7 @@ from typing import Annotated
 from pneumarm.commands.common import COLUMNS, Json, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
-from pneumarm.control.found import said
+from pneumarm.control.condition import complaints
 from pneumarm.run import Run, RunSettings
 
 
@@ -37,7 +37,7 @@ def run_(
     show(results, json, lambda: [table(("", *COLUMNS), rows, title="Ledger")])
     say_history(out)
     for stage, doing in (("collect", "collecting"), ("transfer", "moving")):
-        for line in said(results[stage], doing):
+        for line in complaints(results[stage], doing):
             say(line)
     seconds = sum(results["wall_seconds"].values())
     say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory")

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pneumarm.commands.common import COLUMNS, Json
+from pneumarm.commands.common import COLUMNS, Json, OwnMethod
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
 from pneumarm.learning import LOOKING_AHEAD, results_with_lookahead, test_ahead
@@ -12,7 +12,17 @@ from pneumarm.task import begin_states
 from pneumarm.transitions import Store
 
 
-def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: int = 0, json: Json = False) -> None:
+def test_(
+    agent: Path,
+    sim: Path,
+    db: Path,
+    /,
+    *,
+    episodes: int = 10_000,
+    seed: int = 0,
+    method: OwnMethod = None,
+    json: Json = False,
+) -> None:
     """Test an agent in a simulation: greedy, not learning, from all begin states to all goals.
 
     An agent that looks ahead on an arm is tested without lookahead, and then with it on the first 500 movements
@@ -30,10 +40,12 @@ def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: 
         How many movements (thesis section 5.2: 10,000).
     seed
         Of the begin states, the goals and the noise.
+    method
+        The method that trained it, MODULE:NAME, if that is one of your own that is not installed.
     json
         Print one JSON object on stdout and nothing else there.
     """
-    trained, simulation = open_agent(agent), Simulation.load(sim)
+    trained, simulation = open_agent(agent, method), Simulation.load(sim)
     with Store.open(db) as store:
         begin = begin_states(store, simulation.window, simulation.scaling)
     tested = test_agent(trained, simulation, begin, episodes, seed)

@@ -1,7 +1,7 @@
 """``pneumarm track``."""
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import Json
+from pneumarm.commands.common import Json, OwnMethod
 from pneumarm.console import live, show, table
 from pneumarm.control.named import open_tracking
 from pneumarm.moving import check_seconds, track
@@ -19,6 +19,7 @@ def track_(
     seconds: float | None = None,
     unforeseen: bool = False,
     seed: int = 0,
+    method: OwnMethod = None,
     json: Json = False,
 ) -> None:
     """Have an arm follow a reference. It first moves to where the reference begins.
@@ -38,11 +39,13 @@ def track_(
         The controller must not look at the reference's future, as if a person gave it by hand.
     seed
         Of a virtual arm's noise.
+    method
+        The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     json
         Print one JSON object on stdout and nothing else there.
     """
     with open_arm(arm, seed) as opened:
-        mover, spec, goal_range = open_tracking(controller, opened)
+        mover, spec, goal_range = open_tracking(controller, opened, method=method)
         wanted = parse_reference(reference, spec, known_ahead=not unforeseen)
         lasting = seconds if seconds is not None else wanted.duration or _SECONDS
         check_seconds(lasting)

@@ -1,11 +1,12 @@
 """``pneumarm train``."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pneumarm.commands.common import COLUMNS, Json, Settings
 from pneumarm.console import progress, show, table
+from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder
 from pneumarm.learning import LearnSettings, train
 from pneumarm.simulation import Simulation
@@ -42,17 +43,36 @@ def train_(
         Print one JSON object on stdout and nothing else there.
     """
     require_folder(out)
-    chosen = settings.chosen if agents is None else replace(settings.chosen, agents=agents)
+    chosen = settings.chosen if agents is None else with_agents(settings.chosen, agents)
     simulation = Simulation.load(sim)
     with Store.open(db) as store:
         begin = begin_states(store, simulation.window, simulation.scaling)
     with progress("training") as report:
-        training = train(simulation, begin, chosen, seed, progress=lambda now: report(round(1000 * now.share), 1000))
+        training = train(
+            simulation,
+            begin,
+            chosen,
+            seed,
+            method=settings.found,
+            progress=lambda now: report(round(1000 * now.share), 1000),
+        )
     training.agent.save(out)
     result = training.results()
     figures = [(name, value) for name, value in result.items() if name != _EACH]
     each = [(i + 1, *(one[column] for column in COLUMNS)) for i, one in enumerate(result[_EACH])]
     show(result, json, lambda: [table(("trained", ""), figures), table(("agent, validated", *COLUMNS), each)])
+
+
+def with_agents(settings: Any, agents: int) -> Any:
+    """Return the ``settings`` of a method for so many ``agents``.
+
+    Raises:
+        UnusableInput: the method has no such setting.
+
+    """
+    if "agents" not in {one.name for one in fields(settings)}:
+        raise UnusableInput("this method does not train several agents: leave --agents out")
+    return replace(settings, agents=agents)
 
 
 _EACH = "validation"  # figures of every agent, in the results

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import COLUMNS, Json, Settings
+from pneumarm.commands.common import COLUMNS, Json, OwnMethod, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
-from pneumarm.control.found import said
+from pneumarm.control.condition import complaints
 
 
 def transfer_(
@@ -18,6 +18,7 @@ def transfer_(
     arm: str,
     seed: int = 0,
     out: Path = Path("pneumarm-transfer"),
+    method: OwnMethod = None,
     settings: Annotated[TransferSettings, Settings] = TransferSettings(),
     json: Json = False,
 ) -> None:
@@ -33,14 +34,16 @@ def transfer_(
         Of the begin states, the goals and the exploration, and of a virtual arm's noise.
     out
         Folder for episodes.csv, the store of all movements and the adapted agent; created if it does not exist.
+    method
+        The method that trained it, MODULE:NAME, if that is one of your own that is not installed.
     json
         Print one JSON object on stdout and nothing else there.
     """
-    trained = open_agent(agent)
+    trained = open_agent(agent, method)
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
         result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
     say_history(out)
-    for line in said(result, "moving"):
+    for line in complaints(result, "moving"):
         say(line)
     say(f"adapted agent: {out / 'adapted.safetensors'}")
     show(

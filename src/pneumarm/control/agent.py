@@ -6,21 +6,23 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.arm.valves import Command, to_valves
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Actor, AnyAgent
+from pneumarm.learning import Acts, LearningActor
 from pneumarm.task import StateTracker
+from pneumarm.task.acting import Acting
 from pneumarm.transitions.watch import made_up_readings
 
 
 class AgentController:
-    """Maps readings to valves with an agent of any kind; learns if its actor does.
+    """Maps readings to valves with an agent of any kind; learns if its ``actor`` does, by default the agent's own.
 
     ``reset(goal)`` begins a movement with the arm at rest and its valves closed; then every ``act(reading)`` gives
-    the valves to set, one control period after the other. An actor is told what came of it by ``observe``.
+    the valves to set, one control period after the other. ``observe`` says what came of it: the valves as applied.
     """
 
-    def __init__(self, agent: AnyAgent, actor: Actor | None = None) -> None:
+    def __init__(self, agent: Acts, actor: Acting | None = None) -> None:
         self.agent = agent
         self.actor = agent.actor() if actor is None else actor
+        self._learner = self.actor if isinstance(self.actor, LearningActor) else None
         self._tracker = StateTracker(agent.window, agent.scaling)
         self._goal: NDArray[np.float64] | None = None
         self._seen: float | None = None
@@ -51,20 +53,22 @@ class AgentController:
         return valves
 
     def observe(self, reading: Reading, applied: Command, reward: NDArray[np.float64], terminal: bool) -> None:
-        """Learn from ``reading``, to which the valves as ``applied`` led with ``reward`` (joints,)."""
+        """Go on with ``reading``, to which the valves as ``applied`` led with ``reward`` (joints,); learn from it."""
         self._tracker.commanded(applied)
         state = self._tracker.reading(reading)
-        self.actor.observe(reward, state, terminal)
+        if self._learner is None:
+            self.actor.follow(state)
+        else:
+            self._learner.observe(reward, state, terminal)
         self._seen = reading.time
 
 
-def warm_up(agent: AnyAgent, learning_rate: float = 0.0, explores: bool = False) -> None:
-    """Have a controller of ``agent`` of its own make some turns with made-up readings, and learn from them.
+def warm_up(agent: Acts, actor: Acting | None = None) -> None:
+    """Have a controller of ``agent`` of its own make some turns with made-up readings; an ``actor`` learns from them.
 
     The first turns of a kind of agent compile or load its kernels, for up to seconds; an arm that moves would have
     been vented by its dead-man by then.
     """
-    actor = agent.actor(learning_rate, explores=explores)
     controller = AgentController(agent, actor)
     controller.reset(agent.goal_range.mean(axis=1))
     first, *others = made_up_readings(agent.spec)

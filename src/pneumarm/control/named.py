@@ -12,6 +12,7 @@ from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
+from pneumarm.learning import Tracks
 from pneumarm.moving import Holding, at_period
 from pneumarm.planning.agent import PlanAgent
 
@@ -19,7 +20,7 @@ _PLAN = "plan:"
 
 
 def open_tracking(
-    name: str, arm: Arm, tolerance: float = 1.0
+    name: str, arm: Arm, tolerance: float = 1.0, method: str | None = None
 ) -> tuple[TrackingController, ArmSpec, NDArray[np.float64]]:
     """Return the controller called ``name`` for ``arm``, the arm's spec, and the goals (joints, 2) [counts] it knows.
 
@@ -30,6 +31,7 @@ def open_tracking(
         name: of the controller.
         arm: as it was opened.
         tolerance: within which a controller that only reaches goals is made to hold them [degrees].
+        method: of one's own that trained the agent, MODULE:NAME, if it is not installed.
 
     Raises:
         UnusableInput: there is no such controller, or it is for another arm.
@@ -46,10 +48,9 @@ def open_tracking(
         tuned.check_fit(arm)
         at_period(arm, tuned.spec.period)
         return tuned.controller(), arm.spec, tuned.goal_range
-    agent = PlanAgent.load(path) if name.startswith(_PLAN) else open_agent(path)
+    agent = PlanAgent.load(path) if name.startswith(_PLAN) else open_agent(path, method)
     check_fit(agent, arm)
+    if isinstance(agent, Tracks):
+        return agent.controller(), arm.spec, agent.goal_range
     warm_up(agent)
-    controller = AgentController(agent)
-    if isinstance(controller, TrackingController):
-        return controller, arm.spec, agent.goal_range
-    return Holding(controller, arm.spec, agent.goal_range, tolerance), arm.spec, agent.goal_range
+    return Holding(AgentController(agent), arm.spec, agent.goal_range, tolerance), arm.spec, agent.goal_range

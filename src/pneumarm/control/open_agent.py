@@ -3,16 +3,20 @@
 from pathlib import Path
 
 from pneumarm.files import kind_of
-from pneumarm.learning import AnyAgent, load_agent
+from pneumarm.learning import AnyAgent, find_method, load_agent
 from pneumarm.planning.agent import PlanAgent
 from pneumarm.simulation.simulation import KIND as SIMULATION
 
 
-def open_agent(path: Path) -> AnyAgent:
+def open_agent(path: Path, method: str | None = None) -> AnyAgent:
     """Return the agent in ``path``; the file of a simulation gives one that plans in it.
 
+    ``method`` is a method of one's own, MODULE:NAME, whose agents may be read; see :mod:`pneumarm.learning.methods`.
+
     Raises:
-        UnusableInput: ``path`` is neither, is damaged, or does not fit together.
+        UnusableInput: ``path`` is neither, is damaged, or does not fit together; or there is no such method.
 
     """
+    if method is not None:
+        find_method(method)  # which imports it
     return PlanAgent.load(path) if kind_of(path) == SIMULATION else load_agent(path)

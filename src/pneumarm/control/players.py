@@ -16,11 +16,12 @@ from pneumarm.transitions import Keyboard, Trajectory
 
 
 @contextmanager
-def open_controller(name: str, arm: Arm) -> Iterator[Controller | None]:
+def open_controller(name: str, arm: Arm, method: str | None = None) -> Iterator[Controller | None]:
     """Give the controller called ``name`` for ``arm`` (thesis section 3.2.2 names all of these).
 
     ``random`` is None, random actions; ``keyboard`` a person at the terminal; a CSV file predefined trajectories, a
-    column a muscle of -1, 0, +1 and a row a control period; any other file an agent, to be improved.
+    column a muscle of -1, 0, +1 and a row a control period; any other file an agent, to be improved, which a
+    ``method`` of one's own may have trained.
 
     Raises:
         UnusableInput: there is no such controller, or it is for another arm.
@@ -34,7 +35,7 @@ def open_controller(name: str, arm: Arm) -> Iterator[Controller | None]:
     elif name.endswith(".csv"):
         yield read_trajectory(Path(name), arm.spec.joints)
     else:
-        agent = open_agent(Path(name))
+        agent = open_agent(Path(name), method)
         check_fit(agent, arm)
         warm_up(agent)
         yield AgentController(agent)

@@ -27,7 +27,7 @@ from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import begin_acting, learn_and_act
 from pneumarm.learning.online.loop import Schedule, Workspace, workspace_of
 from pneumarm.learning.online.settings import Exploration
-from pneumarm.learning.online.values import Learner, learner
+from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state, uniform
 from pneumarm.simulation.kernel import Places, places
 from pneumarm.task.begin import BeginParameters, draw_interval
@@ -66,7 +66,7 @@ class _Watched(NamedTuple):
 class _Mind(NamedTuple):
     """The agent acting and learning."""
 
-    learner: Learner
+    learner: ActionValues
     x: NDArray[np.float32]
     sigma: NDArray[np.float32]
     """State window, shape (state_size,) [scaled]."""

@@ -14,13 +14,13 @@ from pneumarm.adaptation import AdaptationSettings, adaptation
 from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
 from pneumarm.arm.counts import Counts
 from pneumarm.control.agent import AgentController, warm_up
-from pneumarm.control.found import Found
+from pneumarm.control.condition import Condition
 from pneumarm.control.monitor import Monitor
 from pneumarm.control.movement import MOVEMENT, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
-from pneumarm.learning import AnyAgent, fingerprint
+from pneumarm.learning import AnyAgent, LearningActor, Learns, SimulationAgent, fingerprint
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import Store
@@ -71,13 +71,6 @@ class TransferSettings(Settings):
         return self.episodes if phase == "learning" else self.test_episodes
 
 
-def begin_and_goal(
-    agent: AnyAgent, seed: int, test: bool, number: int
-) -> tuple[np.random.Generator, NDArray[np.float64]]:
-    """Return the random numbers of movement ``number`` of ``agent`` and its goal."""
-    return draw_movement(agent.goal_range, seed, test, number)
-
-
 def draw_movement(
     goal_range: NDArray[np.float64], seed: int, test: bool, number: int
 ) -> tuple[np.random.Generator, NDArray[np.float64]]:
@@ -101,7 +94,7 @@ class Transferred:
     learning_rate: float
     adapted: Adapted | None = None
     """How a policy adapted; None for an agent that does not, or learns while it moves."""
-    found: Found = field(default_factory=Found)
+    condition: Condition = field(default_factory=Condition)
     """What the monitor found wrong with the arm, and what guard, control cycle and link counted in each phase."""
 
     @property
@@ -117,7 +110,7 @@ class Transferred:
             "episodes": self.movements["learning"].n,
             "learning_rate": self.learning_rate,
             "adaptations": self.adaptations,
-            **self.found.results(),
+            **self.condition.results(),
             **({} if self.adapted is None else self._adapted(self.adapted)),
         }
 
@@ -157,147 +150,212 @@ def transfer(
         ArmFailure: the arm failed; the movements up to then are stored.
 
     """
-    check_fit(agent, arm)
-    number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": fingerprint(agent)})
-    done = [dict(entry.info) for entry in _movements(store, number)]
-    squares = [info[_SQUARES] for info in done if _SQUARES in info]
-    arm_state = store.state("arm")
-    if arm_state is not None and arm.get_state() is not None:
-        arm.set_state(arm_state)
-    rate = settings.learning_rate if agent.learns else 0.0
-    learner = agent.actor(rate, explores=agent.learns, seed=seed)
-    mean = _Mean(agent)
-    adapting = adaptation(agent, settings.adaptation, seed)
-    adapts = settings.learning_rate > 0
-    if done:
-        learner.set_state(store.state("learner") or learner.get_state())
-        mean.set_state(store.state("mean") or mean.get_state())
-        if adapting is not None:
-            adapting.set_state(store.state("adaptation") or adapting.get_state())
-    elif keep_version is not None and adapting is not None:
-        keep_version(0, agent)
-    task = agent.settings
-    total = sum(settings.movements(phase) for phase in PHASES)
-    cycle = ControlCycle(guarded(arm), settings.close_while_computing)
-    waiting: list[Recorded] = []
-    broken: list[Recorded] = []
-    watch = watch or Monitor(arm.spec, getattr(agent, "simulation", None))  # not every kind of agent keeps one
-    if adapting is not None:
-        watch.judge_by(adapting.agent.simulation)
-    warm_up_watch(watch, arm.spec)
-    warm_up(agent)
-    if agent.learns:
-        warm_up(agent, rate, explores=True)
-    if done and (seen := store.state("watch")) is not None:
-        watch.set_state(seen)
-    counted = {phase: Counts.of(saved) for phase, saved in json.loads(store.state(_COUNTS) or b"{}").items()}
-    until = Counts.now(cycle)
+    return Transfer(agent, arm, store, settings, seed, keep_version, watch).run(progress)
 
-    def count(phase: Phase) -> None:
-        """Count what happened in ``phase`` since it was last counted."""
-        nonlocal until
-        before, until = until, Counts.now(cycle)
-        counted[phase] = counted.get(phase, Counts()) + (until - before)
 
-    def keep() -> None:
-        state = {"learner": learner.get_state(), "mean": mean.get_state(), "arm": arm.get_state()}
-        state["watch"] = watch.get_state()
-        state[_COUNTS] = json.dumps({phase: counts.as_dict() for phase, counts in counted.items()}).encode()
-        keep_watch(store, watch, number)
-        if adapting is not None:
-            state["adaptation"] = adapting.get_state()
-        recorded = [replace(one, marks=(*watch.marks(one), *one.marks)) for one in waiting]
-        store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
-        waiting.clear()
+class Transfer:
+    """A transfer, see :func:`transfer`; where the store holds the begin of it, it goes on from there."""
 
-    def keep_rest() -> None:
-        """Keep what waits, and nothing twice: a signal may have come between keeping and forgetting it."""
-        kept = max(len(waiting) - (len(done) - len(_movements(store, number))), 0)
-        waiting[:] = [*waiting[kept:], *broken]
-        if waiting:
-            keep()
+    def __init__(
+        self,
+        agent: AnyAgent,
+        arm: Arm,
+        store: Store,
+        settings: TransferSettings,
+        seed: int = 0,
+        keep_version: Callable[[int, AnyAgent], None] | None = None,
+        watch: Monitor | None = None,
+    ) -> None:
+        check_fit(agent, arm)
+        self._arrived, self._arm, self._store, self._settings, self._seed = agent, arm, store, settings, seed
+        self._keep_version = keep_version or (lambda version, agent: None)
+        self._number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": fingerprint(agent)})
+        self._done = [dict(entry.info) for entry in self._stored()]
+        """What is stored beside each movement: its phase, its figures, and the errors of simulations in it."""
+        self._adapting = adaptation(agent, settings.adaptation, seed)
+        self._learning: _Learning | None = None
+        if isinstance(agent, Learns) and self._adapting is None:
+            self._learning = _Learning(agent, settings.learning_rate, seed)
+        self._watch = watch or Monitor(arm.spec, agent.simulation if isinstance(agent, SimulationAgent) else None)
+        self._waiting: list[Recorded] = []
+        self._broken: list[Recorded] = []
+        self._resume()
+        self._cycle = ControlCycle(guarded(arm), settings.close_while_computing)
+        self._warm_up()
+        self._counted = {
+            phase: Counts.of(saved) for phase, saved in json.loads(store.state(_COUNTS) or b"{}").items()
+        }
+        self._until = Counts.now(self._cycle)
 
-    def note(phase: Phase, movement: Movement) -> None:
+    def _stored(self) -> list[SequenceEntry]:
+        """Return the movements that were finished, in order."""
+        return [entry for entry in self._store.catalogue(self._number) if entry.kind == MOVEMENT]
+
+    def _state(self, name: str) -> bytes | None:
+        """Return what was kept under ``name``, if the transfer goes on."""
+        return self._store.state(name) if self._done else None
+
+    def _resume(self) -> None:
+        """Put arm and agent where they were."""
+        arm_state = self._store.state("arm")
+        if arm_state is not None and self._arm.get_state() is not None:
+            self._arm.set_state(arm_state)
+        if self._learning is not None and self._done:
+            self._learning.set_states(self._store)
+        if self._adapting is not None:
+            if (state := self._state("adaptation")) is not None:
+                self._adapting.set_state(state)
+            if not self._done:
+                self._keep_version(0, self._arrived)
+
+    def _warm_up(self) -> None:
+        """Have everything compiled before the arm moves, and put the monitor where it was."""
+        self._judge()
+        warm_up_watch(self._watch, self._arm.spec)
+        warm_up(self._arrived)
+        if self._learning is not None:
+            warm_up(self._arrived, self._learning.another())
+        if (seen := self._state("watch")) is not None:
+            self._watch.set_state(seen)
+
+    def _judge(self) -> None:
+        """Let the monitor judge by the simulation of the agent as it is."""
+        if self._adapting is not None:
+            self._watch.judge_by(self._adapting.agent.simulation)
+
+    @property
+    def agent(self) -> AnyAgent:
+        """The agent as it is now."""
+        if self._adapting is not None:
+            return self._adapting.agent
+        return self._arrived if self._learning is None else self._learning.agent
+
+    def run(self, progress: Callable[[float, float], None] | None = None) -> Transferred:
+        """Make all movements that are not made yet; return what came of the transfer.
+
+        Raises:
+            ArmFailure: the arm failed; the movements up to then are stored.
+
+        """
+        phase: Phase = PHASES[0]
+        try:
+            for phase in PHASES:
+                self._make(phase, progress or (lambda done, total: None))
+        except BaseException as error:
+            if self._arm.get_state() is None:  # no arm can make these movements again
+                with suppress(Exception):  # the first failure is the one to tell of
+                    self._count(phase)
+                    self._keep_rest()
+            if isinstance(error, PneumarmError) or not isinstance(error, Exception):
+                raise
+            raise ArmFailure(
+                f"{self._arm.spec.name}: failed in movement {len(self._done) + 1} ({type(error).__name__}: {error}); "
+                "see to the arm and run the same command again"
+            ) from error
+        return self._result()
+
+    def _make(self, phase: Phase, progress: Callable[[float, float], None]) -> None:
+        """Make the movements of ``phase`` that are not made yet."""
+        settings, learns = self._settings, phase == "learning"
+        movements, total = settings.movements(phase), sum(settings.movements(each) for each in PHASES)
+        made = sum(info[_PHASE] == phase for info in self._done)
+        if phase == "after" and settings.episodes > 0 and made == 0:
+            self._adapt()
+        controller = self._controller(phase)
+        for number in range(made, movements):
+            if learns:
+                self._adapt()
+            if self._adapting is not None and controller.agent is not self._adapting.agent:
+                controller = self._controller(phase)
+            movement = self._move(controller, not learns, number)
+            if self._learning is not None and learns and number >= (1 - settings.averaged) * movements:
+                self._learning.remember()
+            self._note(phase, movement)
+            self._count(phase)
+            if len(self._waiting) == _TOGETHER or number == movements - 1:
+                self._keep()
+            progress(len(self._done), total)
+
+    def _controller(self, phase: Phase) -> AgentController:
+        """Return what moves the arm in ``phase``."""
+        if self._learning is not None and phase == "learning":
+            return AgentController(self._arrived, self._learning.learner)
+        return AgentController(self.agent)
+
+    def _move(self, controller: AgentController, test: bool, number: int) -> Movement:
+        """Bring the arm to a begin state and make movement ``number`` of a test or of learning."""
+        agent, task = self._arrived, self._arrived.settings
+        random, goal = draw_movement(agent.goal_range, self._seed, test, number)
+        BEGIN.reach(self._cycle.arm, random)
+        return move(
+            self._cycle, controller, goal, task.reward, task.cutoff, self._watch, self._broken.append,
+            agent.window.velocity,
+        )  # fmt: skip
+
+    def _adapt(self) -> None:
+        """Let the agent adapt where that is due."""
+        adapting = self._adapting
+        if adapting is None or self._settings.learning_rate == 0 or not adapting.is_due():
+            return
+        self._keep()  # it learns from what is stored, so that an interruption changes nothing
+        made = [entry.number for entry in self._stored()][-adapting.usable :]
+        blocks = list(self._store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
+        if blocks and adapting.learn(joined(blocks)):
+            self._judge()
+            self._keep_version(adapting.version, adapting.agent)
+
+    def _note(self, phase: Phase, movement: Movement) -> None:
         """Keep what came of a movement, and let the agent take notice of it."""
         info = {_PHASE: phase, **movement.row()}
+        if self._adapting is not None:
+            judges = self._settings.learning_rate > 0 and phase == "learning"
+            sound = not self._watch.marks(movement.recorded)
+            info[_SQUARES] = self._adapting.observe(
+                rows_of(movement.recorded), movement.reward, judges=judges, sound=sound
+            )
+            self._judge()
+        self._done.append(info)
+        self._waiting.append(replace(movement.recorded, info=info))
+
+    def _count(self, phase: Phase) -> None:
+        """Count what happened in ``phase`` since it was last counted."""
+        before, self._until = self._until, Counts.now(self._cycle)
+        self._counted[phase] = self._counted.get(phase, Counts()) + (self._until - before)
+
+    def _keep(self) -> None:
+        """Store the movements that wait, with the state of everything after them."""
+        state = {"arm": self._arm.get_state(), "watch": self._watch.get_state()}
+        state[_COUNTS] = json.dumps({phase: counts.as_dict() for phase, counts in self._counted.items()}).encode()
+        keep_watch(self._store, self._watch, self._number)
+        if self._learning is not None:
+            state |= self._learning.get_states()
+        if self._adapting is not None:
+            state["adaptation"] = self._adapting.get_state()
+        recorded = [replace(one, marks=(*self._watch.marks(one), *one.marks)) for one in self._waiting]
+        self._store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
+        self._waiting.clear()
+
+    def _keep_rest(self) -> None:
+        """Keep what waits, and nothing twice: a signal may have come between keeping and forgetting it."""
+        kept = max(len(self._waiting) - (len(self._done) - len(self._stored())), 0)
+        self._waiting[:] = [*self._waiting[kept:], *self._broken]
+        if self._waiting:
+            self._keep()
+
+    def _result(self) -> Transferred:
+        """Return what came of the transfer."""
+        adapted, adapting = None, self._adapting
         if adapting is not None:
-            judges, sound = adapts and phase == "learning", not watch.marks(movement.recorded)
-            squares.append(adapting.saw(rows_of(movement.recorded), movement.reward, judges=judges, sound=sound))
-            info[_SQUARES] = squares[-1]
-            watch.judge_by(adapting.agent.simulation)
-        done.append(info)
-        waiting.append(replace(movement.recorded, info=info))
-
-    def adapt() -> None:
-        """Let the agent adapt where that is due."""
-        if adapting is None or not adapts or not adapting.is_due():
-            return
-        keep()  # it learns from what is stored, so that an interruption changes nothing
-        made = [entry.number for entry in _movements(store, number)][-adapting.usable :]
-        blocks = list(store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
-        if blocks and adapting.learn(joined(blocks)):
-            watch.judge_by(adapting.agent.simulation)
-            if keep_version is not None:
-                keep_version(adapting.version, adapting.agent)
-
-    def shown() -> AnyAgent:
-        if adapting is not None:
-            return adapting.agent
-        return mean.agent if mean.count else agent.with_weights(learner.weights())
-
-    phase: Phase = PHASES[0]
-    try:
-        for phase in PHASES:
-            movements = settings.movements(phase)
-            greedy = phase != "learning"
-            made = sum(info[_PHASE] == phase for info in done)
-            if phase == "after" and settings.episodes > 0 and made == 0:
-                adapt()
-            learns = adapting is None and not greedy
-            moving = agent if learns else shown()
-            controller = AgentController(moving, learner if learns else None)
-            for i in range(made, movements):
-                if phase == "learning":
-                    adapt()
-                if adapting is not None and moving is not adapting.agent:
-                    moving = adapting.agent
-                    controller = AgentController(moving)
-                random, goal = begin_and_goal(agent, seed, greedy, i)
-                BEGIN.reach(cycle.arm, random)
-                movement = move(
-                    cycle, controller, goal, task.reward, task.cutoff, watch, broken.append, agent.window.velocity
-                )
-                if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * movements:
-                    mean.add(learner.weights())
-                note(phase, movement)
-                count(phase)
-                if len(waiting) == _TOGETHER or i == movements - 1:
-                    keep()
-                if progress is not None:
-                    progress(len(done), total)
-    except BaseException as error:
-        if arm.get_state() is None:  # no arm can make these movements again
-            with suppress(Exception):  # the first failure is the one to tell of
-                count(phase)
-                keep_rest()
-        if isinstance(error, PneumarmError) or not isinstance(error, Exception):
-            raise
-        raise ArmFailure(
-            f"{arm.spec.name}: failed in movement {len(done) + 1} ({type(error).__name__}: {error}); "
-            "see to the arm and run the same command again"
-        ) from error
-    adapted = None
-    if adapting is not None:
-        adapted = Adapted(adapting.version, adapting.quantities, np.array(squares), adapting.events)
-    found = Found(tuple(watch.findings), store.marked_rows(number), counted)
-    phases = {name: [info for info in done if info[_PHASE] == name] for name in PHASES}
-    made_in = {str(name): of_rows(rows, agent.window.joints) for name, rows in phases.items()}
-    return Transferred(made_in, shown(), rate, adapted, found)
-
-
-def _movements(store: Store, run: int) -> list[SequenceEntry]:
-    """Return the movements of ``run`` that were finished, in order."""
-    return [entry for entry in store.catalogue(run) if entry.kind == MOVEMENT]
+            squares = np.array([info[_SQUARES] for info in self._done])
+            adapted = Adapted(adapting.version, adapting.quantities, squares, adapting.events)
+        phases = {name: [info for info in self._done if info[_PHASE] == name] for name in PHASES}
+        return Transferred(
+            movements={str(name): of_rows(rows, self._arrived.window.joints) for name, rows in phases.items()},
+            agent=self.agent,
+            learning_rate=0.0 if self._learning is None else self._learning.learning_rate,
+            adapted=adapted,
+            condition=Condition(tuple(self._watch.findings), self._store.marked_rows(self._number), self._counted),
+        )
 
 
 _PHASE = "phase"  # place of a movement's phase beside its figures in the store
@@ -305,29 +363,44 @@ _SQUARES = "squares"  # place of a movement's errors beside its figures in the s
 _COUNTS = "counts"  # place of what was counted, among the states in the store
 
 
-class _Mean:
-    """The mean of an agent's weights over movements."""
+class _Learning:
+    """An agent that learns on the arm, and the mean of its weights over movements."""
 
-    def __init__(self, agent: AnyAgent) -> None:
+    def __init__(self, agent: Learns, learning_rate: float, seed: int) -> None:
         self._agent = agent
+        self.learning_rate = learning_rate
+        self.learner = agent.learner(learning_rate, seed)
         self._sum = np.zeros(agent.weights().shape)
-        self.count = 0
+        self._count = 0
 
-    def add(self, weights: NDArray[np.float32]) -> None:
-        self._sum += weights
-        self.count += 1
+    def remember(self) -> None:
+        """Count the weights as they are now."""
+        self._sum += self.learner.weights()
+        self._count += 1
+
+    def another(self) -> LearningActor:
+        """Return another learner like the one that moves the arm."""
+        return self._agent.learner(self.learning_rate)
 
     @property
-    def agent(self) -> AnyAgent:
-        """The agent with the mean weights."""
-        return self._agent.with_weights((self._sum / self.count).astype(np.float32))
+    def agent(self) -> Learns:
+        """The agent with the mean of the weights that count, or with those that it has now."""
+        if self._count:
+            return self._agent.with_weights((self._sum / self._count).astype(np.float32))
+        return self._agent.with_weights(self.learner.weights())
 
-    def get_state(self) -> bytes:
-        return np.int64(self.count).tobytes() + self._sum.tobytes()
+    def get_states(self) -> dict[str, bytes]:
+        """Return all that its future depends on, by its name in a store."""
+        mean = np.int64(self._count).tobytes() + self._sum.tobytes()
+        return {"learner": self.learner.get_state(), "mean": mean}
 
-    def set_state(self, state: bytes) -> None:
-        self.count = int(np.frombuffer(state[:8], np.int64)[0])
-        self._sum = np.frombuffer(state[8:]).reshape(self._sum.shape).copy()
+    def set_states(self, store: Store) -> None:
+        """Take up what :meth:`get_states` returned, if ``store`` has it."""
+        learner, mean = store.state("learner"), store.state("mean")
+        if learner is not None and mean is not None:
+            self.learner.set_state(learner)
+            self._count = int(np.frombuffer(mean[:8], np.int64)[0])
+            self._sum = np.frombuffer(mean[8:]).reshape(self._sum.shape).copy()
 
 
 def transfer_into(

@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.adaptation import Event, told
+from pneumarm.adaptation import Event, sentences
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_json
 from pneumarm.learning import AnyAgent, load_agent
@@ -26,7 +26,7 @@ AGENTS, HISTORY, ADAPTED = "agents", "adaptation.json", "adapted.safetensors"
 
 @dataclass(frozen=True)
 class Adapted:
-    """How a policy adapted between movements, see :class:`~pneumarm.learning.Adaptation`."""
+    """How an agent adapted between movements, see :class:`~pneumarm.adaptation.Adaptation`."""
 
     version: int
     """Of the agent as it is after learning; 0 is the one that arrived."""
@@ -40,7 +40,7 @@ class Adapted:
     @property
     def sentences(self) -> list[str]:
         """What happened, for people."""
-        return told(self.events, self.quantities)
+        return sentences(self.events, self.quantities)
 
 
 @dataclass(frozen=True)

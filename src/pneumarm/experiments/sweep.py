@@ -19,7 +19,7 @@ from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Repo
 from pneumarm.experiments.preparation import SETTINGS, claim
 from pneumarm.experiments.rows import RowWriter
 from pneumarm.files import require_folder
-from pneumarm.learning.online.training import cores
+from pneumarm.learning.training import cores
 
 ROWS = "rows.jsonl"
 _PATIENCE = 10.0  # s, for a scheduler to answer

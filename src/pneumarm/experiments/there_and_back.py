@@ -22,8 +22,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
 from pneumarm.files import write_json
-from pneumarm.learning import AnyAgent, TrainSettings, test
-from pneumarm.learning.online.training import train
+from pneumarm.learning import Acts, Method, TrainSettings, test, train
 from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
 from pneumarm.simulation.quality import propagation
 from pneumarm.task import BeginStates, Movement, begin_states
@@ -205,10 +204,11 @@ def over_joints(values: NDArray[np.float64]) -> dict[str, float]:
 
 def trained_and_moved(
     material: Prepared,
-    train_settings: TrainSettings,
+    train_settings: Any,
     run: int,
     settings: LaboratorySettings,
     goals: NDArray[np.float64] | None = None,
+    method: Method | None = None,
 ) -> Figures:
     """Train agents, test the best in its simulation, and move the arm with it; nothing is learned on the arm.
 
@@ -217,16 +217,18 @@ def trained_and_moved(
 
     Args:
         material: the simulation that it is trained in; the arm is controlled as its transitions were collected.
-        train_settings: of the agents.
+        train_settings: of the agents, those of any method.
         run: that weights and movements are those of.
         settings: of the laboratory.
         goals: range of the goals on the arm, shape (joints, 2) [counts]; the simulation's by default.
+        method: that the settings are of, where it is not a built-in one.
 
     """
     seed, recipe = run_seed(settings, run), material.recipe
-    most = settings.max_episodes or train_settings.max_episodes
-    chosen = replace(train_settings, max_episodes=most)
-    training = train(material.simulation, material.begin, chosen, seed, threads=1)
+    chosen = train_settings
+    if settings.max_episodes and isinstance(chosen, TrainSettings):
+        chosen = replace(chosen, max_episodes=settings.max_episodes)
+    training = train(material.simulation, material.begin, chosen, seed, method=method, threads=1)
     agent = training.agent
     simulated = test(agent, material.simulation, material.begin, settings.test_episodes, 0)
     span = material.simulation.goal_range if goals is None else goals
@@ -242,12 +244,12 @@ def trained_and_moved(
         "switches": float(np.mean([one.switches.sum() for one in made])),
         "seconds": float(np.mean([one.time_end - one.time_start for one in made])),
         "episodes": float(training.episodes.mean()),
-        "met": float(training.met.mean()),
+        **({"met": float(training.met.mean())} if training.met.size else {}),
     }
 
 
 def moved(
-    agent: AnyAgent,
+    agent: Acts,
     arm: Arm,
     goals: NDArray[np.float64],
     numbers: Iterable[int],

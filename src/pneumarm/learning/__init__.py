@@ -1,16 +1,25 @@
 """Learning to control an arm in its simulation (thesis chapter 4), and going on learning on the arm."""
 
-from pneumarm.learning.fleet_settings import BatchedSettings, PolicySettings
+from pneumarm.learning.agents import (
+    Acts,
+    Adapts,
+    AnyAgent,
+    LearningActor,
+    Learns,
+    LooksAhead,
+    Saved,
+    SelfTesting,
+    SimulationAgent,
+    Tracks,
+    fingerprint,
+)
+from pneumarm.learning.batched.settings import BatchedSettings
 from pneumarm.learning.methods import (
     LOOKING_AHEAD,
     METHODS,
-    Actor,
-    AnyAgent,
     LearnSettings,
     Method,
-    MethodSettings,
-    Trained,
-    fingerprint,
+    find_method,
     load_agent,
     results_with_lookahead,
     test,
@@ -20,37 +29,44 @@ from pneumarm.learning.methods import (
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import OnlineLearner
 from pneumarm.learning.online.settings import Exploration, Shaping, TrainSettings
-from pneumarm.learning.online.training import CURVES, Progress, Training
+from pneumarm.learning.online.training import CURVES
 from pneumarm.learning.policy.agent import PolicyAgent
-from pneumarm.learning.policy.training import FleetTraining
-from pneumarm.learning.side_by_side import FLEET_CURVES
+from pneumarm.learning.policy.settings import PolicySettings
+from pneumarm.learning.training import Learner, Progress, Training, train_side_by_side
 
 __all__ = [
     "CURVES",
-    "FLEET_CURVES",
     "LOOKING_AHEAD",
     "METHODS",
-    "Actor",
+    "Acts",
+    "Adapts",
     "Agent",
     "AnyAgent",
     "BatchedSettings",
     "Exploration",
-    "FleetTraining",
     "LearnSettings",
+    "Learner",
+    "LearningActor",
+    "Learns",
+    "LooksAhead",
     "Method",
-    "MethodSettings",
     "OnlineLearner",
     "PolicyAgent",
     "PolicySettings",
     "Progress",
+    "Saved",
+    "SelfTesting",
     "Shaping",
+    "SimulationAgent",
+    "Tracks",
     "TrainSettings",
-    "Trained",
     "Training",
+    "find_method",
     "fingerprint",
     "load_agent",
     "results_with_lookahead",
     "test",
     "test_ahead",
     "train",
+    "train_side_by_side",
 ]

@@ -4,7 +4,7 @@ The file holds plain numbers, as all files here, so that nothing of that library
 taken greedily; it does not go on learning on an arm.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Self
 
@@ -17,11 +17,7 @@ from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning.online.settings import TrainSettings
-from pneumarm.simulation.simulation import Scaling, Simulation
-from pneumarm.task.acting import test_acting
-from pneumarm.task.begin import BeginStates
-from pneumarm.task.environment import environment
-from pneumarm.task.movements import Movements
+from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import QUANTITIES, Window
 
 KIND = "pneumarm imported policy"
@@ -32,7 +28,9 @@ _SCALING = ("observation_offset", "observation_scale", "command_scale")
 _MOST_LAYERS = 64
 
 
-class _Settings(msgspec.Struct, forbid_unknown_fields=True):
+class ImportedHeader(msgspec.Struct, forbid_unknown_fields=True):
+    """What the file of an imported policy says besides its arrays."""
+
     spec: ArmSpec
     window: Window
     activation: Activation
@@ -67,11 +65,6 @@ class ImportedPolicy:
         if len(sizes) == 1 or sizes[-1] != ACTIONS * self.window.joints:
             raise UnusableInput(f"a policy needs {ACTIONS} outputs a joint, this one has {sizes[-1]}")
 
-    @property
-    def learns(self) -> bool:
-        """It does not learn on an arm."""
-        return False
-
     def values(self, inputs: ArrayLike) -> Array:
         """Return a value for each action (..., joints, 9) of states with goals ``inputs`` (..., inputs)."""
         x = np.asarray(inputs, np.float32)
@@ -82,31 +75,9 @@ class ImportedPolicy:
         values: Array = x.reshape(*x.shape[:-1], self.window.joints, ACTIONS)
         return values
 
-    def weights(self) -> Array:
-        """Return a copy of all weights, one after the other."""
-        return np.concatenate([part.ravel() for layer in self.layers for part in layer])
-
-    def with_weights(self, weights: Array) -> Self:
-        """Return the policy with other ``weights``, as of :meth:`weights`.
-
-        Raises:
-            UnusableInput: not as many as it has.
-
-        """
-        sizes = np.cumsum([part.size for layer in self.layers for part in layer])
-        if weights.shape != (sizes[-1],):
-            raise UnusableInput(f"expected {sizes[-1]} weights, got {weights.shape}")
-        parts = iter(np.split(weights.astype(np.float32), sizes[:-1]))
-        layers = tuple((next(parts).reshape(w.shape), next(parts).copy()) for w, _ in self.layers)
-        return replace(self, layers=layers)
-
-    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> "ImportedActor":
-        """Return it acting greedily; it neither learns nor explores, whatever is asked."""
+    def actor(self) -> "ImportedActor":
+        """Return it acting greedily; it neither learns nor explores."""
         return ImportedActor(self)
-
-    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
-        """Let it move in ``simulation``; ``seed`` decides begin states and goals."""
-        return test_acting(self.actor(), environment(simulation, begin, self.settings), episodes, seed)
 
     def save(self, path: Path) -> None:
         """Write it to ``path``, whole or not at all.
@@ -115,7 +86,7 @@ class ImportedPolicy:
             UnusableInput: ``path`` cannot be written.
 
         """
-        settings = _Settings(self.spec, self.window, self.activation, len(self.layers), self.settings)
+        settings = ImportedHeader(self.spec, self.window, self.activation, len(self.layers), self.settings)
         arrays: dict[str, NDArray[np.floating]] = {name: getattr(self.scaling, name) for name in _SCALING}
         arrays["goal_range"] = self.goal_range
         for number, (weights, bias) in enumerate(self.layers):
@@ -132,7 +103,7 @@ class ImportedPolicy:
         """
         read, arrays = read_arrays(path, KIND)
         try:
-            known = msgspec.convert(read, _Settings)
+            known = msgspec.convert(read, ImportedHeader)
             joints, size = known.window.joints, known.window.observation_size
             if known.spec.joints != joints or not 1 <= known.layers <= _MOST_LAYERS:
                 raise UnusableInput(f"{known.layers} layers for {joints} of {known.spec.joints} joints are no policy")
@@ -184,20 +155,3 @@ class ImportedActor:
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state``."""
         self._inputs[: self._policy.window.state_size] = next_state
-
-    def observe(self, reward: ArrayLike, next_state: ArrayLike, terminal: bool) -> None:
-        """Go on in ``next_state``; nothing is learned."""
-        self.follow(next_state)
-
-    def weights(self) -> Array:
-        """Return a copy of the weights."""
-        return self._policy.weights()
-
-    def get_state(self) -> bytes:
-        """Return nothing: between movements there is nothing to remember."""
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        """Take up a state of :meth:`get_state`."""
-        if state:
-            raise UnusableInput("this state is not of an imported policy")

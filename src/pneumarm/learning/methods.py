@@ -1,208 +1,225 @@
-"""Agents of all kinds: what they have in common, and the methods that train them.
+"""The methods that train agents, in one table, and what is done with an agent of any of them.
 
-Whatever kind an agent is of, it is trained, saved, loaded, tested, transferred and used as a controller by the same
-commands. A kind is a class like :class:`Agent`; a method is a learner for :func:`train_fleet`, or
-a function of its own.
+A method of your own is a :class:`Method` in a module of yours, say ``MINE`` in ``my_module.py``:
+
+- ``pneumarm train --method my_module:MINE`` uses it; its settings are ``--own.NAME VALUE``.
+- An installed package names it as an entry point of the group ``pneumarm.methods`` and then has a short name for it.
+- Its agents are saved in files whose kind is ``my_module:MINE`` (:func:`~pneumarm.files.write_arrays`), by which
+  :func:`load_agent` finds the method again.
+
+Loading runs code of that module, so a file alone never decides it: the module is imported already (``--method`` of
+the command names it, or a program has imported it), or it is an installed entry point. Otherwise the file is refused.
 """
 
-import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Literal, Protocol, Self, get_args
+from typing import Any, Literal
 
+import msgspec
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import kind_of
-from pneumarm.learning.batched.training import ValueLearner
-from pneumarm.learning.fleet_settings import BatchedSettings, PolicySettings
+from pneumarm.learning.agents import Acts, AnyAgent, LooksAhead, SelfTesting
+from pneumarm.learning.batched.settings import BatchedSettings
+from pneumarm.learning.batched.training import train_batched
 from pneumarm.learning.imported import KIND as IMPORTED
 from pneumarm.learning.imported import ImportedPolicy
 from pneumarm.learning.online.agent import KIND as ACTION_VALUES
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.settings import TrainSettings
-from pneumarm.learning.online.training import Progress, Training
 from pneumarm.learning.online.training import train as train_online
 from pneumarm.learning.policy.agent import KIND as POLICY
 from pneumarm.learning.policy.agent import PolicyAgent
-from pneumarm.learning.policy.training import FleetTraining, PolicyLearner, train_fleet
+from pneumarm.learning.policy.settings import PolicySettings
+from pneumarm.learning.policy.training import train_policy
+from pneumarm.learning.training import Progress, Training
 from pneumarm.settings import Settings, Valid
-from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.acting import test_acting
 from pneumarm.task.begin import BeginStates
-from pneumarm.task.environment import TaskSettings
+from pneumarm.task.environment import environment
 from pneumarm.task.movements import TEST, Movements
-from pneumarm.transitions.window import Window
 
-Method = Literal["policy", "batched", "sarsa", "q-learning"]
-"""A policy, by default; the thesis' nine networks learned in many arms at once; the thesis' own two."""
-METHODS: tuple[Method, ...] = get_args(Method)
-MethodSettings = PolicySettings | BatchedSettings | TrainSettings
-"""Settings of a training; their type says which method is meant."""
-Trained = FleetTraining[PolicyAgent] | FleetTraining[Agent] | Training
-
+TaskName = Literal["reach", "settle", "hold", "track"]
+GROUP = "pneumarm.methods"
+"""The group of entry points of installed methods."""
 LOOKING_AHEAD = 500
 """Movements of a test that looks ahead; they take seconds."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method: what it is told, how it trains agents, and how these are read again."""
+
+    settings: type[Any]
+    """Class of its settings, a dataclass whose defaults work. They decide the task of its agents, too."""
+    train: Callable[..., Training[Any]]
+    """Called with simulation, begin states, settings and seed, and by their names ``progress``, ``checkpoint`` and
+    ``threads``, see :func:`train`."""
+    load: Callable[[Path], AnyAgent]
+    """Returns the agent in a file."""
+    tasks: tuple[TaskName, ...] = ("reach",)
+    """What its agents can be asked to do."""
+    place: str = "own"
+    """Field of :class:`LearnSettings` that holds its settings."""
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    """Settings that are as they are, because they make the method."""
+
+
+def _thesis(name: str) -> Method:
+    return Method(TrainSettings, train_online, Agent.load, place="thesis", fixed={"method": name})
+
+
+METHODS: Mapping[str, Method] = {
+    "policy": Method(PolicySettings, train_policy, PolicyAgent.load, place="policy"),
+    "batched": Method(BatchedSettings, train_batched, Agent.load, place="batched"),
+    "sarsa": _thesis("sarsa"),
+    "q-learning": _thesis("q-learning"),
+}
+"""A policy, by default; the thesis' nine networks learned in many arms at once; the thesis' own two."""
+_LOADS: Mapping[str, Callable[[Path], AnyAgent]] = {
+    POLICY: PolicyAgent.load,
+    ACTION_VALUES: Agent.load,
+    IMPORTED: ImportedPolicy.load,
+}
+"""By kind of file."""
+
+
+def find_method(name: str) -> Method:
+    """Return the method called ``name``: one of :data:`METHODS`, an installed one, or MODULE:NAME of your own.
+
+    The module may lie in the current folder; it is imported.
+
+    Raises:
+        UnusableInput: there is no such method.
+
+    """
+    if name in METHODS:
+        return METHODS[name]
+    installed = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if name in installed:
+        return _imported(installed[name])
+    if ":" in name:
+        if "" not in sys.path:
+            sys.path.insert(0, "")  # a user's module lies in the folder that they call us from
+        return _imported(EntryPoint(name, name, GROUP))
+    raise UnusableInput(f"method {name!r}: expected {', '.join([*METHODS, *sorted(installed)])} or MODULE:NAME")
+
+
+def _imported(entry: EntryPoint) -> Method:
+    try:
+        found = entry.load()
+    except (ImportError, AttributeError, ValueError) as error:
+        raise UnusableInput(f"method {entry.value}: expected a module and a Method in it; {error}") from error
+    if not isinstance(found, Method):
+        raise UnusableInput(f"method {entry.value}: expected a pneumarm.learning.Method, got {type(found).__name__}")
+    return found
+
+
+def load_agent(path: Path) -> AnyAgent:
+    """Return the agent in ``path``, of whatever method.
+
+    Raises:
+        UnusableInput: ``path`` is no agent, is damaged, does not fit together, or is of a method that nobody named.
+
+    """
+    kind = kind_of(path)
+    if kind in _LOADS:
+        return _LOADS[kind](path)
+    if kind.partition(":")[0] in sys.modules or kind in (one.value for one in entry_points(group=GROUP)):
+        return _imported(EntryPoint(kind, kind, GROUP)).load(path)
+    if ":" in kind:
+        raise UnusableInput(
+            f"{path}: an agent of the method {kind}, which is not installed; its code must run to read it: if you "
+            f"trust it give --method {kind}, or import its module first"
+        )
+    raise UnusableInput(f"{path}: expected an agent written by pneumarm train, its kind is {kind!r}")
 
 
 @dataclass(frozen=True)
 class LearnSettings(Settings):
     """Which method learns, and the settings of each."""
 
-    method: Method = "policy"
-    """policy, batched (the thesis' networks learned in many arms at once), sarsa or q-learning (the thesis')."""
+    method: str = "policy"
+    """policy, batched (the thesis' networks learned in many arms at once), sarsa or q-learning (the thesis'), an
+    installed method, or MODULE:NAME of your own."""
     policy: PolicySettings = field(default_factory=PolicySettings)
     """Of the method policy."""
     batched: BatchedSettings = field(default_factory=BatchedSettings)
     """Of the method batched."""
     thesis: TrainSettings = field(default_factory=TrainSettings)
     """Of the methods sarsa and q-learning."""
+    own: dict[str, Any] = field(default_factory=dict)
+    """Of a method of your own, by name."""
 
     def _valid(self) -> Valid:
-        return {"method": self.method in METHODS or f"one of {', '.join(METHODS)}"}
+        _ = self.chosen  # it says what is wrong with the method or with settings of one's own
+        own = self.found.place == "own"
+        return {"own": own or not self.own or "nothing, as the method is not one of your own"}
 
     @property
-    def chosen(self) -> MethodSettings:
-        """The settings of the method."""
-        if self.method == "policy":
-            return self.policy
-        if self.method == "batched":
-            return self.batched
-        return replace(self.thesis, method=self.method)
-
-
-class Actor(Protocol):
-    """An agent acting step by step, see :class:`~pneumarm.learning.online.learner.OnlineLearner`."""
-
-    def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
-        """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
-
-    def act(self) -> NDArray[np.int64]:
-        """Return the actions (joints,) of the current state."""
-
-    def follow(self, next_state: ArrayLike) -> None:
-        """Go on in ``next_state`` without learning."""
-
-    def observe(self, reward: ArrayLike, next_state: ArrayLike, terminal: bool) -> None:
-        """Go on in ``next_state``, and learn from it if it is one that learns."""
-
-    def weights(self) -> NDArray[np.float32]:
-        """Return a copy of the weights as they are now."""
-
-    def get_state(self) -> bytes:
-        """Return everything that the future depends on, besides what it was made with."""
-
-    def set_state(self, state: bytes) -> None:
-        """Take up a state of :meth:`get_state`, bit for bit."""
-
-
-class AnyAgent(Protocol):
-    """What every kind of agent can do."""
+    def found(self) -> Method:
+        """The method."""
+        return find_method(self.method)
 
     @property
-    def spec(self) -> ArmSpec:
-        """The arm that it was trained for."""
+    def chosen(self) -> Any:
+        """The settings of the method.
 
-    @property
-    def window(self) -> Window:
-        """Of its state."""
+        Raises:
+            UnusableInput: the method is one of the user's own and has no such settings.
 
-    @property
-    def scaling(self) -> Scaling:
-        """Of its state."""
-
-    @property
-    def goal_range(self) -> NDArray[np.float64]:
-        """Goals that it has learned to reach, shape (joints, 2) [counts]."""
-
-    @property
-    def settings(self) -> TaskSettings:
-        """How it was trained, and for which task."""
-
-    @property
-    def learns(self) -> bool:
-        """Whether its actor can learn on an arm."""
-
-    def weights(self) -> NDArray[np.float32]:
-        """Return a copy of what it has learned."""
-
-    def with_weights(self, weights: NDArray[np.float32]) -> Self:
-        """Return the agent with other ``weights``, as of :meth:`weights`."""
-
-    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> Actor:
-        """Return it acting: greedily, or exploring as at the end of training; learning by ``learning_rate``."""
-
-    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
-        """Let it move greedily in ``simulation``; ``seed`` decides begin states and goals."""
-
-    def save(self, path: Path) -> None:
-        """Write it to ``path``, whole or not at all."""
-
-
-def fingerprint(agent: AnyAgent) -> str:
-    """Return what tells ``agent`` from others: of its kind, its settings, what it has learned, and its simulation."""
-    digest = hashlib.sha256(f"{type(agent).__name__} {agent.settings!r}".encode())
-    arrays = [agent.weights(), agent.goal_range, *vars(agent.scaling).values()]
-    simulation = getattr(agent, "simulation", None)  # it decides too, in agents that look ahead or adapt
-    if isinstance(simulation, Simulation):
-        header, parts = simulation.parts()
-        digest.update(repr(header).encode())
-        arrays += [parts[name] for name in sorted(parts)]
-    for array in arrays:
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()[:16]
-
-
-def load_agent(path: Path) -> AnyAgent:
-    """Return the agent in ``path``, of whatever kind.
-
-    Raises:
-        UnusableInput: ``path`` is no agent, is damaged, or does not fit together.
-
-    """
-    kind = kind_of(path)
-    if kind == POLICY:
-        return PolicyAgent.load(path)
-    if kind == ACTION_VALUES:
-        return Agent.load(path)
-    if kind == IMPORTED:
-        return ImportedPolicy.load(path)
-    raise UnusableInput(f"{path}: expected an agent written by pneumarm train, its kind is {kind!r}")
+        """
+        method = self.found
+        if method.place != "own":
+            return replace(getattr(self, method.place), **method.fixed)
+        known = [one.name for one in fields(method.settings)]
+        if unknown := sorted(self.own.keys() - set(known)):
+            raise UnusableInput(
+                f"method {self.method}: has no setting {', '.join(unknown)}; it has {', '.join(known)}"
+            )
+        try:
+            return msgspec.convert({**self.own, **method.fixed}, method.settings, strict=False)
+        except msgspec.ValidationError as error:
+            raise UnusableInput(f"method {self.method}: {error}") from error
 
 
 def train(
     simulation: Simulation,
     begin_states: BeginStates,
-    settings: MethodSettings | None = None,
+    settings: Any = None,
     seed: int = 0,
     *,
+    method: Method | None = None,
     progress: Callable[[Progress], None] | None = None,
     checkpoint: Path | None = None,
     threads: int | None = None,
-) -> Trained:
-    """Train agents by the method that ``settings`` are of (default: a policy) and return the best.
+) -> Training[Any]:
+    """Train agents by ``method``, by default the built-in one that ``settings`` are of, and return the best.
 
     The same seed gives the same agents, bit for bit, with any number of ``threads`` (default: one a core). With a
-    ``checkpoint`` a killed training goes on from there; the file is left when training is done.
+    ``checkpoint`` a killed training goes on from there; the file is left when training is done. A method of your own
+    does that if it cares to.
 
     Raises:
         UnusableInput: begin states and simulation do not fit, or the checkpoint is of another training.
 
     """
-    how: dict[str, Any] = {"progress": progress, "checkpoint": checkpoint, "threads": threads}
-    if isinstance(settings, TrainSettings):
-        return train_online(simulation, begin_states, settings, seed, **how)
-    if isinstance(settings, BatchedSettings):
-        batched = settings
-        return train_fleet(lambda n: ValueLearner(simulation, begin_states, batched, seed, n), batched, seed, **how)
-    policy = settings or PolicySettings()
-    return train_fleet(lambda n: PolicyLearner(simulation, begin_states, policy, seed, n), policy, seed, **how)
+    settings = (method or METHODS["policy"]).settings() if settings is None else settings
+    method = method or next((one for one in METHODS.values() if isinstance(settings, one.settings)), None)
+    if method is None:
+        raise UnusableInput(f"{type(settings).__name__} are the settings of no method here; say of which")
+    return method.train(
+        simulation, begin_states, settings, seed, progress=progress, checkpoint=checkpoint, threads=threads
+    )
 
 
 def test(
-    agent: AnyAgent,
+    agent: Acts,
     simulation: Simulation,
     begin_states: BeginStates,
     episodes: int = 10_000,  # noqa: PT028 - this is no test case
@@ -218,14 +235,16 @@ def test(
 
     """
     _check_made_for(agent, simulation)
-    return agent.test(simulation, begin_states, episodes, (seed, TEST))
+    if isinstance(agent, SelfTesting):
+        return agent.test(simulation, begin_states, episodes, (seed, TEST))
+    return test_acting(agent.actor(), environment(simulation, begin_states, agent.settings), episodes, (seed, TEST))
 
 
 test.__test__ = False  # type: ignore[attr-defined]
 
 
 def test_ahead(
-    agent: AnyAgent,
+    agent: Acts,
     simulation: Simulation,
     begin_states: BeginStates,
     episodes: int = LOOKING_AHEAD,  # noqa: PT028 - this is no test case
@@ -240,7 +259,7 @@ def test_ahead(
 
     """
     _check_made_for(agent, simulation)
-    if not isinstance(agent, PolicyAgent):
+    if not isinstance(agent, LooksAhead):
         return None
     return agent.test_ahead(simulation, begin_states, episodes, (seed, TEST))
 
@@ -253,7 +272,7 @@ def results_with_lookahead(tested: Movements, ahead: Movements | None) -> dict[s
     return {**tested.results(), "lookahead": None if ahead is None else ahead.results()}
 
 
-def _check_made_for(agent: AnyAgent, simulation: Simulation) -> None:
+def _check_made_for(agent: Acts, simulation: Simulation) -> None:
     if agent.window != simulation.window:
         raise UnusableInput(f"an agent for {agent.window} cannot be tested on a simulation of {simulation.window}")
     scaling, other = agent.scaling, simulation.scaling

@@ -144,6 +144,7 @@ def _movements(
     seed: int,
     report: Callable[[int], None],
 ) -> Planned:
+    planner.warm_up()
     cycle, rows = ControlCycle(guarded(arm)), []
     for number in range(settings.episodes):
         random, goal = draw_movement(goal_range, seed, True, number)

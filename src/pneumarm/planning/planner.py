@@ -30,11 +30,12 @@ from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
 from pneumarm.errors import UnusableInput
-from pneumarm.planning.search import CERTAIN, Found, PlanSettings, Uncertainty, find, problem, tree, workspace_of
+from pneumarm.planning.search import CERTAIN, Plan, PlanSettings, Uncertainty, find, problem, tree, workspace_of
 from pneumarm.random import random_state
 from pneumarm.simulation.rollout import look_simulated, simulated_states, simulated_world
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task import Reward, StateTracker
+from pneumarm.transitions.watch import made_up_readings
 
 _OWN_SUPPLY = 0
 """Seed of the supply's fluctuation in plans that do not foresee the true one."""
@@ -176,7 +177,7 @@ class Planner:
     """How long each decision took [s]."""
     unproven: int = field(default=0, init=False)
     """Plans of which it is not proven that none is better."""
-    found: Found | None = field(default=None, init=False)
+    found: Plan | None = field(default=None, init=False)
     """The last plan."""
 
     def __post_init__(self) -> None:
@@ -187,6 +188,13 @@ class Planner:
         self._last = -1
         self._still = 0
         self._since: NDArray[np.float64] | None = None
+
+    def warm_up(self) -> None:
+        """Plan once from a made-up reading: compiling takes longer than an arm waits for a decision."""
+        self.reset(np.full(self.model.spec.joints, sum(self.model.spec.angle_range) / 2))
+        self.act(made_up_readings(self.model.spec)[0])
+        self.seconds.clear()
+        self.unproven = 0
 
     def reset(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts]."""

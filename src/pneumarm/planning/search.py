@@ -105,7 +105,7 @@ class Uncertainty(NamedTuple):
 CERTAIN = Uncertainty(0.0, 0.0)
 
 
-class Problem(NamedTuple):
+class PlanProblem(NamedTuple):
     """What is sought. Made by :func:`problem`."""
 
     commands: NDArray[np.int8]
@@ -148,7 +148,7 @@ class Tree(NamedTuple):
     """The plan that was found, shape (cutoff,)."""
 
 
-class Found(NamedTuple):
+class Plan(NamedTuple):
     """What a search found."""
 
     actions: NDArray[np.int64]
@@ -164,7 +164,7 @@ class Found(NamedTuple):
 
 def problem(
     goal: NDArray[np.float64], reward: Reward, settings: PlanSettings, uncertainty: Uncertainty = CERTAIN
-) -> Problem:
+) -> PlanProblem:
     """Return the problem of moving to ``goal`` (joints,) [counts] for ``reward``.
 
     Raises:
@@ -176,7 +176,7 @@ def problem(
     actions = np.array(list(product(range(ACTIONS), repeat=len(goal))))
     switched = (actions[:, None] != actions[None]).sum(axis=2)
     begin = np.zeros((1, len(actions)), np.int64)
-    return Problem(
+    return PlanProblem(
         commands=np.ascontiguousarray(VALVES[actions]),
         switched=np.concatenate([switched, begin]),
         goal=np.array(goal, np.float64),
@@ -211,14 +211,16 @@ def workspace_of(settings: PlanSettings, joints: int) -> int:
     return settings.nodes + int(ACTIONS**joints) + 1
 
 
-def find(world: Any, states: Any, sought: Problem, workspace: Tree, last: int = -1, may_hold: bool = True) -> Found:
+def find(
+    world: Any, states: Any, sought: PlanProblem, workspace: Tree, last: int = -1, may_hold: bool = True
+) -> Plan:
     """Return the best plan from state 0 of ``states``, after the action ``last`` (-1 at the begin of a movement).
 
     Unless it ``may_hold``, the plan begins with another action than ``last``.
     """
     begin = len(sought.commands) if last < 0 else last
     length, cost, proven, simulated = search(world, states, sought, workspace, begin, may_hold)
-    return Found(workspace.plan[:length].copy(), cost, math.isfinite(cost), proven, simulated)
+    return Plan(workspace.plan[:length].copy(), cost, math.isfinite(cost), proven, simulated)
 
 
 @part

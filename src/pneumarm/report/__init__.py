@@ -3,7 +3,6 @@
 from pneumarm.report.data import (
     CoverageData,
     Demonstration,
-    LearningData,
     MarkedData,
     QualityData,
     TrainingData,
@@ -16,7 +15,6 @@ from pneumarm.report.sections import RunData
 __all__ = [
     "CoverageData",
     "Demonstration",
-    "LearningData",
     "MarkedData",
     "Picture",
     "QualityData",

@@ -163,83 +163,43 @@ class MarkedData(Record):
 
 
 @dataclass(frozen=True)
-class LearningData(Record):
-    """Learning curves of all agents that learned in many simulated arms at once, and their validation."""
-
-    file = "learning_curves.safetensors"
-    shapes = {  # noqa: RUF012
-        "episodes": "agents evaluations",
-        "reward_learning": "agents evaluations",
-        "success_learning": "agents evaluations",
-        "reward": "agents",
-        "success": "agents",
-    }
-
-    episodes: Array
-    """Episodes at each evaluation, shape (agents, evaluations)."""
-    reward_learning: Array
-    """Mean reward of the episodes since the evaluation before, exploring, shape (agents, evaluations)."""
-    success_learning: Array
-    """Their success rate, shape (agents, evaluations)."""
-    reward: Array
-    """Mean reward of each agent in the validation, shape (agents,)."""
-    success: Array
-    """Its success rate, shape (agents,)."""
-    chosen: int
-    """Index of the agent that is kept."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0 <= self.chosen < len(self.reward):
-            raise UnusableInput(f"LearningData: chosen must be one of {len(self.reward)} agents, got {self.chosen}")
-
-
-@dataclass(frozen=True)
 class TrainingData(Record):
-    """Shaping curves of all agents and their validation."""
+    """How all agents learned, and their validation."""
 
     file = "training_curves.safetensors"
     shapes = {  # noqa: RUF012
-        "episodes": "evaluations",
-        "deviation": "agents evaluations",
-        "criterion": "agents evaluations",
-        "performance": "agents evaluations",
-        "epsilon": "agents evaluations",
-        "temperature": "agents evaluations",
-        "evaluated": "agents",
+        "curves": "drawn rows columns",
+        "evaluated": "drawn",
         "reward": "agents",
         "success": "agents",
     }
 
-    episodes: Array
-    """Episodes at each evaluation, shape (evaluations,)."""
-    deviation: Array
-    """Shape (agents, evaluations) [counts]; what lies behind an agent's ``evaluated`` is not looked at."""
-    criterion: Array
-    """Share of successes asked for, shape (agents, evaluations)."""
-    performance: Array
-    """p(k) of eq. 4.14, shape (agents, evaluations)."""
-    epsilon: Array
-    """Share of exploring actions, shape (agents, evaluations)."""
-    temperature: Array
-    """Temperature of the exploration, shape (agents, evaluations)."""
+    curves: Array
+    """Training curves, shape (agents, rows, columns), or none; behind an agent's ``evaluated`` rows is nothing."""
     evaluated: NDArray[np.int64]
-    """Evaluations that each agent took before its training ended, shape (agents,)."""
+    """Rows that each agent took before its training ended, shape (agents,)."""
     reward: Array
     """Mean reward of each agent in the validation, shape (agents,)."""
     success: Array
     """Its success rate, shape (agents,)."""
     chosen: int
     """Index of the agent that is kept."""
+    columns: Sequence[str] = ()
+    """What the columns are, the first of them the episodes so far, see
+    :attr:`pneumarm.learning.Training.columns`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.chosen < len(self.evaluated):
+        agents, rows, columns = self.curves.shape
+        if not 0 <= self.chosen < len(self.reward):
+            raise UnusableInput(f"TrainingData: chosen must be one of {len(self.reward)} agents, got {self.chosen}")
+        if agents not in (0, len(self.reward)) or columns != len(self.columns):
             raise UnusableInput(
-                f"TrainingData: chosen must be one of {len(self.evaluated)} agents, got {self.chosen}"
+                f"TrainingData: curves must be of {len(self.reward)} agents and {len(self.columns)} columns, got "
+                f"{self.curves.shape}"
             )
-        if not ((self.evaluated >= 0) & (self.evaluated <= len(self.episodes))).all():
-            raise UnusableInput(f"TrainingData: evaluated must lie in 0..{len(self.episodes)}, got {self.evaluated}")
+        if not ((self.evaluated >= 0) & (self.evaluated <= rows)).all():
+            raise UnusableInput(f"TrainingData: evaluated must lie in 0..{rows}, got {self.evaluated}")
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Any
 
 from pneumarm.arm.counts import Counts
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.control.found import COLLECTING, LINK, WAYS, rows_marked
+from pneumarm.control.condition import COLLECTING, LINK, WAYS, rows_marked
 from pneumarm.report import figures
 from pneumarm.report.data import MarkedData
 from pneumarm.report.ledger import MISSING

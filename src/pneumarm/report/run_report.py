@@ -15,7 +15,6 @@ from pneumarm.files import write_json, write_text
 from pneumarm.report.data import (
     CoverageData,
     Demonstration,
-    LearningData,
     MarkedData,
     QualityData,
     Record,
@@ -92,7 +91,7 @@ def read_run(folder: Path) -> RunData:
         results=results,
         coverage=_read(CoverageData, folder),
         quality=_read(QualityData, folder),
-        training=_read(TrainingData, folder) or _read(LearningData, folder),
+        training=_read(TrainingData, folder),
         test=Movements.load(folder / TEST) if (folder / TEST).exists() else None,
         transfer=_read_transfer(folder / EPISODES, results),
         adaptation=read_history(folder) if (folder / HISTORY).exists() else None,

@@ -16,7 +16,6 @@ from pneumarm.report import figures
 from pneumarm.report.data import (
     CoverageData,
     Demonstration,
-    LearningData,
     MarkedData,
     QualityData,
     TrainingData,
@@ -39,7 +38,7 @@ class RunData:
     """Contents of ``results.json``."""
     coverage: CoverageData | None = None
     quality: QualityData | None = None
-    training: TrainingData | LearningData | None = None
+    training: TrainingData | None = None
     test: Movements | None = None
     transfer: TransferData | None = None
     adaptation: Adapted | None = None
@@ -57,10 +56,8 @@ def all_sections(run: RunData) -> list[Section]:
             predicted(run.quality, run.spec),
             propagated(run.quality, run.spec, run.results.get("simulation", {})),
         ]
-    if isinstance(run.training, TrainingData):
+    if run.training is not None:
         sections.append(trained(run.training, run.spec))
-    elif run.training is not None:
-        sections.append(learned(run.training))
     if run.test is not None:
         sections.append(tested(run.test))
     if run.transfer is not None:
@@ -250,58 +247,33 @@ def _invalid(found: Mapping[str, Any]) -> list[str]:
 
 
 def trained(data: TrainingData, spec: ArmSpec) -> Section:
-    """Return the shaping curves and the spread of the agents."""
-    return Section(
-        "Training in the simulation",
-        (
-            f"{len(data.evaluated)} agents learn at once from different initial weights, because these decide most "
-            "(thesis section 5.4.2); the best in a validation of its own is kept. Shaping lets begin "
-            "states lie farther "
-            "from the goal as the agent meets its criterion (thesis section 4.3.2).",
-        ),
-        (
+    """Return the training curves and the spread of the agents."""
+    text = [
+        f"{len(data.reward)} agents learn at once from different initial weights, because these decide most (thesis "
+        "section 5.4.2); the best in a validation of its own is kept."
+    ]
+    if "deviation" in data.columns:
+        text.append(
+            "Shaping lets begin states lie farther from the goal as the agent meets its criterion (thesis section "
+            "4.3.2)."
+        )
+    pictures = []
+    if len(data.columns) > 1:
+        pictures.append(
             Picture(
-                figures.shaping_curves(
-                    data.episodes, data.deviation, data.criterion, data.performance, data.epsilon, data.temperature,
-                    data.evaluated, data.chosen, spec,
-                ),
-                "Deviation, performance with its criterion, exploration and temperature over the episodes (thesis "
-                "figure 4.3 shows the last three over the deviation).",
-                figures.shaping_curves_alt(
-                    data.episodes, data.deviation, data.performance, data.evaluated, data.chosen, spec
-                ),
-            ),
-            Picture(
-                figures.spread_of_agents(data.reward, data.success, data.chosen),
-                "Validation of all agents, ordered by reward (compare the spread over runs in thesis tables 5.5 and "
-                "5.7).",
-                figures.spread_of_agents_alt(data.reward, data.success, data.chosen),
-            ),
-        ),
-    )  # fmt: skip
-
-
-def learned(data: LearningData) -> Section:
-    """Return the learning curves and the spread of agents that learned in many simulated arms at once."""
-    return Section(
-        "Training in the simulation",
-        (
-            f"{len(data.reward)} agents learn from different initial weights, each in many simulated arms at once; "
-            "the best in a validation of its own is kept.",
-        ),
-        (
-            Picture(
-                figures.learning_curves(data.episodes, data.reward_learning, data.success_learning, data.chosen),
-                "Reward and success while learning; with exploration they stay below those of the test.",
-                figures.learning_curves_alt(data.episodes, data.reward_learning, data.success_learning, data.chosen),
-            ),
-            Picture(
-                figures.spread_of_agents(data.reward, data.success, data.chosen),
-                "Validation of all agents, ordered by reward.",
-                figures.spread_of_agents_alt(data.reward, data.success, data.chosen),
-            ),
-        ),
+                figures.training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec),
+                "How the agents learned; exploring they earn less than in the test (over deviations: thesis figure 4.3).",
+                figures.training_curves_alt(data.curves, data.columns, data.evaluated, data.chosen),
+            )
+        )
+    pictures.append(
+        Picture(
+            figures.spread_of_agents(data.reward, data.success, data.chosen),
+            "Validation of all agents, ordered by reward (the spread over runs: thesis tables 5.5 and 5.7).",
+            figures.spread_of_agents_alt(data.reward, data.success, data.chosen),
+        )
     )
+    return Section("Training in the simulation", text, pictures)
 
 
 def tested(test: Movements) -> Section:

@@ -1,7 +1,10 @@
 """Training the thesis' nine networks in many simulated arms at once."""
 
+from typing import Any
+
 import numpy as np
 
+from pneumarm.learning.batched.settings import BatchedSettings
 from pneumarm.learning.batched.values import (
     ValueRule,
     collect_values,
@@ -11,11 +14,11 @@ from pneumarm.learning.batched.values import (
     to_networks,
     value_batch,
 )
-from pneumarm.learning.fleet_settings import BatchedSettings
+from pneumarm.learning.fleet import FleetLearner, train_fleet
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.policy.acting import Mind
 from pneumarm.learning.policy.inputs import input_parameters
-from pneumarm.learning.policy.training import FleetLearner
+from pneumarm.learning.training import Training
 from pneumarm.networks.layers import initial_weights, trainable
 from pneumarm.random import random_state, random_states
 from pneumarm.simulation.simulation import Simulation
@@ -28,7 +31,14 @@ _WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
 _LAST_LAYER = 0.1  # the first values are small
 
 
-class ValueLearner(FleetLearner[Agent]):
+def train_batched(
+    simulation: Simulation, begin_states: BeginStates, settings: BatchedSettings, seed: int = 0, **how: Any
+) -> Training[Agent]:
+    """Train agents and return the best; ``how`` as of :func:`~pneumarm.learning.fleet.train_fleet`."""
+    return train_fleet(lambda n: ValueLearner(simulation, begin_states, settings, seed, n), settings, seed, **how)
+
+
+class ValueLearner(FleetLearner[Agent, BatchedSettings]):
     """Nine networks a joint, with the arms in which they are learned."""
 
     networks = ("values",)
@@ -53,7 +63,7 @@ class ValueLearner(FleetLearner[Agent]):
         )
         arms = fleet(env, random_states((seed, _ARMS, number), settings.arms))
         begin_all(env, arms)
-        super().__init__(arms, random_state((seed, _ORDER, number)))
+        super().__init__(settings, env, arms, random_state((seed, _ORDER, number)))
         self._batch = value_batch(settings.steps, sizes[0], window.joints, settings.arms)
         self._rule = ValueRule(
             discount=float(settings.discount),
@@ -62,11 +72,11 @@ class ValueLearner(FleetLearner[Agent]):
             largest=float(settings.largest_gradient),
             scale=float(settings.return_scale),
         )
-        self._simulation, self._begin, self._settings, self._seed = simulation, begin_states, settings, seed
+        self._simulation, self._begin, self._seed = simulation, begin_states, seed
 
     def update(self) -> tuple[int, int, float]:
         """Act for a batch of steps and learn from them."""
-        settings, counts = self._settings, self.counts
+        settings, counts = self.settings, self.counts
         first, last, share = settings.first_exploration, settings.last_exploration, counts[0] / settings.updates
         exploration = (
             float(first.epsilon + share * (last.epsilon - first.epsilon)),
@@ -82,9 +92,9 @@ class ValueLearner(FleetLearner[Agent]):
     def agent(self) -> Agent:
         """Return the agent as it is now."""
         window, simulation = self._simulation.window, self._simulation
-        networks = to_networks(self.values.flat, window, self._settings.hidden)
+        networks = to_networks(self.values.flat, window, self.settings.hidden)
         return Agent(
-            simulation.spec, window, simulation.scaling, simulation.goal_range, networks, self._settings.online
+            simulation.spec, window, simulation.scaling, simulation.goal_range, networks, self.settings.online
         )
 
     def validate(self, episodes: int) -> Movements:

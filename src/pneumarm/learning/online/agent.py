@@ -27,7 +27,9 @@ KIND = "pneumarm agent"
 _MOST_JOINTS, _MOST_HISTORY = 16, 64  # beyond these a file is damaged, not ambitious
 
 
-class _Settings(msgspec.Struct, forbid_unknown_fields=True):
+class AgentHeader(msgspec.Struct, forbid_unknown_fields=True):
+    """What the file of an agent says besides its arrays."""
+
     spec: ArmSpec
     window: Window
     settings: TrainSettings
@@ -47,24 +49,24 @@ class Agent:
     """How it was trained; ``settings.exploration`` holds the end-of-shaping values to go on learning with."""
 
     def weights(self) -> NDArray[np.float32]:
-        """Return a fresh copy of the networks as a kernel uses them, see :class:`~.values.Learner`."""
+        """Return a fresh copy of the networks as a kernel uses them, see :class:`~.values.ActionValues`."""
         return pack(self.networks, self.window)
 
     def with_weights(self, weights: NDArray[np.float32]) -> Self:
         """Return the agent with other ``weights``, as of :meth:`weights`."""
         return replace(self, networks=unpack(weights, self.window, self.settings.hidden))
 
-    @property
-    def learns(self) -> bool:
-        """It can learn on an arm."""
-        return True
-
-    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> "OnlineLearner":
-        """Return the agent acting step by step, greedily or exploring as at the end of its training."""
+    def actor(self) -> "OnlineLearner":
+        """Return the agent acting step by step, greedily."""
         from pneumarm.learning.online.learner import OnlineLearner  # which imports this module
 
-        exploration = self.settings.exploration if explores else None
-        return OnlineLearner(self, learning_rate, exploration, seed)
+        return OnlineLearner(self)
+
+    def learner(self, learning_rate: float, seed: int = 0) -> "OnlineLearner":
+        """Return the agent acting and learning step by step, exploring as at the end of its training."""
+        from pneumarm.learning.online.learner import OnlineLearner  # which imports this module
+
+        return OnlineLearner(self, learning_rate, self.settings.exploration, seed)
 
     def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
         """Let the agent move greedily in ``simulation``."""
@@ -78,7 +80,7 @@ class Agent:
             UnusableInput: ``path`` cannot be written.
 
         """
-        settings = msgspec.to_builtins(_Settings(self.spec, self.window, self.settings))
+        settings = msgspec.to_builtins(AgentHeader(self.spec, self.window, self.settings))
         scaling = {name: getattr(self.scaling, name) for name in _SCALING}
         write_arrays(path, KIND, settings, self.networks._asdict() | scaling | {"goal_range": self.goal_range})
 
@@ -92,7 +94,7 @@ class Agent:
         """
         read, arrays = read_arrays(path, KIND)
         try:
-            known = msgspec.convert(read, _Settings)
+            known = msgspec.convert(read, AgentHeader)
         except (msgspec.ValidationError, UnusableInput) as error:
             raise UnusableInput(f"{path}: expected the settings of an agent; {error}") from error
         window = known.window

@@ -33,7 +33,7 @@ _IN_ORDER = {"contract"}
 """A product and a sum may become one instruction, but sums keep their order."""
 
 
-class Learner(NamedTuple):
+class ActionValues(NamedTuple):
     """The networks of an agent as a kernel changes them. Made by :func:`learner`."""
 
     weights: NDArray[np.float32]
@@ -64,10 +64,12 @@ class Learner(NamedTuple):
     """Q-learning."""
 
 
-def learner(weights: NDArray[np.float32], settings: TrainSettings, learning_rate: float | None = None) -> Learner:
+def learner(
+    weights: NDArray[np.float32], settings: TrainSettings, learning_rate: float | None = None
+) -> ActionValues:
     """Return a learner that changes ``weights`` in place."""
     width = padded(settings.hidden, LANES)
-    return Learner(
+    return ActionValues(
         weights=weights,
         traces=np.zeros_like(weights),
         traced=np.zeros((len(weights), ACTIONS), np.bool_),
@@ -112,7 +114,7 @@ def draw_networks(window: Window, settings: TrainSettings, random: np.random.Gen
 
 
 def pack(networks: Networks, window: Window) -> NDArray[np.float32]:
-    """Return ``networks`` as the weights of a :class:`Learner`."""
+    """Return ``networks`` as the weights of a :class:`ActionValues`."""
     place, state = places(window), window.state_size
     joints, _, _, size = networks.hidden_weights.shape
     width = padded(size, LANES)
@@ -139,7 +141,7 @@ def unpack(weights: NDArray[np.float32], window: Window, hidden: int) -> Network
 
 
 def _by_action(weights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
-    """Return ``weights`` of a :class:`Learner` seen network by network, shape (joints, 9, inputs + 2, width)."""
+    """Return ``weights`` of a :class:`ActionValues` seen network by network, shape (joints, 9, inputs + 2, width)."""
     used = weights[:, :, : ACTIONS * width]
     return used.reshape(*used.shape[:2], ACTIONS, width).transpose(0, 2, 1, 3)
 

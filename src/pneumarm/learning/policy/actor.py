@@ -5,8 +5,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import PneumarmError
 from pneumarm.kernels import kernel
-from pneumarm.learning.fleet_settings import PolicySettings
 from pneumarm.learning.policy.acting import Mind, decide, lanes
+from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.random import random_states
 from pneumarm.task.fleet import look, note_still
 
@@ -17,10 +17,7 @@ class PolicyActor:
     It does not learn.
     """
 
-    def __init__(
-        self, policy: NDArray[np.float32], mind: Mind, sizes: tuple[int, ...], settings: PolicySettings
-    ) -> None:
-        self._policy = policy
+    def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings) -> None:
         self._mind, self._horizon, self._clear = mind, settings.horizon, settings.clear
         self._single = lanes(mind, sizes, random_states(0, 1))
         self._lanes = lanes(mind, sizes, np.zeros((settings.lookahead, 4), np.uint64))
@@ -56,21 +53,6 @@ class PolicyActor:
             raise PneumarmError("begin an episode and act before going on")
         _follow(self._mind, self._single, self._checked(next_state))
         self._decided = False
-
-    def observe(self, reward: ArrayLike, next_state: ArrayLike, terminal: bool) -> None:
-        """Go on in ``next_state``; nothing is learned."""
-        self.follow(next_state)
-
-    def weights(self) -> NDArray[np.float32]:
-        """Return a copy of the policy's weights."""
-        return self._policy.copy()
-
-    def get_state(self) -> bytes:
-        """Return nothing: between episodes there is nothing to remember."""
-        return b""
-
-    def set_state(self, state: bytes) -> None:
-        """Take up what :meth:`get_state` returned."""
 
     def _checked(self, state: ArrayLike) -> NDArray[np.float32]:
         checked = np.asarray(state, np.float32)

@@ -8,18 +8,18 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
-from pneumarm.learning.fleet_settings import PolicySettings
+from pneumarm.learning.agents import SimulationAgent
 from pneumarm.learning.policy.acting import Mind
 from pneumarm.learning.policy.actor import PolicyActor
 from pneumarm.learning.policy.inputs import input_parameters, input_size
+from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.policy.testing import run_policy
 from pneumarm.networks.layers import split, weight_count
 from pneumarm.random import random_states
-from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.acting import test_acting
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
@@ -33,33 +33,12 @@ _LOOKAHEAD = 5  # seed of the noise in which it looks ahead
 
 
 @dataclass(frozen=True)
-class PolicyAgent:
+class PolicyAgent(SimulationAgent):
     """A policy by state and goal, the simulation that it was trained in, and how it was trained."""
 
-    simulation: Simulation
     policy: NDArray[np.float32]
     """Weights of its network, layer after layer, shape (size,)."""
     settings: PolicySettings
-
-    @property
-    def spec(self) -> ArmSpec:
-        """The arm that it was trained for."""
-        return self.simulation.spec
-
-    @property
-    def window(self) -> Window:
-        """Of its state."""
-        return self.simulation.window
-
-    @property
-    def scaling(self) -> Scaling:
-        """Of its state."""
-        return self.simulation.scaling
-
-    @property
-    def goal_range(self) -> NDArray[np.float64]:
-        """Goals that it has learned to reach, shape (joints, 2) [counts]."""
-        return self.simulation.goal_range
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -70,22 +49,27 @@ class PolicyAgent:
         """Return a copy of the policy's weights."""
         return self.policy.copy()
 
-    def with_weights(self, weights: NDArray[np.float32]) -> Self:
-        """Return the agent with other ``weights``, as of :meth:`weights`."""
-        return replace(self, policy=weights)
+    def revised(self, simulation: Simulation, weights: NDArray[np.float32]) -> Self:
+        """Return the agent with another ``simulation`` of its arm and other ``weights``."""
+        return replace(self, simulation=simulation, policy=weights)
 
     def mind(self, begin: BeginStates | None = None) -> Mind:
         """Return what decides, for kernels; with ``begin`` states its simulated arms can begin episodes, too."""
         return mind(self.simulation, begin, self.settings, self.policy)
 
-    @property
-    def learns(self) -> bool:
-        """It does not learn while it moves an arm; between movements it can adapt."""
-        return False
+    def actor(self) -> PolicyActor:
+        """Return the policy acting greedily; it does not learn while it moves an arm."""
+        return PolicyActor(self.mind(), self.sizes, self.settings)
 
-    def actor(self, learning_rate: float = 0.0, explores: bool = False, seed: int = 0) -> PolicyActor:
-        """Return the policy acting greedily; it neither learns nor explores, so the arguments change nothing."""
-        return PolicyActor(self.policy.copy(), self.mind(), self.sizes, self.settings)
+    def adapted(
+        self, simulation: Simulation, begin: BeginStates, updates: int, warm_up: int, learning_rate: float, seed: int
+    ) -> Self:
+        """Return the policy after learning in ``simulation``; only the values of states learn while it warms up."""
+        from pneumarm.learning.policy.training import tuned_policy  # which imports this module
+
+        tuned = replace(self.settings, updates=warm_up + updates, learning_rate=learning_rate)
+        policy = tuned_policy(self.policy, simulation, begin, tuned, seed, warm_up)
+        return self.revised(simulation, policy)
 
     def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
         """Let the policy move greedily in ``simulation``, without lookahead."""

@@ -41,7 +41,7 @@ _SHORTEST = np.float32(-60.0)  # exp(-60) is as good as 0, and no squaring under
 _NEVER = np.float32(1e-20)  # less probable is a forbidden action only
 
 
-class Batch(NamedTuple):
+class Experience(NamedTuple):
     """What ``n`` arms did in ``steps`` steps. Made by :func:`batch`."""
 
     inputs: NDArray[np.float32]
@@ -68,10 +68,10 @@ class Batch(NamedTuple):
     """Workspace, shape (steps,)."""
 
 
-def batch(steps: int, inputs: int, joints: int, n: int) -> Batch:
+def batch(steps: int, inputs: int, joints: int, n: int) -> Experience:
     """Return workspace for ``steps`` of ``n`` arms."""
     each, float_ = (steps, n), np.float32
-    return Batch(
+    return Experience(
         inputs=np.zeros((steps + 1, inputs, n), float_),
         bias=np.zeros((steps, ACTIONS * joints, n), float_),
         actions=np.zeros((steps, n, joints), np.int64),

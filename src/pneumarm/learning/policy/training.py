@@ -1,21 +1,16 @@
-"""Training in many simulated arms: several learners at once, of which the best is kept; and the policy's learner."""
+"""Training a policy in many simulated arms, and going on with it when an arm has changed."""
 
-from abc import abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.learning.fleet_settings import FleetSettings, PolicySettings
-from pneumarm.learning.online.training import Progress
-from pneumarm.learning.policy.acting import Mind
+from pneumarm.learning.fleet import FleetLearner, train_fleet
 from pneumarm.learning.policy.agent import PolicyAgent, mind, policy_sizes
 from pneumarm.learning.policy.proximal import Rule, batch, collect, improve
+from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.policy.testing import run_policy
-from pneumarm.learning.side_by_side import Learner, identity_of, train_side_by_side
+from pneumarm.learning.training import Training
 from pneumarm.networks.layers import initial_weights, trainable
 from pneumarm.random import random_state, random_states
 from pneumarm.simulation.simulation import Simulation
@@ -25,99 +20,17 @@ from pneumarm.task.movements import Movements
 
 _WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
 _FIRST_OUTPUT = 0.01  # the first policy chooses by its bonus for holding alone
-AgentT = TypeVar("AgentT")
+_VALUE_RATE = 4e-3  # of a policy's training, whose values begin at random, too
 
 
-@dataclass(frozen=True)
-class FleetTraining(Generic[AgentT]):
-    """A training in many simulated arms: its best agent and all that it took."""
-
-    agent: AgentT
-    best: int
-    """Index of the best learner, by mean reward in its validation."""
-    validation: tuple[Movements, ...]
-    """Validation of every learner, without lookahead, with seeds of its own."""
-    curves: NDArray[np.float64]
-    """Columns as in ``FLEET_CURVES``, shape (agents, rows, columns)."""
-    episodes: int
-    """Of all learners together."""
-    steps: int
-    """Of all simulated arms of all learners together."""
-    seconds: float
-    """Wall time of training and validation [s], without compiling."""
-    core_seconds: float
-    """Processor time of collecting and learning, all threads together [s], without compiling and validation."""
-
-    def results(self) -> dict[str, Any]:
-        """Return what ``train --json`` says."""
-        return {
-            "episodes": self.episodes,
-            "steps": self.steps,
-            "seconds": self.seconds,
-            "steps_per_second": self.steps / max(self.seconds, 1e-9),
-            "steps_per_second_per_core": self.steps / max(self.core_seconds, 1e-9),
-            "best": self.best,
-            "validation": [result.results() for result in self.validation],
-        }
+def train_policy(
+    simulation: Simulation, begin_states: BeginStates, settings: PolicySettings, seed: int = 0, **how: Any
+) -> Training[PolicyAgent]:
+    """Train policies and return the best; ``how`` as of :func:`~pneumarm.learning.fleet.train_fleet`."""
+    return train_fleet(lambda n: PolicyLearner(simulation, begin_states, settings, seed, n), settings, seed, **how)
 
 
-class FleetLearner(Learner, Generic[AgentT]):
-    """A learner that becomes an agent."""
-
-    mind: Mind
-    """What acts in the simulated arms."""
-
-    @abstractmethod
-    def agent(self) -> AgentT:
-        """Return the agent as it is now."""
-
-
-def train_fleet(
-    make: Callable[[int], FleetLearner[AgentT]],
-    settings: FleetSettings,
-    seed: int = 0,
-    *,
-    progress: Callable[[Progress], None] | None = None,
-    checkpoint: Path | None = None,
-    threads: int | None = None,
-) -> FleetTraining[AgentT]:
-    """Train ``settings.agents`` learners, of which ``make`` makes each by its number, and return the best agent.
-
-    The same seed gives the same agents, bit for bit, with any number of ``threads`` (default: one a core). With a
-    ``checkpoint`` a killed training goes on from there; the file is left when training is done.
-
-    ``seed`` is the one that the learners are made with.
-
-    Raises:
-        UnusableInput: the checkpoint is of another training.
-
-    """
-    compiled = make(0)
-    compiled.update()  # on a learner that is thrown away, so that compiling is not counted as training
-    compiled.validate(1)
-    learners = [make(number) for number in range(settings.agents)]
-    trained = train_side_by_side(
-        learners,
-        settings.updates,
-        settings.validation_episodes,
-        identity_of(compiled.mind.environment, settings, seed),
-        progress=progress,
-        checkpoint=checkpoint,
-        threads=threads,
-    )
-    return FleetTraining(
-        agent=learners[trained.best].agent(),
-        best=trained.best,
-        validation=trained.validation,
-        curves=np.stack([one.curve for one in learners]),
-        episodes=sum(int(one.counts[2]) for one in learners),
-        steps=sum(int(one.counts[0]) for one in learners) * settings.arms * settings.steps,
-        seconds=trained.seconds,
-        core_seconds=sum(float(one.seconds[0]) for one in learners),
-    )
-
-
-class PolicyLearner(FleetLearner[PolicyAgent]):
+class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):
     """A policy and the value of states under it, with the arms in which they are learned."""
 
     networks = ("policy", "value")
@@ -134,10 +47,10 @@ class PolicyLearner(FleetLearner[PolicyAgent]):
         self.mind = mind(simulation, begin_states, settings, self.policy.flat)
         arms = fleet(self.mind.environment, random_states((seed, _ARMS, number), settings.arms))
         begin_all(self.mind.environment, arms)
-        super().__init__(arms, random_state((seed, _ORDER, number)))
+        super().__init__(settings, self.mind.environment, arms, random_state((seed, _ORDER, number)))
         self._batch = batch(settings.steps, self.sizes[0], window.joints, settings.arms)
         self._rule = rule(settings)
-        self._simulation, self._settings, self._seed = simulation, settings, seed
+        self._simulation, self._seed = simulation, seed
 
     def update(self) -> tuple[int, int, float]:
         """Act for a batch of steps and learn from them."""
@@ -148,12 +61,12 @@ class PolicyLearner(FleetLearner[PolicyAgent]):
 
     def rates(self) -> tuple[float, float]:
         """Return the learning rates of policy and values."""
-        rate = self._settings.learning_rate * (1 - self.counts[0] / self._settings.updates)
+        rate = self.settings.learning_rate * (1 - self.counts[0] / self.settings.updates)
         return rate, rate
 
     def agent(self) -> PolicyAgent:
         """Return the agent as it is now."""
-        return PolicyAgent(self._simulation, self.policy.flat.copy(), self._settings)
+        return PolicyAgent(self._simulation, self.policy.flat.copy(), self.settings)
 
     def validate(self, episodes: int) -> Movements:
         """Return greedy movements, without lookahead."""
@@ -172,3 +85,36 @@ def rule(settings: PolicySettings) -> Rule:
         largest=float(settings.largest_gradient),
         scale=float(settings.return_scale),
     )
+
+
+class _Tuner(PolicyLearner):
+    """A policy that is kept as it is until the values of states are known."""
+
+    def __init__(
+        self, simulation: Simulation, begin: BeginStates, settings: PolicySettings, seed: int, warm_up: int
+    ) -> None:
+        super().__init__(simulation, begin, settings, seed, 0)
+        self._warm_up = warm_up
+
+    def rates(self) -> tuple[float, float]:
+        """Return the learning rates of policy and values."""
+        done, updates = int(self.counts[0]), self.settings.updates
+        left = 1 - max(done - self._warm_up, 0) / (updates - self._warm_up)
+        return (self.settings.learning_rate * left if done >= self._warm_up else 0.0), _VALUE_RATE * left
+
+
+def tuned_policy(
+    policy: NDArray[np.float32],
+    simulation: Simulation,
+    begin: BeginStates,
+    settings: PolicySettings,
+    seed: int,
+    warm_up: int,
+) -> NDArray[np.float32]:
+    """Return the weights ``policy`` after learning in ``simulation``, or as they were where those are better."""
+    learner = _Tuner(simulation, begin, settings, seed, warm_up)
+    learner.policy.flat[:] = policy
+    before = learner.validate(settings.validation_episodes).reward.mean()
+    learner.learn(settings.updates)
+    after = learner.validate(settings.validation_episodes).reward.mean()
+    return learner.policy.flat if after > before else policy

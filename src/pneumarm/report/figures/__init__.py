@@ -11,7 +11,6 @@ from pneumarm.report.figures.displacement import against_displacement, against_d
 from pneumarm.report.figures.episodes import distributions, distributions_alt
 from pneumarm.report.figures.importance import input_importance, input_importance_alt
 from pneumarm.report.figures.isoplots import isoplot, isoplot_alt
-from pneumarm.report.figures.learning import learning_curves, learning_curves_alt
 from pneumarm.report.figures.marked import marked_rows, marked_rows_alt
 from pneumarm.report.figures.movements import movement, movement_alt
 from pneumarm.report.figures.propagation import error_propagation, error_propagation_alt, expectation
@@ -23,10 +22,10 @@ from pneumarm.report.figures.residues import (
     residue_by_class_alt,
 )
 from pneumarm.report.figures.training import (
-    shaping_curves,
-    shaping_curves_alt,
     spread_of_agents,
     spread_of_agents_alt,
+    training_curves,
+    training_curves_alt,
 )
 from pneumarm.report.figures.transfer import Phase, transfer_curves, transfer_curves_alt
 
@@ -52,8 +51,6 @@ __all__ = [
     "input_importance_alt",
     "isoplot",
     "isoplot_alt",
-    "learning_curves",
-    "learning_curves_alt",
     "marked_rows",
     "marked_rows_alt",
     "movement",
@@ -65,10 +62,10 @@ __all__ = [
     "residue_alt",
     "residue_by_class",
     "residue_by_class_alt",
-    "shaping_curves",
-    "shaping_curves_alt",
     "spread_of_agents",
     "spread_of_agents_alt",
+    "training_curves",
+    "training_curves_alt",
     "transfer_curves",
     "transfer_curves_alt",
 ]

@@ -1,4 +1,7 @@
-"""The training in the simulation: shaping over the episodes, and the spread of the agents (thesis section 4.3)."""
+"""The training in the simulation: what learning went like, and the spread of the agents (thesis section 4.3)."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -23,78 +26,88 @@ from pneumarm.report.style import (
 Array = NDArray[np.float64]
 
 
+EPISODES, CRITERION, DEVIATION = "episodes", "criterion", "deviation"
+LABELS = {
+    DEVIATION: ("deviation [counts]", 1.0),
+    "performance": ("performance p(k) [-]", 1.0),
+    "epsilon": ("exploring share ε [-]", 1.0),
+    "temperature": ("temperature T [-]", 1.0),
+    "reward": ("reward an episode, exploring [-]", 1.0),
+    "success": ("success, exploring [%]", 100.0),
+}
+"""Labels of curves by the name of their column, and what values are multiplied by; others are called as they are."""
+_WORST = 100.0  # of rewards, below the best: the very first ones wander about
+
+
 @styled
-def shaping_curves(
-    episodes: Array,
-    deviation: Array,
-    criterion: Array,
-    performance: Array,
-    epsilon: Array,
-    temperature: Array,
-    evaluations: NDArray[np.int64],
-    chosen: int,
-    spec: ArmSpec,
+def training_curves(
+    curves: Array, columns: Sequence[str], evaluated: NDArray[np.int64], chosen: int, spec: ArmSpec
 ) -> Figure:
-    """Draw the shaping of every agent over its episodes; the chosen agent stands out.
+    """Draw every column of training curves over the episodes; the chosen agent stands out.
 
     Args:
-        episodes: episodes at each evaluation, shape (evaluations,).
-        deviation: largest distance of a begin state from the goal, shape (agents, evaluations) [counts].
-        criterion: share of successes asked for, the same shape.
-        performance: p(k) of eq. 4.14, the same shape.
-        epsilon: share of exploring actions, the same shape.
-        temperature: of the Boltzmann exploration, the same shape.
-        evaluations: how many of the evaluations each agent took before its training ended, shape (agents,).
+        curves: of each agent, shape (agents, rows, columns).
+        columns: what they are, the first of them the episodes; a criterion is drawn into the performance.
+        evaluated: how many rows each agent took before its training ended, shape (agents,).
         chosen: index of the chosen agent.
         spec: the arm, for units.
 
     """
-    figure, axes = panels(2, 2, 4.6, sharex=True)
-    curves = (
-        (axes[0, 0], deviation, "deviation [counts]"),
-        (axes[0, 1], performance, "performance p(k) [-]"),
-        (axes[1, 0], epsilon, "exploring share ε [-]"),
-        (axes[1, 1], temperature, "temperature T [-]"),
-    )
-    agents = len(evaluations)
-    order = [a for a in range(agents) if a != chosen] + ([chosen] if agents else [])
-    for place, curve, label in curves:
+    drawn = [name for name in columns[1:] if name != CRITERION]
+    rows, agents = -(-len(drawn) // 2), len(evaluated)
+    figure, axes = panels(rows, min(len(drawn), 2), 0.5 + 2.1 * rows, sharex=True)
+    for place in axes.flat[len(drawn) :]:
+        place.set_visible(False)
+    of = {name: (place, curves[:, :, columns.index(name)]) for name, place in zip(drawn, axes.flat, strict=False)}
+    for name, (place, values) in of.items():
+        label, factor = LABELS.get(name, (f"{name} [-]", 1.0))
         place.set_ylabel(label)
-        for agent in order:
-            upto = slice(int(evaluations[agent]))
-            best = agent == chosen
-            style = {"color": DARK, "lw": 1.8} if best else {"color": GREY, "lw": 0.6, "alpha": 0.7}
-            place.plot(episodes[upto] / 1e3, curve[agent, upto], **style, marker="o" if upto.stop == 1 else None)
-        if agents == 0:
+        for agent in [*(a for a in range(agents) if a != chosen), *([chosen] if agents else [])]:
+            upto = slice(int(evaluated[agent]))
+            style = {"color": DARK, "lw": 1.8} if agent == chosen else {"color": GREY, "lw": 0.6, "alpha": 0.7}
+            marker = "o" if upto.stop == 1 else None
+            place.plot(curves[agent, upto, 0] / 1e3, factor * values[agent, upto], **style, marker=marker)
+        if not evaluated.any():
             nothing(place, "no agent was trained")
-    if agents:
-        upto = slice(int(evaluations[chosen]))
-        axes[0, 1].plot(episodes[upto] / 1e3, criterion[chosen, upto], color=MIDDLE, ls="--")
-        second_unit(axes[0, 0], "deviation [°]", 1 / spec.counts_per_degree)
-        handles = [key(DARK, lw=1.8), key(MIDDLE, "--"), key(GREY, lw=0.6)]
-        legend_below(figure, handles, ["chosen agent", "its criterion", f"the other {agents - 1}"])
+    handles, words = [key(DARK, lw=1.8), key(GREY, lw=0.6)], ["chosen agent", f"the other {agents - 1}"]
+    if evaluated.any() and {"performance", CRITERION} <= set(columns):
+        best = curves[chosen, : int(evaluated[chosen])]
+        of["performance"][0].plot(best[:, 0] / 1e3, best[:, columns.index(CRITERION)], color=MIDDLE, ls="--")
+        handles.insert(1, key(MIDDLE, "--"))
+        words.insert(1, "its criterion")
+    if evaluated.any():
+        if DEVIATION in of:
+            second_unit(of[DEVIATION][0], "deviation [°]", 1 / spec.counts_per_degree)
+        legend_below(figure, handles, words)
+    _limit(of, evaluated)
     for place in axes[-1]:
         place.set_xlabel("episodes [thousands]")
-        place.set_xlim(0)
-    for place in axes.flat:
-        place.set_ylim(0)
     return figure
 
 
-def shaping_curves_alt(
-    episodes: Array, deviation: Array, performance: Array, evaluations: NDArray[np.int64], chosen: int, spec: ArmSpec
-) -> str:
-    """Say in words what :func:`shaping_curves` shows."""
-    if len(evaluations) == 0 or evaluations[chosen] == 0:
+def _limit(of: Mapping[str, tuple[Any, Array]], evaluated: NDArray[np.int64]) -> None:
+    """Let axes begin at 0, but for rewards."""
+    for name, (place, values) in of.items():
+        place.set_xlim(0)
+        known = np.concatenate([values[agent, : int(rows)] for agent, rows in enumerate(evaluated)] or [np.zeros(0)])
+        if name != "reward" and (known >= 0).all():
+            place.set_ylim(0)
+        elif name == "reward" and known.size:
+            best = float(known.max())
+            place.set_ylim(max(float(known.min()), best - _WORST), best + 5)
+
+
+def training_curves_alt(curves: Array, columns: Sequence[str], evaluated: NDArray[np.int64], chosen: int) -> str:
+    """Say in words what :func:`training_curves` shows."""
+    if len(evaluated) == 0 or evaluated[chosen] == 0:
         return "No agent was trained."
-    last = int(evaluations[chosen]) - 1
-    ends = np.array([episodes[max(int(e) - 1, 0)] for e in evaluations])
+    mine = curves[chosen, : int(evaluated[chosen])]
+    told = [
+        f"{name} from {a:.4g} to {b:.4g}" for name, a, b in zip(columns[1:], mine[0, 1:], mine[-1, 1:], strict=True)
+    ]
     return (
-        f"Shaping of {len(evaluations)} agents. The chosen one trained for {episodes[last]:,.0f} "
-        "episodes; its deviation "
-        f"grew from {deviation[chosen, 0]:.0f} to {deviation[chosen, last]:.0f} counts "
-        f"({deviation[chosen, last] / spec.counts_per_degree:.0f}°) and its performance ended at "
-        f"{performance[chosen, last]:.3f}. All agents ended after {ends.min():,.0f} to {ends.max():,.0f} episodes."
+        f"Learning of {len(evaluated)} agents. The chosen one made {mine[-1, 0]:,.0f} episodes; meanwhile "
+        f"{'; '.join(told)}."
     )
 
 

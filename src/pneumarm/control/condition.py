@@ -31,7 +31,7 @@ COLLECTING = "collecting"
 
 
 @dataclass(frozen=True)
-class Found:
+class Condition:
     """What was wrong while an arm moved."""
 
     findings: tuple[Finding, ...] = ()
@@ -57,15 +57,15 @@ def findings_as_dicts(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 def collected_results(collected: CollectResult, watch: Monitor) -> dict[str, Any]:
     """Return what was collected as in ``results.json``, with what ``watch`` found wrong meanwhile."""
-    found = Found(tuple(watch.findings), collected.marked, {COLLECTING: collected.counts})
+    found = Condition(tuple(watch.findings), collected.marked, {COLLECTING: collected.counts})
     return {**asdict(collected), **found.results()}
 
 
-def said(results: Mapping[str, Any], doing: str) -> list[str]:
+def complaints(results: Mapping[str, Any], doing: str) -> list[str]:
     """Return the lines in which a command tells what was wrong while it was ``doing`` something to an arm.
 
-    ``results`` are those of :meth:`Found.results`. What the guard does on any healthy arm, keeping inlets closed at
-    the highest pressure, is not told.
+    ``results`` are those of :meth:`Condition.results`. What the guard does on any healthy arm, keeping inlets closed
+    at the highest pressure, is not told.
     """
     marked = results.get("marked", {})
     findings = (one for one in results.get("findings", []) if isinstance(one, Mapping))  # text in older results

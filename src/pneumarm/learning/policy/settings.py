@@ -1,0 +1,47 @@
+"""What a user can choose about learning a policy."""
+
+import math
+from dataclasses import dataclass
+
+from pneumarm.learning.fleet import FleetSettings
+from pneumarm.settings import Valid
+
+
+@dataclass(frozen=True)
+class PolicySettings(FleetSettings):
+    """A policy, improved by proximal policy optimisation, and how it acts on the arm."""
+
+    hidden: tuple[int, ...] = (32, 32)
+    """Hidden units of each layer, of the policy and of the state's value alike."""
+    clip: float = 0.2
+    """How much more or less probable an action may become by one batch."""
+    entropy: float = 0.01
+    """Price of being certain, in standard deviations of the advantage."""
+    hold: float = 3.0
+    """Bonus, on its logit, of the action that is being held: a first guess at what switches cost."""
+    squash: tuple[float, ...] = (25.0, 100.0)
+    """Errors of the angle at which the inputs that tell them bend, finely and coarsely [counts]."""
+    still: float = 2.5
+    """Changes of angle and pressures up to this count as none [counts]."""
+    patience: int = 2
+    """Steps without change, off the goal, after which another action must be taken; 0: never."""
+    lookahead: int = 192
+    """Simulated movements by which a decision that is not clear is made on the arm; 0: as the policy says."""
+    horizon: int = 25
+    """Longest of these movements [steps]."""
+    clear: float = 0.001
+    """Actions less probable than this are not looked at; where only one is left the decision is clear."""
+
+    def _valid(self) -> Valid:
+        return {
+            "hidden": 1 <= len(self.hidden) <= 8 and all(1 <= size <= 1024 for size in self.hidden),
+            "clip": 0 < self.clip < 1,
+            "entropy": 0 <= self.entropy < math.inf,
+            "hold": math.isfinite(self.hold),
+            "squash": len(self.squash) <= 16 and all(0 < error < math.inf for error in self.squash),
+            "still": 0 <= self.still < math.inf,
+            "patience": self.patience >= 0,
+            "lookahead": 0 <= self.lookahead <= 65_536,
+            "horizon": self.horizon >= 1,
+            "clear": 0 <= self.clear < 1,
+        }

@@ -15,7 +15,7 @@ def load_controller(file: str | Path) -> "Controller":
     It has made its first turns when it is returned: an arm that waits for it waits for nothing to be compiled.
     """
     from pneumarm.classical import is_tuned, load_tuned
-    from pneumarm.control.agent import AgentController, warm_up
+    from pneumarm.control.agent import controller_of, warm_up
     from pneumarm.control.open_agent import open_agent
 
     path = Path(file)
@@ -23,4 +23,4 @@ def load_controller(file: str | Path) -> "Controller":
         return load_tuned(path).controller()
     opened = open_agent(path)
     warm_up(opened)
-    return AgentController(opened)
+    return controller_of(opened)

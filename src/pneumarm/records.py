@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.arm.valves import Command
-from pneumarm.control import BEGIN, AgentController, move
+from pneumarm.control import BEGIN, controller_of, move
 from pneumarm.learning import AnyAgent, Training
 from pneumarm.report.data import Demonstration, MarkedData, TrainingData
 from pneumarm.task import Movement
@@ -91,7 +91,7 @@ def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Demonstration]:
 
 def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Movement:
     task = agent.settings
-    return move(cycle, AgentController(agent), goal, task.reward, task.cutoff, velocity=agent.window.velocity)
+    return move(cycle, controller_of(agent), goal, task.reward, task.cutoff, velocity=agent.window.velocity)
 
 
 def _recorded(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Demonstration:

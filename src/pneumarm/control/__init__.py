@@ -1,6 +1,6 @@
 """Controllers on an arm: agents, movements, transfer and adaptation."""
 
-from pneumarm.control.agent import AgentController
+from pneumarm.control.agent import AgentController, controller_of
 from pneumarm.control.monitor import Finding, Monitor, MonitorSettings
 from pneumarm.control.movement import LearningController, move
 from pneumarm.control.open_agent import open_agent
@@ -25,6 +25,7 @@ __all__ = [
     "MonitorSettings",
     "TransferSettings",
     "Transferred",
+    "controller_of",
     "move",
     "open_agent",
     "open_controller",

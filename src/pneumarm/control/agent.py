@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.controller import Controller
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.arm.valves import Command, to_valves
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Acts, LearningActor
+from pneumarm.learning import Acts, LearningActor, Tracks
 from pneumarm.task import StateTracker
 from pneumarm.task.acting import Acting
 from pneumarm.transitions.watch import made_up_readings
@@ -36,7 +37,7 @@ class AgentController:
         self._seen = None
         self._tracker.reset()
 
-    def act(self, reading: Reading) -> NDArray[np.int8]:
+    def act(self, reading: Reading) -> Command:
         """Return the valves (joints, 2) to set after ``reading``."""
         if self._goal is None:
             raise UnusableInput("call reset(goal) before act(reading)")
@@ -48,9 +49,10 @@ class AgentController:
             else:  # a reading that nobody told the actor about: nothing can be learned from the way to it
                 self.actor.follow(state)
             self._seen = reading.time
-        valves = to_valves(self.actor.act())
-        self._tracker.commanded(valves)
-        return valves
+        chosen = self.actor.act()
+        command: Command = to_valves(chosen) if chosen.ndim == 1 else chosen.astype(np.float64)
+        self._tracker.commanded(command)
+        return command
 
     def observe(self, reading: Reading, applied: Command, reward: NDArray[np.float64], terminal: bool) -> None:
         """Go on with ``reading``, to which the valves as ``applied`` led with ``reward`` (joints,); learn from it."""
@@ -61,6 +63,11 @@ class AgentController:
         else:
             self._learner.observe(reward, state, terminal)
         self._seen = reading.time
+
+
+def controller_of(agent: Acts) -> Controller:
+    """Return the controller with which ``agent`` acts as well as it can: its own where it has one."""
+    return agent.controller() if isinstance(agent, Tracks) else AgentController(agent)
 
 
 def warm_up(agent: Acts, actor: Acting | None = None) -> None:

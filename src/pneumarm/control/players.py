@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pneumarm.arm import Arm, Controller
-from pneumarm.control.agent import AgentController, warm_up
+from pneumarm.control.agent import controller_of, warm_up
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
@@ -38,7 +38,7 @@ def open_controller(name: str, arm: Arm, method: str | None = None) -> Iterator[
         agent = open_agent(Path(name), method)
         check_fit(agent, arm)
         warm_up(agent)
-        yield AgentController(agent)
+        yield controller_of(agent)
 
 
 def read_trajectory(path: Path, joints: int) -> Trajectory:

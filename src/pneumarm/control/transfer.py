@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.adaptation import AdaptationSettings, adaptation
-from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
+from pneumarm.arm import Arm, BeginState, ControlCycle, Controller, guarded
 from pneumarm.arm.counts import Counts
-from pneumarm.control.agent import AgentController, warm_up
+from pneumarm.control.agent import AgentController, controller_of, warm_up
 from pneumarm.control.condition import Condition
 from pneumarm.control.monitor import Monitor
 from pneumarm.control.movement import MOVEMENT, move
@@ -276,13 +276,13 @@ class Transfer:
                 self._keep()
             progress(len(self._done), total)
 
-    def _controller(self, phase: Phase) -> AgentController:
+    def _controller(self, phase: Phase) -> Controller:
         """Return what moves the arm in ``phase``."""
         if self._learning is not None and phase == "learning":
             return AgentController(self._arrived, self._learning.learner)
-        return AgentController(self.agent)
+        return controller_of(self.agent)
 
-    def _move(self, controller: AgentController, test: bool, number: int) -> Movement:
+    def _move(self, controller: Controller, test: bool, number: int) -> Movement:
         """Bring the arm to a begin state and make movement ``number`` of a test or of learning."""
         agent, task = self._arrived, self._arrived.settings
         random, goal = draw_movement(agent.goal_range, self._seed, test, number)

@@ -36,6 +36,10 @@ from pneumarm.learning.policy.agent import KIND as POLICY
 from pneumarm.learning.policy.agent import PolicyAgent
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.policy.training import train_policy
+from pneumarm.learning.servo.agent import KIND as SERVO
+from pneumarm.learning.servo.agent import ServoAgent
+from pneumarm.learning.servo.settings import ServoSettings
+from pneumarm.learning.servo.training import train_servo
 from pneumarm.learning.training import Progress, Training
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
@@ -75,6 +79,7 @@ def _thesis(name: str) -> Method:
 
 
 METHODS: Mapping[str, Method] = {
+    "servo": Method(ServoSettings, train_servo, ServoAgent.load, ("settle", "hold", "track", "reach"), place="servo"),
     "policy": Method(PolicySettings, train_policy, PolicyAgent.load, place="policy"),
     "batched": Method(BatchedSettings, train_batched, Agent.load, place="batched"),
     "sarsa": _thesis("sarsa"),
@@ -82,6 +87,7 @@ METHODS: Mapping[str, Method] = {
 }
 """A policy, by default; the thesis' nine networks learned in many arms at once; the thesis' own two."""
 _LOADS: Mapping[str, Callable[[Path], AnyAgent]] = {
+    SERVO: ServoAgent.load,
     POLICY: PolicyAgent.load,
     ACTION_VALUES: Agent.load,
     IMPORTED: ImportedPolicy.load,
@@ -147,6 +153,8 @@ class LearnSettings(Settings):
     method: str = "policy"
     """policy, batched (the thesis' networks learned in many arms at once), sarsa or q-learning (the thesis'), an
     installed method, or MODULE:NAME of your own."""
+    servo: ServoSettings = field(default_factory=ServoSettings)
+    """Of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)
     """Of the method policy."""
     batched: BatchedSettings = field(default_factory=BatchedSettings)

@@ -262,7 +262,7 @@ def trained(data: TrainingData, spec: ArmSpec) -> Section:
         pictures.append(
             Picture(
                 figures.training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec),
-                "How the agents learned; exploring they earn less than in the test (over deviations: thesis figure 4.3).",
+                "How the agents learned; exploring they earn less than tested (over deviations: thesis figure 4.3).",
                 figures.training_curves_alt(data.curves, data.columns, data.evaluated, data.chosen),
             )
         )

@@ -1,6 +1,6 @@
 """The testing phase of section 5.2 for whatever acts step by step, compiled or not."""
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.random import random_state
-from pneumarm.task.environment import Environment, begin_episode, episode, take
+from pneumarm.task.environment import Environment, Episode, begin_episode, episode, take, take_pulses
 from pneumarm.task.movements import NOISE, Movements, movements
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
 
@@ -19,8 +19,8 @@ class Acting(Protocol):
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
 
-    def act(self) -> NDArray[np.int64]:
-        """Return the actions (joints,) of the current state."""
+    def act(self) -> NDArray[np.int64] | NDArray[np.float64]:
+        """Return the actions (joints,) of the current state, or pulses (joints, 2)."""
 
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state`` without learning."""
@@ -33,12 +33,25 @@ def _begin(environment, episode, random, record, e):  # type: ignore[no-untyped-
 
 
 @kernel
+def _take_pulses(environment, episode, pulses, record, e):  # type: ignore[no-untyped-def]
+    """Do what :func:`_take` does with ``pulses`` (joints, 2)."""
+    is_reached = take_pulses(environment, episode, pulses)
+    note_action(environment.task.reward, episode.switched, is_reached, record, e)
+    note_end(environment.task, episode, is_reached, record, e)
+    return goes_on(environment.task, is_reached, record, e)
+
+
+@kernel
 def _take(environment, episode, actions, record, e):  # type: ignore[no-untyped-def]
     """Take ``actions`` (joints,) in movement ``e``; return whether it goes on."""
     is_reached = take(environment, episode, actions)
     note_action(environment.task.reward, episode.switched, is_reached, record, e)
     note_end(environment.task, episode, is_reached, record, e)
     return goes_on(environment.task, is_reached, record, e)
+
+
+def _next(env: Environment, one: Episode, said: NDArray[Any], record: Movements, e: int) -> bool:
+    return bool((_take if said.ndim == 1 else _take_pulses)(env, one, said, record, e))
 
 
 def test_acting(actor: Acting, env: Environment, episodes: int, seed: tuple[int, ...]) -> Movements:
@@ -56,7 +69,7 @@ def test_acting(actor: Acting, env: Environment, episodes: int, seed: tuple[int,
     for e in range(episodes):
         _begin(env, one, random, record, e)
         actor.begin(one.state.x[:size], one.goal)
-        while _take(env, one, actor.act(), record, e):
+        while _next(env, one, actor.act(), record, e):
             actor.follow(one.state.x[:size])
     return record
 

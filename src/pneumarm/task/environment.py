@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.valves import VALVES
+from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import part
 from pneumarm.random import RandomState, uniform
@@ -163,6 +163,22 @@ def order(task, episode, actions):  # type: ignore[no-untyped-def]
 def take(environment, episode, actions):  # type: ignore[no-untyped-def]
     """Take ``actions`` (joints,) for a period; return whether the goals are reached."""
     order(environment.task, episode, actions)
+    step(environment.simulation, environment.noise, episode.state, episode.command)
+    return reached(environment.task, episode)
+
+
+@part
+def take_pulses(environment, episode, pulses):  # type: ignore[no-untyped-def]
+    """Do what :func:`take` does with ``pulses`` (joints, 2); a switch is a joint's other pulses than before."""
+    for joint in range(pulses.shape[0]):
+        differs = False
+        for muscle in range(2):
+            whole = environment.task.commands[joint, ACTIONS - 1, muscle]  # both inlets open for the whole period
+            command = np.float32(pulses[joint, muscle]) * whole
+            differs = differs or command != episode.command[2 * joint + muscle]
+            episode.command[2 * joint + muscle] = command
+        episode.switched[joint] = 1 if episode.actions[joint] >= 0 and differs else 0
+        episode.actions[joint] = 0  # no longer the first
     step(environment.simulation, environment.noise, episode.state, episode.command)
     return reached(environment.task, episode)
 

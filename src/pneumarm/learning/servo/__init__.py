@@ -2,6 +2,6 @@
 
 from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.settings import ServoSettings
-from pneumarm.learning.servo.training import ServoTraining, train_servo
+from pneumarm.learning.servo.training import train_servo
 
-__all__ = ["ServoAgent", "ServoSettings", "ServoTraining", "train_servo"]
+__all__ = ["ServoAgent", "ServoSettings", "train_servo"]

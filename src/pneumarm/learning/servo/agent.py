@@ -1,6 +1,6 @@
 """A trained servo and its file, which holds all it needs to act; and the servo as a controller."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
@@ -8,9 +8,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
+from pneumarm.learning.agents import SimulationAgent
+from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.commands import command_parameters, shortest_share
 from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.gradient import ServoTask
@@ -19,45 +20,60 @@ from pneumarm.learning.servo.price import PriceParameters
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.networks.layers import weight_count
 from pneumarm.simulation.kernel import simulation_parameters
-from pneumarm.simulation.simulation import Scaling, Simulation
-from pneumarm.transitions.window import Window
+from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.begin import BeginStates
+from pneumarm.transitions.watch import made_up_readings
 
 KIND = "pneumarm servo"
 _WEIGHTS = "servo_weights"
 
 
 @dataclass(frozen=True)
-class ServoAgent:
+class ServoAgent(SimulationAgent):
     """A policy over pulses by state and reference, and the simulation that it was trained in."""
 
-    simulation: Simulation
     policy: NDArray[np.float32]
     """Weights of its network, layer after layer, shape (size,)."""
     settings: ServoSettings
 
     @property
-    def spec(self) -> ArmSpec:
-        """The arm that it was trained for."""
-        return self.simulation.spec
+    def sizes(self) -> tuple[int, ...]:
+        """Units of each layer of the policy, inputs first."""
+        return servo_sizes(self.simulation, self.settings)
 
     @property
-    def window(self) -> Window:
-        """Of its state."""
-        return self.simulation.window
-
-    @property
-    def scaling(self) -> Scaling:
-        """Of its state."""
-        return self.simulation.scaling
-
-    @property
-    def goal_range(self) -> NDArray[np.float64]:
-        """Goals that it has learned to hold, shape (joints, 2) [counts]."""
-        return self.simulation.goal_range
+    def task(self) -> ServoTask:
+        """What it does, for kernels."""
+        return servo_task(self.simulation, self.settings)
 
     def controller(self) -> ServoController:
-        """Return it as a controller of an arm."""
+        """Return it as a controller of an arm, which settles, holds and tracks; all that it needs is compiled."""
+        controller = ServoController(self)
+        controller.reset(self.goal_range.mean(axis=1))
+        for reading in made_up_readings(self.spec):
+            controller.act(reading)
         return ServoController(self)
+
+    def actor(self) -> ServoActor:
+        """Return it acting state by state."""
+        return ServoActor(self)
+
+    def weights(self) -> NDArray[np.float32]:
+        """Return a copy of the policy's weights."""
+        return self.policy.copy()
+
+    def revised(self, simulation: Simulation, weights: NDArray[np.float32]) -> Self:
+        """Return the agent with another ``simulation`` of its arm and other ``weights``."""
+        return replace(self, simulation=simulation, policy=weights)
+
+    def adapted(
+        self, simulation: Simulation, begin: BeginStates, updates: int, warm_up: int, learning_rate: float, seed: int
+    ) -> Self:
+        """Return the servo after learning in ``simulation``, which needs no warming up."""
+        from pneumarm.learning.servo.training import tuned_servo  # which imports this module
+
+        tuned = replace(self.settings, updates=updates, learning_rate=learning_rate)
+        return self.revised(simulation, tuned_servo(self.policy, simulation, begin, tuned, seed))
 
     def save(self, path: Path) -> None:
         """Write the agent to ``path``, whole or not at all.

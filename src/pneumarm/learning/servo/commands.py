@@ -21,6 +21,7 @@ from pneumarm.simulation.simulation import Simulation
 
 _GAIN = np.float32(1.25)
 _LEAK = 0.05
+_AS_IF = 0.1
 _ONE, _ZERO = np.float32(1.0), np.float32(0.0)
 
 
@@ -46,9 +47,11 @@ def command_parameters(simulation: Simulation, dead: float, shortest: float) -> 
 
 
 def shortest_share(spec: ArmSpec) -> float:
-    """Return the shortest pulse of an arm in periods; 1 where it has none."""
-    shortest = getattr(spec, "shortest_pulse", None)
-    return 1.0 if not shortest else min(shortest / spec.period, 1.0)
+    """Return the shortest pulse of an arm in periods.
+
+    A servo of an arm without pulses learns as if it had some, and spreads them over whole periods when it acts.
+    """
+    return min(spec.shortest_pulse / spec.period, 1.0) if spec.pulses else _AS_IF
 
 
 @part

@@ -11,10 +11,6 @@ from numpy.typing import NDArray
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.servo.commands import write_commands
-from pneumarm.learning.servo.inputs import input_size, write_inputs
-from pneumarm.networks.layers import forward, split
-from pneumarm.networks.layers import workspace as layers_workspace
 from pneumarm.task.forecast import Forecast
 from pneumarm.task.tracker import StateTracker
 
@@ -23,6 +19,9 @@ if TYPE_CHECKING:
 
 _LOOK = 0.2  # s over which readings are averaged where the arm is nearly at rest
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
+_COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
+_MOST = 0.8  # of a period for which a valve is due, for it to open for one
+_FORGOTTEN = 0.8  # share of what is due that is left after a period with closed valves
 _LEAVING = 2.5  # as many times the error and drift of coming to rest end it
 _NEAR = 1.0  # tolerances within which an arm can be nearly at rest
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
@@ -39,31 +38,19 @@ class ServoController:
     """
 
     def __init__(self, agent: ServoAgent) -> None:
-        from pneumarm.learning.servo.agent import servo_sizes, servo_task  # which imports this module
-
-        spec, window, wanted = agent.spec, agent.window, agent.settings
+        spec, wanted = agent.spec, agent.settings
         self.spec, self.goal_range = spec, agent.goal_range
-        self._task = servo_task(agent.simulation, wanted)
-        sizes = servo_sizes(agent.simulation, wanted)
-        self._layers = split(agent.policy, sizes)
-        self._units = layers_workspace(sizes, 1)
-        self._tracker = StateTracker(window, agent.scaling)
-        self._x = np.zeros((self._task.simulation.hidden.shape[0], 1), np.float32)
-        self._inputs = np.zeros((input_size(self._task.inputs), 1), np.float32)
-        commands = (2 * window.joints, 1)
-        self._command, self._slope = np.zeros(commands, np.float32), np.zeros(commands, np.float32)
-        self._no_noise = np.zeros((window.history, 3 * window.joints, 1), np.float32)
-        self._offset = window.of_joints(agent.scaling.observation_offset)[:, 0]
-        self._scale = window.of_joints(agent.scaling.observation_scale)[:, 0]
-        tolerance = wanted.tolerance * spec.counts_per_degree
+        self._actor = agent.actor()
+        self._tracker = StateTracker(agent.window, agent.scaling)
+        tolerance = wanted.tolerance * spec.counts_per_degree * (1.0 if spec.pulses else _COARSE)
         self._quiet_below, self._alert_above = wanted.quiet * tolerance, wanted.alert * tolerance
-        self._still = _STILL * tolerance
+        self._near, self._still = _NEAR * tolerance, _STILL * tolerance
         self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(4, round(_LOOK / spec.period)))
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
-        self._near = _NEAR * tolerance
-        self._rest = [_Rest() for _ in range(window.joints)]
+        self._rest = [_Rest() for _ in range(spec.joints)]
+        self._spread = None if spec.pulses else Spread(spec.joints)
 
     def reset(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts], to be held; the arm is at rest with its valves closed."""
@@ -96,20 +83,17 @@ class ServoController:
         now, preview = self._preview(reading.time - self._begin)
         acts = self._which_act(now, preview)
         bias = np.array([rest.bias for rest in self._rest])
-        self._x[: state.size, 0] = state
-        scaled = ((preview + bias - self._offset) / self._scale).astype(np.float32)[:, :, None]
-        write_inputs(self._task.inputs, self._x, self._no_noise, len(self._no_noise) - 1, scaled, self._inputs)
-        forward(self._layers, self._inputs, self._units)
-        write_commands(self._task.commands, self._x, self._units[-1], self._slope, self._command)
-        command = self._command.astype(np.float64).reshape(-1, 2)
+        command = self._actor.pulses(state, preview + bias)
         command[~acts] = 0.0
+        if self._spread is not None:
+            command = self._spread(command)
         self._tracker.commanded(command)
         return command
 
     def _preview(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return what is asked for now (joints,) and ahead (previews, joints) [counts]."""
         assert self._reference is not None
-        now, steps = self._reference.at(time), self._task.inputs.steps
+        now, steps = self._reference.at(time), self._actor.task.inputs.steps
         if self._reference.known_ahead:
             return now, np.array([self._reference.at(time + k * self.spec.period) for k in steps])
         self._forecast.see(now)
@@ -135,6 +119,25 @@ class ServoController:
                 rest.look = len(read)
                 rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._near, self._near))
         return acts
+
+
+class Spread:
+    """Pulses spread over whole periods, for an arm without pulses: error diffusion of first order.
+
+    What a valve was to be open for is summed up, and once that is most of a period the valve opens for one.
+    """
+
+    def __init__(self, joints: int) -> None:
+        self._due = np.zeros((joints, 2))
+
+    def __call__(self, pulses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return whole periods (joints, 2) of -1, 0, +1 for ``pulses`` (joints, 2)."""
+        self._due[pulses * self._due < 0] = 0.0  # the other way than before
+        self._due[pulses == 0] *= _FORGOTTEN
+        self._due += pulses
+        opened = np.where(np.abs(self._due) >= _MOST, np.sign(self._due), 0.0)
+        self._due = np.clip(self._due - opened, -1.0, 1.0)
+        return opened
 
 
 class _Rest:

@@ -1,199 +1,212 @@
 """Training servos: several at once from different weights, of which the best is kept."""
 
 import time
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.learning.online.training import Progress, cores
 from pneumarm.learning.servo.agent import ServoAgent, servo_sizes, servo_task
-from pneumarm.learning.servo.gradient import ServoTask, errors_of, learn_once, tape
+from pneumarm.learning.servo.gradient import ServoTask, errors_of, learn_once, move_forward, tape
 from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.settings import ServoSettings
+from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
 from pneumarm.networks.layers import adam, initial_weights, trainable
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
+from pneumarm.task.environment import environment
+from pneumarm.task.movements import Movements, movements
 
 _WEIGHTS, _MOVEMENTS, _VALIDATION = 0, 1, 2  # streams of random numbers
-_CHUNK = 25  # updates between two rows of the curves
-_FIRST_OUTPUT = 1.0
+_ROW = 25  # updates between two rows of the curves
+_FIRST_OUTPUT = 1.0  # the first policy opens valves now and then
 _RENEWED = 0.5  # share of arms that begin anew at rest; the others go on from where they are
 _FREE = 0.6  # share of the updates in which the price of changes rises to what it is
 _FASTEST = 4.0  # highest speed of a reference, in scaled velocities
-SERVO_CURVES = ("updates", "price", "settled")
-"""Columns of the training curves: updates so far, mean price of a step, share of the last third within tolerance."""
 
 
-@dataclass(frozen=True)
-class ServoTraining:
-    """A training of servos: its best agent and all that it took."""
-
-    agent: ServoAgent
-    best: int
-    """Index of the best agent, by mean price in its validation."""
-    validation: tuple[dict[str, float], ...]
-    """Price and share settled of every agent, the same movements for all."""
-    curves: NDArray[np.float64]
-    """Columns as in ``SERVO_CURVES``, shape (agents, rows, columns)."""
-    episodes: int
-    """Movements of all agents together."""
-    steps: int
-    """Steps of all simulated arms of all agents together."""
-    seconds: float
-    """Wall time of training and validation [s], without compiling."""
-    core_seconds: float
-    """Processor time of learning, all threads together [s], without compiling and validation."""
-
-    def results(self) -> dict[str, Any]:
-        """Return what ``train --json`` says."""
-        return {
-            "episodes": self.episodes,
-            "steps": self.steps,
-            "seconds": self.seconds,
-            "steps_per_second": self.steps / max(self.seconds, 1e-9),
-            "steps_per_second_per_core": self.steps / max(self.core_seconds, 1e-9),
-            "best": self.best,
-            "validation": list(self.validation),
-        }
+def train_servo(
+    simulation: Simulation, begin_states: BeginStates, settings: ServoSettings, seed: int = 0, **how: Any
+) -> Training[ServoAgent]:
+    """Train servos and return the best; ``how`` as of :func:`~pneumarm.learning.training.train_side_by_side`."""
+    return train_side_by_side(
+        lambda number: ServoLearner(simulation, begin_states, settings, seed, number),
+        settings.agents,
+        settings.validation_movements,
+        identity_of(environment(simulation, begin_states, settings), settings, seed),
+        **how,
+    )
 
 
-class ServoLearner:
-    """One servo that learns, with its simulated arms and random numbers."""
+def tuned_servo(
+    policy: NDArray[np.float32], simulation: Simulation, begin_states: BeginStates, settings: ServoSettings, seed: int
+) -> NDArray[np.float32]:
+    """Return the weights ``policy`` after learning on in ``simulation``, or as they were where that is better."""
+    learners = [ServoLearner(simulation, begin_states, settings, seed, 0, policy) for _ in range(2)]
+    learners[0].price_all_along = True
+    while not learners[0].ended:
+        learners[0].learn_on()
+    rewards = [one.validate(settings.validation_movements).reward.mean() for one in learners]
+    return learners[0 if rewards[0] > rewards[1] else 1].net.flat.copy()
 
-    def __init__(self, simulation: Simulation, begin: BeginStates, settings: ServoSettings, seed: int, number: int):
-        self.simulation, self.settings, self._begin, self._seed = simulation, settings, begin, seed
+
+class ServoLearner(Learner[ServoAgent]):
+    """One servo that learns, with its simulated arms. What it draws depends on its seed and the update alone."""
+
+    columns = ("episodes", "price", "settled")
+    """Mean price of a step, and share of the last third of movements within tolerance, since the row before."""
+    price_all_along = False
+    """Whether changes of valves have their whole price from the first update on."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        begin: BeginStates,
+        settings: ServoSettings,
+        seed: int,
+        number: int,
+        policy: NDArray[np.float32] | None = None,
+    ) -> None:
+        super().__init__()
+        self.simulation, self.settings, self._begin = simulation, settings, begin
+        self._seed, self._number = seed, number
         self.task = servo_task(simulation, settings)
         sizes = servo_sizes(simulation, settings)
-        weights = initial_weights(sizes, _FIRST_OUTPUT, np.random.default_rng([seed, _WEIGHTS, number]))
-        self.net = trainable(weights, sizes, settings.arms)
-        self._steps = max(round(settings.duration / simulation.spec.period), 2)
-        self._tape = tape(self.task, self._steps, settings.arms)
-        self._random = np.random.default_rng([seed, _MOVEMENTS, number])
-        self.updates = 0
-        self.curve = np.zeros((0, len(SERVO_CURVES)))
-        self.seconds = 0.0
-        self._draw_states(self._random, np.ones(settings.arms, bool))
+        if policy is None:
+            policy = initial_weights(sizes, _FIRST_OUTPUT, np.random.default_rng([seed, _WEIGHTS, number]))
+        self.net = trainable(policy.copy(), sizes, settings.arms)
+        self.tape = tape(self.task, max(round(settings.duration / simulation.spec.period), 2), settings.arms)
+        self.updates = np.zeros(1, np.int64)
 
-    def learn_until(self, updates: int) -> None:
-        """Move and learn until there have been so many ``updates``, and add a row to the curve."""
-        began, price, wanted = time.thread_time(), 0.0, self.settings
-        updates -= self.updates
-        for _ in range(updates):
-            self._prepare(self._random)
-            price += learn_once(self._task_now(), self.net, self._tape)
-            rate = wanted.learning_rate * (1 - self.updates / wanted.updates)
-            self.updates += 1
-            adam(self.net, rate, wanted.largest_gradient, self.updates)
-        self.seconds += time.thread_time() - began
-        row = [self.updates, price / updates, self._settled()]
-        self.curve = np.concatenate([self.curve, [row]])
+    @property
+    def ended(self) -> bool:
+        """Whether there have been as many updates as were asked for."""
+        return bool(self.updates[0] >= self.settings.updates)
 
-    def validate(self, movements: int) -> dict[str, float]:
-        """Return price and share settled of movements that are the same for all learners."""
-        random, prices, settled = np.random.default_rng([self._seed, _VALIDATION]), [], []
-        for _ in range(-(-movements // self.settings.arms)):
-            self._draw_states(random, np.ones(self.settings.arms, bool))
-            self._prepare(random)
-            gradient = self.net.gradient.copy()
-            prices.append(learn_once(self.task, self.net, self._tape))
-            self.net.gradient[:] = gradient
-            settled.append(self._settled())
-        return {"price": float(np.mean(prices)), "settled": float(np.mean(settled))}
+    @property
+    def share(self) -> float:
+        """How far it is, 0 to 1."""
+        return float(self.updates[0]) / self.settings.updates
 
-    def _task_now(self) -> ServoTask:
-        """Return the task with the price of changes of this update: who pays for them first never learns to move."""
-        paid = min(self.updates / (_FREE * self.settings.updates), 1.0) * self.settings.change
-        return self.task._replace(prices=self.task.prices._replace(change=paid))
+    @property
+    def episodes(self) -> int:
+        """Movements so far."""
+        return int(self.updates[0]) * self.settings.arms
+
+    @property
+    def steps(self) -> int:
+        """Steps of all simulated arms so far."""
+        return self.episodes * len(self.tape.slope)
+
+    def warm_up(self) -> None:
+        """Learn once."""
+        self._update()
+
+    def learn_on(self) -> None:
+        """Move and learn until the next row of the curve."""
+        began, price, count = time.thread_time(), 0.0, 0
+        while count < _ROW and not self.ended:
+            price += self._update()
+            count += 1
+        late = errors_of(self.task, self.tape)[-len(self.tape.slope) // 3 :]
+        self.add_row([self.episodes, price / count, float((np.abs(late) <= 1).mean())], time.thread_time() - began)
+
+    def validate(self, episodes: int) -> Movements:
+        """Return movements in which references are followed, the same for all learners.
+
+        ``reward`` is what they cost, negative; ``success`` whether they stayed within tolerance in the last third.
+        """
+        joints, steps = self.simulation.window.joints, len(self.tape.slope)
+        parts = []
+        for part in range(-(-episodes // self.settings.arms)):
+            self._prepare(np.random.default_rng([self._seed, _VALIDATION, part]), np.ones(self.settings.arms, bool))
+            move_forward(self.task, self.net, self.tape)
+            made = movements(self.settings.arms, joints)
+            error = np.abs(errors_of(self.task, self.tape))
+            made.goal[:], made.angle_begin[:], made.angle_end[:] = (
+                self._counts(x).T for x in (self.tape.reference[-1], self._angles(0), self._angles(-1))
+            )
+            changes = self._valve_changes()
+            made.actions[:], made.switches[:] = steps, changes.T
+            prices = self.task.prices
+            beyond = np.maximum(error - prices.flat, 0) / prices.precision
+            cost = (0.5 * np.log1p(beyond**2) + prices.far * error).sum(axis=(0, 1))
+            made.reward[:] = -cost - prices.change * changes.sum(axis=0)
+            made.success[:] = (error[-steps // 3 :] <= 1).all(axis=(0, 1))
+            parts.append(made)
+        return Movements(*(np.concatenate(columns)[:episodes] for columns in zip(*parts, strict=True)))
 
     def agent(self) -> ServoAgent:
         """Return the servo as it is now."""
         return ServoAgent(self.simulation, self.net.flat.copy(), self.settings)
 
-    def _settled(self) -> float:
-        late = errors_of(self.task, self._tape)[-self._steps // 3 :]
-        return float((np.abs(late) <= 1).mean())
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all that its future depends on, by name."""
+        net = {f"net.{name}": getattr(self.net, name) for name in ("flat", "mean", "square")}
+        return {**net, "updates": self.updates, "states": self.tape.x[-1]}
 
-    def _draw_states(self, random: np.random.Generator, renewed: NDArray[np.bool_]) -> None:
-        chosen = self._begin.states[random.integers(len(self._begin), size=int(renewed.sum()))]
-        x = self._tape.x[0]
-        x[: chosen.shape[1], renewed] = chosen.T
-        x[self._one] = 1
+    def _update(self) -> float:
+        """Move and learn once; return the mean price of a step."""
+        wanted, number = self.settings, int(self.updates[0])
+        random = np.random.default_rng([self._seed, _MOVEMENTS, self._number, number])
+        fresh = random.random(wanted.arms) < _RENEWED
+        self._prepare(random, fresh if number else np.ones(wanted.arms, bool))
+        price = float(learn_once(self._task_now(), self.net, self.tape))
+        self.updates += 1
+        adam(self.net, wanted.learning_rate * (1 - number / wanted.updates), wanted.largest_gradient, number + 1)
+        return price
 
-    @property
-    def _one(self) -> int:
-        window = self.simulation.window
-        return window.input_size + window.joints
+    def _task_now(self) -> ServoTask:
+        """Return the task with the price of changes of this update: who pays for them first never learns to move."""
+        paid = 1.0 if self.price_all_along else min(self.share / _FREE, 1.0)
+        return self.task._replace(prices=self.task.prices._replace(change=paid * self.settings.change))
 
-    def _prepare(self, random: np.random.Generator) -> None:
-        """Put states, noise, references and previews of the next movements on the tape."""
-        tape, wanted, simulation = self._tape, self.settings, self.simulation
-        window, scaling, joints = simulation.window, simulation.scaling, simulation.window.joints
-        n, size = wanted.arms, window.state_size
-        if self.updates:
-            tape.x[0, :size] = tape.x[-1, :size]
-        self._draw_states(random, random.random(n) < _RENEWED)
+    def _angles(self, step: int) -> NDArray[np.float32]:
+        """Return the angles at a step on the tape, shape (joints, n) [scaled]."""
+        return self.tape.x[step, 0 : 4 * self.simulation.window.joints : 4]
+
+    def _counts(self, angle: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return scaled angles (..., joints, n) in counts."""
+        window, scaling = self.simulation.window, self.simulation.scaling
         offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+        return angle * scale[:, :1] + offset[:, :1]
+
+    def _valve_changes(self) -> NDArray[np.int64]:
+        """Return how often valves opened or closed in the movements on the tape, shape (joints, n)."""
+        window = self.simulation.window
+        first = window.state_size
+        command = self.tape.x[:-1, first : first + window.command_size]
+        opened = np.sign(command)
+        left = np.where(np.abs(command) >= 1, opened, 0)
+        found = np.concatenate([np.zeros_like(left[:1]), left[:-1]])
+        changes = (opened != found).sum(axis=0) + (left != opened).sum(axis=0)
+        return changes.reshape(window.joints, 2, -1).sum(axis=1)
+
+    def _prepare(self, random: np.random.Generator, fresh: NDArray[np.bool_]) -> None:
+        """Put states, noise, references and previews of the next movements on the tape; ``fresh`` begin at rest."""
+        tape, wanted, simulation = self.tape, self.settings, self.simulation
+        window, scaling = simulation.window, simulation.scaling
+        n, size, steps = wanted.arms, window.state_size, len(tape.slope)
+        tape.x[0, :size] = tape.x[-1, :size]
+        chosen = self._begin.states[random.integers(len(self._begin), size=int(fresh.sum()))]
+        tape.x[0, :size, fresh] = chosen
+        tape.x[0, window.input_size + window.joints] = 1
+        scale = window.of_joints(scaling.observation_scale)
         noise = wanted.reading_noise * simulation.error_std[:, [0, 2, 3]] / scale[:, [0, 2, 3]]
         tape.noise[...] = random.standard_normal(tape.noise.shape, np.float32) * noise.reshape(-1, 1)
-        angle = tape.x[0, 0 : 4 * joints : 4] * scale[:, :1] + offset[:, :1]
         ahead = self.task.inputs.steps
-        fastest = _FASTEST * 1e3 * scale[:, 1]
-        length = self._steps + 1 + int(ahead.max())
-        drawn = draw_references(random, simulation.goal_range, angle, length, simulation.spec, fastest)
+        drawn = draw_references(
+            random,
+            simulation.goal_range,
+            self._counts(self._angles(0)),
+            steps + 1 + int(ahead.max()),
+            simulation.spec,
+            _FASTEST * 1e3 * scale[:, 1],
+        )
+        offset = window.of_joints(scaling.observation_offset)
         reference = ((drawn - offset[:, :1]) / scale[:, :1]).astype(np.float32)
-        tape.reference[...] = reference[: self._steps + 1]
-        steps = np.arange(self._steps)
-        slope = np.diff(reference[: self._steps], axis=0, prepend=reference[:1])
-        line = reference[: self._steps, None] + ahead[:, None, None] * slope[:, None]
+        tape.reference[...] = reference[: steps + 1]
+        slope = np.diff(reference[:steps], axis=0, prepend=reference[:1])
+        line = reference[:steps, None] + ahead[:, None, None] * slope[:, None]
         known = random.random(n) < wanted.known
-        tape.preview[...] = np.where(known, reference[steps[:, None] + ahead], line)
-
-
-def train_servo(
-    simulation: Simulation,
-    begin_states: BeginStates,
-    settings: ServoSettings | None = None,
-    seed: int = 0,
-    *,
-    progress: Callable[[Progress], None] | None = None,
-    checkpoint: Path | None = None,
-    threads: int | None = None,
-) -> ServoTraining:
-    """Train ``settings.agents`` servos in ``simulation`` and return the best.
-
-    The same seed gives the same agents, bit for bit, with any number of ``threads`` (default: one a core). Training
-    takes seconds, so a ``checkpoint`` is not needed and not written: a killed one begins anew.
-    """
-    settings = settings or ServoSettings()
-    compiled = ServoLearner(simulation, begin_states, settings, seed, 0)
-    compiled.learn_until(1)  # on a learner that is thrown away, so that compiling is not counted as training
-    learners = [ServoLearner(simulation, begin_states, settings, seed, a) for a in range(settings.agents)]
-    began, done = time.perf_counter(), 0
-    with ThreadPoolExecutor(min(threads or cores(), settings.agents)) as pool:
-        while done < settings.updates:
-            done = min(done + _CHUNK, settings.updates)
-            list(pool.map(ServoLearner.learn_until, learners, [done] * len(learners)))
-            if progress is not None:
-                share, ended = done / settings.updates, settings.agents if done == settings.updates else 0
-                progress(Progress(ended, settings.agents, done * settings.arms * settings.agents, share))
-        validation = tuple(pool.map(lambda one: one.validate(settings.validation_movements), learners))
-    best = int(np.argmin([one["price"] for one in validation]))
-    movements = settings.updates * settings.arms * settings.agents
-    return ServoTraining(
-        agent=learners[best].agent(),
-        best=best,
-        validation=validation,
-        curves=np.stack([one.curve for one in learners]),
-        episodes=movements,
-        steps=movements * learners[0]._steps,
-        seconds=time.perf_counter() - began,
-        core_seconds=sum(one.seconds for one in learners),
-    )
-
-
-__all__ = ["SERVO_CURVES", "ServoLearner", "ServoTraining", "train_servo"]
+        tape.preview[...] = np.where(known, reference[np.arange(steps)[:, None] + ahead], line)

@@ -1,0 +1,55 @@
+"""A servo that acts state by state: the policy's network, once, on one arm."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pneumarm.learning.servo.commands import write_commands
+from pneumarm.learning.servo.inputs import input_size, write_inputs
+from pneumarm.networks.layers import forward, split
+from pneumarm.networks.layers import workspace as layers_workspace
+
+if TYPE_CHECKING:
+    from pneumarm.learning.servo.agent import ServoAgent
+
+
+class ServoActor:
+    """Gives commands for scaled states (state_size,), with a goal that stays or with previews of a reference."""
+
+    def __init__(self, agent: ServoAgent) -> None:
+        window = agent.window
+        self.task, self._layers = agent.task, split(agent.policy, agent.sizes)
+        self._units = layers_workspace(agent.sizes, 1)
+        self._x = np.zeros((self.task.simulation.hidden.shape[0], 1), np.float32)
+        self._inputs = np.zeros((input_size(self.task.inputs), 1), np.float32)
+        self._command, self._slope = (np.zeros((2 * window.joints, 1), np.float32) for _ in range(2))
+        self._no_noise = np.zeros((window.history, 3 * window.joints, 1), np.float32)
+        self._offset = window.of_joints(agent.scaling.observation_offset)[:, 0]
+        self._scale = window.of_joints(agent.scaling.observation_scale)[:, 0]
+        self._state = np.zeros(window.state_size, np.float32)
+        self._previews = np.zeros((self.task.inputs.steps.size, window.joints))
+
+    def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
+        """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
+        self._previews[:] = np.asarray(goal, np.float64)
+        self.follow(state)
+
+    def act(self) -> NDArray[np.float64]:
+        """Return the pulses (joints, 2) of the current state."""
+        return self.pulses(self._state, self._previews)
+
+    def follow(self, next_state: ArrayLike) -> None:
+        """Go on in ``next_state``."""
+        self._state = np.asarray(next_state, np.float32).copy()
+
+    def pulses(self, state: NDArray[np.float32], previews: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pulses (joints, 2) in ``state``; the reference will be at ``previews`` (previews, joints)."""
+        self._x[: state.size, 0] = state
+        scaled = ((previews - self._offset) / self._scale).astype(np.float32)[:, :, None]
+        write_inputs(self.task.inputs, self._x, self._no_noise, len(self._no_noise) - 1, scaled, self._inputs)
+        forward(self._layers, self._inputs, self._units)
+        write_commands(self.task.commands, self._x, self._units[-1], self._slope, self._command)
+        return self._command.astype(np.float64).reshape(-1, 2)

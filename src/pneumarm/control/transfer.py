@@ -261,12 +261,12 @@ class Transfer:
         made = sum(info[_PHASE] == phase for info in self._done)
         if phase == "after" and settings.episodes > 0 and made == 0:
             self._adapt()
-        controller = self._controller(phase)
+        moving, controller = self.agent, self._controller(phase)
         for number in range(made, movements):
             if learns:
                 self._adapt()
-            if self._adapting is not None and controller.agent is not self._adapting.agent:
-                controller = self._controller(phase)
+            if moving is not self.agent and self._adapting is not None:
+                moving, controller = self.agent, self._controller(phase)
             movement = self._move(controller, not learns, number)
             if self._learning is not None and learns and number >= (1 - settings.averaged) * movements:
                 self._learning.remember()

@@ -10,13 +10,16 @@ from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.arm.valves import Command
 from pneumarm.control import BEGIN, controller_of, move
 from pneumarm.learning import AnyAgent, Training
-from pneumarm.report.data import Demonstration, MarkedData, TrainingData
+from pneumarm.moving.trial import MoveTrial
+from pneumarm.report.data import Demonstration, MarkedData, MovingData, TrainingData
 from pneumarm.task import Movement
 from pneumarm.transitions import Store
 
 DISPLACEMENTS = {"medium displacement": 30.0, "small displacement": 5.0, "large displacement": 70.0}
 """Movements that are shown [degrees] (thesis figures 5.17 to 5.19)."""
 _TAIL = 1.0  # s recorded after a movement, in which the arm swings out
+
+_SHOWN_GOALS = 6
 
 
 def training_record(training: Training[Any]) -> TrainingData:
@@ -61,6 +64,17 @@ def marked_record(store: Store) -> MarkedData:
         ends=np.array(list(rows.values()), np.int64),
         reasons=tuple(reasons),
         stages=tuple(rows),
+    )
+
+
+def moving_record(tried: MoveTrial, most: int = _SHOWN_GOALS) -> MovingData:
+    """Return the first ``most`` movements of a trial, for the picture of the arm that moves."""
+    shown = tried.moved[:most]
+    lengths = [len(one.recorded.time) for one in shown]
+    return MovingData(
+        time=np.concatenate([one.recorded.time for one in shown]),
+        angle=np.concatenate([one.recorded.angle for one in shown]),
+        wanted=np.concatenate([np.tile(one.goal, (n, 1)) for one, n in zip(shown, lengths, strict=True)]),
     )
 
 

@@ -21,11 +21,20 @@ from pneumarm.control import Monitor, TransferSettings, save_history, transfer, 
 from pneumarm.control.condition import collected_results
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
-from pneumarm.learning import LOOKING_AHEAD, LearnSettings, load_agent, results_with_lookahead, test_ahead, train
+from pneumarm.learning import (
+    LOOKING_AHEAD,
+    LearnSettings,
+    Tracks,
+    load_agent,
+    results_with_lookahead,
+    test_ahead,
+    train,
+)
 from pneumarm.learning import test as test_agent
+from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning import PlanSettings
 from pneumarm.planning.bound import BoundSettings, known_bound
-from pneumarm.records import demonstrate, marked_record, training_record
+from pneumarm.records import demonstrate, marked_record, moving_record, training_record
 from pneumarm.report import save_demonstration, save_spec, write_report
 from pneumarm.report.run_report import TEST
 from pneumarm.settings import Valid
@@ -61,6 +70,7 @@ class RunSettings(LearnSettings):
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     transfer: TransferSettings = field(default_factory=TransferSettings)
+    moving: MoveTrialSettings = field(default_factory=MoveTrialSettings)
 
     def _valid(self) -> Valid:
         return {
@@ -123,6 +133,7 @@ class Run:
             ("training", self._train),
             ("test", self._test),
             ("transfer", self._transfer),
+            ("settle", self._move),
             ("bound", self._bound),
         ):
             if name not in self.results:
@@ -211,6 +222,20 @@ class Run:
         for number, shown in enumerate(demonstrations):
             save_demonstration(self.folder, shown, number)
         return {"transfer": moved.results()}
+
+    def _move(self) -> dict[str, Any]:
+        """Say in degrees and seconds how the adapted agent settles, holds and tracks, if it does."""
+        wanted, agent = self.settings, load_agent(self.adapted)
+        found: dict[str, Any] = {"settle": None, "track": []}
+        if not isinstance(agent, Tracks):
+            return found
+        with self.progress("moving to goals") as report, open_arm_checked(wanted) as arm:
+            tried = try_moving(
+                arm, agent.controller(), agent.goal_range, wanted.moving, seed=wanted.seed, progress=report
+            )
+        if tried.moved:
+            moving_record(tried).save(self.folder)
+        return found | tried.results()
 
     def _bound(self) -> dict[str, Any]:
         """Say what could be achieved in the first movements of the tests on the arm (thesis section 5.5.1)."""

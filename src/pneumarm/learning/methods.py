@@ -150,9 +150,12 @@ def load_agent(path: Path) -> AnyAgent:
 class LearnSettings(Settings):
     """Which method learns, and the settings of each."""
 
-    method: str = "policy"
-    """policy, batched (the thesis' networks learned in many arms at once), sarsa or q-learning (the thesis'), an
-    installed method, or MODULE:NAME of your own."""
+    task: TaskName = "settle"
+    """What the agent is for: to settle at goals, hold them and track references (one agent does all three), or to
+    reach goals as in the thesis, where flying through one slowly enough counts."""
+    method: str | None = None
+    """servo, policy, batched (the thesis' networks learned in many arms at once), sarsa or q-learning (the thesis'),
+    an installed method, or MODULE:NAME of your own; by default servo, and policy to reach."""
     servo: ServoSettings = field(default_factory=ServoSettings)
     """Of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)
@@ -167,12 +170,14 @@ class LearnSettings(Settings):
     def _valid(self) -> Valid:
         _ = self.chosen  # it says what is wrong with the method or with settings of one's own
         own = self.found.place == "own"
-        return {"own": own or not self.own or "nothing, as the method is not one of your own"}
+        return {
+            "own": own or not self.own or "nothing, as the method is not one of your own",
+        }
 
     @property
     def found(self) -> Method:
         """The method."""
-        return find_method(self.method)
+        return find_method(self.method or ("policy" if self.task == "reach" else "servo"))
 
     @property
     def chosen(self) -> Any:

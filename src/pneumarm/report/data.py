@@ -249,3 +249,18 @@ class Demonstration(Record):
     """When the goal was reached [s], None if it was not."""
     name: str
     """What is typical of it, such as "large displacement"."""
+
+
+@dataclass(frozen=True)
+class MovingData(Record):
+    """Goals that were moved to and held, one after the other."""
+
+    file = "moving.safetensors"
+    shapes = {"time": "n", "angle": "n joints", "wanted": "n joints"}  # noqa: RUF012
+
+    time: Array
+    """Of the readings, shape (n,) [s]."""
+    angle: Array
+    """Shape (n, joints) [counts]."""
+    wanted: Array
+    """The goal at that time, shape (n, joints) [counts]."""

@@ -16,7 +16,8 @@ from pneumarm.report.style import svg
 class Picture:
     """A figure, what it shows in general (caption) and what is to be seen in it (text alternative)."""
 
-    figure: Figure
+    figure: Figure | str
+    """Drawn, or an SVG as text."""
     caption: str
     alt: str
 
@@ -89,6 +90,7 @@ def _numbered(sections: Sequence[Section]) -> Iterator[dict[str, Any]]:
         }
 
 
-def embedded(figure: Figure) -> str:
+def embedded(figure: Figure | str) -> str:
     """Return ``figure`` as a data URI. As an image of its own its ids cannot clash with those of another figure."""
-    return "data:image/svg+xml;base64," + base64.b64encode(svg(figure).encode()).decode()
+    text = figure if isinstance(figure, str) else svg(figure)
+    return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode()

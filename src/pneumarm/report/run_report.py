@@ -16,6 +16,7 @@ from pneumarm.report.data import (
     CoverageData,
     Demonstration,
     MarkedData,
+    MovingData,
     QualityData,
     Record,
     TrainingData,
@@ -23,7 +24,7 @@ from pneumarm.report.data import (
 )
 from pneumarm.report.health import summary_of_health
 from pneumarm.report.page import render
-from pneumarm.report.sections import RunData, all_sections, collected, predicted, propagated
+from pneumarm.report.sections import RunData, all_sections, collected, moving_words, predicted, propagated
 from pneumarm.task.movements import Movements, movements, read_episodes
 
 REPORT = "report.html"
@@ -96,6 +97,7 @@ def read_run(folder: Path) -> RunData:
         transfer=_read_transfer(folder / EPISODES, results),
         adaptation=read_history(folder) if (folder / HISTORY).exists() else None,
         marked=_read(MarkedData, folder),
+        moving=_read(MovingData, folder),
         demonstrations=tuple(Demonstration.load(folder, path.name) for path in sorted(folder.glob(DEMONSTRATIONS))),
     )
 
@@ -142,6 +144,7 @@ def _summary(run: RunData) -> list[str]:
     spec = run.spec
     joints = f"{spec.joints} joint{'s' if spec.joints > 1 else ''}"
     text = [f"{spec.name}: {joints}, {1 / spec.period:.3g} Hz, pressures up to {spec.max_pressure:g} bar."]
+    text = [*moving_words(run.results), *text]
     if run.test is not None and run.test.n:
         text.append(
             f"In the simulation the controller reaches {run.test.success.mean():.2%} of its goals "

@@ -17,6 +17,7 @@ from pneumarm.report.data import (
     CoverageData,
     Demonstration,
     MarkedData,
+    MovingData,
     QualityData,
     TrainingData,
     TransferData,
@@ -24,7 +25,7 @@ from pneumarm.report.data import (
 from pneumarm.report.figures import Classification, Mark, Phase
 from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
-from pneumarm.report.page import Picture, Section
+from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.style import of_joint, quantities
 from pneumarm.task import Movements, running_time
 
@@ -44,11 +45,13 @@ class RunData:
     adaptation: Adapted | None = None
     demonstrations: tuple[Demonstration, ...] = ()
     marked: MarkedData | None = None
+    moving: MovingData | None = None
 
 
 def all_sections(run: RunData) -> list[Section]:
     """Return the sections of ``run`` in the order of the way of the data."""
-    sections = [overview(run)]
+    sections = [] if run.moving is None else [moving(run.moving, run.results, run.spec)]
+    sections.append(overview(run))
     if run.coverage is not None:
         sections.append(collected(run.coverage, run.spec))
     if run.quality is not None:
@@ -70,6 +73,41 @@ def all_sections(run: RunData) -> list[Section]:
     if tells_of_health(run.results):
         sections.append(health(run.results, run.marked, run.spec))
     return sections
+
+
+def moving(data: MovingData, results: Mapping[str, Any], spec: ArmSpec) -> Section:
+    """Return how the arm moves, as a picture that plays, and in degrees and seconds."""
+    numbers = (data.time, data.angle, data.wanted, spec)
+    picture = Picture(
+        figures.moving_arm(*numbers),
+        "The arm as it moved to goals and held them; the light arm is where it was asked to be.",
+        figures.moving_arm_alt(*numbers),
+    )
+    tracked = [
+        (
+            f"{one['frequency_hz']:g} Hz, {one['amplitude_deg']:.0f}°",
+            ", ".join(f"{e:.2f}" for e in one["rms_error_deg"]),
+        )
+        for one in results.get("track", [])
+    ]
+    table = Table(("sinusoid", "RMS error [°]"), tracked, "Sinusoids that were followed, the reference known ahead.")
+    return Section("How it moves", tuple(moving_words(results)), [picture], [table] if tracked else [])
+
+
+def moving_words(results: Mapping[str, Any]) -> list[str]:
+    """Return what a run says of settling and holding, as sentences; none where it was not tried."""
+    found = results.get("settle")
+    if not found:
+        return []
+    seconds = found["median_seconds"]
+    words = (
+        f"The arm settles within {found['tolerance_deg']:g}° of {found['settled']:.1%} of {found['movements']} goals"
+        + (f", half of them within {seconds:.2f} s" if seconds is not None else "")
+        + f", and rests {found['rest_error_deg']:.2f}° off on average, with "
+        f"{found['valve_changes_per_second']:.1f} valve changes a second while it moves and holds"
+    )
+    air = found["air_litres_per_movement"]
+    return [words + (f" and {air:.2f} normal litres of air a movement." if air is not None else ".")]
 
 
 def overview(run: RunData) -> Section:

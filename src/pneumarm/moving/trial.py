@@ -1,0 +1,108 @@
+"""What a controller is good for, told in degrees and seconds: goals held one after the other, sinusoids followed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import Arm, guarded
+from pneumarm.arm.controller import TrackingController
+from pneumarm.arm.reference import Reference
+from pneumarm.moving.movement import Moved, MoveSettings, Tracked, move, track
+from pneumarm.settings import Settings, Valid
+from pneumarm.statistics import wilson
+
+
+@dataclass(frozen=True)
+class MoveTrialSettings(Settings):
+    """What is tried."""
+
+    goals: int = 40
+    """Goals that are moved to, one after the other, drawn uniformly; 0 for none."""
+    hold: float = 3.0
+    """For how long each is held, from when it is given [s]."""
+    tolerance: float = 1.0
+    """A joint is there within so much [degrees]."""
+    frequencies: tuple[float, ...] = (0.25, 0.5, 1.0)
+    """Of the sinusoids that are followed [Hz]."""
+    amplitude: float = 20.0
+    """Of the sinusoids about the middle of the goals; less where the arm does not go so far [degrees]."""
+    seconds: float = 8.0
+    """For how long each sinusoid is followed [s]."""
+
+    def _valid(self) -> Valid:
+        return {
+            "goals": 0 <= self.goals <= 1_000_000,
+            "hold": 0 < self.hold <= 3600 or "above 0 and at most 3600 s",
+            "tolerance": 0 < self.tolerance < 360 or "above 0 and below 360 degrees",
+            "frequencies": all(0 < one <= 100 for one in self.frequencies) or "above 0 and at most 100 Hz each",
+            "amplitude": 0 < self.amplitude < 360 or "above 0 and below 360 degrees",
+            "seconds": 0 < self.seconds <= 3600 or "above 0 and at most 3600 s",
+        }
+
+
+@dataclass(frozen=True)
+class MoveTrial:
+    """What came of a trial."""
+
+    moved: tuple[Moved, ...]
+    tracked: dict[float, tuple[float, Tracked]]
+    """By frequency: the amplitude in degrees, and what came of it."""
+    settings: MoveTrialSettings
+
+    def results(self) -> dict[str, Any]:
+        """Return the figures for ``results.json``, ``settle`` and ``track``."""
+        found: dict[str, Any] = {}
+        if self.moved:
+            settled = [one for one in self.moved if one.time_settled is not None]
+            seconds = [one.time_settled - one.time_start for one in settled if one.time_settled is not None]
+            low, high = wilson(len(settled), len(self.moved))
+            air = [one.air for one in self.moved if one.air is not None]
+            found["settle"] = {
+                "movements": len(self.moved),
+                "tolerance_deg": self.settings.tolerance,
+                "settled": len(settled) / len(self.moved),
+                "settled_interval": [low, high],
+                "median_seconds": float(np.median(seconds)) if seconds else None,
+                "rest_error_deg": float(np.mean([one.rest_error.max() for one in self.moved])),
+                "valve_changes_per_second": float(np.mean([one.switches for one in self.moved]) / self.settings.hold),
+                "air_litres_per_movement": float(np.mean(air)) if air else None,
+            }
+        if self.tracked:
+            found["track"] = [
+                {"frequency_hz": frequency, "amplitude_deg": amplitude, "rms_error_deg": one.rms_error.tolist()}
+                for frequency, (amplitude, one) in self.tracked.items()
+            ]
+        return found
+
+
+def try_moving(
+    arm: Arm,
+    controller: TrackingController,
+    goal_range: NDArray[np.float64],
+    settings: MoveTrialSettings = MoveTrialSettings(),
+    *,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> MoveTrial:
+    """Move ``arm`` to goals in ``goal_range`` (joints, 2) [counts] and along sinusoids; each is tried once."""
+    spec, random = arm.spec, np.random.default_rng([seed, 5])
+    goals = random.uniform(goal_range[:, 0], goal_range[:, 1], (settings.goals, spec.joints))
+    total, moved = settings.goals + len(settings.frequencies), []
+    guard = guarded(arm)
+    for one in move(guard, controller, goals, MoveSettings(settings.hold, 1, settings.tolerance)):
+        moved.append(one)
+        if progress is not None:
+            progress(len(moved), total)
+    middle, half = goal_range.mean(axis=1), np.ptp(goal_range, axis=1) / 2
+    counts = np.minimum(settings.amplitude * spec.counts_per_degree, 0.9 * half)
+    tracked = {}
+    for number, frequency in enumerate(settings.frequencies, 1):
+        wave = Reference(lambda t, f=frequency: middle + counts * np.sin(2 * np.pi * f * t))  # type: ignore[misc]
+        amplitude = float(counts.min() / spec.counts_per_degree)
+        tracked[frequency] = amplitude, track(guard, controller, wave, settings.seconds)
+        if progress is not None:
+            progress(settings.goals + number, total)
+    return MoveTrial(tuple(moved), tracked, settings)

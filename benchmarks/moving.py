@@ -1,21 +1,21 @@
-"""Be there, stay there, follow: controllers of all kinds side by side, each with the same arm time to learn or be tuned.
+"""Be there, stay there, follow: controllers of all kinds side by side, each with the same arm time to get ready.
 
 python -m benchmarks moving
 
-Every controller moves every arm to the same goals within 30 degrees, one after the other, and holds each; then it follows
-sinusoids, with their future known and not. Settings come from the environment:
+Every controller moves every arm to the same goals within 30 degrees, one after the other, and holds each; then it
+follows sinusoids, with their future known and not. Settings come from the environment:
 
-PNEUMARM_MOVING_CONTROLLERS  "agent,pid,pid@200,scheduled,pwm,sliding,sliding@200" by default: ``agent`` is the default agent,
-                             ``plan`` plans in its simulation; the others are tuned, at 30 Hz or at that behind @, with
-                             pulses, or by whole periods where ``-whole`` is added, such as pid-whole@200
+PNEUMARM_MOVING_CONTROLLERS  "agent,pid,pid@200,scheduled,pwm,sliding,sliding@200". ``agent`` is the default agent,
+                             ``plan`` plans in its simulation; the others are tuned, at 30 Hz or at that behind @,
+                             with pulses, or by whole periods where ``-whole`` is added, such as pid-whole@200
 PNEUMARM_MOVING_ARMS         seeds of virtual arms; the ten held-out arms by default
 PNEUMARM_MOVING_SEEDS        "0,1,2": of collecting, training and tuning, and of goals and noise
 PNEUMARM_MOVING_GOALS        500 for each of them
 PNEUMARM_MOVING_MINUTES      20, of arm time to collect or to tune
 PNEUMARM_MOVING_SECONDS      30 for each sinusoid
 PNEUMARM_MOVING_PROCESSES    2
-PNEUMARM_MOVING_FOLDER       where controllers and rows are kept; a call with the same folder goes on where another ended.
-                             runs/moving by default
+PNEUMARM_MOVING_FOLDER       where controllers and rows are kept; a call with the same folder goes on where another
+                             ended. runs/moving by default
 """
 
 import os
@@ -77,7 +77,7 @@ def measure() -> Iterator[str]:
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         for row in pool.map(measured, [plan] * len(wanted), *zip(*wanted, strict=True)) if wanted else ():
             rows.add(row)
-    found = {name: [] for name in controllers}  # type: dict[str, list[dict[str, Any]]]
+    found: dict[str, list[dict[str, Any]]] = {name: [] for name in controllers}
     for one in asked:
         row = rows.get(*one, plan.goals, plan.minutes, plan.seconds)
         assert row is not None

@@ -101,13 +101,17 @@ def prepared(plan: Plan, name: str, arm: int, seed: int) -> str:
             train(made.simulation, begin, None, seed).agent.save(agent)
         return f"plan:{simulation}" if name == "plan" else str(agent)
     if not file.exists():
-        kind, _, rate = name.partition("@")
-        settings = TuneSettings(
-            seconds=60 * plan.minutes, rate=float(rate or 0), whole_periods=kind.endswith("-whole")
-        )
-        with open_arm(f"virtual:seed={arm}", seed) as opened:
+        kind, _, _ = name.partition("@")
+        settings = TuneSettings(seconds=60 * plan.minutes, whole_periods=kind.endswith("-whole"))
+        with open_arm(arm_for(name, arm), seed) as opened:
             tune(kind.removesuffix("-whole"), opened, settings, seed).save(file)
     return str(file)
+
+
+def arm_for(name: str, arm: int) -> str:
+    """Return the name of an arm, controlled at the rate of the controller ``name``."""
+    _, _, rate = name.partition("@")
+    return f"virtual:seed={arm},rate={rate}" if rate else f"virtual:seed={arm}"
 
 
 def measured(plan: Plan, name: str, arm: int, seed: int) -> dict[str, Any]:
@@ -116,7 +120,7 @@ def measured(plan: Plan, name: str, arm: int, seed: int) -> dict[str, Any]:
     random = np.random.default_rng((arm, seed))
     row: dict[str, Any] = {"controller": name, "arm": arm, "seed": seed}
     row |= {"goals": plan.goals, "minutes": plan.minutes, "seconds": plan.seconds}
-    with open_arm(f"virtual:seed={arm}", 1000 + seed) as opened:
+    with open_arm(arm_for(name, arm), 1000 + seed) as opened:
         mover, spec, _ = open_tracking(controller, opened, TOLERANCE)
         goals = counts_of(random.uniform(-RANGE, RANGE, (1 + plan.goals, spec.joints)), spec)
         made = move(opened, mover, goals, MoveSettings(hold=HOLD, tries=1, tolerance=TOLERANCE))

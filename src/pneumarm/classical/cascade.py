@@ -22,17 +22,17 @@ from pneumarm.classical.static_map import StaticMap
 class CascadeGains(CommonGains):
     """Gains of the cascade; times in seconds."""
 
-    proportional: float = 0.3
+    proportional: float = 0.33
     """Kp."""
-    derivative: float = 0.02
+    derivative: float = 0.009
     """Kd."""
-    velocity: float = 0.08
+    velocity: float = 0.045
     """Tv."""
-    acceleration: float = 0.002
+    acceleration: float = 0.0017
     """Ta [s2]."""
-    pressure_gain: float = 1.0
+    pressure_gain: float = 1.4
     """Share of a pressure's error that a pulse takes away."""
-    dead_band: float = 0.01
+    dead_band: float = 0.0085
     """Errors of pressure below this are left [bar]."""
 
 

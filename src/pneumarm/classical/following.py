@@ -60,23 +60,23 @@ class Law(Protocol):
 class CommonGains:
     """What all laws have; times in seconds."""
 
-    move_time: float = 0.2
+    move_time: float = 0.21
     """Time of the smallest move to a goal."""
-    move_speed: float = 250.0
+    move_speed: float = 200.0
     """A move takes longer by its length divided by this [degrees/s]."""
-    smoothing: float = 0.02
+    smoothing: float = 0.017
     """Time constant of the filter on the measured velocity."""
-    rest: float = 0.25
+    rest: float = 0.23
     """Off by less than this the joint is left alone [degrees]."""
-    lead: float = 0.06
+    lead: float = 0.09
     """How far ahead the reference is fed forward."""
     total: float = 0.9
     """Sum of both pressures, in units of the highest: co-contraction."""
     trust: float = 0.6
     """Share of a reading that goes into the estimate of a pressure, while the joint stands still."""
-    integral: float = 3.0
+    integral: float = 5.0
     """Ki, how fast the error of the static map is learned [1/s]."""
-    memory: float = 0.4
+    memory: float = 0.27
     """Share of the map's error, as it is where a movement begins, that is taken for true there."""
 
 

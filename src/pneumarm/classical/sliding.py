@@ -25,13 +25,13 @@ _ACTIONS = [(float(first), float(second)) for first, second in VALVES.tolist()]
 class SlidingGains(CommonGains):
     """Constants of the surface; times in seconds."""
 
-    slope: float = 15.0
+    slope: float = 24.0
     """lambda [1/s]."""
-    balance: float = 0.8
+    balance: float = 0.9
     """kappa."""
-    layer: float = 0.7
+    layer: float = 0.8
     """Half of the boundary layer's thickness, in s [degrees]."""
-    stiffening: float = 5.0
+    stiffening: float = 9.5
     """What a bar that the sum is off counts as, in s [degrees/bar]."""
     switching: float = 0.2
     """What another action than the last counts as, in s [degrees]."""

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.adaptation import AdaptationSettings, adaptation
-from pneumarm.arm import Arm, BeginState, ControlCycle, guarded
+from pneumarm.arm import Arm, ControlCycle, guarded
 from pneumarm.arm.counts import Counts
 from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.found import Found
 from pneumarm.control.monitor import Monitor
-from pneumarm.control.movement import MOVEMENT, move
+from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
@@ -31,8 +31,6 @@ from pneumarm.transitions.watch import warm_up as warm_up_watch
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
-BEGIN = BeginState()
-"""How the arm gets to a begin state between movements (thesis section 5.5)."""
 _TOGETHER = 10
 """Movements that are stored in one transaction: at most these are made again after an interruption."""
 
@@ -69,25 +67,6 @@ class TransferSettings(Settings):
     def movements(self, phase: Phase) -> int:
         """Number of movements in ``phase``."""
         return self.episodes if phase == "learning" else self.test_episodes
-
-
-def begin_and_goal(
-    agent: AnyAgent, seed: int, test: bool, number: int
-) -> tuple[np.random.Generator, NDArray[np.float64]]:
-    """Return the random numbers of movement ``number`` of ``agent`` and its goal."""
-    return draw_movement(agent.goal_range, seed, test, number)
-
-
-def draw_movement(
-    goal_range: NDArray[np.float64], seed: int, test: bool, number: int
-) -> tuple[np.random.Generator, NDArray[np.float64]]:
-    """Return the random numbers of movement ``number`` and its goal within ``goal_range`` (joints, 2) [counts].
-
-    Both tests use the same begin states and goals, and so does every baseline with the same seed.
-    """
-    random = np.random.default_rng([seed, 0 if test else 1, number])
-    low, high = goal_range.T
-    return random, random.uniform(low, high)
 
 
 @dataclass(frozen=True)
@@ -176,7 +155,6 @@ def transfer(
             adapting.set_state(store.state("adaptation") or adapting.get_state())
     elif keep_version is not None and adapting is not None:
         keep_version(0, agent)
-    task = agent.settings
     total = sum(settings.movements(phase) for phase in PHASES)
     cycle = ControlCycle(guarded(arm), settings.close_while_computing)
     waiting: list[Recorded] = []
@@ -262,10 +240,10 @@ def transfer(
                 if adapting is not None and moving is not adapting.agent:
                     moving = adapting.agent
                     controller = AgentController(moving)
-                random, goal = begin_and_goal(agent, seed, greedy, i)
-                BEGIN.reach(cycle.arm, random)
+                draw = draw_movement(agent.goal_range, seed, greedy, i)
+                BEGIN.reach(cycle.arm, draw.random)
                 movement = move(
-                    cycle, controller, goal, task.reward, task.cutoff, watch, broken.append, agent.window.velocity
+                    cycle, controller, draw.goal, agent.settings, watch, broken.append, agent.window.velocity
                 )
                 if phase == "learning" and agent.learns and i >= (1 - settings.averaged) * movements:
                     mean.add(learner.weights())

@@ -32,8 +32,8 @@ from pneumarm.learning.policy.training import FleetTraining, PolicyLearner, trai
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.begin import BeginStates
-from pneumarm.task.environment import TaskSettings
 from pneumarm.task.movements import TEST, Movements
+from pneumarm.task.settings import TaskSettings
 from pneumarm.transitions.window import Window
 
 Method = Literal["policy", "batched", "sarsa", "q-learning"]

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.networks.network import Network
 from pneumarm.planning.planner import SIMULATED, SimulationModel, simulated_planner
 from pneumarm.planning.search import PlanSettings
@@ -24,6 +23,7 @@ from pneumarm.task.acting import test_acting
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
 from pneumarm.task.movements import Movements
+from pneumarm.task.settings import TaskSettings
 from pneumarm.transitions.window import Window
 
 
@@ -32,8 +32,8 @@ class PlanAgent:
     """A simulation that is planned in."""
 
     simulation: Simulation
-    settings: TrainSettings = field(default_factory=TrainSettings)
-    """Of these the reward, the cut-off and the noise of a test are used: nothing is trained."""
+    settings: TaskSettings = field(default_factory=TaskSettings)
+    """What is asked of its movements."""
     plan: PlanSettings = SIMULATED
     """Which plans are considered."""
 

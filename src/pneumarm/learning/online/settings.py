@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pneumarm.settings import Settings, Valid
-from pneumarm.simulation.noise import NoiseSettings
-from pneumarm.task.reward import Reward
+from pneumarm.task.settings import TaskSettings
 
 Method = Literal["sarsa", "q-learning"]
 
@@ -73,7 +72,7 @@ class Shaping(Settings):
 
 
 @dataclass(frozen=True)
-class TrainSettings(Settings):
+class TrainSettings(TaskSettings):
     """Everything that decides a training phase, besides the simulation, the begin states and the seed."""
 
     method: Method = "sarsa"
@@ -86,8 +85,6 @@ class TrainSettings(Settings):
     """lambda of the eligibility traces (thesis: 0)."""
     discount: float = 0.98
     """gamma (thesis: 0.98)."""
-    cutoff: int = 100
-    """Actions after which an episode that has not reached its goal is cut off (thesis: 100)."""
     agents: int = 16
     """Agents trained at once from different weights, of which the best is kept (section 5.4.2: they decide most)."""
     initial_weight: float = 0.3
@@ -100,14 +97,10 @@ class TrainSettings(Settings):
     """Whether training ends when the criterion is met; otherwise at ``max_episodes`` (thesis: yes; not in 5.4.3)."""
     validation_episodes: int = 2_000
     """Greedy episodes on which the best agent is chosen."""
-    reward: Reward = field(default_factory=Reward)
-    """What is paid for an action."""
     exploration: Exploration = field(default_factory=Exploration)
     """Exploration at the end of shaping, or all the time without shaping."""
     shaping: Shaping | None = field(default_factory=Shaping)
     """Shaping, or None: then all begin states from the first episode on."""
-    noise: NoiseSettings = field(default_factory=NoiseSettings)
-    """Noise on the simulation's predictions."""
 
     @property
     def begin_weights(self) -> tuple[float, ...]:
@@ -122,7 +115,6 @@ class TrainSettings(Settings):
             "hidden": 1 <= self.hidden <= 1024,
             "trace_decay": 0 <= self.trace_decay <= 1,
             "discount": 0 <= self.discount <= 1,
-            "cutoff": self.cutoff >= 1,
             "agents": 1 <= self.agents <= 4096,
             "initial_weight": 0 < self.initial_weight < math.inf,
             "return_scale": 0 < self.return_scale < math.inf,

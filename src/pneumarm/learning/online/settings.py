@@ -19,8 +19,7 @@ class Exploration(Settings):
     temperature: float = 1.0
     """Temperature T of its Boltzmann distribution, in units of reward (thesis: 1 at the end of shaping)."""
 
-    def valid(self) -> Valid:
-        """Return which values are valid."""
+    def _valid(self) -> Valid:
         return {"epsilon": 0 <= self.epsilon <= 1, "temperature": 0 < self.temperature < math.inf}
 
 
@@ -57,8 +56,7 @@ class Shaping(Settings):
     weights: tuple[float, ...] = (0.4, 0.3, 0.2, 0.1)
     """Weights of the sub-intervals of begin states on each side of the goal, the farthest first (thesis: these)."""
 
-    def valid(self) -> Valid:
-        """Return which values are valid."""
+    def _valid(self) -> Valid:
         return {
             "initial_deviation": 0 < self.initial_deviation < math.inf,
             "episodes": self.episodes >= 1,
@@ -107,8 +105,7 @@ class TrainSettings(TaskSettings):
         """Weights of the sub-intervals of begin states, see :class:`Shaping`."""
         return self.shaping.weights if self.shaping else (1.0,)
 
-    def valid(self) -> Valid:
-        """Return which values are valid."""
+    def _valid(self) -> Valid:
         return {
             "method": self.method in ("sarsa", "q-learning"),
             "learning_rate": 0 <= self.learning_rate < math.inf,

@@ -6,7 +6,19 @@ import sys
 
 import benchmarks
 
-LONG = ("adaptation", "agents", "bound", "faults", "held_out", "minutes", "baselines", "sensors", "serial", "success")
+LONG = (
+    "adaptation",
+    "agents",
+    "bound",
+    "faults",
+    "held_out",
+    "minutes",
+    "moving",
+    "baselines",
+    "sensors",
+    "serial",
+    "success",
+)
 """What takes many minutes runs only when it is named."""
 
 if __name__ == "__main__":

@@ -23,12 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
-from pneumarm.control import BEGIN, AgentController, move
-from pneumarm.control.transfer import begin_and_goal
+from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.learning import AnyAgent, LearnSettings, PolicySettings, Training, test, train
 from pneumarm.simulation import FitSettings, Simulation, fit_store
-from pneumarm.statistics import summarise
 from pneumarm.task import BeginStates, Movement, begin_states
+from pneumarm.task.movements import of_rows
 from pneumarm.transitions import KINDS, Store, collect
 
 TRANSITIONS = 200_000
@@ -59,7 +58,7 @@ def measure() -> Iterator[str]:
                     trained = train_by(method, simulation, begin, int(seed))
                     simulated = test(trained.agent, simulation, begin).reward.mean()
                     made, p99 = moved(trained.agent, int(arm), movements)
-                    figures = summary(made)
+                    figures = of_rows(one.row() for one in made).results()
                     found[method].append((figures, trained))
                     failures[method].update(kind(one) for one in made if not one.success)
                     yield row(arm, seed, method, trained, simulated, figures, p99)
@@ -102,15 +101,13 @@ class Timed(AgentController):
 
 def moved(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
     """Return movements on a virtual arm, and the processor time of a decision at the 99th percentile [ms]."""
-    controller, made = Timed(agent), []
+    controller = Timed(agent)
     controller.reset(agent.goal_range.mean(axis=1))
     with open_arm(f"virtual:seed={arm}", 1000 + arm) as opened:
         cycle = ControlCycle(guarded(opened))
         controller.act(cycle.arm.read())  # compiles
-        for number in range(movements):
-            random, goal = begin_and_goal(agent, SEED_OF_MOVEMENTS, True, number)
-            BEGIN.reach(cycle.arm, random)
-            made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
+        draws = drawn(agent.goal_range, SEED_OF_MOVEMENTS, range(movements))
+        made = list(make_movements(cycle, controller, agent.settings, draws, velocity=agent.window.velocity))
     return made, 1e3 * float(np.quantile(controller.seconds[1:], 0.99))
 
 
@@ -122,15 +119,6 @@ def kind(movement: Movement) -> str:
     if spread <= 5:
         return "stands still near the goal" if away <= 100 else "stands still far from the goal"
     return "moves about near the goal" if away <= 100 else "moves about far from the goal"
-
-
-def summary(made: list[Movement]) -> dict[str, Any]:
-    return summarise(
-        reward=[one.reward for one in made],
-        success=[one.success for one in made],
-        actions=[one.actions for one in made],
-        switches=[one.switches.sum() for one in made],
-    )
 
 
 def row(

@@ -45,8 +45,7 @@ from pneumarm.arm.virtual import (
 from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control import AgentController, TransferSettings, transfer
 from pneumarm.control.monitor import Finding, Monitor, marks_of
-from pneumarm.control.movement import move
-from pneumarm.control.transfer import BEGIN, draw_movement
+from pneumarm.control.movement import BEGIN, draw_movement, move
 from pneumarm.learning import AnyAgent, load_agent, train
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.fit import FitSettings, fit_store
@@ -274,9 +273,9 @@ def play(kind: Kind, arm_seed: int, seed: int, agent: AnyAgent | None = None) ->
     else:
         cycle, controller, number = ControlCycle(guarded(twins)), AgentController(agent), 0
         while not stage.over:
-            drawn, goal = draw_movement(agent.goal_range, seed, True, number)
-            BEGIN.reach(cycle.arm, drawn)
-            move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff, stage)
+            draw = draw_movement(agent.goal_range, seed, True, number)
+            BEGIN.reach(cycle.arm, draw.random)
+            move(cycle, controller, draw.goal, agent.settings, stage)
             number += 1
     assert stage.broke is not None
     return Played(twins.spec, stage.turns, stage.broke, stage.contradiction)

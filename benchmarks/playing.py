@@ -12,19 +12,18 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from benchmarks.learning import _synthetic
-from pneumarm.arm import BeginState, ControlCycle, guarded
+from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.control.agent import AgentController
-from pneumarm.control.movement import move
+from pneumarm.control.movement import BEGIN, drawn, evaluate
 from pneumarm.control.playing import Player
-from pneumarm.control.transfer import draw_movement
 from pneumarm.learning import Agent, Exploration, TrainSettings
 from pneumarm.learning.online.learner import OnlineLearner
 from pneumarm.learning.online.values import draw_networks
 
 MOVEMENTS, REPEATS, SEED = 100, 3, 7
 RANGE = np.array([[150.0, 850.0]])
-BEGIN, EXPLORATION, SETTINGS = BeginState(), Exploration(), TrainSettings()
+EXPLORATION, SETTINGS = Exploration(), TrainSettings()
 
 
 def measure() -> Iterator[str]:
@@ -45,9 +44,9 @@ def measure() -> Iterator[str]:
 
 def _played(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:
     """Return the processor time [s], the sum of rewards and the arm's time at the end [s]."""
-    drawn = [draw_movement(RANGE, SEED, False, i) for i in range(count)]
-    goals = np.array([goal for _, goal in drawn])
-    durations = np.array([random.uniform(0.0, BEGIN.inflate, (1, 2)) for random, _ in drawn])
+    draws = list(drawn(RANGE, SEED, range(count), test=False))
+    goals = np.array([draw.goal for draw in draws])
+    durations = np.array([draw.random.uniform(0.0, BEGIN.inflate, (1, 2)) for draw in draws])
     arm = VirtualArm(draw_parameters(1), seed=SEED)
     player = Player(agent, arm, SETTINGS.learning_rate, EXPLORATION, seed=SEED, begin=BEGIN)
     began = time.process_time()
@@ -59,11 +58,7 @@ def _moved(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:
     """Return the same of movements through the guard and the control cycle."""
     learning = OnlineLearner(agent, SETTINGS.learning_rate, EXPLORATION, seed=SEED)
     cycle = ControlCycle(guarded(VirtualArm(draw_parameters(1), seed=SEED)))
-    controller, reward, end = AgentController(agent, learning), 0.0, 0.0
+    controller = AgentController(agent, learning)
     began = time.process_time()
-    for i in range(count):
-        random, goal = draw_movement(RANGE, SEED, False, i)
-        BEGIN.reach(cycle.arm, random)
-        made = move(cycle, controller, goal, SETTINGS.reward, SETTINGS.cutoff)
-        reward, end = reward + made.reward, made.time_end
-    return time.process_time() - began, reward, end
+    made = evaluate(cycle, controller, SETTINGS, drawn(RANGE, SEED, range(count), test=False))
+    return time.process_time() - began, float(made.reward.sum()), float(made.time_end[-1])

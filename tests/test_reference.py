@@ -27,12 +27,16 @@ def test_waves_begin_in_the_middle_or_at_an_end() -> None:
 def test_files_hold_their_ends(tmp_path: Path) -> None:
     file = tmp_path / "way.csv"
     file.write_text("time,angle\n1,0\n2,10\n4,-10\n")
-    assert degrees(str(file), [-1, 0, 0.5, 1, 2, 9]) == [[0, 0, 5, 10, 0, -10]]
+    assert degrees(str(file), [-1, 0, 1, 3, 9]) == [[0, 0, 10, -10, -10]]
     assert degrees(f"steps:{file}", [-1, 0, 0.9, 1, 2.9, 3]) == [[0, 0, 0, 10, 10, -10]]
     steps = parse_reference(f"steps:{file}", ONE)
     assert (steps.smooth, steps.duration) == (False, 3.0)
     file.write_text("0,1,2\n1,3,4\n")
     assert degrees(str(file), [0.5], TWO) == [[2], [3]]
+    times = np.arange(0, 3, 1 / 30)
+    file.write_text("".join(f"{time},{20 * np.sin(6 * time)}\n" for time in times))
+    fine = np.arange(0.1, 2.8, 0.01)
+    np.testing.assert_allclose(degrees(str(file), fine.tolist())[0], 20 * np.sin(6 * fine), atol=0.05)
 
 
 @pytest.mark.parametrize(

@@ -38,11 +38,9 @@ import numpy as np
 from benchmarks.agents import Timed, prepared
 from benchmarks.baselines.learning import OURS, PLANNING, STABLE, learn
 from benchmarks.baselines.table import HEADER, Row, curves, floor, line, pooled, write_page
-from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.console import jsonable, peak_memory
-from pneumarm.control import BEGIN, move
-from pneumarm.control.transfer import begin_and_goal
+from pneumarm.control import drawn, make_movements
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import AnyAgent, load_agent, test, test_ahead
 from pneumarm.planning import PlanAgent
@@ -192,14 +190,11 @@ def tested(agent: AnyAgent, simulation: Simulation, begin: BeginStates, episodes
 
 def moved(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
     """Return movements on a virtual arm as on arrival, and the 99th percentile of a decision's time [ms]."""
-    controller, made = Timed(agent), []
+    controller = Timed(agent)
     controller.reset(agent.goal_range.mean(axis=1))
     with VirtualArm(draw_parameters(arm), seed=SEED) as opened:
         controller.act(opened.read())  # compiles
     with VirtualArm(draw_parameters(arm), seed=SEED) as opened:
-        cycle = ControlCycle(guarded(opened))
-        for number in range(movements):
-            random, goal = begin_and_goal(agent, SEED, True, number)
-            BEGIN.reach(cycle.arm, random)
-            made.append(move(cycle, controller, goal, agent.settings.reward, agent.settings.cutoff))
+        draws = drawn(agent.goal_range, SEED, range(movements))
+        made = list(make_movements(opened, controller, agent.settings, draws, velocity=agent.window.velocity))
     return made, 1e3 * float(np.quantile(controller.seconds[1:], 0.99))

@@ -104,8 +104,7 @@ def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Demonstration]:
 
 
 def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Movement:
-    task = agent.settings
-    return move(cycle, controller_of(agent), goal, task.reward, task.cutoff, velocity=agent.window.velocity)
+    return move(cycle, controller_of(agent), goal, agent.settings, velocity=agent.window.velocity)
 
 
 def _recorded(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64], name: str) -> Demonstration:

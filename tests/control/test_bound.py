@@ -100,7 +100,7 @@ def test_only_virtual_arms_have_a_bound(capsys: pytest.CaptureFixture[str], smal
 
 
 def test_settings_are_checked() -> None:
-    with pytest.raises(UnusableInput, match="at least 1"):
+    with pytest.raises(UnusableInput, match="1 or more"):
         BoundSettings(episodes=0)
     with pytest.raises(UnusableInput, match="switches"):
         PlanSettings(switches=-1)

@@ -8,7 +8,7 @@ from pneumarm.arm import Arm, ArmSpec, ControlCycle, Reading, guarded
 from pneumarm.control import LearningController, move
 from pneumarm.errors import ControllerFailure
 from pneumarm.simulation import SimulationArm
-from pneumarm.task import Reward
+from pneumarm.task import Reward, TaskSettings
 from simple_simulation import QUIET, simulation
 
 GOAL = np.array([500.0])
@@ -61,7 +61,7 @@ class Pupil(Player):
 def test_actions_switches_and_reward_are_counted_by_hand() -> None:
     pupil = Pupil(1, 1, -1, 1)
     arm = Dial(455)
-    made = move(ControlCycle(guarded(arm)), pupil, GOAL, Reward())
+    made = move(ControlCycle(guarded(arm)), pupil, GOAL)
     # 455 -> 465 -> 475: within 25 of the goal and slow (10 counts in 40 ms) after two actions.
     assert (made.actions, made.switches.tolist(), made.reward, made.success) == (2, [0], 49.0, True)
     assert made.velocity_end == pytest.approx([0.25])
@@ -70,29 +70,29 @@ def test_actions_switches_and_reward_are_counted_by_hand() -> None:
 
 
 def test_a_goal_is_reached_after_an_action_at_the_earliest_and_switches_cost() -> None:
-    made = move(ControlCycle(guarded(Dial(500))), Player(0), GOAL, Reward())
+    made = move(ControlCycle(guarded(Dial(500))), Player(0), GOAL)
     assert (made.actions, made.reward, made.success) == (1, 50.0, True)
-    made = move(ControlCycle(guarded(Dial(445))), Player(1, -1, 1, 1, 1), GOAL, Reward())
+    made = move(ControlCycle(guarded(Dial(445))), Player(1, -1, 1, 1, 1), GOAL)
     assert (made.actions, made.switches.tolist(), made.reward) == (5, [2], 50.0 - 4 - 16)
 
 
 def test_a_movement_is_cut_off_and_that_is_no_terminal_state() -> None:
     pupil = Pupil(*[0] * 9)
-    made = move(ControlCycle(guarded(Dial(100))), pupil, GOAL, Reward(), cutoff=7)
+    made = move(ControlCycle(guarded(Dial(100))), pupil, GOAL, TaskSettings(cutoff=7))
     assert (made.actions, made.reward, made.success) == (7, -7.0, False)
     assert [terminal for *_, terminal in pupil.told] == [False] * 7
 
 
 def test_what_counts_is_what_the_guard_let_through() -> None:
     pupil = Pupil(1, 0, 1, 0)
-    made = move(ControlCycle(guarded(Dial(100, over_pressure=True))), pupil, GOAL, Reward(), cutoff=4)
+    made = move(ControlCycle(guarded(Dial(100, over_pressure=True))), pupil, GOAL, TaskSettings(cutoff=4))
     assert made.switches.tolist() == [0]
     assert np.nanmax(made.recorded.command) == 0
     assert [applied for _, applied, *_ in pupil.told] == [0, 0, 0, 0]
 
 
 def test_a_movement_is_recorded_whole() -> None:
-    made = move(ControlCycle(guarded(Dial(455))), Player(1, 1), GOAL, Reward())
+    made = move(ControlCycle(guarded(Dial(455))), Player(1, 1), GOAL)
     assert made.recorded.angle[:, 0].tolist() == [455, 465, 475]
     assert made.recorded.command[:2, 0, 0].tolist() == [1, 1]
     assert np.isnan(made.recorded.command[2]).all()
@@ -101,14 +101,16 @@ def test_a_movement_is_recorded_whole() -> None:
 
 
 def test_too_fast_at_the_goal_is_not_at_the_goal() -> None:
-    made = move(ControlCycle(guarded(Dial(455))), Player(1, 1), GOAL, Reward(velocity_tolerance=0.2), cutoff=2)
+    made = move(
+        ControlCycle(guarded(Dial(455))), Player(1, 1), GOAL, TaskSettings(Reward(velocity_tolerance=0.2), cutoff=2)
+    )
     assert not made.success
 
 
 def test_valves_are_closed_when_a_controller_fails() -> None:
     arm = Dial(100)
     with pytest.raises(ControllerFailure, match="IndexError"):
-        move(ControlCycle(guarded(arm)), Player(1), GOAL, Reward())
+        move(ControlCycle(guarded(arm)), Player(1), GOAL)
     assert arm.valve == 0
 
 
@@ -124,6 +126,6 @@ def test_any_number_of_joints(joints: int) -> None:
             return np.tile(np.array([self.valves.pop(0), 0], np.int8), (joints, 1))
 
     arm = guarded(SimulationArm(simulation(joints), noise=QUIET))
-    made = move(ControlCycle(arm), Both(1, 0, 1, 0), np.full(joints, 100.0), Reward(), cutoff=4)
+    made = move(ControlCycle(arm), Both(1, 0, 1, 0), np.full(joints, 100.0), TaskSettings(cutoff=4))
     assert made.switches.tolist() == [3] * joints
     assert made.reward == -4 - 8 * 3 * joints

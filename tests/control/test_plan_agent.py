@@ -15,7 +15,7 @@ from pneumarm.learning import Agent, Learns, TrainSettings, fingerprint, test, t
 from pneumarm.learning.online.testing import run_test
 from pneumarm.planning import PlanAgent, simulated_planner
 from pneumarm.simulation import SimulationArm
-from pneumarm.task import Reward, StateTracker
+from pneumarm.task import StateTracker
 from pneumarm.task.acting import test_acting
 from pneumarm.task.environment import environment
 from pneumarm.task.movements import TEST
@@ -51,7 +51,7 @@ def test_the_actor_decides_as_the_planner() -> None:
     movements = []
     for controller in (ThroughActor(PlanAgent(SIMULATION)), simulated_planner(SIMULATION)):
         cycle = ControlCycle(guarded(SimulationArm(SIMULATION, seed=3)))
-        movements.append([move(cycle, controller, np.array([goal]), Reward()) for goal in (400.0, 650.0, 510.0)])
+        movements.append([move(cycle, controller, np.array([goal])) for goal in (400.0, 650.0, 510.0)])
     for one, two in zip(*movements, strict=True):
         np.testing.assert_array_equal(one.recorded.command, two.recorded.command)
         assert one.reward == two.reward

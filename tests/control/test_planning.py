@@ -18,7 +18,7 @@ from pneumarm.planning import PhysicsModel, Planner, PlanSettings, SimulationMod
 from pneumarm.planning.search import Uncertainty, find, problem, tree, within, workspace_of
 from pneumarm.simulation import NoiseSettings, SimulationArm
 from pneumarm.simulation.rollout import advance_simulated, copy_simulated, simulated_states, simulated_world
-from pneumarm.task import Movement, Reward
+from pneumarm.task import Movement, Reward, TaskSettings
 
 BEGIN = BeginState(deflate=0.5, inflate=0.8, settle=0.5)
 REWARD = Reward()
@@ -48,7 +48,7 @@ def quiet_arm(seed: int) -> VirtualArm:
 def carried_out(arm: VirtualArm, controller: object, goal: float, cutoff: int = 100) -> Movement:
     """Return a movement from where the arm is, and put it back there."""
     state = arm.get_state()
-    movement = move(ControlCycle(guarded(arm)), controller, np.array([goal]), REWARD, cutoff)
+    movement = move(ControlCycle(guarded(arm)), controller, np.array([goal]), TaskSettings(REWARD, cutoff))
     arm.set_state(state)
     return movement
 

@@ -231,7 +231,7 @@ def test_on_an_arm_it_is_the_movement_of_a_transfer(seed: int) -> None:
     goal = own.uniform(low, high)
     np.testing.assert_array_equal(goal, info["goal"])
     QUICK.reach(arm, own)
-    movement = move(ControlCycle(arm), Replay(actions), goal, Reward())
+    movement = move(ControlCycle(arm), Replay(actions), goal)
     assert movement.actions == len(paid)
     assert movement.reward == sum(paid)
     assert movement.success == terminated

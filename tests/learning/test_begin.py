@@ -35,7 +35,9 @@ def test_sub_intervals_and_their_probabilities(goal: float, deviation: float, lo
     """Four parts a side with the weights of table 4.1, the farthest most likely; the sides stay in 0..1023."""
     begin = begin_parameters(_line(), DOMAIN, Shaping().weights)
     random, draws = random_state(1), 20_000
-    ends = np.array([draw_interval(begin, goal, deviation, random) for _ in range(draws)]) - goal
+    ends = (
+        np.array([draw_interval(begin.domain, begin.weights, goal, deviation, random) for _ in range(draws)]) - goal
+    )
     found, counts = np.unique(ends.round(6), axis=0, return_counts=True)
     expected = [(-lower * (4 - i) / 4, -lower * (3 - i) / 4) for i in range(4)]
     expected += [(higher * i / 4, higher * (i + 1) / 4) for i in range(4)]
@@ -65,6 +67,19 @@ def test_begin_states_lie_within_the_deviation(joints: int, deviation: float) ->
     if joints == 1 or deviation > 50:  # two joints are seldom both within 30 counts: then the nearest is taken
         assert max(distances) <= deviation
     assert max(distances) > min(0.7 * deviation, 200)
+
+
+def test_no_joint_leads_the_others() -> None:
+    """With the joints' angles and goals exchanged the same distances are drawn."""
+    simulation = synthetic_simulation(2)
+    states = synthetic_begin_states(simulation)
+    exchanged = replace(states, angle=np.ascontiguousarray(states.angle[:, ::-1]))
+    goal, means = np.array([450.0, 560.0]), []
+    for one, aim in ((states, goal), (exchanged, goal[::-1].copy())):
+        begin, random = begin_parameters(one, DOMAIN, Shaping().weights), random_state(0)
+        found = [np.abs(one.angle[draw_begin(begin, aim, 200.0, random)] - aim) for _ in range(4000)]
+        means.append(np.mean(found, axis=0))
+    np.testing.assert_allclose(means[0], means[1][::-1], rtol=0.05)
 
 
 def test_nothing_near_the_goal_gives_the_nearest() -> None:

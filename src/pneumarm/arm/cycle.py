@@ -109,7 +109,10 @@ class ControlCycle:
 
 
 def missed_turns(late: float, period: float) -> int:
-    """Return how many turns of the grid a turn has missed that is ``late`` [s]; the next is due after these."""
+    """Return how many turns of the grid a turn has missed that is ``late`` [s]; the next is due after these.
+
+    The compiled loop of :mod:`pneumarm.control.playing` is made of it too, by :func:`pneumarm.kernels.part`.
+    """
     return max(round(late / period), 0)
 
 

@@ -446,6 +446,22 @@ def _outward(angle: NDArray[np.float64], low: float, high: float) -> NDArray[np.
     return np.stack([side, -side], axis=1) if side.any() else None
 
 
+def open_time(seconds: float, valve: int, passed: float) -> float:
+    """Return for how long [s] an inlet counts as open, ``passed`` [s] after ``seconds``, its valve being so.
+
+    This and :func:`stays_closed` are compiled by :func:`pneumarm.kernels.part` too, see
+    :mod:`pneumarm.control.playing`.
+    """
+    if valve > 0:
+        return seconds + passed
+    return seconds - (passed if valve == 0 else VENTING * passed) if seconds > 0 else seconds
+
+
+def stays_closed(blocked: bool, valve: int, seconds: float, limit: float) -> bool:
+    """Return whether an inlet that counts as open for ``seconds`` stays closed from now on."""
+    return blocked or seconds >= limit if valve > 0 else blocked and seconds > 0
+
+
 class _Inflation:
     """For how long each inlet has been open: counted up while it is, down while it is closed, fast while vented.
 
@@ -468,12 +484,9 @@ class _Inflation:
         passed = 0.0 if self._time is None else time - self._time
         self._time = time
         for i, valve in enumerate(self.valves):
-            if valve > 0:
-                self._open_for[i] += passed
-                if self._open_for[i] >= self._limit:
-                    self.blocked[i] = self.spent = True
-            elif self._open_for[i] > 0:
-                self._open_for[i] -= passed if valve == 0 else VENTING * passed
-                if self._open_for[i] <= 0 and self.blocked[i]:
-                    self.blocked[i] = False
+            if valve > 0 or self._open_for[i] > 0:
+                self._open_for[i] = seconds = open_time(self._open_for[i], valve, passed)
+                blocked = stays_closed(self.blocked[i], valve, seconds, self._limit)
+                if blocked != self.blocked[i]:
+                    self.blocked[i] = blocked
                     self.spent = any(self.blocked)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-_HALF = 0.03
+_HALF = 0.015
 """Time between the points that velocities and accelerations are derived from [s]."""
 
 

@@ -7,6 +7,8 @@ A command is valves, which hold until the next one, or *pulses*: numbers from -1
 whose magnitude the share of the control period for which it is open; then it closes. +-1 holds until the next one.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -29,6 +31,11 @@ def to_valves(actions: ArrayLike) -> NDArray[np.int8]:
 
 def to_actions(valves: ArrayLike) -> NDArray[np.int64]:
     """Return the actions (...) of ``valves`` (..., 2) of -1, 0, +1."""
-    valves = np.asarray(valves)
-    actions: NDArray[np.int64] = 3 * (valves[..., 0].astype(np.int64) + 1) + valves[..., 1].astype(np.int64) + 1
+    both = np.asarray(valves).astype(np.int64)
+    actions: NDArray[np.int64] = action_of(both[..., 0], both[..., 1])
     return actions
+
+
+def action_of(valve_1: Any, valve_2: Any) -> Any:
+    """Return the action of the valves of a joint's muscles; compiled by :func:`pneumarm.kernels.part` too."""
+    return 3 * (valve_1 + 1) + valve_2 + 1

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec, Reading
 from pneumarm.arm.reference import Reference, constant
+from pneumarm.classical.muscles import Muscles
 from pneumarm.errors import UnusableInput
 
 _JUMP = 1.0
@@ -22,6 +23,9 @@ _LEAVING = 1.8
 """A joint at rest is left alone until it is off by so many times the tolerance in which it came to rest."""
 _CALM = 8.0
 """... and it comes to rest when it would need an eighth of a second or longer to cross that tolerance [1/s]."""
+
+_FAST = 60.0
+"""A joint that moves faster compresses air by more than the sensors' noise [degrees/s]."""
 
 
 @dataclass(frozen=True)
@@ -42,41 +46,45 @@ class Wish:
 class Law(Protocol):
     """How one joint's valves follow from what is wanted and what is read."""
 
-    lead: float
-    """How far ahead it wants to know the reference [s]."""
+    muscles: Muscles
+    """Of the joint; who follows tells them what is read and what is commanded."""
 
-    def begin(self, angle: float, pressures: tuple[float, float]) -> None:
-        """Begin with the joint at ``angle`` [counts] and ``pressures`` [bar], with valves that were closed."""
-
-    def read(self, pressures: tuple[float, float]) -> None:
-        """Take in the ``pressures`` [bar] of a turn; called once a turn before :meth:`act` or :meth:`rest`."""
+    def begin(self) -> None:
+        """Begin a movement."""
 
     def act(self, wish: Wish, angle: float, velocity: float) -> tuple[float, float]:
         """Return the commands of both muscles, -1 to 1, for a joint at ``angle`` [counts] and ``velocity``."""
 
-    def rest(self, wish: Wish) -> None:
-        """Note that the valves stay closed in this turn."""
-
 
 @dataclass(frozen=True)
-class FollowGains:
-    """How references are followed; times in seconds."""
+class CommonGains:
+    """What all laws have; times in seconds."""
 
-    move_time: float = 0.25
+    move_time: float = 0.21
     """Time of the smallest move to a goal."""
     move_speed: float = 200.0
     """A move takes longer by its length divided by this [degrees/s]."""
-    smoothing: float = 0.02
+    smoothing: float = 0.017
     """Time constant of the filter on the measured velocity."""
-    rest: float = 0.3
-    """Off by less than this the joint is left alone [degrees]; 0: never."""
+    rest: float = 0.23
+    """Off by less than this the joint is left alone [degrees]."""
+    lead: float = 0.09
+    """How far ahead the reference is fed forward."""
+    total: float = 0.9
+    """Sum of both pressures, in units of the highest: co-contraction."""
+    trust: float = 0.6
+    """Share of a reading that goes into the estimate of a pressure, while the joint stands still."""
+    integral: float = 5.0
+    """Ki, how fast the error of the static map is learned [1/s]."""
+    memory: float = 0.27
+    """Share of the map's error, as it is where a movement begins, that is taken for true there."""
 
 
 class Following:
     """A controller of all joints: one :class:`Law` each."""
 
     def __init__(
-        self, spec: ArmSpec, gains: FollowGains, laws: Sequence[Law], goal_range: NDArray[np.float64], *, pulses: bool
+        self, spec: ArmSpec, gains: CommonGains, laws: Sequence[Law], goal_range: NDArray[np.float64], *, pulses: bool
     ) -> None:
         self.spec, self.goal_range = spec, goal_range
         self._pulses = pulses
@@ -122,7 +130,7 @@ class Following:
         now = reference.wanted(time)
         found = []
         for j, joint in enumerate(self._joints):
-            ahead = reference.wanted(time, joint.law.lead)
+            ahead = reference.wanted(time, joint.gains.lead)
             found.append(
                 Wish(
                     float(now.angle[j]),
@@ -138,7 +146,7 @@ class Following:
 class _Joint:
     """One joint on its way."""
 
-    def __init__(self, spec: ArmSpec, gains: FollowGains, law: Law) -> None:
+    def __init__(self, spec: ArmSpec, gains: CommonGains, law: Law) -> None:
         self.law, self.gains = law, gains
         self._counts = spec.counts_per_degree
         self._rest = gains.rest * spec.counts_per_degree
@@ -151,7 +159,8 @@ class _Joint:
         self._time, self._angle, self._velocity, self._smooth = time, angle, 0.0, angle
         self._resting = False
         self._way = _Way(0.0, 0.0, angle, 0.0, 0.0, angle)
-        self.law.begin(angle, pressures)
+        self.law.muscles.begin(angle, pressures)
+        self.law.begin()
 
     def on_the_way(self, time: float, goal: float) -> Wish:
         """Return where the joint is to be at ``time`` [s] on its way to ``goal``, which may be a new one."""
@@ -161,7 +170,7 @@ class _Joint:
             duration = self.gains.move_time + abs(goal - angle) / self._counts / self.gains.move_speed
             self._way = _Way(time, duration, angle, velocity, acceleration, goal)
         angle, velocity, _ = self._way.at(time)
-        ahead, its_velocity, its_acceleration = self._way.at(time + self.law.lead)
+        ahead, its_velocity, its_acceleration = self._way.at(time + self.gains.lead)
         return Wish(angle, ahead, its_velocity, its_acceleration, velocity)
 
     def act(self, time: float, angle: float, pressures: tuple[float, float], wish: Wish) -> tuple[float, float]:
@@ -172,11 +181,11 @@ class _Joint:
             self._velocity += (1 - keep) * ((angle - self._angle) / passed - self._velocity)
             self._smooth += (1 - keep) * (angle - self._smooth)
         self._time, self._angle = time, angle
-        self.law.read(pressures)
-        if self._rests(wish):
-            self.law.rest(wish)
-            return 0.0, 0.0
-        return self.law.act(wish, angle, self._velocity)
+        muscles = self.law.muscles
+        muscles.read(angle, pressures, min(abs(self._velocity) / (_FAST * self._counts), 1.0))
+        commands = (0.0, 0.0) if self._rests(wish) else self.law.act(wish, angle, self._velocity)
+        muscles.commanded(commands)
+        return commands
 
     def _rests(self, wish: Wish) -> bool:
         off = abs(self._smooth - wish.angle)

@@ -42,7 +42,8 @@ class PressureLoop:
         shortest: pulse that the valves can do [s]; None for valves that are set for whole periods.
         gain: share of the error that is taken away in a period.
         dead_band: errors below this are left [bar].
-        trust: share of a reading that goes into the estimate of the pressure; the rest is predicted.
+        trust: share of a reading that goes into the estimate of the pressure while the joint stands still; the
+            rest is predicted.
 
     """
 
@@ -62,28 +63,30 @@ class PressureLoop:
         self._commands: deque[float] = deque(maxlen=int(self._delay / period) + 2)
         self.estimate: float | None = None
         """Of the pressure now [bar]."""
-        self.saturated = False
-        """Whether the last command asked for more than an open valve gives in a period and a half."""
 
     def reset(self) -> None:
         """Begin with valves that were closed for longer than the dead time."""
         self._commands.clear()
         self.estimate = None
 
-    def read(self, pressure: float) -> float:
-        """Take in a reading [bar] and return the pressure that there will be when a command now takes effect."""
+    def read(self, pressure: float, motion: float = 0.0) -> float:
+        """Take in a reading [bar] and return the pressure that there will be when a command now takes effect.
+
+        ``motion``, from 0 for a joint that stands still to 1, is how far the reading is trusted beyond ``trust``: a
+        moving joint compresses the air, which no rate foresees.
+        """
         if self.estimate is None:
             self.estimate = pressure
         else:
             expected = self.estimate + self._change(-self.period)
-            self.estimate = expected + self.trust * (pressure - expected)
+            trust = self.trust + (1 - self.trust) * motion
+            self.estimate = expected + trust * (pressure - expected)
         return self.estimate + self._change(0.0)
 
     def command(self, target: float, expected: float) -> float:
         """Return the command, -1 to 1, that brings the pressure from ``expected`` to ``target`` [bar]."""
         lacking = target - expected
         periods = lacking / (self.rates.at(expected, lacking) * self.period)
-        self.saturated = abs(periods) > 1.5
         if abs(lacking) < self.dead_band:
             return 0.0
         if self.shortest is None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.classical.cascade import CascadeGains, ScheduledGains
-from pneumarm.classical.following import FollowGains
+from pneumarm.classical.following import CommonGains
 from pneumarm.classical.pulse_width import PulseWidthGains
 from pneumarm.classical.sliding import SlidingGains
 
@@ -17,7 +17,7 @@ from pneumarm.classical.sliding import SlidingGains
 class Range:
     """The gains that are searched: each from 0 to 1 between its least and its greatest, in equal ratios."""
 
-    default: FollowGains
+    default: CommonGains
     limits: dict[str, tuple[float, float]]
 
     @property
@@ -27,7 +27,7 @@ class Range:
             [math.log(getattr(self.default, name) / a) / math.log(b / a) for name, (a, b) in self.limits.items()]
         )
 
-    def gains(self, gains: FollowGains, point: NDArray[np.float64]) -> FollowGains:
+    def gains(self, gains: CommonGains, point: NDArray[np.float64]) -> CommonGains:
         """Return ``gains`` with those that are searched as they are at ``point`` (n,)."""
         found: dict[str, Any] = {
             name: a * (b / a) ** float(x) for (name, (a, b)), x in zip(self.limits.items(), point, strict=True)
@@ -35,25 +35,25 @@ class Range:
         return replace(gains, **found)
 
 
-_FOLLOWING = {
+_COMMON = {
     "move_time": (0.1, 0.8),
     "move_speed": (50.0, 1000.0),
     "smoothing": (0.002, 0.1),
     "rest": (0.05, 0.8),
     "lead": (0.005, 0.2),
     "total": (0.4, 1.8),
+    "trust": (0.03, 1.0),
+    "integral": (0.3, 20.0),
+    "memory": (0.05, 1.2),
 }
 _CASCADE = {
-    **_FOLLOWING,
+    **_COMMON,
     "proportional": (0.05, 3.0),
-    "integral": (0.1, 20.0),
     "derivative": (0.002, 0.3),
     "velocity": (0.005, 0.3),
     "acceleration": (0.0003, 0.03),
-    "memory": (0.1, 1.2),
-    "pressure_gain": (0.2, 1.5),
+    "pressure_gain": (0.2, 4.0),
     "dead_band": (0.002, 0.08),
-    "trust": (0.1, 1.0),
 }
 RANGES = {
     "pid": Range(CascadeGains(), _CASCADE),
@@ -62,7 +62,7 @@ RANGES = {
         {
             **_CASCADE,
             "proportional_outside": (0.2, 5.0),
-            "integral_outside": (0.2, 5.0),
+            "velocity_outside": (0.2, 5.0),
             "derivative_outside": (0.2, 5.0),
             "total_outside": (0.5, 1.6),
         },
@@ -70,9 +70,8 @@ RANGES = {
     "pwm": Range(
         PulseWidthGains(),
         {
-            **_FOLLOWING,
+            **_COMMON,
             "proportional": (0.005, 1.0),
-            "integral": (0.005, 3.0),
             "derivative": (0.0005, 0.06),
             "velocity": (0.001, 0.1),
             "balance": (0.005, 1.0),
@@ -82,10 +81,9 @@ RANGES = {
     "sliding": Range(
         SlidingGains(),
         {
-            **_FOLLOWING,
+            **_COMMON,
             "slope": (3.0, 100.0),
             "balance": (0.1, 3.0),
-            "integral": (0.05, 10.0),
             "layer": (0.1, 5.0),
             "stiffening": (0.3, 60.0),
             "switching": (0.01, 3.0),

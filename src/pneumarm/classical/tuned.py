@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ArmSpec
 from pneumarm.classical.calibration import Calibration
 from pneumarm.classical.cascade import Cascade, CascadeGains, Scheduled, ScheduledGains
-from pneumarm.classical.following import FollowGains, Following, Law
+from pneumarm.classical.following import CommonGains, Following, Law
 from pneumarm.classical.pulse_width import PulseWidth, PulseWidthGains
 from pneumarm.classical.sliding import Sliding, SlidingGains
 from pneumarm.errors import UnusableInput
@@ -25,7 +25,7 @@ _LARGEST = 1 << 20
 class Kind(NamedTuple):
     """A kind of controller."""
 
-    gains: type[FollowGains]
+    gains: type[CommonGains]
     law: Callable[..., Law]
     pulses: bool
     """Whether it can make use of pulses."""
@@ -49,7 +49,7 @@ class Tuned:
     spec: ArmSpec
     """Of the arm, with the control period that it was tuned for."""
     calibration: Calibration
-    gains: FollowGains
+    gains: CommonGains
     shortest_pulse: float | None
     """Shortest pulse that it opens a valve for [s]; None where valves are set for whole periods."""
     seconds: float

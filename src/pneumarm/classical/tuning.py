@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, GuardedArm, guarded
 from pneumarm.arm.reference import Reference
 from pneumarm.classical.calibration import calibrate
-from pneumarm.classical.following import FollowGains
+from pneumarm.classical.following import CommonGains
 from pneumarm.classical.ranges import RANGES, Range
 from pneumarm.classical.search import Evolution
 from pneumarm.classical.tuned import KINDS, Tuned
@@ -24,7 +24,7 @@ from pneumarm.moving import Moved, MoveSettings, at_period, move, track
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.reference import parse_reference
 
-_STEP = 0.12
+_STEP = 0.05
 """Standard deviation of the first candidates, in units of a gain's range."""
 _HOLD = 1.2
 """For how long a goal is held while tuning [s]."""
@@ -41,7 +41,7 @@ _REST = 0.6
 """What a degree of rest error counts as [s]."""
 _OVERSHOOT = 0.02
 """What a degree of overshoot counts as [s]."""
-_CHANGE = 0.004
+_CHANGE = 0.002
 """What a change of a valve counts as [s]."""
 _FOLLOWING = 0.06
 """What a degree of error in following a sinusoid counts as [s]."""
@@ -153,7 +153,7 @@ class _Trials:
         places[-1] = 0.5
         return self._low + places * (self._high - self._low)
 
-    def gains(self, point: NDArray[np.float64]) -> FollowGains:
+    def gains(self, point: NDArray[np.float64]) -> CommonGains:
         """Return the gains at a ``point`` of the search."""
         return self._space.gains(self.start.gains, point)
 

@@ -2,11 +2,10 @@
 
 from pneumarm.control.agent import AgentController, controller_of
 from pneumarm.control.monitor import Finding, Monitor, MonitorSettings
-from pneumarm.control.movement import LearningController, move
+from pneumarm.control.movement import BEGIN, Draw, LearningController, drawn, evaluate, make_movements, move
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.players import open_controller
 from pneumarm.control.transfer import (
-    BEGIN,
     Transferred,
     TransferSettings,
     transfer,
@@ -18,6 +17,7 @@ __all__ = [
     "BEGIN",
     "Adapted",
     "AgentController",
+    "Draw",
     "Finding",
     "History",
     "LearningController",
@@ -26,6 +26,9 @@ __all__ = [
     "TransferSettings",
     "Transferred",
     "controller_of",
+    "drawn",
+    "evaluate",
+    "make_movements",
     "move",
     "open_agent",
     "open_controller",

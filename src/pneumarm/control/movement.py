@@ -1,15 +1,20 @@
-"""One movement on an arm: from where it stands to a goal, counted as the thesis counts an episode (5.1, 5.2)."""
+"""Movements on an arm: from where it stands to a goal, counted as the thesis counts an episode (5.1, 5.2)."""
 
-from collections.abc import Callable
-from typing import Literal, Protocol, runtime_checkable
+from collections.abc import Callable, Iterable, Iterator
+from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm import ControlCycle, Controller, Reading, Step
+from pneumarm.arm import Arm, BeginState, ControlCycle, Controller, Reading, Step, guarded
+from pneumarm.arm.controller import TrackingController
+from pneumarm.arm.reference import Reference, constant
 from pneumarm.arm.valves import Command
-from pneumarm.errors import ArmFailure
-from pneumarm.task import Movement, Reward
+from pneumarm.arm.velocity import derived_velocity
+from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.task import Movement, Movements, TaskSettings
+from pneumarm.task.movements import of_rows
+from pneumarm.task.tally import Tally
 from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.watch import Watch, watched
 
@@ -17,6 +22,8 @@ MOVEMENT = "episode"
 """Kind of the sequence that a movement is."""
 BROKEN = "broken episode"
 """Kind of one that broke off, with the arm or the link."""
+BEGIN = BeginState()
+"""How the arm gets to a begin state between movements (thesis section 5.5)."""
 
 
 @runtime_checkable
@@ -33,9 +40,8 @@ class LearningController(Controller, Protocol):
 def move(
     cycle: ControlCycle,
     controller: Controller,
-    goal: NDArray[np.float64],
-    reward: Reward,
-    cutoff: int = 100,
+    goal: ArrayLike | Reference,
+    task: TaskSettings = TaskSettings(),
     watch: Watch | None = None,
     broken: Callable[[Recorded], None] | None = None,
     velocity: Literal["derived", "measured"] = "derived",
@@ -45,9 +51,8 @@ def move(
     Args:
         cycle: the control cycle of the arm.
         controller: what acts; a :class:`LearningController` also learns.
-        goal: shape (joints,) [counts].
-        reward: what is paid for an action, and when the goal is reached.
-        cutoff: actions after which a movement that has not reached its goal ends (thesis section 5.4.2: 100).
+        goal: shape (joints,) [counts]; or one that moves, for a :class:`~pneumarm.arm.controller.TrackingController`.
+        task: what is paid for an action, when the goal is reached, and when the movement is cut off.
         watch: sees every reading, such as a :class:`~pneumarm.control.Monitor`.
         broken: given what there is of a movement that breaks off, of the kind :data:`BROKEN`, before that is raised.
         velocity: whether a goal is reached by the velocity derived from the angles, or by that of the arm's sensor.
@@ -55,73 +60,123 @@ def move(
     """
 
     def keep(steps: list[Step], why: BaseException) -> None:
-        info = {"goal": count.goal.tolist()}
+        info = {"goal": attempt.goal.tolist()}
         recorded = broken_off(steps, cycle.arm.spec, why, kind=BROKEN, at_rest=True, info=info)
         if recorded is not None and broken is not None:
             broken(recorded)
 
-    count = _Count(cycle, controller, np.asarray(goal, np.float64), reward, cutoff, velocity == "measured")
-    controller.reset(count.goal)
-    steps = watched(cycle.run(count.decide), watch, at_rest=True, broken=keep)
+    attempt = _Attempt(cycle, controller, goal, task, velocity == "measured")
+    steps = watched(cycle.run(attempt.decide), watch, at_rest=True, broken=keep)
     recorded = Recorded.from_steps(steps, cycle.arm.spec, kind=MOVEMENT, at_rest=True)
-    return Movement(count.goal, len(steps) - 1, count.switches, count.total, count.success, count.velocity, recorded)
+    made = attempt.tally
+    return Movement(attempt.goal, made.actions, made.switches, made.reward, made.reached, attempt.velocity, recorded)
 
 
-def velocity_of(reading: Reading, before: Reading, *, measured: bool) -> NDArray[np.float64]:
-    """Return the velocity (joints,) at ``reading``, as a sensor has measured it or since ``before`` [counts/ms]."""
-    if not measured:
-        return (reading.angle - before.angle) / (1e3 * (reading.time - before.time))
-    if reading.velocity is None:
-        raise ArmFailure("a reading must hold a velocity by which this agent's goals are reached, this has none")
-    return reading.velocity
-
-
-class _Count:
-    """Decides turn by turn, counting actions, switches and reward alike in simulation and on the arm."""
+class _Attempt:
+    """Decides turn by turn, and counts what comes of it."""
 
     def __init__(
         self,
         cycle: ControlCycle,
         controller: Controller,
-        goal: NDArray[np.float64],
-        reward: Reward,
-        cutoff: int,
+        goal: ArrayLike | Reference,
+        task: TaskSettings,
         measures: bool,
     ) -> None:
-        self.measures = measures
-        self.cycle, self.controller, self.goal = cycle, controller, goal
-        self.reward, self.cutoff = reward, cutoff
+        self.cycle, self.controller, self.measures = cycle, controller, measures
         self.learner = controller if isinstance(controller, LearningController) else None
+        self.reference = goal if isinstance(goal, Reference) else constant(goal)
+        self.goal = self.reference.at(0.0)
+        self.velocity = np.zeros(self.goal.shape)
+        self.tally = Tally(task, self.goal.size)
+        self.began = 0.0
         self.before: Reading | None = None
-        self.actions = 0
-        self.switches = np.zeros(goal.shape, np.int64)
-        self.velocity = np.zeros(goal.shape)
-        self.total = 0.0
-        self.success = False
-        self._last_applied: Command | None = None
+        if not isinstance(goal, Reference):
+            controller.reset(self.goal)
+        elif isinstance(controller, TrackingController):
+            controller.track(goal)
+        else:
+            raise UnusableInput("a goal that moves needs a controller that follows references, with a method track")
 
     def decide(self, reading: Reading) -> Command | None:
         """Count what the last action led to; then return the valves of the next, or None at the end."""
-        if self.before is not None:
+        if self.before is None:
+            self.began = reading.time
+        else:
             gained = self._count(self.before, reading)
             if self.learner is not None:
-                self.learner.observe(reading, self.cycle.applied, gained, self.success)
-            if self.success or self.actions == self.cutoff:
+                self.learner.observe(reading, self.cycle.applied, gained, self.tally.reached)
+            if self.tally.over:
                 return None
         self.before = reading
-        self.actions += 1
         return self.controller.act(reading)
 
     def _count(self, before: Reading, reading: Reading) -> NDArray[np.float64]:
         """Return what each joint is paid for the action between two readings."""
-        applied = self.cycle.applied
-        switched = np.zeros(len(self.switches), bool)
-        if self._last_applied is not None:
-            switched = (applied != self._last_applied).any(axis=1)
-        self._last_applied = applied
-        self.switches += switched
-        self.velocity = velocity_of(reading, before, measured=self.measures)
-        self.success = self.reward.reached(reading.angle, self.velocity, self.goal)
-        self.total += self.reward.goal if self.success else self.reward.action
-        self.total += self.reward.switch * int(switched.sum())
-        return self.reward.of(self.success, switched)
+        if self.measures and reading.velocity is None:
+            raise ArmFailure("a reading must hold a velocity by which this agent's goals are reached, this has none")
+        self.goal = self.reference.at(reading.time - self.began)
+        if self.measures and reading.velocity is not None:
+            self.velocity = reading.velocity
+        else:
+            self.velocity = derived_velocity(reading.angle, before.angle, reading.time - before.time)
+        return self.tally.count(self.cycle.applied, reading.angle, self.velocity, self.goal)
+
+
+class Draw(NamedTuple):
+    """A movement to be made."""
+
+    goal: NDArray[np.float64]
+    """Shape (joints,) [counts]."""
+    random: np.random.Generator
+    """Of the way to its begin state, and whatever else is drawn on the way."""
+
+
+def draw_movement(goal_range: NDArray[np.float64], seed: int, test: bool, number: int) -> Draw:
+    """Return movement ``number``, its goal within ``goal_range`` (joints, 2) [counts].
+
+    The movements of a ``test`` are others than those while learning. Both tests of a transfer use the same begin
+    states and goals, and so does every baseline with the same seed.
+    """
+    random = np.random.default_rng([seed, 0 if test else 1, number])
+    low, high = goal_range.T
+    return Draw(random.uniform(low, high), random)
+
+
+def drawn(goal_range: NDArray[np.float64], seed: int, numbers: Iterable[int], *, test: bool = True) -> Iterator[Draw]:
+    """Yield the movements of these ``numbers``, see :func:`draw_movement`."""
+    return (draw_movement(goal_range, seed, test, number) for number in numbers)
+
+
+def make_movements(
+    arm: Arm | ControlCycle,
+    controller: Controller,
+    task: TaskSettings,
+    draws: Iterable[Draw],
+    *,
+    watch: Watch | None = None,
+    velocity: Literal["derived", "measured"] = "derived",
+) -> Iterator[Movement]:
+    """Make the movements ``draws`` on ``arm``, any of them, and yield each; the arguments are those of :func:`move`.
+
+    Before each the arm is brought to a random begin state.
+    """
+    cycle = arm if isinstance(arm, ControlCycle) else ControlCycle(guarded(arm))
+    for draw in draws:
+        BEGIN.reach(cycle.arm, draw.random)
+        yield move(cycle, controller, draw.goal, task, watch, velocity=velocity)
+
+
+def evaluate(
+    arm: Arm | ControlCycle,
+    controller: Controller,
+    task: TaskSettings,
+    draws: Iterable[Draw],
+    *,
+    watch: Watch | None = None,
+    velocity: Literal["derived", "measured"] = "derived",
+) -> Movements:
+    """Return the record of the movements ``draws`` of ``controller`` on ``arm``, see :func:`make_movements`."""
+    cycle = arm if isinstance(arm, ControlCycle) else ControlCycle(guarded(arm))
+    made = make_movements(cycle, controller, task, draws, watch=watch, velocity=velocity)
+    return of_rows((one.row() for one in made), cycle.arm.spec.joints)

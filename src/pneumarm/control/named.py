@@ -1,5 +1,6 @@
 """Controllers that move to goals and follow references, by their name on the command line."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,8 @@ def open_tracking(
     if is_tuned(path):
         tuned = load_tuned(path)
         tuned.check_fit(arm)
-        at_period(arm, tuned.spec.period)
+        if not math.isclose(arm.spec.period, tuned.spec.period, rel_tol=1e-3):
+            at_period(arm, tuned.spec.period)
         return tuned.controller(), arm.spec, tuned.goal_range
     agent = PlanAgent.load(path) if name.startswith(_PLAN) else open_agent(path, method)
     check_fit(agent, arm)

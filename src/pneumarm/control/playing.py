@@ -14,26 +14,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import BeginState
-from pneumarm.arm.guard import VENTING
-from pneumarm.arm.valves import VALVES
+from pneumarm.arm.cycle import missed_turns
+from pneumarm.arm.guard import open_time, stays_closed
+from pneumarm.arm.valves import VALVES, action_of
+from pneumarm.arm.velocity import derived_velocity
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.arm.virtual.body import Body
 from pneumarm.arm.virtual.passing import pass_for, pass_until
 from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import begin_acting, learn_and_act
 from pneumarm.learning.online.loop import Schedule, Workspace, workspace_of
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state, uniform
-from pneumarm.simulation.kernel import Places, places
-from pneumarm.task.begin import BeginParameters, draw_interval
+from pneumarm.simulation.kernel import Places, places, shift
+from pneumarm.task.begin import draw_interval
 from pneumarm.task.movements import Movements, movements
+from pneumarm.task.noting import goes_on, note_action
+from pneumarm.task.reward import RewardParameters, at_goal, is_switch, paid
 
 Array = NDArray[np.float64]
+_missed, _action, _velocity = part(missed_turns), part(action_of), part(derived_velocity)
+_open_time, _stays_closed = part(open_time), part(stays_closed)
 
 
 class _Watched(NamedTuple):
@@ -79,20 +85,20 @@ class _Mind(NamedTuple):
     """Shape (joints, 4) [sensor units]."""
     command_scale: Array
     """Shape (joints, 2)."""
+    command: NDArray[np.float32]
+    """Workspace, shape (2 joints,) [scaled]."""
     history: int
 
 
 class _Rules(NamedTuple):
     """What is asked of the arm."""
 
-    goal: float
-    action: float
-    switch: float
-    angle_tolerance: float
-    velocity_tolerance: float
+    reward: RewardParameters
     cutoff: int
     deflate: float
+    """[s]"""
     settle: float
+    """[s]"""
 
 
 class _Aims(NamedTuple):
@@ -102,8 +108,10 @@ class _Aims(NamedTuple):
     """Shape (n, joints) [counts]."""
     durations: Array
     """How long muscles are inflated before each movement, shape (n, joints, 2) [s]."""
-    near: BeginParameters
-    """Distribution of goals around the angle at the begin, used where the deviation is finite."""
+    range: Array
+    """Goals around the angle at the begin, drawn where the deviation is finite, lie in it, shape (joints, 2)."""
+    weights: Array
+    """Cumulative probabilities of the sub-intervals that they are drawn from, the farthest first."""
     random: NDArray[np.uint64]
 
 
@@ -154,6 +162,7 @@ class Player:
             np.ascontiguousarray(window.of_joints(scaling.observation_offset), np.float64),
             np.ascontiguousarray(window.of_joints(scaling.observation_scale), np.float64),
             np.ascontiguousarray(scaling.command_scale.reshape(joints, 2), np.float64),
+            np.zeros(2 * joints, np.float32),
             window.history,
         )
         both = joints, 2
@@ -170,25 +179,10 @@ class Player:
             float(spec.period),
             float(spec.latency),
         )
-        reward = agent.settings.reward
-        self._rules = _Rules(
-            float(reward.goal),
-            float(reward.action),
-            float(reward.switch),
-            float(reward.angle_tolerance),
-            float(reward.velocity_tolerance),
-            int(agent.settings.cutoff),
-            float(begin.deflate),
-            float(begin.settle),
-        )
-        low, high = agent.goal_range[0]
-        self._near = BeginParameters(
-            np.zeros((0, window.state_size), np.float32),
-            np.zeros((0, joints)),
-            np.zeros(0),
-            np.array([low, high], np.float64),
-            np.cumsum(agent.settings.begin_weights) / np.sum(agent.settings.begin_weights),
-        )
+        task = agent.settings
+        self._rules = _Rules(task.reward.parameters, int(task.cutoff), float(begin.deflate), float(begin.settle))
+        self._range = np.ascontiguousarray(agent.goal_range, np.float64)
+        self._weights = np.cumsum(task.begin_weights) / np.sum(task.begin_weights)
         self._aim_random = random_state((seed, 1))
         self.performance = 0.0
         """Moving average of successes (thesis eq. 4.14) by the schedule of :meth:`play`."""
@@ -205,7 +199,7 @@ class Player:
         """
         goals, durations = np.ascontiguousarray(goals, np.float64), np.ascontiguousarray(durations, np.float64)
         record = movements(len(goals), goals.shape[1])
-        aims = _Aims(goals, durations, self._near, self._aim_random)
+        aims = _Aims(goals, durations, self._range, self._weights, self._aim_random)
         count, self.performance = _play(
             self.arm.plain,
             self._watched,
@@ -247,14 +241,9 @@ def _read(body: Body, watched: _Watched) -> float:
     for j in range(watched.applied.shape[0]):
         for m in range(2):
             valve = watched.applied[j, m]
-            if valve > 0:
-                watched.open_for[j, m] += passed
-                if watched.open_for[j, m] >= watched.longest:
-                    watched.blocked[j, m] = True
-            elif watched.open_for[j, m] > 0:
-                watched.open_for[j, m] -= passed if valve == 0 else VENTING * passed
-                if watched.open_for[j, m] <= 0:
-                    watched.blocked[j, m] = False
+            seconds = _open_time(watched.open_for[j, m], valve, passed)
+            watched.open_for[j, m] = seconds
+            watched.blocked[j, m] = _stays_closed(watched.blocked[j, m], valve, seconds, watched.longest)
     return time
 
 
@@ -313,20 +302,15 @@ def _reach(body: Body, watched: _Watched, rules: _Rules, durations: Array) -> No
 @kernel
 def _push(mind: _Mind, watched: _Watched, velocity: Array, first: bool) -> None:
     """Put what was read into the state window, as :class:`~pneumarm.task.tracker.StateTracker` does."""
-    sigma, observed, commanded = mind.sigma, 4 * velocity.size, 2 * velocity.size
-    oldest = mind.history * observed
+    sigma, observed = mind.sigma, 4 * velocity.size
     if first:
         sigma[:] = 0
     else:
-        for i in range(oldest - 1, observed - 1, -1):
-            sigma[i] = sigma[i - observed]
-        if mind.history > 1:
-            for i in range(sigma.size - 1, oldest + commanded - 1, -1):
-                sigma[i] = sigma[i - commanded]
-            for j in range(velocity.size):
-                for m in range(2):
-                    valve = np.float64(watched.applied[j, m]) / mind.command_scale[j, m]
-                    sigma[oldest + 2 * j + m] = np.float32(valve)
+        for j in range(velocity.size):
+            for m in range(2):
+                valve = np.float64(watched.applied[j, m]) / mind.command_scale[j, m]
+                mind.command[2 * j + m] = np.float32(valve)
+        shift(sigma, mind.history, observed, mind.command)
     for j in range(velocity.size):
         for q in range(4):
             value = watched.angle[j] if q == 0 else (velocity[j] if q == 1 else watched.pressure[j, q - 2])
@@ -338,63 +322,72 @@ def _push(mind: _Mind, watched: _Watched, velocity: Array, first: bool) -> None:
 @kernel
 def _aim(aims: _Aims, watched: _Watched, deviation: float, goal: Array) -> None:
     """Put a goal near to where the arm stands into ``goal`` (joints,) (thesis section 4.3.3)."""
-    low, high = aims.near.domain[0], aims.near.domain[1]
     for j in range(goal.size):
-        here = min(max(watched.angle[j], low), high)
-        first, last = draw_interval(aims.near, here, deviation, aims.random)
+        here = min(max(watched.angle[j], aims.range[j, 0]), aims.range[j, 1])
+        first, last = draw_interval(aims.range[j], aims.weights, here, deviation, aims.random)
         goal[j] = first + (last - first) * uniform(aims.random)
+
+
+@kernel
+def _begin(watched, mind, schedule, goal, velocity):  # type: ignore[no-untyped-def]
+    """Begin a movement to ``goal`` in the state that was read."""
+    place = mind.places
+    for j in range(goal.size):
+        velocity[j] = 0.0
+        mind.x[place.goal + j] = np.float32((goal[j] - mind.offset[j, 0]) / mind.scale[j, 0])
+    _push(mind, watched, velocity, True)
+    for i in range(place.command):
+        mind.x[i] = mind.sigma[i]
+    begin_acting(mind.learner, schedule, mind.x, mind.workspace, mind.random)
+
+
+@kernel
+def _judge(watched, rules, goal, velocity, turn, gained):  # type: ignore[no-untyped-def]
+    """Set what each joint has ``gained`` by its last action and whether it switched; return whether all are there."""
+    is_reached = True
+    for j in range(goal.size):
+        is_reached = is_reached and at_goal(rules.reward, watched.angle[j], velocity[j], goal[j])
+    for j in range(goal.size):
+        action = _action(watched.applied[j, 0], watched.applied[j, 1])
+        turn.switched[j] = 1 if is_switch(turn.last[j], action) else 0
+        turn.last[j] = action
+        gained[j] = paid(rules.reward, is_reached, turn.switched[j])
+    return is_reached
+
+
+class _Turn(NamedTuple):
+    """The last actions as applied, and whether they were switches, each of shape (joints,)."""
+
+    last: NDArray[np.int64]
+    switched: NDArray[np.int64]
 
 
 @kernel
 def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignore[no-untyped-def]
     """Make movement ``e`` to ``goal``, as ``move`` does; return whether it succeeded."""
     joints = goal.size
-    before, velocity = np.zeros(joints), np.zeros(joints)
-    last, paid = np.zeros((joints, 2), np.int8), np.zeros(joints)
-    place = mind.places
-    success, due, then = False, 0.0, 0.0
+    before, velocity, gained = np.zeros(joints), np.zeros(joints), np.zeros(joints)
+    turn = _Turn(np.full(joints, -1), np.zeros(joints, np.int64))
+    success, is_first, due, then = False, True, 0.0, 0.0
     while True:
         time = _read(body, watched)
-        if record.actions[e] == 0:
+        due = time if is_first else due
+        due += (_missed(time - due, watched.period) + 1) * watched.period
+        if is_first:
             record.time_start[e] = time
-            due = time
-            for j in range(joints):
-                record.goal[e, j], record.angle_begin[e, j] = goal[j], watched.angle[j]
-                mind.x[place.goal + j] = np.float32((goal[j] - mind.offset[j, 0]) / mind.scale[j, 0])
-            _push(mind, watched, velocity, True)
-            for i in range(place.command):
-                mind.x[i] = mind.sigma[i]
-            begin_acting(mind.learner, schedule, mind.x, mind.workspace, mind.random)
+            record.goal[e], record.angle_begin[e] = goal, watched.angle
+            _begin(watched, mind, schedule, goal, velocity)
         else:
-            if time - due > watched.period / 2:
-                due = time
-            success = True
-            total = 0
             for j in range(joints):
-                velocity[j] = (watched.angle[j] - before[j]) / (1e3 * (time - then))
-                if abs(watched.angle[j] - goal[j]) > rules.angle_tolerance:
-                    success = False
-                if abs(velocity[j]) > rules.velocity_tolerance:
-                    success = False
-            for j in range(joints):
-                switched = 0
-                if record.actions[e] > 1 and (last[j] != watched.applied[j]).any():
-                    switched = 1
-                last[j] = watched.applied[j]
-                record.switches[e, j] += switched
-                total += switched
-                paid[j] = (rules.goal if success else rules.action) + rules.switch * switched
-            record.reward[e] += rules.goal if success else rules.action
-            record.reward[e] += rules.switch * total
+                velocity[j] = _velocity(watched.angle[j], before[j], time - then)
+            success = _judge(watched, rules, goal, velocity, turn, gained)
+            note_action(rules.reward, turn.switched, success, record, e)
             _push(mind, watched, velocity, False)
-            learn_and_act(mind.learner, schedule, mind.x, mind.workspace, mind.random, (paid, mind.sigma), success)
-            if success or record.actions[e] == rules.cutoff:
+            learn_and_act(mind.learner, schedule, mind.x, mind.workspace, mind.random, (gained, mind.sigma), success)
+            if not goes_on(rules, success, record, e):
                 break
-        for j in range(joints):
-            before[j] = watched.angle[j]
-        then = time
-        record.actions[e] += 1
-        due += watched.period
+        before[:] = watched.angle
+        then, is_first = time, False
         if watched.latency > 0.0:
             _wait(body, watched, watched.latency)
         for j in range(joints):
@@ -404,10 +397,8 @@ def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignor
         pass_until(body, due)
     watched.asked[:] = 0
     _set(body, watched)
-    record.time_end[e] = time
-    record.success[e] = success
-    for j in range(joints):
-        record.angle_end[e, j], record.velocity_end[e, j] = watched.angle[j], velocity[j]
+    record.time_end[e], record.success[e] = time, success
+    record.angle_end[e], record.velocity_end[e] = watched.angle, velocity
     return success
 
 

@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pneumarm.adaptation import AdaptationSettings, adaptation
-from pneumarm.arm import Arm, BeginState, ControlCycle, Controller, guarded
+from pneumarm.arm import Arm, ControlCycle, Controller, guarded
 from pneumarm.arm.counts import Counts
 from pneumarm.control.agent import AgentController, controller_of, warm_up
 from pneumarm.control.condition import Condition
 from pneumarm.control.monitor import Monitor
-from pneumarm.control.movement import MOVEMENT, move
+from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
@@ -31,8 +30,6 @@ from pneumarm.transitions.watch import warm_up as warm_up_watch
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
-BEGIN = BeginState()
-"""How the arm gets to a begin state between movements (thesis section 5.5)."""
 _TOGETHER = 10
 """Movements that are stored in one transaction: at most these are made again after an interruption."""
 
@@ -69,18 +66,6 @@ class TransferSettings(Settings):
     def movements(self, phase: Phase) -> int:
         """Number of movements in ``phase``."""
         return self.episodes if phase == "learning" else self.test_episodes
-
-
-def draw_movement(
-    goal_range: NDArray[np.float64], seed: int, test: bool, number: int
-) -> tuple[np.random.Generator, NDArray[np.float64]]:
-    """Return the random numbers of movement ``number`` and its goal within ``goal_range`` (joints, 2) [counts].
-
-    Both tests use the same begin states and goals, and so does every baseline with the same seed.
-    """
-    random = np.random.default_rng([seed, 0 if test else 1, number])
-    low, high = goal_range.T
-    return random, random.uniform(low, high)
 
 
 @dataclass(frozen=True)
@@ -284,13 +269,18 @@ class Transfer:
 
     def _move(self, controller: Controller, test: bool, number: int) -> Movement:
         """Bring the arm to a begin state and make movement ``number`` of a test or of learning."""
-        agent, task = self._arrived, self._arrived.settings
-        random, goal = draw_movement(agent.goal_range, self._seed, test, number)
-        BEGIN.reach(self._cycle.arm, random)
+        agent = self._arrived
+        draw = draw_movement(agent.goal_range, self._seed, test, number)
+        BEGIN.reach(self._cycle.arm, draw.random)
         return move(
-            self._cycle, controller, goal, task.reward, task.cutoff, self._watch, self._broken.append,
+            self._cycle,
+            controller,
+            draw.goal,
+            agent.settings,
+            self._watch,
+            self._broken.append,
             agent.window.velocity,
-        )  # fmt: skip
+        )
 
     def _adapt(self) -> None:
         """Let the agent adapt where that is due."""

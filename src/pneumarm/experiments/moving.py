@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import ArmParameters, VirtualArm
+from pneumarm.control.movement import BEGIN, drawn
 from pneumarm.control.playing import Player
-from pneumarm.control.transfer import BEGIN, draw_movement
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import ARMS, Experiment, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
@@ -161,9 +161,10 @@ def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> t
 
     """
     shape = agent.spec.joints, 2
-    drawn = [draw_movement(agent.goal_range, seed, stream == TEST_MOVEMENTS, first + i) for i in range(count)]
-    goals = np.array([goal for _, goal in drawn]).reshape(count, shape[0])
-    return goals, np.array([random.uniform(0.0, BEGIN.inflate, shape) for random, _ in drawn]).reshape(count, *shape)
+    numbers = range(first, first + count)
+    draws = list(drawn(agent.goal_range, seed, numbers, test=stream == TEST_MOVEMENTS))
+    goals = np.array([draw.goal for draw in draws]).reshape(count, shape[0])
+    return goals, np.array([one.random.uniform(0.0, BEGIN.inflate, shape) for one in draws]).reshape(count, *shape)
 
 
 def simulated_test(

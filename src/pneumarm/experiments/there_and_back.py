@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
-from pneumarm.control import BEGIN, AgentController, move
-from pneumarm.control.transfer import draw_movement
+from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
@@ -26,6 +25,7 @@ from pneumarm.learning import Acts, Method, TrainSettings, test, train
 from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
 from pneumarm.simulation.quality import propagation
 from pneumarm.task import BeginStates, Movement, begin_states
+from pneumarm.task.movements import of_rows
 from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, QUANTITIES, CollectSettings, Store, collect
 from pneumarm.transitions.choice import joined
 
@@ -234,15 +234,14 @@ def trained_and_moved(
     span = material.simulation.goal_range if goals is None else goals
     numbers = range(min(MOVEMENTS, settings.test_episodes))
     with opened(material.arm, seed % 2**31, recipe.frequency) as arm:
-        made = moved(agent, arm, span, numbers, seed, close_while_computing=recipe.close_while_computing)
+        closes = recipe.close_while_computing
+        rows = moved(agent, arm, span, numbers, seed, close_while_computing=closes)
+    made = of_rows(one.row() for one in rows)
     return {
         BEFORE + "reward": float(simulated.reward.mean()),
         BEFORE + "success_rate": float(simulated.success.mean()),
-        "reward": float(np.mean([one.reward for one in made])),
-        "success_rate": float(np.mean([one.success for one in made])),
-        "actions": float(np.mean([one.actions for one in made])),
-        "switches": float(np.mean([one.switches.sum() for one in made])),
-        "seconds": float(np.mean([one.time_end - one.time_start for one in made])),
+        **made.means(),
+        "seconds": float((made.time_end - made.time_start).mean()),
         "episodes": float(training.episodes.mean()),
         **({"met": float(training.met.mean())} if training.met.size else {}),
     }
@@ -271,11 +270,5 @@ def moved(
 
     """
     cycle = ControlCycle(guarded(arm), close_while_computing)
-    controller = controller or AgentController(agent)
-    made = []
-    for number in numbers:
-        random, goal = draw_movement(goals, seed, True, number)
-        BEGIN.reach(cycle.arm, random)
-        task, velocity = agent.settings, agent.window.velocity
-        made.append(move(cycle, controller, goal, task.reward, task.cutoff, velocity=velocity))
-    return made
+    draws, velocity = drawn(goals, seed, numbers), agent.window.velocity
+    return list(make_movements(cycle, controller or AgentController(agent), agent.settings, draws, velocity=velocity))

@@ -20,7 +20,7 @@ from pneumarm.learning.online.training import train
 from pneumarm.learning.online.values import learner
 from pneumarm.random import random_state
 from pneumarm.task.environment import Environment, environment, episode
-from pneumarm.task.movements import TEST, Movements
+from pneumarm.task.movements import TEST
 
 CRITERIA = {
     "reward": "average cumulative reward per episode",
@@ -113,11 +113,11 @@ def train_and_test(
     one = replace(settings, agents=1, validation_episodes=1, max_episodes=most)
     training = train(simulation, material.begin, one, run_seed(laboratory, run), threads=1)
     agent, count = training.agent, laboratory.test_episodes
-    found = _means(test(agent, simulation, material.begin, count, _TEST_SEED))
+    found = test(agent, simulation, material.begin, count, _TEST_SEED).means()
     env = environment(simulation, material.begin, one)
     if laboratory.exploring:
-        again = _means(run_test(env, agent.weights(), one, count, (_TEST_SEED, TEST), one.exploration))
-        found |= {EXPLORING + name: value for name, value in again.items()}
+        tested = run_test(env, agent.weights(), one, count, (_TEST_SEED, TEST), one.exploration)
+        found |= {EXPLORING + name: value for name, value in tested.means().items()}
     return {
         **found,
         LEARNING: _learning(env, agent.weights(), one, min(count, _LEARNING_EPISODES)),
@@ -140,12 +140,3 @@ def _learning(env: Environment, weights: NDArray[np.float32], settings: TrainSet
     learns = learner(weights.copy(), settings)
     performance, _, _ = train_episodes(env, learns, schedule, one, workspace(one), count, 0.0)
     return float(performance / (1 - (1 - _NEWEST) ** count))
-
-
-def _means(tested: Movements) -> dict[str, float]:
-    return {
-        "reward": float(tested.reward.mean()),
-        "success_rate": float(tested.success.mean()),
-        "actions": float(tested.actions.mean()),
-        "switches": float(tested.switches.sum(axis=1).mean()),
-    }

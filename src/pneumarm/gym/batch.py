@@ -22,8 +22,8 @@ from pneumarm.task.environment import (
 )
 
 
-class Batch(NamedTuple):
-    """``n`` movements, and workspace for as many threads as work on them. Made by :func:`batch`."""
+class SimulatedArms(NamedTuple):
+    """``n`` movements, and workspace for as many threads as work on them. Made by :func:`simulated_arms`."""
 
     x: NDArray[np.float32]
     """State vectors, see :mod:`pneumarm.simulation.kernel`, shape (n, inputs)."""
@@ -62,11 +62,11 @@ class Outcome(NamedTuple):
     """Observations at the end of movements that were followed by a new one in the same step, as ``observation``."""
 
 
-def batch(environment: Environment, n: int, threads: int) -> Batch:
+def simulated_arms(environment: Environment, n: int, threads: int) -> SimulatedArms:
     """Return workspace for ``n`` movements in ``environment``; none has begun."""
     one = episode(environment, random_state(0))
     joints = one.goal.size
-    return Batch(
+    return SimulatedArms(
         x=np.tile(one.state.x, (n, 1)),
         average=np.zeros((n, one.state.average.size), np.float32),
         random=np.zeros((n, 4), np.uint64),

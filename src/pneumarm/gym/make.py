@@ -15,11 +15,11 @@ from pneumarm.gym.on_arm import ArmPointToPoint
 from pneumarm.gym.simulated import SimulatedPointToPoint
 from pneumarm.gym.spaces import nominal_goals, nominal_scaling
 from pneumarm.gym.vector import PointToPointVector
-from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates, begin_states
 from pneumarm.task.reward import Reward
+from pneumarm.task.settings import TaskSettings
 from pneumarm.transitions import Store
 from pneumarm.transitions.window import Window
 
@@ -92,7 +92,7 @@ def point_to_point(
     * ``like``: on an arm, the simulation whose state window, scaling and goals are used.
     * ``goals``: lowest and highest goal (joints, 2) [counts]; by default those of the simulation, or the inner 80 %
       of the angle's range.
-    * ``reward``, ``cutoff``, ``noise``: as in :class:`pneumarm.learning.TrainSettings`; noise in a simulation only.
+    * ``reward``, ``cutoff``, ``noise``: as in :class:`pneumarm.task.TaskSettings`; noise in a simulation only.
     * ``seed``: of a virtual arm's noise.
 
     ## Version History
@@ -106,7 +106,7 @@ def point_to_point(
     if simulation is not None:
         if like is not None:
             raise UnusableInput("like= is for arms; a simulation has a state window of its own")
-        settings = TrainSettings(reward=reward, cutoff=cutoff, noise=noise, shaping=None)
+        settings = TaskSettings(reward, cutoff, noise)
         return SimulatedPointToPoint(_with_goals(simulation, goals), _begin(simulation, transitions), settings)
     if transitions is not None:
         raise UnusableInput("transitions= is for simulations; an arm is brought to its begin states")
@@ -121,7 +121,7 @@ def point_to_point(
         window, scaling, range_ = model.window, model.scaling, model.goal_range
     if goals is not None:
         range_ = _goals(goals, window.joints)
-    return ArmPointToPoint(opened, window, scaling, range_, reward, cutoff)
+    return ArmPointToPoint(opened, window, scaling, range_, TaskSettings(reward, cutoff))
 
 
 def point_to_point_vector(
@@ -153,7 +153,7 @@ def point_to_point_vector(
         _with_goals(simulation, goals),
         _begin(simulation, transitions),
         num_envs,
-        TrainSettings(reward=reward, cutoff=cutoff, noise=noise, shaping=None),
+        TaskSettings(reward, cutoff, noise),
         threads=threads,
         autoreset_mode=autoreset_mode,
         copy=copy,

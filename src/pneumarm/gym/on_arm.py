@@ -14,10 +14,11 @@ from pneumarm.arm import Arm, BeginState, Reading, guarded
 from pneumarm.arm.cycle import missed_turns
 from pneumarm.arm.valves import Command, to_valves
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.spaces import action_space, observation_space, scaled_goal, sensor_ranges
+from pneumarm.gym.spaces import action_space, observation_space, sensor_ranges
 from pneumarm.simulation.simulation import Scaling
-from pneumarm.task.reward import Reward
-from pneumarm.task.tracker import StateTracker
+from pneumarm.task.settings import TaskSettings
+from pneumarm.task.tally import Tally
+from pneumarm.task.tracker import StateTracker, scaled_goal
 from pneumarm.transitions.window import Window
 
 Observation = NDArray[np.float32]
@@ -40,14 +41,14 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         window: Window,
         scaling: Scaling,
         goals: NDArray[np.float64],
-        reward: Reward = Reward(),
-        cutoff: int = 100,
+        task: TaskSettings = TaskSettings(),
         begin: BeginState = BeginState(),
     ) -> None:
         """Move ``arm`` to goals within ``goals`` (joints, 2) [counts]; it is closed with the environment."""
         self.arm = guarded(arm)
         self._fresh = self.arm.get_state()
-        self._goals, self._reward, self._cutoff, self._begin = goals, reward, cutoff, begin
+        self._goals, self._task, self._begin = goals, task, begin
+        self._tally = Tally(task, window.joints)
         self._tracker, self._scaling = StateTracker(window, scaling), scaling
         self.action_space = action_space(window.joints)
         space = observation_space(window, scaling, sensor_ranges(arm.spec, window), goals)
@@ -56,11 +57,9 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._closed = np.zeros((arm.spec.joints, 2), np.int8)
         self._over = True
         self._goal = goals.mean(axis=1)
-        self._applied: Command | None = None
         self._reading: Reading
         self._asked = 0.0  # when the agent was last asked for an action [s]
         self._due = 0.0
-        self._count = 0
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -83,7 +82,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._goal = goal
         self._begin.reach(self.arm, self.np_random)
         self._reading = self.arm.read()
-        self._due, self._count, self._applied, self._over = self._reading.time, 0, None, False
+        self._due, self._over, self._tally = self._reading.time, False, Tally(self._task, goal.size)
         self._tracker.reset()
         observation = self._observation(self._reading)
         self._ask()
@@ -100,20 +99,15 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         applied = self._turn(to_valves(actions.reshape(-1)))
         self._reading = reading = self.arm.read()
         self._due += missed_turns(reading.time - self._due, self.arm.spec.period) * self.arm.spec.period
-        switched = 0 if self._applied is None else int((applied != self._applied).any(axis=1).sum())
-        self._applied = applied
         self._tracker.commanded(applied)
         observation = self._observation(reading)
-        self._count += 1
-        reached = self._reward.reached(reading.angle, self._tracker.velocity, self._goal)
-        truncated = not reached and self._count >= self._cutoff
-        self._over = reached or truncated
+        self._tally.count(applied, reading.angle, self._tracker.velocity, self._goal)
+        reached, self._over = self._tally.reached, self._tally.over
         if self._over:
             self.arm.set_valves(self._closed)
         else:
             self._ask()
-        paid = (self._reward.goal if reached else self._reward.action) + self._reward.switch * switched
-        return observation, paid, reached, truncated, {"is_success": reached}
+        return observation, self._tally.paid, reached, self._over and not reached, {"is_success": reached}
 
     def _turn(self, valves: Command) -> Command:
         """Let a turn pass with ``valves`` (joints, 2); return them as applied."""

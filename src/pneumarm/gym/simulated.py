@@ -12,14 +12,15 @@ from numba.experimental import structref
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.batch import act, batch, begin_movement, observe, outcome
+from pneumarm.gym.batch import act, begin_movement, observe, outcome, simulated_arms
 from pneumarm.gym.spaces import action_space, observation_space, sensor_ranges
 from pneumarm.kernels import kernel
-from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
+from pneumarm.task.settings import TaskSettings
+from pneumarm.task.tracker import scaled_goal
 
 Observation = NDArray[np.float32]
 
@@ -62,14 +63,12 @@ class SimulatedPointToPoint(gymnasium.Env[Observation, Any]):
 
     metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium wants it
 
-    def __init__(
-        self, simulation: Simulation, begin: BeginStates, settings: TrainSettings = TrainSettings(shaping=None)
-    ) -> None:
-        """Move in ``simulation`` from ``begin`` states; of ``settings`` reward, cut-off and noise are used."""
+    def __init__(self, simulation: Simulation, begin: BeginStates, settings: TaskSettings = TaskSettings()) -> None:
+        """Move in ``simulation`` from ``begin`` states, as ``settings`` ask."""
         self.simulation = simulation
         world = environment(simulation, begin, settings)
         window = simulation.window
-        self._many = batch(world, 1, 1)
+        self._many = simulated_arms(world, 1, 1)
         self._result = outcome(1, window.state_size + window.joints)
         self._handle = _handle(world, self._many, self._result)
         self._task = world.task
@@ -99,7 +98,7 @@ class SimulatedPointToPoint(gymnasium.Env[Observation, Any]):
         low, high = self._task.goal_range.T
         if goal.shape != low.shape or not ((low <= goal) & (goal <= high)).all():
             raise UnusableInput(f"a goal needs {low.size} angle(s) in counts within {low} to {high}, got {goal}")
-        scaled = (goal - self._task.unit[:, 0]) / self._task.unit[:, 1]
+        scaled = scaled_goal(goal, self.simulation.scaling)
         place = self._task.goal_place
         self._many.goal[0] = goal
         self._many.x[0, place : place + goal.size] = scaled

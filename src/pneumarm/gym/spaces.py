@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.simulation.simulation import Scaling
-from pneumarm.transitions.window import QUANTITIES, Window
+from pneumarm.task.tracker import scaled_goal
+from pneumarm.transitions.window import Window
 
 Array = NDArray[np.float64]
 
@@ -71,10 +72,3 @@ def observation_space(window: Window, scaling: Scaling, ranges: ArrayLike, goals
     parts = [observed] * window.history + [commanded] * (window.history - 1) + [wanted]
     bounds = np.concatenate(parts)
     return Box((bounds[:, 0] - _ROUNDING).astype(np.float32), (bounds[:, 1] + _ROUNDING).astype(np.float32))
-
-
-def scaled_goal(goal: Array, scaling: Scaling) -> Array:
-    """Return goals (..., joints) [counts] scaled as angles are."""
-    angle = slice(0, goal.shape[-1] * len(QUANTITIES), len(QUANTITIES))
-    scaled: Array = (goal - scaling.observation_offset[angle]) / scaling.observation_scale[angle]
-    return scaled

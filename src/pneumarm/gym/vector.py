@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.batch import batch, begin_batch, outcome, step_batch
+from pneumarm.gym.batch import begin_batch, outcome, simulated_arms, step_batch
 from pneumarm.gym.simulated import simulated_space
 from pneumarm.gym.spaces import action_space
-from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
+from pneumarm.task.settings import TaskSettings
 
 Array = NDArray[Any]
 
@@ -38,7 +38,7 @@ class PointToPointVector(VectorEnv[Array, Array, Array]):
         simulation: Simulation,
         begin: BeginStates,
         num_envs: int,
-        settings: TrainSettings = TrainSettings(shaping=None),
+        settings: TaskSettings = TaskSettings(),
         *,
         threads: int | None = None,
         autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
@@ -50,7 +50,7 @@ class PointToPointVector(VectorEnv[Array, Array, Array]):
             simulation: the simulated arm.
             begin: states to begin at.
             num_envs: number of movements at a time.
-            settings: of these reward, cut-off and noise are used.
+            settings: what is asked of a movement.
             threads: threads to step on; by default the cores of the machine.
             autoreset_mode: whether a new movement begins in the step that ends one (``final_obs`` in the info is then
                 what ended it) or in the next step, whose action is ignored.
@@ -79,7 +79,7 @@ class PointToPointVector(VectorEnv[Array, Array, Array]):
         self._edges = np.linspace(0, num_envs, self._threads + 1).astype(int).tolist()
         self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
         self._world = environment(simulation, begin, settings)
-        self._many = batch(self._world, num_envs, self._threads)
+        self._many = simulated_arms(self._world, num_envs, self._threads)
         self._result = outcome(num_envs, window.state_size + window.joints)
         self._seeded = False
 

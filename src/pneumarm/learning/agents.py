@@ -20,8 +20,8 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.acting import Acting
 from pneumarm.task.begin import BeginStates
-from pneumarm.task.environment import TaskSettings
 from pneumarm.task.movements import Movements
+from pneumarm.task.settings import TaskSettings
 from pneumarm.transitions.window import Window
 
 

@@ -4,7 +4,7 @@ import math
 import time
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from pneumarm.learning.training import Learner, Progress, Training, identity_of, train_side_by_side
 from pneumarm.networks.layers import Trainable
-from pneumarm.settings import Settings, Valid
-from pneumarm.simulation.noise import NoiseSettings
+from pneumarm.settings import Valid
 from pneumarm.task.environment import Environment
 from pneumarm.task.fleet import Fleet
-from pneumarm.task.reward import Reward
+from pneumarm.task.settings import TaskSettings
 
 _ROW = 10  # updates between two rows of the curves
 _NETWORK = ("flat", "mean", "square")
@@ -27,7 +26,7 @@ SettingsT = TypeVar("SettingsT", bound="FleetSettings")
 
 
 @dataclass(frozen=True)
-class FleetSettings(Settings):
+class FleetSettings(TaskSettings):
     """What learning in many simulated arms at once needs, whatever is learned."""
 
     agents: int = 2
@@ -50,19 +49,8 @@ class FleetSettings(Settings):
     """Longer gradients are cut to this length."""
     return_scale: float = 50.0
     """Return that a network's output of 1 stands for."""
-    cutoff: int = 100
-    """Actions after which an episode that has not reached its goal is cut off (thesis: 100)."""
     validation_episodes: int = 2_000
     """Greedy episodes, without lookahead, on which the best agent is chosen."""
-    reward: Reward = field(default_factory=Reward)
-    """What is paid for an action."""
-    noise: NoiseSettings = field(default_factory=NoiseSettings)
-    """Noise on the simulation's predictions."""
-
-    @property
-    def begin_weights(self) -> tuple[float, ...]:
-        """Begin states are all the same, near to the goal or far from it."""
-        return (1.0,)
 
     def _valid(self) -> Valid:
         return {
@@ -76,7 +64,6 @@ class FleetSettings(Settings):
             "trace_decay": 0 <= self.trace_decay <= 1,
             "largest_gradient": 0 < self.largest_gradient < math.inf,
             "return_scale": 0 < self.return_scale < math.inf,
-            "cutoff": self.cutoff >= 1,
             "validation_episodes": self.validation_episodes >= 1,
         }
 

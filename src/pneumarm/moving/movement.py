@@ -122,12 +122,12 @@ class Tracked:
 def at_period(arm: Arm, period: float) -> Arm:
     """Return ``arm``, as it was opened, controlled with another ``period`` [s].
 
-    An arm whose spec lets its own latency pass (a modelled one) is given one of at most two fifths of the period: who
-    controls it faster computes faster.
+    The latency of a modelled arm shrinks with the period: who controls it faster computes faster.
     """
     if isinstance(arm, GuardedArm):
         raise UnusableInput("the control period of an arm is chosen before it is guarded")
-    arm.spec = replace(arm.spec, period=period, latency=min(arm.spec.latency, 0.4 * period))
+    faster = min(period / arm.spec.period, 1.0)
+    arm.spec = replace(arm.spec, period=period, latency=arm.spec.latency * faster)
     return arm
 
 
@@ -175,7 +175,7 @@ def track(
         begin = reference.at(0.0)
         controller.reset(begin)
         played(cycle, controller, lead_in, lambda time: begin, watch, seen)
-    air = _air_used(cycle.arm)
+    air = cycle.arm.air_used()
     controller.track(reference)
     recorded = played(cycle, controller, seconds, reference.at, watch, seen)
     passed = recorded.time - recorded.time[0]
@@ -248,7 +248,7 @@ def _move_to(
     if goal.shape != (spec.joints,) or not np.isfinite(goal).all():
         raise UnusableInput(f"a goal needs {spec.joints} finite angle(s) in counts, got {goal}")
     closed = np.zeros_like(arm.applied)
-    switches, air, start = 0, _air_used(arm), arm.read().time
+    switches, air, start = 0, arm.air_used(), arm.read().time
     for number in range(1, settings.tries + 1):
         arm.make_ready()
         controller.reset(goal)
@@ -282,12 +282,6 @@ def _settled(times: NDArray[np.float64], error: NDArray[np.float64], tolerance: 
     return float(times[first]) if first < len(times) else None
 
 
-def _air_used(arm: GuardedArm) -> float | None:
-    """Return the air that ``arm`` has taken so far [normal litres]; None where it cannot say."""
-    used = getattr(arm, "air_used", None) or getattr(arm.arm, "air_used", None)
-    return float(used()) if callable(used) else None
-
-
 def _air_since(arm: GuardedArm, before: float | None) -> float | None:
-    now = _air_used(arm)
+    now = arm.air_used()
     return None if now is None or before is None else now - before

@@ -14,18 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.arm.valves import to_actions
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.agents import SimulationAgent
-from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.planning.planner import SIMULATED, SimulationModel, simulated_planner
 from pneumarm.planning.search import PlanSettings
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.settings import TaskSettings
 
 
 @dataclass(frozen=True)
 class PlanAgent(SimulationAgent):
     """A simulation that is planned in."""
 
-    settings: TrainSettings = field(default_factory=TrainSettings)
-    """Of these the reward, the cut-off and the noise of a test are used: nothing is trained."""
+    settings: TaskSettings = field(default_factory=TaskSettings)
+    """What is asked of its movements."""
     plan: PlanSettings = SIMULATED
     """Which plans are considered."""
 

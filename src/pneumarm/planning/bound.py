@@ -13,17 +13,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import Arm, ControlCycle, guarded
+from pneumarm.arm import Arm
 from pneumarm.arm.virtual import VirtualArm, without_noise
-from pneumarm.control.movement import move
-from pneumarm.control.transfer import BEGIN, draw_movement
+from pneumarm.control.movement import drawn, make_movements
 from pneumarm.errors import UnusableInput
 from pneumarm.planning.planner import Planner, physics_planner, simulated_planner
 from pneumarm.planning.search import PlanSettings
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.statistics import FEWEST, mean_estimate
-from pneumarm.task import Reward
+from pneumarm.task import Reward, TaskSettings
 from pneumarm.task.movements import Movements, of_rows
 from pneumarm.transitions import Store, collect
 
@@ -144,14 +143,11 @@ def _movements(
     seed: int,
     report: Callable[[int], None],
 ) -> Planned:
-    planner.warm_up()
-    cycle, rows = ControlCycle(guarded(arm)), []
-    for number in range(settings.episodes):
-        random, goal = draw_movement(goal_range, seed, True, number)
-        BEGIN.reach(cycle.arm, random)
-        movement = move(cycle, planner, goal, planner.reward, settings.plan.cutoff)
-        rows.append(movement.row())
-        report(number + 1)
+    task = TaskSettings(reward=planner.reward, cutoff=settings.plan.cutoff)
+    rows = []
+    for made in make_movements(arm, planner, task, drawn(goal_range, seed, range(settings.episodes))):
+        rows.append(made.row())
+        report(len(rows))
     return Planned(of_rows(rows), np.array(planner.seconds), planner.unproven)
 
 

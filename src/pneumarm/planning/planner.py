@@ -25,6 +25,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.cycle import missed_turns
 from pneumarm.arm.guard import GuardedArm
 from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.virtual import VirtualArm
@@ -103,8 +104,7 @@ class PhysicsModel:
             self.states.random[0] = self._random
         period = self.spec.period
         due = reading.time if self._due is None else self._due + period
-        if reading.time - due > period / 2:
-            due = reading.time  # the control cycle counts afresh after a lost period
+        due += missed_turns(reading.time - due, period) * period
         self.states.due[0] = self._due = due
         self.states.angle[0], self.states.pressure[0] = reading.angle, reading.pressure
 

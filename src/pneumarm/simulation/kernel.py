@@ -191,18 +191,26 @@ def predict_change(simulation, state):  # type: ignore[no-untyped-def]
 
 
 @part
-def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
-    """Shift the window in ``x`` by one step: add ``change`` to the newest observation, remember ``command``."""
-    observed, commanded = simulation.observed, 2 * simulation.joints
-    newest = simulation.history * observed
-    for i in range(newest - 1, observed - 1, -1):
+def shift(x, history, observed, command):  # type: ignore[no-untyped-def]
+    """Move the observations in the window at the begin of ``x`` one step into the past, and remember ``command``.
+
+    The newest of ``history`` observations of the size ``observed`` stays as it is until another is written over it.
+    """
+    oldest, commanded = history * observed, command.shape[0]
+    for i in range(oldest - 1, observed - 1, -1):
         x[i] = x[i - observed]
-    if simulation.history > 1:
-        last = newest + (simulation.history - 1) * commanded - 1
-        for i in range(last, newest + commanded - 1, -1):
+    if history > 1:
+        last = oldest + (history - 1) * commanded - 1
+        for i in range(last, oldest + commanded - 1, -1):
             x[i] = x[i - commanded]
         for i in range(commanded):
-            x[newest + i] = command[i]
+            x[oldest + i] = command[i]
+
+
+@part
+def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
+    """Shift the window in ``x`` by one step: add ``change`` to the newest observation, remember ``command``."""
+    shift(x, simulation.history, simulation.observed, command)
     for joint in range(simulation.velocity.shape[0]):
         x[4 * joint + 1] = x[4 * joint]
     for o in range(change.shape[0]):

@@ -3,6 +3,7 @@
 from pneumarm.task.begin import BeginStates, begin_states
 from pneumarm.task.movements import Movement, Movements, read_episodes, running_time, write_episodes
 from pneumarm.task.reward import Reward
+from pneumarm.task.settings import TaskSettings
 from pneumarm.task.tracker import StateTracker
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "Movements",
     "Reward",
     "StateTracker",
+    "TaskSettings",
     "begin_states",
     "read_episodes",
     "running_time",

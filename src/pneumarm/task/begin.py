@@ -21,7 +21,7 @@ _TRIES = 32  # draws until the farthest sub-intervals count as empty
 
 @dataclass(frozen=True)
 class BeginStates:
-    """Resting states with closed valves, sorted by the angle of the first joint."""
+    """Resting states with closed valves."""
 
     window: Window
     states: NDArray[np.float32]
@@ -84,9 +84,11 @@ class BeginParameters(NamedTuple):
     states: NDArray[np.float32]
     """Shape (n, state_size) [scaled]."""
     angle: NDArray[np.float64]
-    """Shape (n, joints) [counts], sorted by the first joint."""
+    """Shape (n, joints) [counts]."""
+    order: NDArray[np.int64]
+    """Indices of the states by the angle of each joint, shape (joints, n)."""
     sorted: NDArray[np.float64]
-    """Angle of the first joint, shape (n,) [counts]."""
+    """The angles in this order, shape (joints, n) [counts]."""
     domain: NDArray[np.float64]
     """Lowest and highest angle of the sensor, shape (2,) [counts]."""
     weights: NDArray[np.float64]
@@ -98,8 +100,9 @@ def begin_parameters(
 ) -> BeginParameters:
     """Return ``begin`` for a kernel; ``weights`` are those of :class:`~pneumarm.learning.settings.Shaping`."""
     cumulative = np.cumsum(weights) / np.sum(weights)
-    sorted_ = np.ascontiguousarray(begin.angle[:, 0])
-    return BeginParameters(begin.states, begin.angle, sorted_, np.array(domain, np.float64), cumulative)
+    order = np.ascontiguousarray(np.argsort(begin.angle, axis=0, kind="stable").T)
+    sorted_ = np.take_along_axis(begin.angle.T, order, axis=1)
+    return BeginParameters(begin.states, begin.angle, order, sorted_, np.array(domain, np.float64), cumulative)
 
 
 @part
@@ -112,21 +115,22 @@ def side_probability(goal, domain):  # type: ignore[no-untyped-def]
 
 
 @part
-def draw_interval(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
-    """Return a sub-interval of begin angles around ``goal``, as its ends [counts] (section 4.3.2, table 4.1).
+def draw_interval(domain, weights, goal, deviation, random):  # type: ignore[no-untyped-def]
+    """Return a sub-interval of begin angles of a joint around its ``goal``, as its ends [counts] (section 4.3.2).
 
-    Each side reaches as far as ``deviation`` and the domain of angles allow and is cut into equal parts.
+    Each side reaches as far as ``deviation`` and the ``domain`` of angles allow and is cut into equal parts, which
+    are drawn by their cumulative ``weights`` (table 4.1).
     """
-    is_below = uniform(random) < side_probability(goal, begin.domain)
-    draw, bins = uniform(random), begin.weights.shape[0]
+    is_below = uniform(random) < side_probability(goal, domain)
+    draw, bins = uniform(random), weights.shape[0]
     bin_ = 0
-    while bin_ < bins - 1 and draw >= begin.weights[bin_]:
+    while bin_ < bins - 1 and draw >= weights[bin_]:
         bin_ += 1
     far, near = 1.0 - bin_ / bins, 1.0 - (bin_ + 1) / bins
     if is_below:
-        side = max(begin.domain[0], goal - deviation) - goal
+        side = max(domain[0], goal - deviation) - goal
         return goal + far * side, goal + near * side
-    side = min(begin.domain[1], goal + deviation) - goal
+    side = min(domain[1], goal + deviation) - goal
     return goal + near * side, goal + far * side
 
 
@@ -134,18 +138,19 @@ def draw_interval(begin, goal, deviation, random):  # type: ignore[no-untyped-de
 def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
     """Return the index of a begin state for ``goal`` (joints,) within ``deviation`` [counts].
 
-    The first joint's angle lies in a drawn sub-interval, those of the others anywhere within the deviation. Where
-    nothing was recorded another draw is made; where that fails time and again the state nearest to the goal is
-    taken (the thesis does not say). With an infinite deviation all begin states are equally likely.
+    The angle of one joint, of several a random one, lies in a drawn sub-interval, those of the others anywhere within
+    the deviation. Where nothing was recorded another draw is made; where that fails time and again the state nearest
+    to the goal is taken (the thesis does not say). With an infinite deviation all begin states are equally likely.
     """
     if deviation == np.inf:
         return integer(random, begin.states.shape[0])
     for _ in range(_TRIES):
-        low, high = draw_interval(begin, goal[0], deviation, random)
-        first = below(begin.sorted, low)
-        count = below(begin.sorted, high) - first
+        joint = integer(random, goal.shape[0]) if goal.shape[0] > 1 else 0
+        low, high = draw_interval(begin.domain, begin.weights, goal[joint], deviation, random)
+        first = below(begin.sorted[joint], low)
+        count = below(begin.sorted[joint], high) - first
         if count > 0:
-            index = first + integer(random, count)
+            index = begin.order[joint, first + integer(random, count)]
             if distance(begin.angle[index], goal) <= deviation:
                 return index
     nearest = 0

@@ -4,7 +4,7 @@ Any learner can be run on it: it knows nothing of action values. ``begin_episode
 learner calls; both work on one :class:`Episode`, of which there can be as many as one wants.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,33 +22,14 @@ from pneumarm.simulation.kernel import (
     simulation_state,
     step,
 )
-from pneumarm.simulation.noise import NoiseParameters, NoiseSettings, noise_parameters
+from pneumarm.simulation.noise import NoiseParameters, noise_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginParameters, BeginStates, begin_parameters, draw_begin
-from pneumarm.task.reward import Reward, RewardParameters, at_goal, is_switch, paid
+from pneumarm.task.reward import RewardParameters, at_goal, is_switch, paid
+from pneumarm.task.settings import TaskSettings
 
 GOES_ON, REACHED, CUT_OFF = 0, 1, 2
 """How an episode is after an action."""
-
-
-class TaskSettings(Protocol):
-    """What of a learner's settings decides its task."""
-
-    @property
-    def reward(self) -> Reward:
-        """What is paid for an action."""
-
-    @property
-    def cutoff(self) -> int:
-        """Actions after which an episode is cut off."""
-
-    @property
-    def noise(self) -> NoiseSettings:
-        """Noise on the simulation's predictions."""
-
-    @property
-    def begin_weights(self) -> tuple[float, ...]:
-        """Weights of the sub-intervals of begin states on each side of the goal, the farthest first."""
 
 
 class Task(NamedTuple):

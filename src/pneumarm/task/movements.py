@@ -83,6 +83,11 @@ class Movements(NamedTuple):
         figures = summarise(self.reward, self.success, self.actions, self.switches)
         return {**figures, "seconds": self.seconds} if self.time_end.any() else figures
 
+    def means(self) -> dict[str, float]:
+        """Return the means of reward, success, actions, and switches of all joints, without intervals."""
+        figures = {"reward": self.reward, "success_rate": self.success, "actions": self.actions}
+        return {name: float(values.mean()) for name, values in {**figures, "switches": self.all_switches}.items()}
+
     def rows(self) -> list[dict[str, Any]]:
         """Return each as plain values by the names of the columns, lists (joints,) where it has one a joint."""
         columns = [column.tolist() for column in self]

@@ -124,7 +124,7 @@ def _quantity(text: str, part: str, units: tuple[str, ...]) -> float:
 
 
 def _from_file(path: Path, spec: ArmSpec, *, jumps: bool) -> Reference:
-    """Return what the file says: held until its next row where it ``jumps``, else with straight lines between."""
+    """Return what the file says: held until its next row where it ``jumps``, else with a cubic between."""
     expected = f"{path}: expected rows of rising times [s] and the degrees of {spec.joints} joint(s)"
     try:
         with open(path, newline="", encoding="utf-8") as file:
@@ -147,8 +147,16 @@ def _from_file(path: Path, spec: ArmSpec, *, jumps: bool) -> Reference:
         def at(time: float) -> NDArray[np.float64]:
             return angles[max(int(np.searchsorted(times, time, "right")) - 1, 0)]
     else:
+        slopes = np.gradient(angles, times, axis=0) if len(times) > 1 else np.zeros_like(angles)
 
         def at(time: float) -> NDArray[np.float64]:
-            return np.array([np.interp(time, times, column) for column in angles.T])
+            if not times[0] < time < times[-1]:
+                return angles[0 if time <= times[0] else -1]
+            i = int(np.searchsorted(times, time, "right")) - 1
+            step = times[i + 1] - times[i]
+            s = (time - times[i]) / step
+            way = s * s * (3 - 2 * s)
+            bent = s * (1 - s) * step * ((1 - s) * slopes[i] - s * slopes[i + 1])
+            return angles[i] + way * (angles[i + 1] - angles[i]) + bent
 
     return Reference(at, smooth=not jumps, duration=float(times[-1]))

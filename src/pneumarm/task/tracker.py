@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Reading, measured
+from pneumarm.arm.velocity import derived_velocity
+from pneumarm.simulation.kernel import shift
 from pneumarm.simulation.simulation import Scaling
-from pneumarm.transitions.window import Window
+from pneumarm.transitions.window import QUANTITIES, Window
 
 
 class StateTracker:
@@ -44,13 +46,12 @@ class StateTracker:
         """
         window, state = self.window, self._state
         angle = np.array(angle, np.float64).reshape(window.joints)
-        observed, commanded = window.observation_size, window.command_size
-        oldest = window.history * observed
+        observed = window.observation_size
         first = self._angle is None
         if self._measures:
             self.velocity = np.array(measured[: window.joints], np.float64)
         elif self._angle is not None and time > self._time:
-            self.velocity = (angle - self._angle) / (1e3 * (time - self._time))
+            self.velocity = derived_velocity(angle, self._angle, time - self._time)
         self._time, self._angle = time, angle
         observation = np.empty(observed)
         joints = window.of_joints(observation)
@@ -60,13 +61,10 @@ class StateTracker:
             observation[window.joint_size :] = measured[-len(window.further) :]
         newest = (observation - self._offset) / self._scale
         if first:
-            state[:oldest] = np.tile(newest, window.history)
+            state[: window.history * observed] = np.tile(newest, window.history)
         else:
-            state[observed:oldest] = state[: oldest - observed].copy()
+            shift.py_func(state, window.history, observed, self._command)
             state[:observed] = newest
-            if window.history > 1:
-                state[oldest + commanded :] = state[oldest:-commanded].copy()
-                state[oldest : oldest + commanded] = self._command
         return state.copy()
 
     def reading(self, reading: Reading) -> NDArray[np.float32]:
@@ -77,3 +75,10 @@ class StateTracker:
     def commanded(self, valves: ArrayLike) -> None:
         """Note the ``valves`` (joints, 2) as applied after the newest reading."""
         self._command = np.asarray(valves, np.float64).ravel() / self._command_scale
+
+
+def scaled_goal(goal: NDArray[np.float64], scaling: Scaling) -> NDArray[np.float64]:
+    """Return goals (..., joints) [counts] scaled as angles are."""
+    angle = slice(0, goal.shape[-1] * len(QUANTITIES), len(QUANTITIES))
+    scaled: NDArray[np.float64] = (goal - scaling.observation_offset[angle]) / scaling.observation_scale[angle]
+    return scaled

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, SensorKind, velocity_name
+from pneumarm.arm.velocity import derived_velocity
 from pneumarm.errors import UnusableInput
 from pneumarm.transitions.rows import Rows
 
@@ -172,9 +173,9 @@ def observations(rows: Rows, window: Window) -> NDArray[np.float64]:
 def _derived_velocity(rows: Rows) -> NDArray[np.float64]:
     velocity = np.zeros_like(rows.angle)
     follows = _follows(rows)
-    elapsed = 1e3 * np.diff(rows.time)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        velocity[1:] = np.where(follows[1:, None], np.diff(rows.angle, axis=0) / elapsed, 0.0)
+        derived = derived_velocity(rows.angle[1:], rows.angle[:-1], np.diff(rows.time)[:, None])
+    velocity[1:] = np.where(follows[1:, None], derived, 0.0)
     return velocity
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.velocity import derived_velocity
 from pneumarm.arm.virtual.arm import VirtualArm
 from pneumarm.arm.virtual.body import Body
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
@@ -19,7 +20,9 @@ from pneumarm.arm.virtual.sensors import convert, worn
 from pneumarm.arm.virtual.state import JOINT, MUSCLE, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
+
+_velocity = part(derived_velocity)
 
 
 class Physics(NamedTuple):
@@ -154,6 +157,6 @@ def advance_physics(physics, states, i, valves):  # type: ignore[no-untyped-def]
     for j in range(states.angle.shape[1]):
         states.velocity[i, j] = states.angle[i, j]  # kept until the new angle is read
     look(physics, states, i)
-    elapsed = 1e3 * (body.surroundings[0].time - begin)
+    elapsed = body.surroundings[0].time - begin
     for j in range(states.angle.shape[1]):
-        states.velocity[i, j] = (states.angle[i, j] - states.velocity[i, j]) / elapsed
+        states.velocity[i, j] = _velocity(states.angle[i, j], states.velocity[i, j], elapsed)

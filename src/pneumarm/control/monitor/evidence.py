@@ -22,8 +22,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.velocity import derived_velocity
 from pneumarm.control.monitor.expectation import expect_by_rules, expect_by_simulation
 from pneumarm.kernels import kernel, part
+
+_velocity = part(derived_velocity)
 
 FREEDOM = 4.0
 """Degrees of freedom of the Student distribution of residuals."""
@@ -271,7 +274,7 @@ def observe(memory, time, angle, pressure):  # type: ignore[no-untyped-def]
             for q in range(4):
                 memory.observed[lag, j, q] = memory.observed[lag - 1, j, q]
     for j in range(angle.shape[0]):
-        velocity = (angle[j] - memory.observed[0, j, 0]) / (1e3 * (time - memory.clock[0]))
+        velocity = _velocity(angle[j], memory.observed[0, j, 0], time - memory.clock[0])
         memory.observed[0, j, 0] = angle[j]
         memory.observed[0, j, 1] = 0.0 if first else velocity
         memory.observed[0, j, 2] = pressure[j, 0]

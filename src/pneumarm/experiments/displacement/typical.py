@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from pneumarm.arm import ControlCycle, Reading, guarded
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control.agent import AgentController
-from pneumarm.control.movement import move
+from pneumarm.control.movement import BEGIN, move
 from pneumarm.control.playing import Player
-from pneumarm.control.transfer import BEGIN
 from pneumarm.experiments.evidence import (
     series,
 )
@@ -152,7 +151,7 @@ def typical_movement(
             break
     else:
         return None
-    made = move(cycle, AgentController(agent), goal, agent.settings.reward, agent.settings.cutoff)
+    made = move(cycle, AgentController(agent), goal, agent.settings)
     recorded = made.recorded
     turns = len(recorded.angle)
     after: list[Reading] = []

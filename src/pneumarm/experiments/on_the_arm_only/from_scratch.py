@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.control.movement import BEGIN
 from pneumarm.control.playing import Player
-from pneumarm.control.transfer import BEGIN
 from pneumarm.experiments.evidence import (
     series,
 )

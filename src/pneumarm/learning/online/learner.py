@@ -17,6 +17,7 @@ from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import action_values, forget_traces, learner, td_target, update
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import places
+from pneumarm.task.tracker import scaled_goal
 
 _SAVED = ("weights", "traces", "traced", "random", "x", "actions", "next_actions", "next_values", "cut")
 
@@ -57,10 +58,8 @@ class OnlineLearner:
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
         window, scaling = self._agent.window, self._agent.scaling
-        offset = window.of_joints(scaling.observation_offset)[:, 0]
-        scale = window.of_joints(scaling.observation_scale)[:, 0]
-        goal = (np.asarray(goal, np.float64).reshape(window.joints) - offset) / scale
-        self._x[self._places.goal : self._places.one] = goal
+        goal = np.asarray(goal, np.float64).reshape(window.joints)
+        self._x[self._places.goal : self._places.one] = scaled_goal(goal, scaling)
         self._x[: self._places.command] = self._checked(state)
         begin_acting(self._learner, self._schedule, self._x, self._workspace, self._random)
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pneumarm.settings import Settings, Valid
-from pneumarm.simulation.noise import NoiseSettings
-from pneumarm.task.reward import Reward
+from pneumarm.task.settings import TaskSettings
 
 Method = Literal["sarsa", "q-learning"]
 
@@ -20,8 +19,7 @@ class Exploration(Settings):
     temperature: float = 1.0
     """Temperature T of its Boltzmann distribution, in units of reward (thesis: 1 at the end of shaping)."""
 
-    def valid(self) -> Valid:
-        """Return which values are valid."""
+    def _valid(self) -> Valid:
         return {"epsilon": 0 <= self.epsilon <= 1, "temperature": 0 < self.temperature < math.inf}
 
 
@@ -58,8 +56,7 @@ class Shaping(Settings):
     weights: tuple[float, ...] = (0.4, 0.3, 0.2, 0.1)
     """Weights of the sub-intervals of begin states on each side of the goal, the farthest first (thesis: these)."""
 
-    def valid(self) -> Valid:
-        """Return which values are valid."""
+    def _valid(self) -> Valid:
         return {
             "initial_deviation": 0 < self.initial_deviation < math.inf,
             "episodes": self.episodes >= 1,
@@ -73,7 +70,7 @@ class Shaping(Settings):
 
 
 @dataclass(frozen=True)
-class TrainSettings(Settings):
+class TrainSettings(TaskSettings):
     """Everything that decides a training phase, besides the simulation, the begin states and the seed."""
 
     method: Method = "sarsa"
@@ -86,8 +83,6 @@ class TrainSettings(Settings):
     """lambda of the eligibility traces (thesis: 0)."""
     discount: float = 0.98
     """gamma (thesis: 0.98)."""
-    cutoff: int = 100
-    """Actions after which an episode that has not reached its goal is cut off (thesis: 100)."""
     agents: int = 16
     """Agents trained at once from different weights, of which the best is kept (section 5.4.2: they decide most)."""
     initial_weight: float = 0.3
@@ -100,29 +95,23 @@ class TrainSettings(Settings):
     """Whether training ends when the criterion is met; otherwise at ``max_episodes`` (thesis: yes; not in 5.4.3)."""
     validation_episodes: int = 2_000
     """Greedy episodes on which the best agent is chosen."""
-    reward: Reward = field(default_factory=Reward)
-    """What is paid for an action."""
     exploration: Exploration = field(default_factory=Exploration)
     """Exploration at the end of shaping, or all the time without shaping."""
     shaping: Shaping | None = field(default_factory=Shaping)
     """Shaping, or None: then all begin states from the first episode on."""
-    noise: NoiseSettings = field(default_factory=NoiseSettings)
-    """Noise on the simulation's predictions."""
 
     @property
     def begin_weights(self) -> tuple[float, ...]:
         """Weights of the sub-intervals of begin states, see :class:`Shaping`."""
         return self.shaping.weights if self.shaping else (1.0,)
 
-    def valid(self) -> Valid:
-        """Return which values are valid."""
+    def _valid(self) -> Valid:
         return {
             "method": self.method in ("sarsa", "q-learning"),
             "learning_rate": 0 <= self.learning_rate < math.inf,
             "hidden": 1 <= self.hidden <= 1024,
             "trace_decay": 0 <= self.trace_decay <= 1,
             "discount": 0 <= self.discount <= 1,
-            "cutoff": self.cutoff >= 1,
             "agents": 1 <= self.agents <= 4096,
             "initial_weight": 0 < self.initial_weight < math.inf,
             "return_scale": 0 < self.return_scale < math.inf,

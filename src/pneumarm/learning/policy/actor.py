@@ -9,6 +9,7 @@ from pneumarm.learning.policy.acting import Mind, decide, lanes
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.random import random_states
 from pneumarm.task.fleet import look, note_still
+from pneumarm.task.reward import is_switch
 
 
 class PolicyActor:
@@ -42,7 +43,7 @@ class PolicyActor:
         if not self._decided:
             decide(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
             arm = single.fleet
-            arm.switched[...] = (arm.actions >= 0) & (arm.actions != single.actions)
+            arm.switched[...] = is_switch.py_func(arm.actions, single.actions)
             arm.actions[...] = single.actions
             self._decided = True
         return single.actions[0].copy()

@@ -1,16 +1,18 @@
 """What a user can choose about a servo and its training."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from pneumarm.settings import Settings, Valid
-from pneumarm.simulation.noise import NoiseSettings
-from pneumarm.task.reward import Reward
+from pneumarm.settings import Valid
+from pneumarm.task.settings import TaskSettings
 
 
 @dataclass(frozen=True)
-class ServoSettings(Settings):
-    """A policy over pulses that settles, holds and tracks; angles and errors in degrees, times in seconds."""
+class ServoSettings(TaskSettings):
+    """A policy over pulses that settles, holds and tracks; angles and errors in degrees, times in seconds.
+
+    Reward and cut-off are of tests in which it is to reach goals; it learns by the prices below.
+    """
 
     agents: int = 2
     """Agents trained at once from different weights, of which the best is kept; one a core takes no longer."""
@@ -51,18 +53,6 @@ class ServoSettings(Settings):
     validation_movements: int = 400
     """Movements in simulation on which the best agent is chosen."""
 
-    cutoff: int = 100
-    """Actions after which a movement that is to reach its goal is cut off (thesis: 100)."""
-    reward: Reward = field(default_factory=Reward)
-    """When a goal is reached and what is paid for an action, in tests of that; the servo learns by other prices."""
-    noise: NoiseSettings = field(default_factory=NoiseSettings)
-    """Noise on the simulation's predictions in that test."""
-
-    @property
-    def begin_weights(self) -> tuple[float, ...]:
-        """Begin states are all the same, near to the goal or far from it."""
-        return (1.0,)
-
     def _valid(self) -> Valid:
         return {
             "agents": 1 <= self.agents <= 256,
@@ -83,6 +73,5 @@ class ServoSettings(Settings):
             "reading_noise": 0 <= self.reading_noise < math.inf,
             "quiet": 0 <= self.quiet <= self.alert,
             "alert": 0 <= self.alert < math.inf,
-            "cutoff": self.cutoff >= 1,
             "validation_movements": self.validation_movements >= 1,
         }

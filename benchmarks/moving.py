@@ -1,0 +1,199 @@
+"""Be there, stay there, follow: controllers of all kinds side by side, each with the same arm time to get ready.
+
+python -m benchmarks moving
+
+Every controller moves every arm to the same goals within 30 degrees, one after the other, and holds each; then it
+follows sinusoids, with their future known and not. Settings come from the environment:
+
+PNEUMARM_MOVING_CONTROLLERS  "agent,pid,pid@200,scheduled,pwm,sliding,sliding@200". ``agent`` is the default agent,
+                             ``plan`` plans in its simulation; the others are tuned, at 30 Hz or at that behind @,
+                             with pulses, or by whole periods where ``-whole`` is added, such as pid-whole@200
+PNEUMARM_MOVING_ARMS         seeds of virtual arms; the ten held-out arms by default
+PNEUMARM_MOVING_SEEDS        "0,1,2": of collecting, training and tuning, and of goals and noise
+PNEUMARM_MOVING_GOALS        500 for each of them
+PNEUMARM_MOVING_MINUTES      20, of arm time to collect or to tune
+PNEUMARM_MOVING_SECONDS      30 for each sinusoid
+PNEUMARM_MOVING_PROCESSES    2
+PNEUMARM_MOVING_FOLDER       where controllers and rows are kept; a call with the same folder goes on where another
+                             ended. runs/moving by default
+"""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks._trials import HELD_OUT, Rows, collected, fitted
+from pneumarm.arm import open_arm
+from pneumarm.classical import TuneSettings, tune
+from pneumarm.control.named import open_tracking
+from pneumarm.learning import train
+from pneumarm.moving import Moved, MoveSettings, move, track
+from pneumarm.moving.movement import valve_changes
+from pneumarm.task.reference import counts_of, parse_reference
+
+CONTROLLERS = "agent,pid,pid@200,scheduled,pwm,sliding,sliding@200"
+RANGE = 30.0
+"""Goals are drawn uniformly within so many degrees of the middle."""
+HOLD = 2.0
+TOLERANCE = 1.0
+FREQUENCIES = (0.1, 0.25, 0.5, 1.0, 2.0)
+AMPLITUDES = (20.0, 5.0)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is measured."""
+
+    folder: Path
+    goals: int
+    minutes: float
+    seconds: float
+
+
+def measure() -> Iterator[str]:
+    environment = {name.removeprefix("PNEUMARM_MOVING_").lower(): value for name, value in os.environ.items()}
+    folder = Path(environment.get("folder", "runs/moving"))
+    folder.mkdir(parents=True, exist_ok=True)
+    plan = Plan(
+        folder,
+        int(environment.get("goals", "500")),
+        float(environment.get("minutes", "20")),
+        float(environment.get("seconds", "30")),
+    )
+    controllers = environment.get("controllers", CONTROLLERS).split(",")
+    arms = [int(arm) for arm in environment.get("arms", HELD_OUT).split(",")]
+    seeds = [int(seed) for seed in environment.get("seeds", "0,1,2").split(",")]
+    rows = Rows(folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds")
+    asked = [(name, arm, seed) for name in controllers for arm in arms for seed in seeds]
+    wanted = [one for one in asked if rows.get(*one, plan.goals, plan.minutes, plan.seconds) is None]
+    processes = int(environment.get("processes", "2"))
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for row in pool.map(measured, [plan] * len(wanted), *zip(*wanted, strict=True)) if wanted else ():
+            rows.add(row)
+    found: dict[str, list[dict[str, Any]]] = {name: [] for name in controllers}
+    for one in asked:
+        row = rows.get(*one, plan.goals, plan.minutes, plan.seconds)
+        assert row is not None
+        found[one[0]].append(row)
+    yield from settling_table(found)
+    yield from tracking_table(found)
+
+
+def prepared(plan: Plan, name: str, arm: int, seed: int) -> str:
+    """Return the name, as on the command line, of a controller for an arm; make it where that is not done yet."""
+    file = plan.folder / f"{name}-{arm}-{seed}-{plan.minutes:g}"
+    if name in ("agent", "plan"):
+        simulation = plan.folder / f"simulation-{arm}-{seed}-{plan.minutes:g}"
+        agent = plan.folder / f"agent-{arm}-{seed}-{plan.minutes:g}"
+        if not agent.exists():
+            with tempfile.TemporaryDirectory() as place:
+                db = Path(place) / "arm.db"
+                collected(db, arm, seed, minutes=plan.minutes)
+                made, begin = fitted(db, seed)
+            made.simulation.save(simulation)
+            train(made.simulation, begin, None, seed).agent.save(agent)
+        return f"plan:{simulation}" if name == "plan" else str(agent)
+    if not file.exists():
+        kind, _, _ = name.partition("@")
+        settings = TuneSettings(seconds=60 * plan.minutes, whole_periods=kind.endswith("-whole"))
+        with open_arm(arm_for(name, arm), seed) as opened:
+            tune(kind.removesuffix("-whole"), opened, settings, seed).save(file)
+    return str(file)
+
+
+def arm_for(name: str, arm: int) -> str:
+    """Return the name of an arm, controlled at the rate of the controller ``name``."""
+    _, _, rate = name.partition("@")
+    return f"virtual:seed={arm},rate={rate}" if rate else f"virtual:seed={arm}"
+
+
+def measured(plan: Plan, name: str, arm: int, seed: int) -> dict[str, Any]:
+    """Return the row of one controller on one arm."""
+    controller = prepared(plan, name, arm, seed)
+    random = np.random.default_rng((arm, seed))
+    row: dict[str, Any] = {"controller": name, "arm": arm, "seed": seed}
+    row |= {"goals": plan.goals, "minutes": plan.minutes, "seconds": plan.seconds}
+    with open_arm(arm_for(name, arm), 1000 + seed) as opened:
+        mover, spec, _ = open_tracking(controller, opened, TOLERANCE)
+        goals = counts_of(random.uniform(-RANGE, RANGE, (1 + plan.goals, spec.joints)), spec)
+        made = move(opened, mover, goals, MoveSettings(hold=HOLD, tries=1, tolerance=TOLERANCE))
+        next(made)  # from a vented arm
+        row |= settling([*made])
+        tracking: dict[str, float] = {}
+        for amplitude in AMPLITUDES:
+            for frequency in FREQUENCIES:
+                for known in (True, False):
+                    sine = parse_reference(f"sine:{frequency}Hz,{amplitude}deg", spec, known_ahead=known)
+                    followed = track(opened, mover, sine, plan.seconds)
+                    tracking[key(amplitude, frequency, known)] = float(followed.rms_error.mean())
+    return {**row, "tracking": tracking}
+
+
+def key(amplitude: float, frequency: float, known: bool) -> str:
+    return f"{amplitude:g}deg {frequency:g}Hz {'known' if known else 'unknown'}"
+
+
+def settling(made: list[Moved]) -> dict[str, Any]:
+    """Return the figures of movements to goals."""
+    times, moving, holding = [], np.zeros(2), np.zeros(2)  # changes and seconds
+    for one in made:
+        recorded = one.recorded
+        passed = recorded.time - recorded.time[0]
+        end = passed[-1] if one.time_settled is None else one.time_settled - recorded.time[0]
+        there = int(np.searchsorted(passed, end))
+        command = recorded.command[:-1]
+        closed = np.zeros_like(command[0])
+        all_changes, first = valve_changes(command, closed), valve_changes(command[:there], closed)
+        moving += (first, end)
+        holding += (all_changes - first, passed[-1] - end)
+        times.append(None if one.time_settled is None else end)
+    return {
+        "settled": times,
+        "rest_error": [round(float(one.rest_error.max()), 4) for one in made],
+        "overshoot": [round(float(one.overshoot.max()), 3) for one in made],
+        "changes_moving": moving[0] / max(moving[1], 1e-9),
+        "changes_holding": holding[0] / max(holding[1], 1e-9),
+        "air_litres": None if any(one.air is None for one in made) else sum(one.air or 0.0 for one in made),
+    }
+
+
+def settling_table(found: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
+    yield (
+        f"{'controller':16}{'rows':>5}{'settled':>9}{'lowest':>8}{'median':>8}{'95 %':>7}{'at rest':>9}{'95 %':>7}"
+        f"{'beyond':>8}{'changes/s moving':>18}{'holding':>9}{'air [l]':>9}"
+    )
+    for name, rows in found.items():
+        times = [np.array([np.nan if t is None else t for t in row["settled"]]) for row in rows]
+        every = np.concatenate(times)
+        rest = np.concatenate([row["rest_error"] for row in rows])
+        over = np.concatenate([row["overshoot"] for row in rows])
+        air = [row["air_litres"] for row in rows]
+        yield (
+            f"{name:16}{len(rows):5}{np.isfinite(every).mean():9.4f}"
+            f"{min(np.isfinite(one).mean() for one in times):8.3f}"
+            f"{np.nanmedian(every):6.2f} s{np.quantile(np.nan_to_num(every, nan=HOLD), 0.95):5.2f} s"
+            f"{rest.mean():5.2f} deg{np.quantile(rest, 0.95):7.2f}{np.mean(over):4.1f} deg"
+            f"{np.mean([row['changes_moving'] for row in rows]):18.1f}"
+            f"{np.mean([row['changes_holding'] for row in rows]):9.2f}"
+            + ("        -" if None in air else f"{sum(air) / every.size:9.3f}")
+        )
+
+
+def tracking_table(found: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
+    yield f"{'rms error [deg]':24}" + "".join(f"{frequency:>7g} Hz" for frequency in FREQUENCIES)
+    for amplitude in AMPLITUDES:
+        for known in (True, False):
+            yield f"{amplitude:g} deg, {'known ahead' if known else 'not known ahead'}"
+            for name, rows in found.items():
+                errors = [
+                    np.mean([row["tracking"][key(amplitude, frequency, known)] for row in rows])
+                    for frequency in FREQUENCIES
+                ]
+                yield f"  {name:22}" + "".join(f"{error:10.2f}" for error in errors)

@@ -1,0 +1,41 @@
+"""A movement on an arm is counted by the same rules as one in simulation."""
+
+import numpy as np
+import pytest
+
+from pneumarm.arm.valves import to_valves
+from pneumarm.task import Reward, TaskSettings
+from pneumarm.task.movements import movements
+from pneumarm.task.noting import goes_on, note_action
+from pneumarm.task.reward import at_goal, is_switch, paid
+from pneumarm.task.tally import Tally
+
+REWARD = Reward(goal=40.0, action=-2.0, switch=-3.0)
+
+
+@pytest.mark.parametrize("joints", [1, 3])
+def test_an_arm_and_a_compiled_loop_count_alike(joints: int) -> None:
+    random, task = np.random.default_rng(joints), TaskSettings(REWARD, cutoff=7)
+    for e in range(40):
+        tally, record, last = Tally(task, joints), movements(1, joints), np.full(joints, -1)
+        goal = random.uniform(400, 600, joints)
+        while not tally.over:
+            actions = random.integers(3, 5, joints)
+            angle = goal + random.uniform(-26, 26, joints) / (1 + e % 2)
+            velocity = random.uniform(-1.2, 1.2, joints)
+            gained = tally.count(to_valves(actions), angle, velocity, goal)
+            parts = REWARD.parameters
+            reached = all(at_goal(parts, *one) for one in zip(angle, velocity, goal, strict=True))
+            switched = np.array([is_switch(*one) for one in zip(last, actions, strict=True)], np.int64)
+            note_action(parts, switched, reached, record, 0)
+            assert gained.tolist() == [paid(parts, reached, one) for one in switched]
+            assert tally.over == (not goes_on.py_func(task, reached, record, 0))
+            assert (tally.actions, tally.reward, tally.reached) == (record.actions[0], record.reward[0], reached)
+            assert tally.paid == paid(parts, reached, switched.sum())
+            last = actions
+        assert tally.switches.tolist() == record.switches[0].tolist()
+
+
+def test_what_is_no_number_has_not_reached_a_goal() -> None:
+    assert not REWARD.reached([np.nan], [0.0], [500.0])
+    assert not at_goal(REWARD.parameters, np.nan, 0.0, 500.0)

@@ -53,7 +53,7 @@ def test_what_a_parent_demands_is_demanded_of_its_children() -> None:
         Child(share=2)
     with pytest.raises(UnusableInput, match="Child: count cannot be 0; see its documentation"):
         Child(count=0)
-    with pytest.raises(UnusableInput, match="RunSettings: method cannot be 'nonsense'"):
+    with pytest.raises(UnusableInput, match="method 'nonsense'"):
         RunSettings(method="nonsense")
 
 

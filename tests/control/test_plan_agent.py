@@ -112,7 +112,7 @@ def test_its_file_is_that_of_its_simulation(tmp_path: Path) -> None:
     np.testing.assert_array_equal(loaded.weights(), agent.weights())
     np.testing.assert_array_equal(loaded.goal_range, SIMULATION.goal_range)
     assert (loaded.window, loaded.spec, loaded.learns) == (agent.window, agent.spec, False)
-    replace(SIMULATION, valves=False).save(tmp_path / "other.sim")
+    replace(SIMULATION, commands="continuous").save(tmp_path / "other.sim")
     with pytest.raises(UnusableInput, match="continuous"):
         PlanAgent.load(tmp_path / "other.sim")
 

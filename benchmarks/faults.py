@@ -244,12 +244,14 @@ class Stage:
         pass
 
 
-def watched_steps(arm: Arm, monitor: Watch, seed: int) -> Iterator[Step]:
+def watched_steps(
+    arm: Arm, monitor: Watch, seed: int, settings: CollectSettings = CollectSettings()
+) -> Iterator[Step]:
     """Collect for ever, as :func:`pneumarm.transitions.collect` does, and yield the turns that ``monitor`` saw."""
-    settings, random, guard = CollectSettings(), np.random.default_rng([seed, 7]), guarded(arm)
+    random, guard = np.random.default_rng([seed, 7]), guarded(arm)
     while True:
         settings.begin.reach(guard, random)
-        _, actor = random_actions(arm.spec.joints, settings, random)
+        _, actor = random_actions(arm.spec, settings, random)
         actor.reset(np.zeros(arm.spec.joints))
         left = iter(range(settings.actions))
         monitor.begin(at_rest=True)

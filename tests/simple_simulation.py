@@ -5,13 +5,14 @@ import numpy as np
 from pneumarm.arm import ArmSpec
 from pneumarm.networks.network import Network
 from pneumarm.simulation import NoiseSettings, Scaling, Simulation
+from pneumarm.simulation.simulation import Commands
 from pneumarm.transitions import Window
 
 PERIOD = 0.04
 QUIET = NoiseSettings(kind="none")
 
 
-def simulation(joints: int = 1, latency: float = 0.0, valves: bool = True) -> Simulation:
+def simulation(joints: int = 1, latency: float = 0.0, commands: Commands = "valves") -> Simulation:
     """Return an arm whose pressures change by 10 counts a period and whose angle follows their difference."""
     window = Window(joints)
     direct = np.zeros((window.input_size, 3 * joints))
@@ -30,5 +31,5 @@ def simulation(joints: int = 1, latency: float = 0.0, valves: bool = True) -> Si
         np.tile([5.0, 0.1, 2, 2], (joints, 1)),
         np.tile([400.0, 600.0], (joints, 1)),
         np.tile([0.0, 200.0], (joints, 2, 1)),
-        valves,
+        commands,
     )

@@ -30,7 +30,7 @@ ARMS = {
     "virtual": lambda smallest: VirtualArm(seed=1),
     "virtual, supply of 2 bar": lambda smallest: VirtualArm(preset_parameters("C"), seed=1),
     "virtual, drawn": lambda smallest: VirtualArm(draw_parameters(7), seed=1, name="virtual:seed=7"),
-    "simulated": lambda smallest: SimulationArm(simulation(), seed=1),
+    "simulated": lambda smallest: SimulationArm(replace(simulation(), commands="pulses"), seed=1),
     "a user's": lambda smallest: smallest(),
     "a user's with two joints": lambda smallest: smallest(joints=2),
 }

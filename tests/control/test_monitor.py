@@ -13,6 +13,7 @@ from pneumarm.arm.virtual import (
     Leak,
     StuckValve,
     SupplyLoss,
+    SwappedValves,
     VirtualArm,
     WornPotentiometer,
     draw_parameters,
@@ -115,6 +116,33 @@ def test_leaves_healthy_arms_alone(simulation):
             if arm.time > 300:
                 break
         assert monitor.findings == []
+
+
+PULSED = CollectSettings(pulses=0.7)
+
+
+@pytest.fixture(scope="module")
+def simulation_of_pulses(tmp_path_factory):
+    arm = VirtualArm(draw_parameters(3), seed=3)
+    with Store.for_arm(tmp_path_factory.mktemp("pulsed") / "db", arm.spec) as store:
+        collect(arm, store, 10_000, 3, settings=PULSED)
+        return fit_store(store, FitSettings(epochs=12)).simulation
+
+
+@pytest.mark.parametrize("by_rules", [True, False])
+def test_pulses_are_no_fault_and_faults_are_found_under_them(simulation_of_pulses, by_rules):
+    arm = VirtualArm(draw_parameters(3), seed=7)
+    monitor = Monitor(arm.spec, None if by_rules else simulation_of_pulses)
+    for _ in watched_steps(arm, monitor, 7, PULSED):
+        if arm.time > 300 and not arm.faults:
+            assert monitor.findings == []
+            arm.faults = (SwappedValves(muscle=2, begin=arm.time),)
+        if monitor.findings or arm.time > 330:
+            break
+    (found,) = monitor.findings
+    assert found.spoils
+    if not by_rules:  # which tell less of what it is
+        assert (found.kind, found.muscle) == ("swapped-valves", 2)
 
 
 @pytest.mark.soak

@@ -113,7 +113,7 @@ def test_its_file_is_that_of_its_simulation(tmp_path: Path) -> None:
     np.testing.assert_array_equal(loaded.goal_range, SIMULATION.goal_range)
     assert (loaded.window, loaded.spec) == (agent.window, agent.spec)
     assert not isinstance(loaded, Learns)
-    replace(SIMULATION, valves=False).save(tmp_path / "other.sim")
+    replace(SIMULATION, commands="continuous").save(tmp_path / "other.sim")
     with pytest.raises(UnusableInput, match="continuous"):
         PlanAgent.load(tmp_path / "other.sim")
 

@@ -292,7 +292,7 @@ def test_rolling_a_simulation_out_is_stepping_its_arm() -> None:
 
 
 def test_a_simulation_of_continuous_commands_is_refused() -> None:
-    simulation = replace(synthetic_simulation(), valves=False)
+    simulation = replace(synthetic_simulation(), commands="continuous")
     with pytest.raises(UnusableInput, match="valves"):
         SimulationModel(simulation)
 
@@ -303,7 +303,7 @@ class Stuck(SimulationArm):
     changes = 0
 
     def set_valves(self, valves: np.ndarray) -> None:
-        self.changes += bool((valves != self._valves).any())
+        self.changes += bool((valves != self._commanded).any())
         super().set_valves(valves)
 
     def wait(self, seconds: float) -> None:

@@ -174,7 +174,7 @@ def test_what_does_not_fit_is_refused(full: Training, simulation: Simulation, be
     with pytest.raises(UnusableInput, match="begin states"):
         train(other, begin, SHORT)
     with pytest.raises(UnusableInput, match="continuous"):
-        train(replace(simulation, valves=False), begin, SHORT)
+        train(replace(simulation, commands="continuous"), begin, SHORT)
     with pytest.raises(UnusableInput, match="history=2"):
         test(full.agent, other, begin)
     with pytest.raises(UnusableInput, match="at least one"):

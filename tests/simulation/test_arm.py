@@ -97,7 +97,7 @@ def test_seeds_make_the_noise() -> None:
 
 def test_continuous_commands_are_refused() -> None:
     with pytest.raises(UnusableInput, match="continuous"):
-        SimulationArm(simulation(valves=False))
+        SimulationArm(simulation(commands="continuous"))
 
 
 def test_closing_closes_the_valves() -> None:
@@ -106,3 +106,18 @@ def test_closing_closes_the_valves() -> None:
     before = arm.read().pressure
     arm.wait(PERIOD)
     np.testing.assert_allclose(arm.read().pressure, before, atol=1e-3)
+
+
+def test_a_pulse_counts_for_its_period_and_is_over_then() -> None:
+    arm = SimulationArm(simulation(commands="pulses"), noise=QUIET)
+    begin = arm.read().pressure
+    assert arm.set_pulses(np.array([[0.5, -0.25]]))
+    arm.wait(3 * PERIOD)
+    np.testing.assert_allclose(arm.read().pressure - begin, [[5.0, -2.5]], atol=1e-3)
+
+
+def test_of_pulses_that_it_has_not_seen_it_says_nothing() -> None:
+    arm = guarded(SimulationArm(simulation(), noise=QUIET))
+    assert not arm.spec.pulses
+    arm.decide(np.array([[0.6, -0.25]]))
+    assert arm.applied.tolist() == [[1, 0]]

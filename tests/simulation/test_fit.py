@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import UnusableInput
-from pneumarm.simulation import FitResult, FitSettings, by_quantity, fit, fit_store, refiltered
-from pneumarm.transitions import GridSettings, Store, held_out
+from pneumarm.simulation import FitResult, FitSettings, Simulation, by_quantity, fit, fit_store, refiltered
+from pneumarm.transitions import CollectSettings, GridSettings, Store, collect, filter_transitions, held_out
 from pneumarm.transitions.rows import Recorded, Rows
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
 
@@ -212,3 +213,31 @@ def test_a_small_store_is_refused(make_rows: Callable[..., Rows], tmp_path: Path
         pytest.raises(UnusableInput, match=r"120 transitions are too few to fit; collect at least 2,000"),
     ):
         fit_store(store)
+
+
+def test_the_length_of_pulses_is_learned(tmp_path: Path) -> None:
+    """From a record of whole periods and pulses: what they do grows with their length.
+
+    Air begins to flow 19 ms after a reading, so of a long pulse the end works in the period after its own.
+    """
+    arm = VirtualArm(draw_parameters(3), seed=1)
+    with Store.create(tmp_path / "store.db", arm.spec) as store:
+        collect(arm, store, 4000, settings=CollectSettings(pulses=0.5))
+        simulation = fit_store(store, FitSettings(epochs=10, hidden=6))[0].simulation
+        states = filter_transitions(store, simulation.window).transitions.inputs[::20].copy()
+    assert simulation.commands == "pulses"
+    assert simulation.valves
+    names = simulation.window.input_names()
+    for name, shares in (("command_1[k]", (0.0, 0.2, 0.4)), ("command_1[k-1]", (0.4, 0.7, 1.0))):
+        pressures = []
+        for share in shares:
+            states[:, names.index(name)] = share
+            pressures.append(simulation.predict(states)[:, QUANTITIES.index("pressure_1")].mean())
+        assert (np.diff(pressures) > 0.5).all()
+
+
+def test_what_commands_were_fitted_is_known_and_kept(fitted: Fitted, tmp_path: Path) -> None:
+    simulation = fitted[0].simulation
+    assert simulation.commands == "valves"
+    replace(simulation, commands="pulses").save(tmp_path / "sim")
+    assert Simulation.load(tmp_path / "sim").commands == "pulses"

@@ -1,6 +1,7 @@
 """Collecting follows section 3.2.2, goes on where it was interrupted, and ends well when the arm does not."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +9,10 @@ from stand_ins import FirstOrderArm
 
 from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import to_actions
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
+from pneumarm.transitions.collect import random_actions
 from pneumarm.transitions.rows import joined
 
 SHORT = CollectSettings(actions=100, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
@@ -291,3 +294,34 @@ def test_goals_are_drawn_from_the_sensors_range_by_default(tmp_path):
     low, high = ArmSpec().angle_range
     assert goals.min() < low + 0.1 * (high - low)
     assert goals.max() > high - 0.1 * (high - low)
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_pulses_come_on_top_of_the_same_random_actions(joints):
+    spec, pulsed, lengths = ArmSpec(joints=joints), CollectSettings(pulses=0.5), []
+    for seed in range(12):
+        kind, whole = random_actions(spec, CollectSettings(), np.random.default_rng(seed))
+        again, mixed = random_actions(spec, pulsed, np.random.default_rng(seed))
+        _, without = random_actions(replace(spec, pulses=False), pulsed, np.random.default_rng(seed))
+        assert kind == again
+        assert whole.commands.dtype == np.int8
+        np.testing.assert_array_equal(without.commands, whole.commands)
+        np.testing.assert_array_equal(np.sign(mixed.commands), whole.commands)
+        lengths.append(np.abs(mixed.commands[mixed.commands != 0]))
+        if kind == "velocity":  # what is held is held with its length
+            changed = (np.diff(mixed.commands, axis=0) != 0).mean()
+            assert changed == pytest.approx((np.diff(whole.commands, axis=0) != 0).mean(), abs=0.08)
+    share = np.concatenate(lengths)
+    assert share.min() >= spec.shortest_pulse / spec.period
+    assert (share < 1).mean() == pytest.approx(0.5, abs=0.1)
+
+
+def test_pulses_are_stored_as_applied(tmp_path):
+    arm = VirtualArm(draw_parameters(3), seed=1)
+    with Store.create(tmp_path / "pulses.db", arm.spec) as store:
+        collect(arm, store, 2000, settings=CollectSettings(pulses=0.5))
+        command = np.concatenate([rows.command for rows in store])
+    command = command[np.isfinite(command)]
+    assert 0.2 < ((command % 1) != 0).mean() < 0.45
+    shortest = arm.spec.shortest_pulse / arm.spec.period
+    assert np.abs(command[command != 0]).min() >= shortest

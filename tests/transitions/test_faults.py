@@ -290,7 +290,7 @@ SELECT 1 AS sequence, n AS step, 0.0 AS time, 0.0 AS joint_1_angle, 0.0 AS joint
         (["UPDATE rows SET joint_1_angle = 9e999 WHERE sequence = 2 AND step = 5"], "impossible values"),
         (["UPDATE rows SET joint_1_angle = 'x' WHERE sequence = 2 AND step = 5"], "not numbers"),
         (["UPDATE rows SET joint_1_command_2 = NULL WHERE sequence = 2 AND step = 5"], "impossible values"),
-        (["UPDATE rows SET joint_1_command_2 = 0.5 WHERE sequence = 2 AND step = 5"], "impossible values"),
+        (["UPDATE rows SET joint_1_command_2 = 1.5 WHERE sequence = 2 AND step = 5"], "impossible values"),
         (["UPDATE rows SET step = 100 WHERE sequence = 2 AND step = 5"], "impossible values|does not agree"),
         (["UPDATE rows SET time = 100 WHERE sequence = 2 AND step = 5"], "impossible values"),
     ],

@@ -1,5 +1,7 @@
 """The filter keeps what section 3.2.3 says, whatever the blocks; what it leaves out can be streamed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -236,6 +238,22 @@ def test_continuous_commands_are_recognised(tmp_path):
         filtered = filter_transitions(store, Window(1, 3))
         assert not filtered.filter.grid.valves
         assert filtered.coverage.cells == 8**4 * 3**2
+
+
+def test_pulses_are_divided_and_share_the_cells_of_valves(tmp_path):
+    def mixed(number):
+        one = make_recorded(number, n=101)
+        share = np.random.default_rng([number, 1]).choice([1.0, 0.5, 0.2], one.command.shape)
+        return replace(one, command=one.command * share)
+
+    with Store.create(tmp_path / "p.db", ArmSpec()) as store:
+        store.append_all(mixed(i) for i in range(20))
+        grid = filter_transitions(store, Window(1, 3)).filter.grid
+    assert grid.size == 8**4 * 3**2
+    inputs = np.zeros((5, Window(1, 3).input_size))
+    inputs[:, -2] = -1.0, -0.5, 0.2, 0.5, 1.0
+    cells = grid.cells(inputs)
+    assert cells[0] == cells[1] < cells[2] < cells[3] == cells[4]
 
 
 def test_new_cells_tell_whether_data_is_enough(store):

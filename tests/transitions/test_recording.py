@@ -205,3 +205,15 @@ def test_the_example_maps_a_recording_of_its_kind(imported):
     np.testing.assert_allclose(spec.bar(rows["pressure"][:, 0]), [[-0.09923, 1.16415], [1.01185, -0.1]], rtol=1e-12)
     np.testing.assert_array_equal(rows["command"][0, 0], [-4.3086, 3.8828])
     assert read_mapping(EXAMPLE)[1] == spec
+
+
+def test_pulses_are_imported_where_the_mapping_says_so(imported):
+    text = lines(*GOOD).replace("1,-1\n", "0.25,-1\n", 1)
+    _, _, rows = imported(text, MAPPING.replace('"valves"', '"pulses"'))
+    np.testing.assert_array_equal(rows["command"][0, 0], [0.25, -1.0])
+
+
+def test_pulses_longer_than_a_period_are_none(imported):
+    text = lines(*GOOD).replace("1,-1\n", "1.25,-1\n", 1)
+    with pytest.raises(UnusableInput, match=r"expected -1 to 1, got 1\.25"):
+        imported(text, MAPPING.replace('"valves"', '"pulses"'))

@@ -6,6 +6,7 @@ import os
 import socket
 import sqlite3
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,6 +47,21 @@ def test_what_is_appended_comes_back_exactly(path, recorded, joints, valves):
         np.testing.assert_array_equal(rows["sequence"], np.repeat(np.arange(1, 8), [len(one) for one in sequences]))
         np.testing.assert_array_equal(rows["at_rest"], rows["sequence"] % 2 == 1)
         store.check()
+
+
+def test_pulses_are_kept_of_arms_that_can_do_them(path, recorded):
+    command = np.array([[[1.0, -0.25]], [[0.1, 0.0]], [[np.nan, np.nan]]])
+    one = recorded(n=3, command=command)
+    with Store.create(path, ArmSpec()) as store:
+        store.append(one)
+        np.testing.assert_array_equal(all_rows(store)["command"], command)
+        with pytest.raises(UnusableInput, match="pulses in between"):
+            store.append(replace(one, command=1.01 * command))
+    with (
+        Store.create(path.with_name("whole.db"), ArmSpec(pulses=False)) as store,
+        pytest.raises(UnusableInput, match="commands must be -1, 0 or"),
+    ):
+        store.append(one)
 
 
 @given(st.integers(1, 60), st.lists(st.integers(2, 30), min_size=1, max_size=12))
@@ -97,8 +113,8 @@ def test_a_lost_period_leaves_a_gap_that_no_transition_spans(path, recorded):
         ({"step": np.arange(21) + 1}, "steps must begin at 0"),
         ({"step": np.zeros(21, int)}, "steps must begin at 0"),
         ({"command": np.zeros((21, 1, 2))}, "NaN after the last reading"),
-        ({"command": np.full((21, 1, 2), np.nan)}, "commands must be -1, 0 or"),
-        ({"command": np.append(np.full((20, 1, 2), 0.5), np.full((1, 1, 2), np.nan), axis=0)}, "must be -1, 0 or"),
+        ({"command": np.full((21, 1, 2), np.nan)}, "commands must be valves"),
+        ({"command": np.append(np.full((20, 1, 2), 1.5), np.full((1, 1, 2), np.nan), axis=0)}, "must be valves"),
         ({"info": {"goal": float("nan")}}, "info must be"),
     ],
 )

@@ -20,8 +20,8 @@ def open_controller(name: str, arm: Arm, method: str | None = None) -> Iterator[
     """Give the controller called ``name`` for ``arm`` (thesis section 3.2.2 names all of these).
 
     ``random`` is None, random actions; ``keyboard`` a person at the terminal; a CSV file predefined trajectories, a
-    column a muscle of -1, 0, +1 and a row a control period; any other file an agent, to be improved, which a
-    ``method`` of one's own may have trained.
+    column a muscle of -1, 0, +1 or pulses in between, a row a control period; any other file an agent, to be
+    improved, which a ``method`` of one's own may have trained.
 
     Raises:
         UnusableInput: there is no such controller, or it is for another arm.
@@ -42,17 +42,18 @@ def open_controller(name: str, arm: Arm, method: str | None = None) -> Iterator[
 
 
 def read_trajectory(path: Path, joints: int) -> Trajectory:
-    """Return the trajectory in a CSV file with ``2 * joints`` columns of valves and no header.
+    """Return the trajectory in a CSV file with ``2 * joints`` columns of commands and no header.
 
     Raises:
         UnusableInput: the file cannot be read or holds something else.
 
     """
-    expected = f"{path}: expected {2 * joints} columns of valves -1, 0 or 1, a row a control period"
+    expected = (
+        f"{path}: expected {2 * joints} columns of valves -1, 0 or 1, or pulses in between, a row a control period"
+    )
     try:
         with open(path, newline="", encoding="utf-8") as file:
-            rows = [[int(cell) for cell in row] for row in csv.reader(file) if row]
-        valves = np.array(rows, np.int64).reshape(len(rows), joints, 2)
-        return Trajectory(valves)
+            rows = [[float(cell) for cell in row] for row in csv.reader(file) if row]
+        return Trajectory(np.array(rows).reshape(len(rows), joints, 2))
     except (OSError, ValueError, csv.Error, UnusableInput) as error:
         raise UnusableInput(f"{expected}; {error}") from error

@@ -1,6 +1,7 @@
 """A fitted simulation behind the seam of an arm: whatever moves an arm can move it, and cannot tell."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,9 @@ class SimulationArm(Arm):
     def __init__(self, simulation: Simulation, *, seed: int = 0, noise: NoiseSettings | None = None) -> None:
         if not simulation.valves:
             raise UnusableInput("the simulation was fitted to continuous commands; this arm has on/off valves")
-        self.spec = simulation.spec
+        # Of pulses it knows nothing unless it has seen some: then they are rounded to whole periods.
+        pulses = simulation.spec.pulses and simulation.commands == "pulses"
+        self.spec = replace(simulation.spec, pulses=pulses)
         self._simulation = simulation
         self._parameters = simulation_parameters(simulation)
         self._noise = noise_parameters(noise or NoiseSettings(), simulation)

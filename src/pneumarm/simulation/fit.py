@@ -29,7 +29,7 @@ from pneumarm.networks import (
 from pneumarm.networks import importance as importance_of
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.quality import Statistics, statistics
-from pneumarm.simulation.simulation import Scaling, Simulation, Velocity
+from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
 from pneumarm.transitions.choice import share_held_out
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
@@ -150,7 +150,7 @@ def fit(
         held_out: transitions of other sequences, at once or in blocks.
         spec: the arm they are of.
         goal_range: 1st and 99th percentile of the stored angles, (joints, 2) [counts].
-        valves: whether the commands are valves.
+        valves: whether the commands are those of on/off valves.
         generalisation: transitions that the filter left out (section 3.3), at once or in blocks.
         settings: what a person may choose.
         progress: called as ``progress(epochs done, epochs at most)``, over all networks together.
@@ -179,7 +179,7 @@ def fit(
         error_std=np.zeros((spec.joints, len(QUANTITIES))),
         goal_range=np.asarray(goal_range, np.float64).reshape(spec.joints, 2),
         pressure_range=_pressure_range(training, window),
-        valves=valves,
+        commands=_commands(training, window) if valves else "continuous",
         held_out=settings.held_out,
         seed=settings.seed,
         further_std=np.zeros(len(window.further)),
@@ -217,6 +217,12 @@ def fit(
         rows=len(x),
         seconds=seconds,
     )
+
+
+def _commands(training: Transitions, window: Window) -> Commands:
+    """Return what on/off valves were commanded."""
+    command = training.inputs[:, -window.command_size :]
+    return "valves" if ((command == 0) | (np.abs(command) == 1)).all() else "pulses"
 
 
 def _fit_networks(

@@ -26,6 +26,9 @@ from pneumarm.transitions.window import QUANTITIES, Transitions, Window
 
 Velocity = Literal["derived", "network"]
 
+Commands = Literal["valves", "pulses", "continuous"]
+"""Commands that transitions were recorded under: valves for whole periods, pulses too, or imported numbers."""
+
 KIND = "pneumarm simulation 1"
 _ANGLE, _VELOCITY = QUANTITIES.index("angle"), QUANTITIES.index("velocity")
 
@@ -92,8 +95,8 @@ class Simulation:
     """1st and 99th percentile of the stored angles, shape (joints, 2) [counts]."""
     pressure_range: NDArray[np.float64]
     """Lowest and highest pressure that it predicts, shape (joints, 2 muscles, 2) [counts]."""
-    valves: bool = True
-    """Whether the commands are valves; with continuous commands no agent of ours can be trained."""
+    commands: Commands = "valves"
+    """What commands it was fitted to; with continuous ones no agent of ours can be trained."""
     held_out: float = 0.0
     """Share of the sequences that were kept out of the fit, chosen by :func:`pneumarm.transitions.held_out`."""
     seed: int = 0
@@ -102,6 +105,11 @@ class Simulation:
     """As ``error_std``, of the further sensors in the window, shape (further,) [sensor units]."""
     further_range: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     """Lowest and highest readings that it predicts of further sensors, shape (further, 2) [sensor units]."""
+
+    @property
+    def valves(self) -> bool:
+        """Whether its commands are those of on/off valves, for whole periods or in pulses too."""
+        return self.commands != "continuous"
 
     @property
     def outputs(self) -> NDArray[np.int64]:
@@ -171,7 +179,7 @@ class Simulation:
     def parts(self) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
         """Return what a file has to hold: settings for its header, and arrays."""
         direct = [network.direct is not None for network in self.networks]
-        header = _Header(self.spec, self.window, self.velocity, self.valves, self.held_out, self.seed, direct)
+        header = _Header(self.spec, self.window, self.velocity, self.commands, self.held_out, self.seed, direct)
         names = (*_ARRAYS, *(_FURTHER if self.window.further else ()))
         arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in names}
         arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
@@ -211,7 +219,7 @@ class Simulation:
             scaling=scaling,
             networks=networks,
             velocity=header.velocity,
-            valves=header.valves,
+            commands=header.commands,
             held_out=header.held_out,
             seed=header.seed,
             **rest,
@@ -231,7 +239,7 @@ class _Header:
     spec: ArmSpec
     window: Window
     velocity: Velocity
-    valves: bool
+    commands: Commands
     held_out: float
     seed: int
     direct: list[bool]

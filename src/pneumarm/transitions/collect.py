@@ -29,7 +29,7 @@ from pneumarm.arm.controller import Controller
 from pneumarm.arm.counts import Counts
 from pneumarm.arm.cycle import BeginState, ControlCycle, Step
 from pneumarm.arm.guard import GuardedArm, Interventions, guarded
-from pneumarm.arm.seam import Arm, Reading
+from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.valves import ACTIONS, Command, to_valves
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.settings import Settings, Valid
@@ -69,6 +69,9 @@ class CollectSettings(Settings):
     """Share of sequences whose actions are held (the thesis decides "randomly")."""
     longest_hold: int = 10
     """Most control periods that an action is held, the least is 1 (the thesis does not say)."""
+    pulses: float = 0.0
+    """Share of the openings that are pulses of random length, where the arm can do them; the others last the whole
+    period, as in the thesis. A record of both serves controllers with pulses and without."""
     begin: CollectBegin = field(default_factory=CollectBegin)
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5)."""
     close_while_computing: bool = False
@@ -79,6 +82,7 @@ class CollectSettings(Settings):
             "actions": 1 <= self.actions <= 50_000,
             "velocity_share": 0 <= self.velocity_share <= 1,
             "longest_hold": self.longest_hold >= 1,
+            "pulses": 0 <= self.pulses <= 1,
         }
 
 
@@ -304,7 +308,7 @@ def _sequence(
     info: Mapping[str, object] = {}
     actor: Controller
     if controller is None:
-        kind, actor = random_actions(arm.spec.joints, settings, random)
+        kind, actor = random_actions(arm.spec, settings, random)
         actor.reset(np.zeros(arm.spec.joints))
     else:
         kind, actor = "controller", controller
@@ -328,17 +332,22 @@ def _sequence(
     return Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info)
 
 
-def random_actions(joints: int, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
-    """Return one of the two kinds of random sequences: its name and its valves."""
-    shape = (settings.actions, joints)
-    actions = random.integers(ACTIONS, size=shape)
-    if random.random() >= settings.velocity_share:
-        return "zero-velocity", Trajectory(to_valves(actions))
-    held = np.empty_like(actions)
-    for joint in range(joints):
-        lengths = random.integers(1, settings.longest_hold, size=settings.actions, endpoint=True)
-        held[:, joint] = np.repeat(actions[:, joint], lengths)[: settings.actions]
-    return "velocity", Trajectory(to_valves(held))
+def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
+    """Return one of the two kinds of random sequences: its name and its commands."""
+    actions = random.integers(ACTIONS, size=(settings.actions, spec.joints))
+    drawn = np.tile(np.arange(settings.actions)[:, None], spec.joints)  # which action each step and joint does
+    kind = "zero-velocity"
+    if random.random() < settings.velocity_share:
+        kind = "velocity"
+        for joint in range(spec.joints):
+            lengths = random.integers(1, settings.longest_hold, size=settings.actions, endpoint=True)
+            drawn[:, joint] = np.repeat(drawn[:, joint], lengths)[: settings.actions]
+    commands = to_valves(actions).astype(np.float64)
+    if settings.pulses and spec.pulses:
+        shortest = min(spec.shortest_pulse / spec.period, 1.0)
+        shares = random.uniform(shortest, 1.0, commands.shape)
+        commands *= np.where(random.random(commands.shape) < settings.pulses, shares, 1.0)
+    return kind, Trajectory(commands[drawn, np.arange(spec.joints)])
 
 
 def _goal(arm: Arm, goals: ArrayLike | None, random: np.random.Generator) -> NDArray[np.float64]:

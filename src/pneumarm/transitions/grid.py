@@ -30,8 +30,8 @@ class GridSettings(Settings):
     pressure_bins: int = 8
     """Divisions of each pressure (thesis: 8)."""
     command_bins: int = 3
-    """Divisions of each muscle's command where commands are continuous (not in the thesis); valves are divided into
-    the 9 actions of a joint. Three keeps a grid of as many cells: 3 x 3 = 9."""
+    """Divisions of each muscle's command where commands are continuous or pulses (not in the thesis); valves are
+    divided into the 9 actions of a joint. Three keeps a grid of as many cells: 3 x 3 = 9."""
     per_cell: int = 5
     """Transitions kept of a cell at most, on average (thesis: n = 5)."""
     inside: float = 0.998
@@ -54,7 +54,7 @@ class Grid:
 
     window: Window
     low: NDArray[np.float64]
-    """Lower ends, shape (dimensions,): the observation in its order, then continuous commands (sensor units)."""
+    """Lower ends, shape (dimensions,): the observation in its order, then commands but for valves (sensor units)."""
     high: NDArray[np.float64]
     """Upper ends, shape (dimensions,)."""
     bins: NDArray[np.int64]

@@ -15,35 +15,37 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Reading
+from pneumarm.arm.valves import Command
 from pneumarm.errors import UnusableInput
 
 
 class Trajectory:
-    """Valves laid down beforehand, step by step; all closed once they are over."""
+    """Valves or pulses laid down beforehand, step by step; all closed once they are over."""
 
-    def __init__(self, valves: ArrayLike) -> None:
-        """Take the valves (steps, joints, 2) of -1, 0, +1.
+    def __init__(self, commands: ArrayLike) -> None:
+        """Take the commands (steps, joints, 2) from -1 to +1; whole numbers are valves.
 
         Raises:
             UnusableInput: they are something else.
 
         """
-        given = np.asarray(valves)
-        if given.ndim != 3 or given.shape[2] != 2 or not len(given) or not np.isin(given, (-1, 0, 1)).all():
+        given = np.asarray(commands, np.float64)
+        if given.ndim != 3 or given.shape[2] != 2 or not len(given) or not (np.abs(given) <= 1).all():
             raise UnusableInput(
-                f"a trajectory needs valves of shape (steps, joints, 2), each -1, 0 or +1; got shape {given.shape}"
+                "a trajectory needs commands of shape (steps, joints, 2), each -1, 0 or +1 or a pulse in between, "
+                f"got shape {given.shape}"
             )
-        self.valves: NDArray[np.int8] = given.astype(np.int8)
+        self.commands: Command = given.astype(np.int8) if np.isin(given, (-1, 0, 1)).all() else given
         self._step = 0
 
     def reset(self, goal: NDArray[np.float64]) -> None:
         """Begin again; the goal is of no concern to a trajectory."""
         self._step = 0
 
-    def act(self, reading: Reading) -> NDArray[np.int8]:
-        """Return the next valves (joints, 2)."""
+    def act(self, reading: Reading) -> Command:
+        """Return the next command (joints, 2)."""
         step, self._step = self._step, self._step + 1
-        return self.valves[step] if step < len(self.valves) else np.zeros_like(self.valves[0])
+        return self.commands[step] if step < len(self.commands) else np.zeros(self.commands.shape[1:], np.int8)
 
 
 class Keyboard:

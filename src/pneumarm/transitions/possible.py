@@ -24,15 +24,19 @@ def are_possible(rows: Rows, first: NDArray[np.int64], spec: ArmSpec, valves: bo
         and np.isfinite(rows.time).all()
         and far_outside(rows.angle, rows.pressure, spec) is None
         and np.isnan(rows.command[ends]).all()
-        and _commands_possible(rows.command[~ends], valves)
+        and _wrong_commands(rows.command[~ends], spec, valves) is None
         and all(np.isfinite(values).all() for values in rows.measured.values())
     )
 
 
-def _commands_possible(command: NDArray[np.float64], valves: bool) -> bool:
-    if valves:
-        return bool(((command == 0) | (np.abs(command) == 1)).all())
-    return bool(np.isfinite(command).all())
+def _wrong_commands(command: NDArray[np.float64], spec: ArmSpec, valves: bool) -> str | None:
+    """Return what commands would have to be where those of this arm cannot have been these."""
+    if not valves:
+        return None if np.isfinite(command).all() else "finite"
+    whole = (command == 0) | (np.abs(command) == 1)
+    if not spec.pulses:
+        return None if whole.all() else "-1, 0 or +1"
+    return None if (whole | (np.abs(command) < 1)).all() else "valves (-1, 0 or +1) or pulses in between"
 
 
 def far_outside(angle: NDArray[np.float64], pressure: NDArray[np.float64], spec: ArmSpec) -> str | None:
@@ -68,9 +72,9 @@ def row_values(one: Recorded, spec: ArmSpec, further: Sequence[str], valves: boo
     problem = far_outside(one.angle, one.pressure, spec)
     if problem:
         raise UnusableInput(f"{problem}; does the arm's spec have the right counts?")
-    if not np.isnan(one.command[-1]).all() or not _commands_possible(one.command[:-1], valves):
-        wanted = "-1, 0 or +1" if valves else "finite"
-        raise UnusableInput(f"a sequence's commands must be {wanted}, and NaN after the last reading")
+    wanted = _wrong_commands(one.command[:-1], spec, valves)
+    if wanted or not np.isnan(one.command[-1]).all():
+        raise UnusableInput(f"a sequence's commands must be {wanted or 'NaN after the last reading'}")
     per_joint = np.concatenate([one.angle[:, :, None], one.pressure, one.command], axis=2)
     values = np.concatenate([one.time[:, None], per_joint.reshape(n, -1)], axis=1)
     return np.concatenate([values, *(_further_values(one, name) for name in further)], axis=1)

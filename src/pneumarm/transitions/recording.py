@@ -4,7 +4,7 @@ The mapping, with every setting that is not of an arm's spec::
 
     sequence = "episode"          # column that changes where a new sequence begins; optional
     time = "t_s"                  # column of the time [s]; without it rows are one period apart
-    commands = "continuous"       # or "valves": then commands must be -1, 0, +1
+    commands = "continuous"       # or "valves": then commands must be -1, 0, +1; or "pulses": from -1 to +1
 
     [arm]                         # fields of ArmSpec but joints; the period is needed
     period = 0.01
@@ -111,7 +111,7 @@ class Joint(_Table, frozen=True, forbid_unknown_fields=True):
 class Mapping(_Table, frozen=True, forbid_unknown_fields=True):
     """What the columns of a recording are."""
 
-    commands: Literal["valves", "continuous"]
+    commands: Literal["valves", "pulses", "continuous"]
     arm: dict[str, object]
     joint: list[Joint]
     sequence: str | None = None
@@ -160,7 +160,10 @@ def import_recording(recording: Path | str, mapping: Path | str, store: Path | s
     columns = _columns(chosen, spec)
     lock = lock_vacant(store)
     try:
-        with written_whole(store) as temporary, Store.create(temporary, spec, chosen.commands == "valves") as made:
+        with (
+            written_whole(store) as temporary,
+            Store.create(temporary, spec, chosen.commands != "continuous") as made,
+        ):
             made.begin_run("import", {"recording": recording.name, "mapping": mapping.name})
             reader = _Reader(recording, chosen, columns, spec.period)
             made.append_all(_sequences(reader, spec))
@@ -230,9 +233,9 @@ def _columns(mapping: Mapping, spec: ArmSpec) -> list[_Column]:
         found.append(_angle(joint.angle, spec))
         found += [_pressure(pressure, spec) for pressure in (joint.pressure_1, joint.pressure_2)]
         for command in (joint.command_1, joint.command_2):
-            valves = mapping.commands == "valves"
-            low, high = command.range or ((-1.0, 1.0) if valves else (-math.inf, math.inf))
-            found.append(_Column(command.column, low, high, whole=valves))
+            most = math.inf if mapping.commands == "continuous" else 1.0
+            low, high = command.range or (-most, most)
+            found.append(_Column(command.column, low, high, whole=mapping.commands == "valves"))
     found += [_velocity(joint.velocity, spec) for joint in mapping.joint if joint.velocity is not None]
     for joint in mapping.joint:
         for further in (joint.acceleration, joint.temperature_1, joint.temperature_2):

@@ -74,7 +74,7 @@ class Store:
         self.spec: ArmSpec
         """The arm that the rows are of."""
         self.valves: bool
-        """Whether the commands are valves -1, 0, +1; an imported recording may have continuous ones."""
+        """Whether the commands are valves -1, 0, +1 or pulses in between; imported ones may be continuous."""
         with translated(path):
             self.spec, self.valves = read_settings(connection, path)
             if lock is not None:

@@ -101,6 +101,20 @@ def flow_by_rules(rules, pressure, setting):  # type: ignore[no-untyped-def]
 
 
 @part
+def end_of_pulse(command, before):  # type: ignore[no-untyped-def]
+    """Return the last command in the share ``before`` of a period in which it still acts: the end of a long pulse."""
+    share = max(0.0, before - (1.0 - abs(command))) / before if before > 0.0 else 0.0
+    return share if command > 0.0 else -share
+
+
+@part
+def begin_of_pulse(command, before):  # type: ignore[no-untyped-def]
+    """Return a command in the share of a period that is left after the share ``before`` of the last one."""
+    share = min(1.0, abs(command) / (1.0 - before)) if before < 1.0 else 0.0
+    return share if command > 0.0 else -share
+
+
+@part
 def expect_by_rules(rules, readings, memory, angle, expected, std):  # type: ignore[no-untyped-def]
     """Set ``expected`` (n, m) pressures and their ``std`` (m,) [counts]; ``angle`` (joints,) is what was read."""
     for m in range(std.shape[0]):
@@ -109,8 +123,11 @@ def expect_by_rules(rules, readings, memory, angle, expected, std):  # type: ign
         turned = angle[j] - memory.observed[0, j, 0]
         squeezed = (2.0 * side - 1.0) * rules.compression * turned * (pressure + rules.atmosphere)
         for h in range(expected.shape[0]):
-            before = carried_out(readings, h, memory.command[1], m, pressure / rules.bar)
-            now = carried_out(readings, h, memory.command[0], m, pressure / rules.bar)
+            source = readings.source[h, m]
+            ended = end_of_pulse(memory.command[1, source], rules.before)
+            begun = begin_of_pulse(memory.command[0, source], rules.before)
+            before = carried_out(readings, h, m, ended, pressure / rules.bar)
+            now = carried_out(readings, h, m, begun, pressure / rules.bar)
             flow = rules.before * flow_by_rules(rules, pressure, before)
             flow += (1.0 - rules.before) * flow_by_rules(rules, pressure + flow, now)
             expected[h, m] = max(0.0, pressure * (1.0 - readings.leak[h, m]) + flow + squeezed)
@@ -193,10 +210,12 @@ def expect_by_simulation(predictor, readings, memory, expected, angle):  # type:
     for h in range(expected.shape[0]):
         for m in range(muscles):
             bar = memory.observed[0, m // 2, 2 + m % 2] / predictor.bar
-            now = carried_out(readings, h, memory.command[0], m, bar) / predictor.command_scale[m]
+            source = readings.source[h, m]
+            now = carried_out(readings, h, m, memory.command[0, source], bar) / predictor.command_scale[m]
             x[predictor.first_command + m] = np.float32(now)
             for lag in range(1, history):
-                earlier = carried_out(readings, h, memory.command[lag], m, bar) / predictor.command_scale[m]
+                told = memory.command[lag, source]
+                earlier = carried_out(readings, h, m, told, bar) / predictor.command_scale[m]
                 x[simulation.observed * history + muscles * (lag - 1) + m] = np.float32(earlier)
         predict_change(simulation, state)
         for o in range(simulation.place.shape[0] - predictor.further_scale.shape[0]):

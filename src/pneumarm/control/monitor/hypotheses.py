@@ -99,9 +99,13 @@ def hypotheses(joints: int) -> tuple[list[Hypothesis], Readings]:
 
 
 @part
-def carried_out(readings, h, commands, m, bar):  # type: ignore[no-untyped-def]
-    """Return what muscle ``m``, at a pressure of ``bar``, does under hypothesis ``h`` when told ``commands`` (m,)."""
-    done = readings.table[h, m, int(commands[readings.source[h, m]]) + 1]
+def carried_out(readings, h, m, told, bar):  # type: ignore[no-untyped-def]
+    """Return what muscle ``m``, at a pressure of ``bar``, does under hypothesis ``h`` when ``told`` a command.
+
+    During a pulse it does what it does when told to open, in the rest of the period what it does when told to close.
+    """
+    share = abs(told)
+    done = share * readings.table[h, m, 2 if told > 0.0 else 0] + (1.0 - share) * readings.table[h, m, 1]
     if done > 0.0 and readings.supply[h] < math.inf:
         done *= supplied(readings.supply[h], bar)
     return done

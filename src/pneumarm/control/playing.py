@@ -2,8 +2,11 @@
 
 The same as :meth:`BeginState.reach` and :func:`~.movement.move` with an :class:`~.agent.AgentController` behind the
 guard, bit for bit: the same readings with their noise, the same late periods, the same limits of pressure and of
-inflation. Without Python between two periods a movement takes 1.0 instead of 2.5 ms of processor time, and threads do
-not wait for each other; an agent that learns on the arm alone needs 80,000 s of arm time.
+inflation. The rules of the guard, the cycle and the task are compiled from where they stand; what is written here
+again is their order, because without Python between two periods a movement takes 1.4 instead of 8.9 ms of processor
+time (``python -m benchmarks playing``, on two cores that others shared), and threads do not wait for each other: an
+agent that learns on the arm alone needs 80,000 s of arm time. A test compares the two, lateness and two joints
+included.
 
 It is for virtual arms without faults or further sensors, and for agents of the thesis' kind.
 """
@@ -42,7 +45,7 @@ _missed, _action, _velocity = part(missed_turns), part(action_of), part(derived_
 _open_time, _stays_closed = part(open_time), part(stays_closed)
 
 
-class _Watched(NamedTuple):
+class _Guard(NamedTuple):
     """The guard: what was read, what is set, and for how long inlets have been open."""
 
     angle: Array
@@ -166,7 +169,7 @@ class Player:
             window.history,
         )
         both = joints, 2
-        self._watched = _Watched(
+        self._watched = _Guard(
             np.zeros(joints),
             np.zeros(both),
             np.zeros(both, np.int8),
@@ -233,7 +236,7 @@ def _schedule(exploration: Exploration | None) -> Schedule:
 
 
 @kernel
-def _read(body: Body, watched: _Watched) -> float:
+def _read(body: Body, watched: _Guard) -> float:
     """Read the sensors, and count for how long inlets have been open; return the time."""
     time: float = sense(body, watched.angle, watched.pressure)
     passed = 0.0 if np.isnan(watched.clock[0]) else time - watched.clock[0]
@@ -248,7 +251,7 @@ def _read(body: Body, watched: _Watched) -> float:
 
 
 @kernel
-def _set(body: Body, watched: _Watched) -> None:
+def _set(body: Body, watched: _Guard) -> None:
     """Set the valves as asked, but for inlets of muscles at their limits."""
     for j in range(watched.applied.shape[0]):
         for m in range(2):
@@ -260,7 +263,7 @@ def _set(body: Body, watched: _Watched) -> None:
 
 
 @kernel
-def _wait(body: Body, watched: _Watched, seconds: float) -> None:
+def _wait(body: Body, watched: _Guard, seconds: float) -> None:
     """Let time pass, looking at the limits every period while an inlet is open."""
     while seconds > watched.period and (watched.applied > 0).any():
         pass_for(body, watched.period)
@@ -278,7 +281,7 @@ def _wait(body: Body, watched: _Watched, seconds: float) -> None:
 
 
 @kernel
-def _reach(body: Body, watched: _Watched, rules: _Rules, durations: Array) -> None:
+def _reach(body: Body, watched: _Guard, rules: _Rules, durations: Array) -> None:
     """As :meth:`BeginState.reach`, with the ``durations`` (joints, 2) [s] given."""
     _read(body, watched)
     watched.asked[:] = -1
@@ -300,7 +303,7 @@ def _reach(body: Body, watched: _Watched, rules: _Rules, durations: Array) -> No
 
 
 @kernel
-def _push(mind: _Mind, watched: _Watched, velocity: Array, first: bool) -> None:
+def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
     """Put what was read into the state window, as :class:`~pneumarm.task.tracker.StateTracker` does."""
     sigma, observed = mind.sigma, 4 * velocity.size
     if first:
@@ -320,7 +323,7 @@ def _push(mind: _Mind, watched: _Watched, velocity: Array, first: bool) -> None:
 
 
 @kernel
-def _aim(aims: _Aims, watched: _Watched, deviation: float, goal: Array) -> None:
+def _aim(aims: _Aims, watched: _Guard, deviation: float, goal: Array) -> None:
     """Put a goal near to where the arm stands into ``goal`` (joints,) (thesis section 4.3.3)."""
     for j in range(goal.size):
         here = min(max(watched.angle[j], aims.range[j, 0]), aims.range[j, 1])

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.valves import Command
+from pneumarm.task.reward import paid
 from pneumarm.task.settings import TaskSettings
 
 
@@ -48,6 +49,6 @@ class Tally:
         self.actions += 1
         self.switches += switched
         self.reached = reward.reached(angle, velocity, goal)
-        self.paid = float(reward.of(self.reached, switched.sum()))
+        self.paid = float(paid.py_func(reward, self.reached, int(switched.sum())))
         self.reward += self.paid
         return reward.of(self.reached, switched)

@@ -1,5 +1,7 @@
 """A small run of the whole job, made once and used by the tests of everything that comes after it."""
 
+import fcntl
+import os
 import signal
 from pathlib import Path
 
@@ -12,9 +14,13 @@ from small import SMALL
 
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a finished small run; tests must not change it."""
-    folder = tmp_path_factory.mktemp("runs") / "small"
-    Run(folder, SMALL).do()
+    """Return the folder of a finished small run, the same for all workers of pytest; tests must not change it."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "small_run"
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / "report.html").exists():
+            Run(folder, SMALL).do()
     return folder
 
 

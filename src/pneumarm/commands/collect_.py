@@ -36,8 +36,6 @@ def collect_(
         Seed of the random begin states and actions, and of a virtual arm's noise.
     controller
         What acts: random, keyboard, a CSV file of valves, or an agent (thesis section 3.2.2).
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     require_enough(transitions)
     with (

@@ -37,8 +37,6 @@ def move_(
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
         Of a virtual arm's noise.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     with open_arm(arm, seed) as opened:
         mover, spec, goal_range = open_tracking(controller, opened, settings.tolerance)

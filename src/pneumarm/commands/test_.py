@@ -30,8 +30,6 @@ def test_(agent: Path, sim: Path, db: Path, /, *, episodes: int = 10_000, seed: 
         How many movements (thesis section 5.2: 10,000).
     seed
         Of the begin states, the goals and the noise.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     trained, simulation = open_agent(agent), Simulation.load(sim)
     with Store.open(db) as store:

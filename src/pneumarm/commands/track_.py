@@ -38,8 +38,6 @@ def track_(
         The controller must not look at the reference's future, as if a person gave it by hand.
     seed
         Of a virtual arm's noise.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     with open_arm(arm, seed) as opened:
         mover, spec, goal_range = open_tracking(controller, opened)

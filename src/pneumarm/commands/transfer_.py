@@ -33,8 +33,6 @@ def transfer_(
         Of the begin states, the goals and the exploration, and of a virtual arm's noise.
     out
         Folder for episodes.csv, the store of all movements and the adapted agent; created if it does not exist.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     trained = open_agent(agent)
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:

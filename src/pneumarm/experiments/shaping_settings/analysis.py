@@ -13,7 +13,7 @@ from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import Interval, Verdict, below, interval
 from pneumarm.experiments.evidence import Array
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
 from pneumarm.experiments.trainings import CRITERIA, LEARNING
@@ -32,7 +32,7 @@ Differences = Mapping[str, list[Interval | None]]
 """By figure, each trial's difference from its reference, None for a reference itself."""
 
 
-def analysis(experiment: ShapingSettings, rows: Rows) -> Analysis:
+def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     """Return every trial's results and its difference from the thesis' settings within runs."""
     tables = {name: rows.table(name, list(experiment.trials)) for name in _CRITERIA}
     # From here on columns are samples: runs where there is one arm, else the arms.

@@ -207,7 +207,7 @@ def test_a_calibration_finds_scales_and_zeros():
 
 
 @pytest.mark.parametrize(
-    ("known", "complaints_of"),
+    ("known", "message"),
     [
         ({"angles": ((3, -3),)}, "a lower and a higher"),
         ({"supply": 60.0}, "0.1 to 10 bar"),
@@ -217,8 +217,8 @@ def test_a_calibration_finds_scales_and_zeros():
         ({"angles": ((-3, 3),), "counts_per_degree": 4.0}, "not both"),
     ],
 )
-def test_impossible_knowledge_is_refused(known, complaints_of):
-    with pytest.raises(UnusableInput, match=complaints_of):
+def test_impossible_knowledge_is_refused(known, message):
+    with pytest.raises(UnusableInput, match=message):
         Known(**known)
 
 

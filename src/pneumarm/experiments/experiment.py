@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Figures = Mapping[str, float]
 """What was measured, by name."""
 Report = Callable[[float, float], None]
-"""Told what is done and the total."""
+"""Called with what is done and the total."""
 ARMS = tuple(f"virtual:seed={number}" for number in range(1, 6))
 """Five different arms to develop on; those to judge on are ``virtual:seed=1001`` to ``1010``."""
 
@@ -63,7 +63,7 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def key(self) -> tuple[str, int, int]:
-        """What a row is told from the others by."""
+        """What identifies the row."""
         return self.arm, self.trial, self.run
 
 

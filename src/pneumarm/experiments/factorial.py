@@ -175,19 +175,19 @@ class Factorial(Trainings):
         return interval([effect.signed[column - 1] for effect in found])
 
     def _answer(self, rows: TrialRows, ours: Analyses) -> list[str]:
-        """Return in words which factors surely matter, how much is due to one trial, and which settings are best."""
+        """Return in words which factors matter, how much is due to one trial, and which settings are best."""
         judged_alike = not any(factor.setting.startswith("reward.") for factor in self.design.factors)
         name = next(iter(ours)) if judged_alike else "switches"
         analysis, text = ours[name], []
         if all(len(factor.levels) == _TWO for factor in self.design.factors):
             found = {f.label: self.effect(rows, name, f.column, analysis) for f in self.design.factors}
-            surely = [
+            significant = [
                 f"{self.design.factor(label).name} {_step(self.design.factor(label))} ({effect})"
                 for label, effect in found.items()
                 if abs(effect.mean) > effect.half
             ]
             text.append(
-                f"What surely has an effect on the {_IN_WORDS[name]}: {', '.join(surely) or 'none of the factors'}."
+                f"Significant effects on the {_IN_WORDS[name]}: {', '.join(significant) or 'none of the factors'}."
             )
             means = analysis.results.mean(axis=1)
             far = int(np.argmax(np.abs(means - np.median(means))))
@@ -212,7 +212,7 @@ class Factorial(Trainings):
         return f"Means over all trials{beside}: {'; '.join(said)}."
 
     def _met(self, rows: TrialRows) -> str:
-        """Return in words how many agents met the criterion; of training on, how those ended that were slow to."""
+        """Return in words how many agents met the criterion; with longer training, how the slow ones ended."""
         if "met" not in rows.figures:
             return ""
         if self.continued is None:
@@ -225,7 +225,7 @@ class Factorial(Trainings):
                 for arm in rows.arms
             ]
         )
-        ended = "better" if found.low > 0 else "worse" if found.high < 0 else "neither surely better nor worse"
+        ended = "better" if found.low > 0 else "worse" if found.high < 0 else "neither significantly better nor worse"
         return (
             f" Agents that needed more episodes to meet the criterion are {ended} in the end: the rank correlation "
             f"of these episodes with the last reward is {found} within arms."
@@ -235,7 +235,7 @@ class Factorial(Trainings):
         settings = ", ".join(
             f"{self.design.factor(f).name} {_level(level)}" for f, level in first.best.settings.items()
         )
-        return f"Best settings for the {words} by the ranked effects here, sure or not: {settings}" + (
+        return f"Best settings for the {words} by the ranked effects here, significant or not: {settings}" + (
             f" (trial {first.best.trial})." if first.best.trial else " (not among the trials)."
         )
 
@@ -263,7 +263,7 @@ def _level(level: Any) -> str:
 
 
 def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis, effect: Interval) -> Claim:
-    """Return whether an effect has the sign that the thesis says, beyond what chance could make of it."""
+    """Return whether an effect has the sign that the thesis says, beyond chance."""
     column, design = said.column, our.design
     theirs = float(their.effects[said.loss].signed[column - 1])
     factor = design.on(column)

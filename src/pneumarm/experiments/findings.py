@@ -18,7 +18,7 @@ _TRACES, _PUNISHMENT = 11, 12  # columns of table 5.3; in appendix C.1 the secon
 
 
 def weights_matter_more_than_settings(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
-    """Compare what other weights make of the reward with the same settings, with what all settings together do."""
+    """Compare the effect of other weights with the same settings on the reward with that of all settings."""
     tables = [rows.table("reward", list(made.trials), arm) for arm in rows.arms]
     claim = "With the same settings other initial weights make more of the reward than all settings together"
     thesis = f"{100 * _within_settings(theirs['reward'].results):.0f} % of the variance (table C.7)"
@@ -40,7 +40,7 @@ def _within_settings(table: NDArray[np.float64]) -> float:
 
 
 def weights_dominate(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
-    """Compare what runs, that is initial weights, make of the reward with what any column does.
+    """Compare the effect of runs, that is of initial weights, on the reward with that of any column.
 
     Shares are of the sum of squares within arms, without what chance would contribute, so that no difference between
     arms counts as one of weights.
@@ -68,7 +68,7 @@ def _shares(sources: tuple[Source, ...]) -> dict[str, float]:
 
 
 def _dominance(shares: list[dict[str, float]]) -> tuple[str, Verdict]:
-    """Return in words how much runs and the largest column explain on arms, and whether the runs surely explain more.
+    """Return in words how much runs and the largest column explain, and whether runs explain significantly more.
 
     The largest column is chosen among all, so more than the usual confidence is asked for.
     """
@@ -81,7 +81,7 @@ def _dominance(shares: list[dict[str, float]]) -> tuple[str, Verdict]:
 
 
 def traces_are_marginal(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
-    """Ask whether the effect of the traces on the mean reward is surely smaller than the price of a switch."""
+    """Ask whether the effect of the traces on the mean reward is significantly smaller than the price of a switch."""
     found = made.effect(rows, "reward", _TRACES, ours["reward"])
     their = theirs["reward"]
     effect = float(their.effects["mean"].signed[_TRACES - 1])

@@ -84,7 +84,7 @@ def overview(run: RunData) -> Section:
         "those of the thesis."
     ]
     if "missing" in bound:
-        text.append(f"What could be achieved on this arm at all is not told: {bound['missing']}.")
+        text.append(f"What can be achieved on this arm at all is unknown: {bound['missing']}.")
     return Section(
         "Results",
         text,

@@ -11,7 +11,7 @@ from pneumarm.experiments.there_and_back import AFTER_A_SECOND
 
 
 def analysis(experiment: ControlFrequency, rows: TrialRows) -> Analysis:
-    """Return errors and what agents make of them by frequency."""
+    """Return errors and the performance of agents by frequency."""
     found, trials = measured(experiment, rows), experiment.trials
     words = experiment.words.filled(
         {

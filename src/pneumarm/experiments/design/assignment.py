@@ -180,7 +180,7 @@ def _assignments(
         if second < len(chosen):
             found = array.interaction(chosen[first], chosen[second])
             if not _is_whole(array, chosen[first], chosen[second], found):
-                return  # it spreads over columns and cannot be told apart
+                return  # it spreads over columns and cannot be separated
             used.extend(found)
     if len(set(used)) != len(used):
         return

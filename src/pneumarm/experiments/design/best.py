@@ -51,7 +51,7 @@ class FixedFactor:
 
 @dataclass(frozen=True)
 class Best:
-    """Settings and how they were come by."""
+    """Settings and how they were derived."""
 
     levels: Mapping[str, int]
     """Number of the level, from 0, by the factor's label."""

@@ -19,7 +19,7 @@ _GAMMAS = (0.95, 0.98, 0.99)  # of returns_figure: the thesis' levels, and the h
 
 
 def analysis(experiment: FineTuning, rows: TrialRows) -> Analysis:
-    """Return the analysis of the array, and what the settings chosen by odd runs make of the even ones."""
+    """Return the analysis of the array, and how the settings chosen by odd runs do in the even ones."""
     array, trials = experiment.array, experiment.trials
     of_array = array.analyse(rows.of(array.trials))
     found = confirmation(experiment, rows)

@@ -47,12 +47,12 @@ def analysis(experiment: Overnight, rows: TrialRows) -> Analysis:
 
 
 def answer(lost: Interval, frozen: Interval) -> str:
-    """Return in words for whom the night surely costs reward."""
+    """Return in words for whom the night significantly costs reward."""
     agents = {"an agent that learns": lost, "one that never learns": frozen}
     costs = [words for words, found in agents.items() if above(found) == "holds"]
     if costs:
         return f"The night costs {' and '.join(costs)} reward."
-    return "No drop is shown, so that it cannot be seen what would bring the reward back."
+    return "No drop is shown, so what would restore the reward cannot be seen."
 
 
 def _gain(course: Array, place: int) -> Array:

@@ -39,8 +39,10 @@ def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     samples = {name: np.stack([rows.samples(line) for line in table]) for name, table in tables.items()}
     differences = {name: _differences(experiment, table) for name, table in samples.items()}
     found = measured(experiment, tables, samples, len(rows.arms))
-    surely = {f"surely_{name}": _surely(experiment, name, differences) for name in ("reward", "episodes")}
-    words = experiment.words.filled(found | surely)
+    significant = {
+        f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")
+    }
+    words = experiment.words.filled(found | significant)
     strategy, results = words.sections
     drawn = Picture(
         strategy_figure(experiment.train_settings(1), ArmSpec()),
@@ -102,15 +104,15 @@ def _differences(experiment: ShapingSettings, table: Array) -> list[Interval | N
     return [None if n == of else interval(table[n - 1] - table[of - 1]) for n, of in references.items()]
 
 
-def _surely(experiment: ShapingSettings, name: str, differences: Differences) -> str:
+def _significant(experiment: ShapingSettings, name: str, differences: Differences) -> str:
     """Return in words what matters beyond chance."""
     named = zip(experiment.trials.values(), differences[name], strict=True)
-    surely = [
+    significant = [
         f"{words} ({each if name == 'reward' else _whole(each)})"
         for words, each in named
         if each and abs(each.mean) > each.half
     ]
-    return "; ".join(surely) or "none"
+    return "; ".join(significant) or "none"
 
 
 def _results(
@@ -136,7 +138,7 @@ def _results(
 
 
 def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Verdict]:
-    """Return both standard deviations on an arm, and whether the first is surely smaller (Pitman and Morgan).
+    """Return both standard deviations on an arm, and whether the first is significantly smaller (Pitman and Morgan).
 
     Runs are pairs; the variances differ where sum and difference of the pairs are correlated.
     """

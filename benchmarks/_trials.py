@@ -71,7 +71,7 @@ def fitted(path: Path, seed: int) -> tuple[StoreFit, BeginStates]:
     return there_and_back.fitted(path, FitSettings(seed=seed))
 
 
-def moved(
+def greedy_movements(
     agent: AnyAgent,
     arm: int,
     goals: NDArray[np.float64],
@@ -91,4 +91,4 @@ def moved(
 
     """
     with open_arm(f"virtual:seed={arm}", seed) as opened:
-        return there_and_back.moved(agent, opened, goals, numbers, SEED_OF_MOVEMENTS, controller)
+        return there_and_back.greedy_movements(agent, opened, goals, numbers, SEED_OF_MOVEMENTS, controller)

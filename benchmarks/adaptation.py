@@ -146,11 +146,11 @@ class Bench:
         """Return what a baseline did; let it move where that is not done yet."""
         file = self.folder / f"{change}-{seed}-{baseline}-{self.movements}-{self.collected}.json"
         if not file.exists():
-            write_json(file, self.moved(change, seed, baseline))
+            write_json(file, self.measure(change, seed, baseline))
         found: dict[str, Any] = json.loads(file.read_text())
         return found
 
-    def moved(self, change: str, seed: int, baseline: str) -> dict[str, Any]:
+    def measure(self, change: str, seed: int, baseline: str) -> dict[str, Any]:
         old = self.trained(seed, None)
         fresh = old if change == "unchanged" else self.trained(seed, change)
         low = np.maximum(old.goal_range[:, 0], fresh.goal_range[:, 0])

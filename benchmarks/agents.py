@@ -57,7 +57,7 @@ def measure() -> Iterator[str]:
                 for method in methods:
                     trained = train_by(method, simulation, begin, int(seed))
                     simulated = test(trained.agent, simulation, begin).reward.mean()
-                    made, p99 = moved(trained.agent, int(arm), movements)
+                    made, p99 = greedy_movements(trained.agent, int(arm), movements)
                     figures = of_rows(one.row() for one in made).results()
                     found[method].append((figures, trained))
                     failures[method].update(kind(one) for one in made if not one.success)
@@ -99,7 +99,7 @@ class Timed(AgentController):
         return valves
 
 
-def moved(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
+def greedy_movements(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
     """Return movements on a virtual arm, and the processor time of a decision at the 99th percentile [ms]."""
     controller = Timed(agent)
     controller.reset(agent.goal_range.mean(axis=1))

@@ -102,7 +102,7 @@ def played(case: Case, arm: int) -> tuple[Checkup, SoundState | None]:
     return check_up(seen), sound
 
 
-def said(case: Case, arm: int) -> set[str]:
+def complaints_of(case: Case, arm: int) -> set[str]:
     """Return what is said of ``arm``; a fault of a muscle counts only if it is said of the right one."""
     place = f"muscle {1 + arm % 2}" if case.told in OF_MUSCLES else "joint"
     return {f.kind if place in f.where else f"{f.kind} elsewhere" for f in diagnose(*played(case, arm))}
@@ -132,7 +132,7 @@ def measure() -> Iterator[str]:
         worst = max(np.sign(limit) * each[name] for each in figures)
         yield f"  worst {name}: {abs(worst):.3g}, limit {abs(limit):g}"
     for name, case in CASES.items():
-        kinds = [said(case, arm) for arm in arms]
+        kinds = [complaints_of(case, arm) for arm in arms]
         found, alone = sum(case.told in k for k in kinds), sum(k == {case.told} for k in kinds)
         others = sorted(set().union(*kinds) - {case.told})
         besides = f" (besides: {', '.join(others)})" if others else ""

@@ -29,7 +29,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from benchmarks._trials import HELD_OUT, Rows, collected, fitted, moved
+from benchmarks._trials import HELD_OUT, Rows, collected, fitted, greedy_movements
 from pneumarm.learning import test, train
 from pneumarm.report.style import DARK, GREY, MIDDLE, key, legend_below, panels, styled
 from pneumarm.statistics import rate_estimate
@@ -86,7 +86,7 @@ def trial(
     made, begin = fitted(db, seed)
     trained = train(made.simulation, begin, None, seed)
     simulated = test(trained.agent, made.simulation, begin, 2_000, seed)
-    on_arm = moved(trained.agent, arm, goals, range(movements), seed)
+    on_arm = greedy_movements(trained.agent, arm, goals, range(movements), seed)
     return {
         "arm": arm,
         "seed": seed,

@@ -31,8 +31,8 @@ def measure() -> Iterator[str]:
     simulation = _synthetic().synthetic_simulation()
     networks = draw_networks(simulation.window, SETTINGS, np.random.default_rng(2))
     agent = Agent(VirtualArm().spec, simulation.window, simulation.scaling, RANGE, networks, SETTINGS)
-    _played(agent, 2), _moved(agent, 2)  # compiles, or loads what was compiled
-    ways: tuple[Callable[[Agent], tuple[float, float, float]], ...] = (_moved, _played)
+    _played(agent, 2), _by_the_cycle(agent, 2)  # compiles, or loads what was compiled
+    ways: tuple[Callable[[Agent], tuple[float, float, float]], ...] = (_by_the_cycle, _played)
     found = np.array([[way(agent) for way in ways] for _ in range(REPEATS)])
     assert (found[:, :, 1:] == found[0, 0, 1:]).all(), "the loop and move differ"
     (slow, fast), (_, arm_time) = found[:, :, 0].min(axis=0), found[0, 0, 1:]
@@ -54,7 +54,7 @@ def _played(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:
     return time.process_time() - began, float(made.reward.sum()), float(made.time_end[-1])
 
 
-def _moved(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:
+def _by_the_cycle(agent: Agent, count: int = MOVEMENTS) -> tuple[float, float, float]:
     """Return the same of movements through the guard and the control cycle."""
     learning = OnlineLearner(agent, SETTINGS.learning_rate, EXPLORATION, seed=SEED)
     cycle = ControlCycle(guarded(VirtualArm(draw_parameters(1), seed=SEED)))

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks._trials import collected, fitted, moved
+from benchmarks._trials import collected, fitted, greedy_movements
 from pneumarm.arm import Reading
 from pneumarm.control import AgentController
 from pneumarm.learning import AnyAgent, PolicySettings, train
@@ -61,9 +61,9 @@ def measure() -> Iterator[str]:
         f"{trained.core_seconds:.2f} s of cores, {trained.steps / trained.core_seconds / 1e6:.2f} M steps/s a core"
     )
     controller = Timed(trained.agent)
-    moved(trained.agent, ARM, made.simulation.goal_range, range(1), SEED, controller)
+    greedy_movements(trained.agent, ARM, made.simulation.goal_range, range(1), SEED, controller)
     controller.seconds.clear()
-    on_arm = moved(trained.agent, ARM, made.simulation.goal_range, range(MOVEMENTS), SEED, controller)
+    on_arm = greedy_movements(trained.agent, ARM, made.simulation.goal_range, range(MOVEMENTS), SEED, controller)
     yield (
         f"{MOVEMENTS} movements on the arm: reward {np.mean([one.reward for one in on_arm]):.2f}, "
         f"{sum(one.success for one in on_arm)} reached their goals"

@@ -93,10 +93,10 @@ def trial(db: Path, arm: int, seed: int, sensors: str, transitions: int, movemen
         assert isinstance(opened, VirtualArm)
         opened.set_state(state)
         warm = opened.temperature.mean()
-        by_day = moved(trained.agent, opened, goals, movements)
+        by_day = greedy_movements(trained.agent, opened, goals, movements)
         opened.rest(NIGHT)
         cold = opened.temperature.mean()
-        next_day = moved(trained.agent, opened, goals, movements)
+        next_day = greedy_movements(trained.agent, opened, goals, movements)
     successes = [one for one in (*by_day, *next_day) if one.success]
     return {
         "arm": arm,
@@ -116,9 +116,9 @@ def trial(db: Path, arm: int, seed: int, sensors: str, transitions: int, movemen
     }
 
 
-def moved(agent: AnyAgent, arm: VirtualArm, goals: NDArray[np.float64], count: int) -> list[Movement]:
+def greedy_movements(agent: AnyAgent, arm: VirtualArm, goals: NDArray[np.float64], count: int) -> list[Movement]:
     """Return ``count`` greedy movements, the same for all agents."""
-    return there_and_back.moved(agent, arm, goals, range(count), SEED_OF_MOVEMENTS)
+    return there_and_back.greedy_movements(agent, arm, goals, range(count), SEED_OF_MOVEMENTS)
 
 
 def _slow_by_angles(movement: Movement) -> bool:

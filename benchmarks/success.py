@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._trials import HELD_OUT, Rows, collected, fitted, moved
+from benchmarks._trials import HELD_OUT, Rows, collected, fitted, greedy_movements
 from benchmarks.agents import kind
 from pneumarm.learning import load_agent, train
 from pneumarm.statistics import mean_estimate, rate_estimate
@@ -81,7 +81,7 @@ def make_block(folder: Path, arm: int, block: int) -> tuple[dict[str, Any], list
     """Return the row of a block of movements, and one of each that failed."""
     agent = load_agent(folder / f"{arm}.agent")
     numbers = range(block * BLOCK, (block + 1) * BLOCK)
-    made = moved(agent, arm, agent.goal_range, numbers, seed=block)
+    made = greedy_movements(agent, arm, agent.goal_range, numbers, seed=block)
     row = {
         "arm": arm,
         "block": block,

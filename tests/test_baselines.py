@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.baselines import METHODS, Wanted, append, each, known
+from benchmarks.baselines import METHODS, Wanted, append, each, read_rows
 from benchmarks.baselines.table import below, by_method, curves, floor, line, pooled, write_page
 
 from pneumarm.errors import UnusableInput
@@ -37,14 +37,14 @@ ROWS = [row(arm, method, seed) for arm in (1, 2) for method in LEVELS for seed i
 
 def test_rows_come_back_and_one_that_was_cut_short_is_measured_again(tmp_path: Path) -> None:
     file = tmp_path / "baselines.jsonl"
-    assert known(file, WANTED) == {}
+    assert read_rows(file, WANTED) == {}
     append(file, ROWS[0])
     with open(file, "a") as opened:
         opened.write(json.dumps(ROWS[1])[:100])  # killed here
-    assert list(known(file, WANTED)) == [(1, "open loop", 0)]
+    assert list(read_rows(file, WANTED)) == [(1, "open loop", 0)]
     append(file, ROWS[1])
-    assert known(file, WANTED) == {(r["arm"], r["method"], r["seed"]): r for r in ROWS[:2]}
-    assert known(file, Wanted(movements=41, tests=300, steps=1_000)) == {}
+    assert read_rows(file, WANTED) == {(r["arm"], r["method"], r["seed"]): r for r in ROWS[:2]}
+    assert read_rows(file, Wanted(movements=41, tests=300, steps=1_000)) == {}
 
 
 def test_methods_are_asked_for_by_name(monkeypatch: pytest.MonkeyPatch) -> None:

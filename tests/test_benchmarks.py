@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks import minutes, success
-from benchmarks._trials import Rows, collected, moved
+from benchmarks._trials import Rows, collected, greedy_movements
 
 from pneumarm.learning import load_agent
 from pneumarm.task import Movement
@@ -72,8 +72,8 @@ def test_failures_are_told_apart_and_counted(angle: list[float], goal: float, ki
 
 def test_movements_depend_on_their_numbers_alone(small_run: Path) -> None:
     agent = load_agent(small_run / "agent.safetensors")
-    together = moved(agent, 1, agent.goal_range, range(4), seed=0)
-    later = moved(agent, 1, agent.goal_range, range(2, 4), seed=0)
+    together = greedy_movements(agent, 1, agent.goal_range, range(4), seed=0)
+    later = greedy_movements(agent, 1, agent.goal_range, range(2, 4), seed=0)
     for one, other in zip(together[2:], later, strict=True):
         np.testing.assert_array_equal(one.goal, other.goal)
         # from the same inflations; what the muscles did before is felt a little

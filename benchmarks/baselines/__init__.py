@@ -79,7 +79,7 @@ def measure() -> Iterator[str]:
         yield missing
         methods = {name: seeds for name, seeds in methods.items() if name not in STABLE}
     rows: list[Row] = []
-    done = known(folder / "baselines.jsonl", wanted)
+    done = read_rows(folder / "baselines.jsonl", wanted)
     yield HEADER
     for arm in arms:
         for method, seeds in methods.items():
@@ -120,7 +120,7 @@ def unavailable(methods: dict[str, int]) -> str:
     return ""
 
 
-def known(file: Path, wanted: Wanted) -> dict[tuple[int, str, int], Row]:
+def read_rows(file: Path, wanted: Wanted) -> dict[tuple[int, str, int], Row]:
     """Return the rows that were measured before by arm, method and seed."""
     found = {}
     for text in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
@@ -158,7 +158,7 @@ def measured(folder: Path, arm: int, method: str, seed: int, wanted: Wanted) -> 
             learned = replace(learned, agent=load_agent(agent))  # what is measured is what anyone could use
         row |= {"wall": learned.wall, "cpu": learned.cpu, "curve": learned.curve}
         row["simulation"] = tested(learned.agent, simulation, begin, wanted.tests)
-        rows, p99 = moved(learned.agent, arm, wanted.movements)
+        rows, p99 = greedy_movements(learned.agent, arm, wanted.movements)
         made = of_rows(one.row() for one in rows)
     return row | {
         "reward": made.reward.tolist(),
@@ -188,7 +188,7 @@ def tested(agent: AnyAgent, simulation: Simulation, begin: BeginStates, episodes
     return test(agent, simulation, begin, episodes, SEED).results()
 
 
-def moved(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
+def greedy_movements(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
     """Return movements on a virtual arm as on arrival, and the 99th percentile of a decision's time [ms]."""
     controller = Timed(agent)
     controller.reset(agent.goal_range.mean(axis=1))

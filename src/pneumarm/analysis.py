@@ -31,7 +31,7 @@ _FEWEST = 50  # held-out transitions that say something
 
 
 @dataclass(frozen=True)
-class Analysis:
+class SimulationAnalysis:
     """Figures and data of an analysis."""
 
     coverage: CoverageData
@@ -45,7 +45,7 @@ class Analysis:
         self.quality.save(folder)
 
 
-def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = None) -> Analysis:
+def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = None) -> SimulationAnalysis:
     """Analyse ``simulation`` on the sequences of ``store`` that it was not fitted to.
 
     Args:
@@ -82,7 +82,7 @@ def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = No
         "invalid": {"simulated": float(valid.simulated[-1]), "recorded": float(valid.recorded[-1])},
         "filter": filtered.coverage.summary(),
     }
-    return Analysis(
+    return SimulationAnalysis(
         coverage=_coverage(store, filtered),
         quality=_quality(simulation, filtered, apart, window.of_joints(spread.measured)),
         figures=figures,

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.checkup import CASES, said
+from benchmarks.checkup import CASES, complaints_of
 from scipy import signal, stats
 
 from faulty_arm import FAULTS, FaultyArm, logarithmic
@@ -38,7 +38,7 @@ def test_healthy_arms_are_left_alone(seed):
 
 @pytest.mark.parametrize("name", CASES)
 def test_every_fault_is_found_in_its_place_and_nothing_else(name):
-    assert said(CASES[name], 3) == {CASES[name].told}
+    assert complaints_of(CASES[name], 3) == {CASES[name].told}
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -207,7 +207,7 @@ def test_a_calibration_finds_scales_and_zeros():
 
 
 @pytest.mark.parametrize(
-    ("known", "said"),
+    ("known", "message"),
     [
         ({"angles": ((3, -3),)}, "a lower and a higher"),
         ({"supply": 60.0}, "0.1 to 10 bar"),
@@ -217,8 +217,8 @@ def test_a_calibration_finds_scales_and_zeros():
         ({"angles": ((-3, 3),), "counts_per_degree": 4.0}, "not both"),
     ],
 )
-def test_impossible_knowledge_is_refused(known, said):
-    with pytest.raises(UnusableInput, match=said):
+def test_impossible_knowledge_is_refused(known, message):
+    with pytest.raises(UnusableInput, match=message):
         Known(**known)
 
 

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays as any_array
 from scipy import stats
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.design import Wanted, analyse_table, assign, orthogonal_array, thesis_design
+from pneumarm.experiments.design import WantedFactor, analyse_table, assign, orthogonal_array, thesis_design
 from pneumarm.experiments.design.anova import anova, smallest
 from pneumarm.experiments.design.best import Criterion, confirm, derive, level_at, predict
 from pneumarm.experiments.design.distributions import f_tail, half_normal_quantile, incomplete_beta, t_quantile
@@ -181,7 +181,9 @@ def test_the_derivation_finds_the_best_of_additive_results(order: list[int], rai
 
 def test_interactions_decide_factors_that_matter_less() -> None:
     """With results -(a - 1)^2 ... only of a and of the product ab: b is fixed by column 3, given a."""
-    design = assign(orthogonal_array("L8"), [Wanted(label, label, (0, 1)) for label in "abc"], ["ab", "ac", "bc"])
+    design = assign(
+        orthogonal_array("L8"), [WantedFactor(label, label, (0, 1)) for label in "abc"], ["ab", "ac", "bc"]
+    )
     a, ab = design.array.column(1), design.array.column(3)
     for wanted in (0, 1):
         results = 10.0 * a + 5.0 * (ab == wanted) + 0.1 * design.array.column(2) + 0.01 * design.array.column(4)

@@ -54,7 +54,7 @@ def test_l9_is_the_printed_one() -> None:
 
 
 def test_l27_is_the_printed_one_where_a_single_factor_changes() -> None:
-    """Rows 2, 4 and 10 of the printed array are those whose number has one digit that is not 0."""
+    """TrialRows 2, 4 and 10 of the printed array are those whose number has one digit that is not 0."""
     levels = orthogonal_array("L27").levels + 1
     for row, printed in ((2, "1111222222222"), (4, "1222111222333"), (10, "2123123123123")):
         assert levels[row - 1].tolist() == [int(digit) for digit in printed]

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.design import Wanted, assign, load_design, orthogonal_array, thesis_design
+from pneumarm.experiments.design import WantedFactor, assign, load_design, orthogonal_array, thesis_design
 
 # Thesis table 5.3: the labels of the columns, and the levels of its 16 trials.
 LABELS = ("a", "b", "ab", "c", "ac", "bc", "de", "ce", "bd", "ad", "d", "e", "ae", "be", "cd")
@@ -35,8 +35,8 @@ TABLE = (
 PAIRS = ["".join(pair) for pair in itertools.combinations("abcde", 2)]
 
 
-def wanted(letters: str, levels: int = 2) -> list[Wanted]:
-    return [Wanted(letter, letter, tuple(range(levels))) for letter in letters]
+def wanted(letters: str, levels: int = 2) -> list[WantedFactor]:
+    return [WantedFactor(letter, letter, tuple(range(levels))) for letter in letters]
 
 
 def test_the_default_design_is_table_5_3() -> None:
@@ -97,11 +97,13 @@ def test_mixed_and_three_level_designs() -> None:
         ("L16", wanted("ab", 3), [], "no columns of its own"),
         ("L18", wanted("ab", 3), ["ab"], "no columns of its own"),
         ("L16", wanted("ab"), ["ax"], "labels of two factors"),
-        ("L4", [Wanted("a", "a", (0, 1), 7)], [], "columns 1 to 3, not 7"),
+        ("L4", [WantedFactor("a", "a", (0, 1), 7)], [], "columns 1 to 3, not 7"),
         ("L4", [*wanted("a"), *wanted("a")], [], "labels of a design's factors must differ"),
     ],
 )
-def test_what_cannot_be_assigned_is_refused(array: str, factors: list[Wanted], pairs: list[str], words: str) -> None:
+def test_what_cannot_be_assigned_is_refused(
+    array: str, factors: list[WantedFactor], pairs: list[str], words: str
+) -> None:
     with pytest.raises(UnusableInput, match=words):
         assign(orthogonal_array(array), factors, pairs)
 

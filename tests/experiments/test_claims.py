@@ -12,7 +12,7 @@ from pneumarm.cli import main
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.claims import conclusions, judge, keys_of, read_results, sections
-from pneumarm.experiments.experiment import Analysis, Claim, Row, Rows, sorted_rows
+from pneumarm.experiments.experiment import Analysis, Claim, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import Factorial
 from pneumarm.experiments.findings import weights_dominate
 from pneumarm.experiments.page import write_page
@@ -130,7 +130,7 @@ def test_a_damaged_result_is_said(tmp_path: Path) -> None:
         read_results(tmp_path)
 
 
-def rows(made: Factorial, reward: Any, arms: int = 3, runs: int = 4, success: float = 1.0) -> Rows:
+def rows(made: Factorial, reward: Any, arms: int = 3, runs: int = 4, success: float = 1.0) -> TrialRows:
     """Return rows of ``made`` with the reward of a trial in a run on an arm as the function says."""
     found = []
     for arm in range(arms):
@@ -144,7 +144,7 @@ def rows(made: Factorial, reward: Any, arms: int = 3, runs: int = 4, success: fl
     return sorted_rows(found)
 
 
-def claims(made: Factorial, table: Rows) -> list[Claim]:
+def claims(made: Factorial, table: TrialRows) -> list[Claim]:
     return list(made.claims(table, *made.analyses(table)))
 
 

@@ -22,7 +22,7 @@ from pneumarm.experiments.evidence import (
     series,
     table,
 )
-from pneumarm.experiments.experiment import Row, Rows, sorted_rows
+from pneumarm.experiments.experiment import Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import rank_correlation
 from pneumarm.experiments.overnight.analysis import answer
 from pneumarm.experiments.pictures import Axis, Curve, against, courses, dots
@@ -56,10 +56,10 @@ def test_what_is_missing_in_a_row_does_not_count() -> None:
     def row(arm: str, run: int, **figures: float) -> Row:
         return Row(arm, 1, run, figures, 0.0)
 
-    two = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0), row("b", 1, x=8.0), row("b", 2)))
+    two = TrialRows((row("a", 1, x=1.0), row("a", 2, x=3.0), row("b", 1, x=8.0), row("b", 2)))
     assert mean(two, "x", 1)[::2] == (5.0, 2)
     assert f"{mean(two, 'x', 1).times(-1):.0f}" == "-5 ± 38"  # half is t(0.975, 1) 12.7 times 3
-    one = Rows((row("a", 1, x=1.0), row("a", 2, x=3.0)))
+    one = TrialRows((row("a", 1, x=1.0), row("a", 2, x=3.0)))
     assert f"{mean(one, 'y', 1):.2f}" == "none"
     assert difference(one, "x", 1, 1).half == 0
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pneumarm.experiments.claims import keys_of
-from pneumarm.experiments.experiment import Row, Rows, sorted_rows
+from pneumarm.experiments.experiment import Row, TrialRows, sorted_rows
 from pneumarm.experiments.fine_tuning import EXPERIMENT
 from pneumarm.experiments.fine_tuning.analysis import confirmation, returns_figure
 from pneumarm.experiments.registry import experiment
@@ -20,7 +20,7 @@ def test_three_levels_each_and_trial_10() -> None:
     assert found[-1] == experiment("all-goals").train_settings(10)  # type: ignore[attr-defined]
 
 
-def rows(odd: dict[int, float], even: dict[int, float], runs: int = 6) -> Rows:
+def rows(odd: dict[int, float], even: dict[int, float], runs: int = 6) -> TrialRows:
     """Return rows with these rewards by trial in odd and even runs, 0 elsewhere."""
     draw = np.random.default_rng(1)
     found = []

@@ -16,7 +16,7 @@ from pneumarm.experiments import registry
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.displacement import typical
 from pneumarm.experiments.evidence import blocks, values
-from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, Rows, run_seed, sorted_rows
+from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, TrialRows, run_seed, sorted_rows
 from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,
@@ -66,7 +66,7 @@ def small_material(small_run: Path) -> Material:
     return Material(SMALL.arm, Simulated(simulation, begin))
 
 
-def rows_of(experiment: Experiment, of: Material, runs: int = 2) -> Rows:
+def rows_of(experiment: Experiment, of: Material, runs: int = 2) -> TrialRows:
     measured = [
         (trial, run, experiment.measure(of, trial, run, LABORATORY))
         for run in range(1, runs + 1)

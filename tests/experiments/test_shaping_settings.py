@@ -10,7 +10,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.claims import keys_of
-from pneumarm.experiments.experiment import LaboratorySettings, Row, Rows, sorted_rows
+from pneumarm.experiments.experiment import LaboratorySettings, Row, TrialRows, sorted_rows
 from pneumarm.experiments.preparation import PLAN, Simulated, simulated
 from pneumarm.experiments.shaping_settings import EXPERIMENT
 from pneumarm.experiments.shaping_settings.analysis import strategy_figure
@@ -60,7 +60,7 @@ def test_worn_trials_are_measured_on_the_worn_arm() -> None:
     assert found != EXPERIMENT.measure(WholeAndWorn(here, there), THESIS, 1, SHORT)
 
 
-def rows(met: dict[int, float], arms: int = 5, runs: int = 4) -> Rows:
+def rows(met: dict[int, float], arms: int = 5, runs: int = 4) -> TrialRows:
     """Return rows in which shaping brings 10 of reward; runs and arms differ by much more."""
     draw = np.random.default_rng(0)
     found = []
@@ -82,7 +82,7 @@ def test_claims_are_about_what_the_experiment_tests() -> None:
     assert {claim.about for claim in EXPERIMENT.analyse(rows({})).claims} == keys_of(EXPERIMENT.name)
 
 
-def verdicts(found: Rows) -> dict[str, str]:
+def verdicts(found: TrialRows) -> dict[str, str]:
     return {claim.text.split(":")[0]: claim.verdict for claim in EXPERIMENT.analyse(found).claims}
 
 

@@ -14,14 +14,14 @@ from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.control_frequency import ControlFrequency
 from pneumarm.experiments.control_frequency.frequencies import at_frequency
 from pneumarm.experiments.enough_data import EnoughData
-from pneumarm.experiments.experiment import Claim, Experiment, LaboratorySettings, Row, Rows, sorted_rows
+from pneumarm.experiments.experiment import Claim, Experiment, LaboratorySettings, Row, TrialRows, sorted_rows
 from pneumarm.experiments.noise_for_transfer import NoiseForTransfer
 from pneumarm.experiments.page import write_page
 from pneumarm.experiments.registry import experiment
 from pneumarm.experiments.state_history import StateHistory
 from pneumarm.experiments.state_history.histories import errors_with_period, shortened
 from pneumarm.experiments.sweep import sweep
-from pneumarm.experiments.there_and_back import Prepared, Recipe, opened, over_joints, prepared, trained_and_moved
+from pneumarm.experiments.there_and_back import Prepared, Recipe, opened, over_joints, prepared, train_and_move
 from pneumarm.experiments.valves_closed import ValvesClosed
 from pneumarm.experiments.valves_closed.inflation import inflation
 from pneumarm.learning import TrainSettings
@@ -90,7 +90,7 @@ def test_the_experiment_by_its_name_is_of_the_same_kind(chosen: Experiment) -> N
 # Verdicts -------------------------------------------------------------------------------------------------------
 
 
-def made_up(chosen: Experiment, **slopes: float) -> Rows:
+def made_up(chosen: Experiment, **slopes: float) -> TrialRows:
     """Return rows in which every figure grows with the trial by its slope, alike on all arms."""
     names = {*slopes, "reward", "episodes", "seconds", "switches", "actions", "success_rate"}
     names |= {f"{kind} {name}" for kind in ("std", "change", "relative") for name in over_joints(np.ones(4))}
@@ -180,8 +180,8 @@ def test_the_arm_is_controlled_at_the_frequency(material: Prepared, laboratory: 
     """Twice as many actions fit in the time of a movement that is cut off."""
     never = replace(TrainSettings(), cutoff=20, reward=replace(TrainSettings().reward, angle_tolerance=1e-6))
     few = replace(SMALL, max_episodes=1)
-    slow = trained_and_moved(material, never, 1, few)
-    quick = trained_and_moved(replace(material, recipe=replace(material.recipe, frequency=60.0)), never, 1, few)
+    slow = train_and_move(material, never, 1, few)
+    quick = train_and_move(replace(material, recipe=replace(material.recipe, frequency=60.0)), never, 1, few)
     assert slow["actions"] == quick["actions"] == 20
     assert slow["seconds"] == pytest.approx(20 / 30, rel=0.02)
     assert quick["seconds"] == pytest.approx(20 / 60, rel=0.02)

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pneumarm.experiments.experiment import Analysis, Experiment, Figures, LaboratorySettings, Report, Rows, run_seed
+from pneumarm.experiments.experiment import (
+    Analysis,
+    Experiment,
+    Figures,
+    LaboratorySettings,
+    Report,
+    TrialRows,
+    run_seed,
+)
 from pneumarm.experiments.words import Words
 
 
@@ -47,6 +55,6 @@ class Toy(Experiment):
             "process": os.getpid(),
         }
 
-    def analyse(self, rows: Rows) -> Analysis:
+    def analyse(self, rows: TrialRows) -> Analysis:
         table = rows.table("sum", list(self.trials))
         return Analysis(["It does."], {"shape": list(table.shape)}, [])

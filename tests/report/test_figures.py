@@ -29,7 +29,7 @@ def figures_of(n, joints):
     far = (test.distance[won], test.actions[won], test.all_switches[won])
     real, simulated = q.target - q.observation, q.predicted - q.observation
     adapted = builders.adaptation(n, joints)
-    marks = [figures.Mark(event.movement, event.what) for event in adapted.events]
+    marks = [figures.CurveMark(event.movement, event.what) for event in adapted.events]
     m = builders.movement(joints=joints, n=max(n // 8, 1))
     k = builders.marked(n, builders.marked().reasons if n else ())
     made = {
@@ -231,7 +231,7 @@ def test_baselines_stand_at_their_rewards_beside_the_bound():
 
 def test_the_adaptation_is_told_with_its_figures():
     adapted = builders.adaptation()
-    marks = [figures.Mark(event.movement, event.what) for event in adapted.events]
+    marks = [figures.CurveMark(event.movement, event.what) for event in adapted.events]
     words = figures.adaptation_curves_alt(adapted.squares, adapted.quantities, marks)
     first = np.sqrt(adapted.squares[:100, 1, 0].mean())
     assert f"angle {first:.2f} in the first hundred" in words

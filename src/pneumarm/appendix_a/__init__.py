@@ -1,4 +1,4 @@
-"""The errors of thesis appendix A lived through again on a virtual arm, beside the same arm without them.
+"""The errors of thesis appendix A played on a virtual arm, beside the same arm without them.
 
 :mod:`~pneumarm.appendix_a.runs` makes a run, :mod:`~pneumarm.appendix_a.errors` all of them with their pictures, and
 :mod:`~pneumarm.appendix_a.page` a page of those.

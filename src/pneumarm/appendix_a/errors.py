@@ -1,8 +1,11 @@
 """The errors of thesis appendix A, each with the runs that show it."""
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import resources
 
+import msgspec
 from matplotlib.figure import Figure
 
 from pneumarm.appendix_a import pictures
@@ -24,122 +27,94 @@ CLAIMS = 0.05
 """Share of the readings for which the driver claims that the buffer is empty."""
 
 
-@dataclass(frozen=True)
-class Shown:
+class PictureWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A picture of several cases side by side."""
 
-    figure: Figure
+    draw: str
+    """Function of :mod:`.pictures`."""
     caption: str
+    quantities: tuple[int, ...] = ()
+    """That it shows, where it can show several."""
 
 
-@dataclass(frozen=True)
-class Error:
-    """One of the errors, what it did, and what reveals it."""
+class ErrorWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An error in words, as in ``errors.toml``."""
 
     title: str
     happened: str
-    """What the thesis tells, and how it was played."""
+    """What the thesis tells, and how it is played."""
+    cases: str
+    """Name of the runs that show it."""
+    pictures: tuple[PictureWords, ...]
+
+
+class _ErrorsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    errors: tuple[ErrorWords, ...]
+
+
+@dataclass(frozen=True)
+class PlayedError:
+    """One of the errors, what it did, and what reveals it."""
+
+    words: ErrorWords
     cases: tuple[Case, ...]
     """The arm without the error, then with it, then with a remedy where there is one."""
-    shown: tuple[Shown, ...]
+
+    def drawn(self) -> list[tuple[Figure, str]]:
+        """Return the pictures that reveal it, with their captions."""
+        return [
+            (getattr(pictures, one.draw)(self.cases, *([one.quantities] if one.quantities else [])), one.caption)
+            for one in self.words.pictures
+        ]
 
 
-def lived(
+def play_errors(
     seed: int = 0,
     settings: RunsSettings = RunsSettings(),
     *,
     progress: Callable[[float, float], None] | None = None,
-) -> list[Error]:
+) -> list[PlayedError]:
     """Return the errors as they show themselves on the virtual arm ``seed``; 0 is the nominal one."""
-    told, made, total = progress or (lambda done, total: None), 0, 9
-    told(made, total)
+    text = (resources.files(__package__) / "errors.toml").read_text(encoding="utf-8")
+    cases = _cases(seed, settings, progress or (lambda done, total: None))
+    words = msgspec.convert(tomllib.loads(text), _ErrorsFile).errors
+    return [PlayedError(one, cases[one.cases]) for one in words]
+
+
+def _cases(
+    seed: int, settings: RunsSettings, progress: Callable[[float, float], None]
+) -> dict[str, tuple[Case, ...]]:
+    """Run the arm without the errors and with each."""
+    made, total = 0, 9
+    progress(made, total)
 
     def case(name: str, arm: Arm, before: Case | None = None, *, checked: bool = True) -> Case:
         nonlocal made
         simulation = None if before is None else before.simulation
         result = run(name, arm, settings, seed=seed, before=simulation, checked=checked)
         made += 1
-        told(made, total)
+        progress(made, total)
         return result
 
     healthy = case("healthy", virtual(seed))
-    leaps = (healthy, case("sensor at the valve", virtual(seed, ValveSideSensor(muscle=1)), healthy))
-    bent = (healthy, case("logarithmic", virtual(seed, LogarithmicPotentiometer()), healthy))
-    worn = (healthy, case("worn", virtual(seed, WornPotentiometer(angle=5.0, height=15.0, contact=8.0)), healthy))
-    loud = SensorNoise(angle=6.0, pressure=6.0)
-    noisy = (
-        healthy,
-        case("noise, single readings", virtual(seed, loud, conversions=1), healthy),
-        case("noise, medians of 9", virtual(seed, loud, conversions=9), healthy),
-    )
+    worn, loud = WornPotentiometer(angle=5.0, height=15.0, contact=8.0), SensorNoise(angle=6.0, pressure=6.0)
+    found = {
+        "valve side": (healthy, case("sensor at the valve", virtual(seed, ValveSideSensor(muscle=1)), healthy)),
+        "logarithmic": (healthy, case("logarithmic", virtual(seed, LogarithmicPotentiometer()), healthy)),
+        "worn": (healthy, case("worn", virtual(seed, worn), healthy)),
+        "noise": (
+            healthy,
+            case("noise, single readings", virtual(seed, loud, conversions=1), healthy),
+            case("noise, medians of 9", virtual(seed, loud, conversions=9), healthy),
+        ),
+    }
     sound = case("driver in order", SerialArm(*board(seed, 0.0)), checked=False)
-    lost = (
+    found["lost buffer"] = (
         sound,
         case("claims believed", HeadlessArm(*board(seed, CLAIMS)), sound, checked=False),
         case("claims seen through", SerialArm(*board(seed, CLAIMS)), sound, checked=False),
     )
-    return [
-        Error(
-            "Leaps in pressure",
-            "The pressure sensors were at the valves' side of the muscles. While air flows they read what flows; "
-            "only 10 ms after a valve has closed they read what is in the muscle. The isoplots of the pressures "
-            "were very poor, those of the angle fine (A.1.1, figures A.1 and A.2). Played by the sensor of muscle "
-            "1. Here valves stay as they are while a reading is made, and the leap is the same each time: a "
-            "simulation learns it, and its isoplot is hardly worse. A close look at a pulse reveals it.",
-            leaps,
-            (
-                Shown(pictures.opening(leaps), "Pressure 1 around a pulse of air (grey), read every millisecond."),
-                Shown(pictures.isoplots(leaps, (2, 3)), "Isoplots of both pressures; only sensor 1 is misplaced."),
-            ),
-        ),
-        Error(
-            "A logarithmic potentiometer",
-            "The first potentiometer was one for loudness (A.1.2). A simulation can be fitted to it as well: what "
-            "is far from linear is how far the arm turns for a count, and that is seen with the arm at rest.",
-            bent,
-            (
-                Shown(pictures.sweeps(bent), "Angle at rest against the difference of the pressures, up and down."),
-                Shown(pictures.by_angle(bent), "Residue of the angle by angle, with mean and standard deviation."),
-            ),
-        ),
-        Error(
-            "A worn potentiometer",
-            "The axis was pressed on all the time, and the isoplots of the angle became worse and worse (A.1.2). "
-            "Played by a track that is worn around 5 degrees, where it reads wrong and differently each time.",
-            worn,
-            (
-                Shown(pictures.by_angle(worn), "Residue of the angle by angle, with mean and standard deviation."),
-                Shown(pictures.isoplots(worn, (0, 1)), "Isoplots of angle and velocity, which is derived from it."),
-            ),
-        ),
-        Error(
-            "Noise",
-            "Noise as wide as the isoplots (A.1.3). With the muscles filled and closed, and what drifts taken "
-            "out, its covariance is that of white noise: so conversions one after the other are independent, and "
-            "the median of several of them is worth making. Played by 6 counts on every conversion.",
-            noisy,
-            (
-                Shown(pictures.noise(noisy), "Pressure 1 at rest, detrended: power spectrum and autocovariance."),
-                Shown(pictures.isoplots(noisy, (0, 2)), "Isoplots of angle and pressure 1."),
-            ),
-        ),
-        Error(
-            "A lost buffer",
-            "The driver claimed that the buffer was empty while the answer was in it (A.1.4). A host without "
-            "headers and time stamps goes on with what it read before, as if it were new. The protocol's sequence "
-            f"numbers and time stamps see through the claims. Played on the emulated board, for {CLAIMS:.0%} of "
-            "what is read.",
-            lost,
-            (
-                Shown(pictures.in_a_row(lost), "Residue of the angle, transition after transition."),
-                Shown(
-                    pictures.isoplots(lost, (0, 1)),
-                    "Isoplots of angle and velocity: a reading that was "
-                    "taken again is no observed change, and two at once after it.",
-                ),
-            ),
-        ),
-    ]
+    return found
 
 
 def virtual(seed: int, *faults: Fault, conversions: int | None = None) -> VirtualArm:

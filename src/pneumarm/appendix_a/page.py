@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-from pneumarm.appendix_a.errors import Error
+from pneumarm.appendix_a.errors import PlayedError
 from pneumarm.appendix_a.runs import Case
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.style import quantities
 
 
-def errors_page(errors: Sequence[Error], arm: str) -> str:
+def errors_page(errors: Sequence[PlayedError], arm: str) -> str:
     """Return the page of the ``errors`` of ``arm`` as HTML text."""
     summary = [
         f"The errors that appendix A of the thesis tells of, played on {arm}: the same commands to the same arm "
@@ -19,16 +19,16 @@ def errors_page(errors: Sequence[Error], arm: str) -> str:
     return render("The errors of appendix A", summary, [_section(error) for error in errors])
 
 
-def _section(error: Error) -> Section:
+def _section(error: PlayedError) -> Section:
     return Section(
-        error.title,
-        text=[error.happened],
+        error.words.title,
+        text=[" ".join(error.words.happened.split())],
         tables=[verdicts(error)],
-        figures=[Picture(one.figure, one.caption, f"{one.caption} {_errors_of(error)}") for one in error.shown],
+        figures=[Picture(figure, caption, f"{caption} {_errors_of(error)}") for figure, caption in error.drawn()],
     )
 
 
-def verdicts(error: Error) -> Table:
+def verdicts(error: PlayedError) -> Table:
     """Return what is said of each case of ``error``."""
     kinds = quantities(error.cases[0].spec)
     rows = [
@@ -50,7 +50,7 @@ def _checkup(case: Case) -> str:
     return " ".join(case.complaints) or "nothing found"
 
 
-def _errors_of(error: Error) -> str:
+def _errors_of(error: PlayedError) -> str:
     return "; ".join(
         f"{case.name}: error of the angle {case.residue[..., 0].std():.2g} counts, of pressure 1 "
         f"{case.residue[..., 2].std():.2g} counts"

@@ -1,16 +1,16 @@
 """The check-up of an arm: what its sensors, valves and muscles do, what is wrong with them, and its calibration."""
 
-from pneumarm.checkup.calibrate import Calibration, Known, calibrate
-from pneumarm.checkup.diagnose import Finding, diagnose
+from pneumarm.checkup.calibrate import ArmCalibration, Known, calibrate
+from pneumarm.checkup.diagnose import Complaint, diagnose
 from pneumarm.checkup.figures import ends, joint_figures, quickening
 from pneumarm.checkup.leaks import LeakRates, LeakTest, leak_test, leaking
 from pneumarm.checkup.measure import Checkup, CheckupSettings, Trace, fill_alone, measure
 
 __all__ = [
-    "Calibration",
+    "ArmCalibration",
     "Checkup",
     "CheckupSettings",
-    "Finding",
+    "Complaint",
     "Known",
     "LeakRates",
     "LeakTest",

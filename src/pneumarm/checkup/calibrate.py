@@ -61,7 +61,7 @@ def _of_a_sheet(counts: float | None, measured: object, name: str) -> bool | str
 
 
 @dataclass(frozen=True)
-class Calibration:
+class ArmCalibration:
     """What came of it."""
 
     file: ArmFile
@@ -69,7 +69,7 @@ class Calibration:
     """For each joint what a linearised potentiometer leaves [degrees]; None where nothing was to linearise."""
 
 
-def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
+def calibrate(checkup: Checkup, known: Known = Known()) -> ArmCalibration:
     """Return spec, corrections and sound of the arm that was checked with its sensors raw.
 
     Raises:
@@ -116,7 +116,7 @@ def calibrate(checkup: Checkup, known: Known = Known()) -> Calibration:
         spec, counts_per_degree=per_degree, counts_per_bar=mean_per_bar, angle_range=angle_range, period=period
     )
     file = ArmFile(calibrated, correction, _sound_state(checkup, correction))
-    return Calibration(file, tuple(line.residual for line in lines))
+    return ArmCalibration(file, tuple(line.residual for line in lines))
 
 
 def _sound_state(checkup: Checkup, correction: Correction) -> SoundState | None:

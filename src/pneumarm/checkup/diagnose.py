@@ -59,7 +59,7 @@ Kind = Literal[
 ]  # fmt: skip
 
 
-class Finding(NamedTuple):
+class Complaint(NamedTuple):
     """Something that is wrong."""
 
     kind: Kind
@@ -73,7 +73,7 @@ class Finding(NamedTuple):
         return f"{self.where}: {self.kind}: {self.told_by}. {self.remedy}."
 
 
-def diagnose(checkup: Checkup, sound: SoundState | None = None) -> list[Finding]:
+def diagnose(checkup: Checkup, sound: SoundState | None = None) -> list[Complaint]:
     """Return what is wrong with the arm; an empty list for a healthy one.
 
     Args:
@@ -86,11 +86,11 @@ def diagnose(checkup: Checkup, sound: SoundState | None = None) -> list[Finding]
     if np.quantile(periods, 0.95) > 1.5 * checkup.spec.period:
         worst = f"95 % of the control periods are below {1e3 * np.quantile(periods, 0.95):.0f} ms"
         remedy = f"This host or link cannot keep {1e3 * checkup.spec.period:.0f} ms: take a longer period"
-        found.append(Finding("jitter", "control cycle", worst, remedy))
+        found.append(Complaint("jitter", "control cycle", worst, remedy))
     return found
 
 
-def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Finding]:
+def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Complaint]:
     test, figures, bar = checkup.joints[j], joint_figures(checkup, j), checkup.spec.counts_per_bar
     name = f"joint {j + 1}" if len(checkup.joints) > 1 else "joint"
     rose = np.array([_rise(test.muscles[m]) for m in range(2)]) / bar  # [muscle filled, sensor]
@@ -108,7 +108,7 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Fi
         swapped = _vents_up(test.muscles[m], m, checkup)
         if (filled_by_venting[m] or swapped) and _filled_by_venting(test.muscles[m], m, checkup):
             swapped_pair = True
-            yield Finding(
+            yield Complaint(
                 "valves swapped",
                 where,
                 "its pressure rises when its exhaust opens",
@@ -116,13 +116,13 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Fi
             )
     if crossed and reversed_:
         detail = "filling one raises the pressure of the other and turns the joint the other way"
-        yield Finding("muscles swapped", name, detail, "Swap the valves of muscle 1 with those of muscle 2")
+        yield Complaint("muscles swapped", name, detail, "Swap the valves of muscle 1 with those of muscle 2")
     elif crossed:
         detail = "filling one raises the pressure of the other, yet the joint turns the right way"
-        yield Finding("pressure sensors swapped", name, detail, "Swap the two pressure sensors")
+        yield Complaint("pressure sensors swapped", name, detail, "Swap the two pressure sensors")
     elif reversed_:
         detail = f"muscle 1 turns it by {turned[0]:.0f}, muscle 2 by {turned[1]:.0f} degrees"
-        yield Finding("angle reversed", name, detail, "Swap the outer wires of the potentiometer")
+        yield Complaint("angle reversed", name, detail, "Swap the outer wires of the potentiometer")
     if crossed or swapped_pair:
         return
     limit = checkup.spec.max_pressure
@@ -130,7 +130,7 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Fi
     if full > HIGH_SUPPLY * limit:
         detail = f"muscles fill to {full:.2f} bar before their inlets can be closed at the limit of {limit:.2f} bar"
         remedy = "Turn the reducer down; if it creeps up again, put a safety valve on the buffer (thesis A.1.1)"
-        yield Finding("high supply", name, detail, remedy)
+        yield Complaint("high supply", name, detail, remedy)
         return  # so fast nothing else can be judged
     frozen = [_is_frozen(test, m) for m in range(2)]
     valves = list(_of_valves(figures, rose, stays, frozen, checkup, name))
@@ -143,7 +143,7 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Fi
     if (quicker := quickening(test, checkup)) < RISING:
         detail = f"at the end of the check-up muscles fill in {100 * quicker:.0f} % of the time that they took before"
         remedy = "Check whether the reducer leaks: its buffer fills up while no air is used (thesis A.1.1)"
-        yield Finding("rising supply", name, detail, remedy)
+        yield Complaint("rising supply", name, detail, remedy)
     yield from _of_noise(checkup, j, name)
     potentiometer = list(_of_potentiometer(checkup, test, figures, name))
     yield from potentiometer
@@ -153,39 +153,43 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Fi
 
 def _of_valves(
     figures: JointFigures, rose: Array, stays: NDArray[np.bool_], frozen: list[bool], checkup: Checkup, name: str
-) -> Iterator[Finding]:
+) -> Iterator[Complaint]:
     limit = checkup.spec.max_pressure
     own, other = rose.diagonal(), rose[::-1].diagonal()  # by its own inlet, by the other muscle's
     full = np.array([m.full for m in figures.muscles])
     if (own < MOVED).all():
-        yield Finding("low supply", name, "no muscle fills", "Turn the air on; check the valves' power")
+        yield Complaint("low supply", name, "no muscle fills", "Turn the air on; check the valves' power")
         return
     if (np.maximum(full, own) < LOW_SUPPLY * limit).all():
         detail = f"full muscles reach {full[0]:.2f} and {full[1]:.2f} bar of {limit:.2f}"
-        yield Finding("low supply", name, detail, "Check the reducer, the buffer and the filters")
+        yield Complaint("low supply", name, detail, "Check the reducer, the buffer and the filters")
     for m, muscle in enumerate(figures.muscles):
         where = f"{name}, muscle {m + 1}"
         if frozen[m]:
             continue  # nothing is known of its valves
         if own[m] < MOVED:
             detail = f"it gains {own[m]:.2f} bar when its inlet opens"
-            yield Finding("inlet stuck closed", where, detail, "Check the inlet valve, its wire and its hose")
+            yield Complaint("inlet stuck closed", where, detail, "Check the inlet valve, its wire and its hose")
         elif muscle.full < 0.6 * own[m]:
             detail = f"it keeps {muscle.full:.2f} of {own[m]:.2f} bar when its valves close"
-            yield Finding("exhaust stuck open", where, detail, "Check the exhaust valve; or the muscle has burst")
+            yield Complaint("exhaust stuck open", where, detail, "Check the exhaust valve; or the muscle has burst")
         elif other[m] > _EVEN or muscle.leak < -LEAK:
             detail = "its pressure rises while its valves are closed"
-            yield Finding("inlet stuck open", where, detail, "Check the inlet valve: it sticks, or its seat is dirty")
+            yield Complaint(
+                "inlet stuck open", where, detail, "Check the inlet valve: it sticks, or its seat is dirty"
+            )
         elif stays[m]:
             detail = "its pressure does not fall when its exhaust opens"
-            yield Finding("exhaust stuck closed", where, detail, "Check the exhaust valve, its wire and its silencer")
+            yield Complaint(
+                "exhaust stuck closed", where, detail, "Check the exhaust valve, its wire and its silencer"
+            )
         elif muscle.leap > max(LEAP, _CLEAR * muscle.noise / checkup.spec.counts_per_bar):
             detail = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
             remedy = "Move the pressure sensor to the far end of the muscle (thesis A.1.1)"
-            yield Finding("pressure at the valve's side", where, detail, remedy)
+            yield Complaint("pressure at the valve's side", where, detail, remedy)
 
 
-def _of_leaks(figures: JointFigures, name: str, sound: SoundState | None, j: int) -> Iterator[Finding]:
+def _of_leaks(figures: JointFigures, name: str, sound: SoundState | None, j: int) -> Iterator[Complaint]:
     now = np.array([[muscle.leak, muscle.leak_error] for muscle in figures.muscles]).T / 100
     if np.isnan(now).any():
         return
@@ -205,30 +209,30 @@ def _of_leaks(figures: JointFigures, name: str, sound: SoundState | None, j: int
         elif sound is not None:
             detail += f", instead of {100 * then[0, m]:.1f} % when calibrated"
         remedy = "Look for the leak with soap water: clamps, hose, exhaust valve"
-        yield Finding("leak", f"{name}, muscle {m + 1}", detail, remedy)
+        yield Complaint("leak", f"{name}, muscle {m + 1}", detail, remedy)
 
 
 def _of_calibration(
     checkup: Checkup, test: JointTest, name: str, calibrated: tuple[float, float]
-) -> Iterator[Finding]:
+) -> Iterator[Complaint]:
     spec = checkup.spec
     vented = spec.bar(test.before.pressure[-10:].mean(axis=0))
     for m in np.flatnonzero(np.abs(vented) > ZERO):
         detail = f"vented, its sensor reads {vented[m]:.2f} bar; the zero has moved, or the spec is of another arm"
-        yield Finding("not as calibrated", f"{name}, muscle {m + 1}", detail, _AGAIN)
+        yield Complaint("not as calibrated", f"{name}, muscle {m + 1}", detail, _AGAIN)
     moved = (ends(test) - calibrated) / spec.counts_per_degree
     if np.abs(moved).max() > ENDS:
         detail = (
             f"its ends are {moved[0]:+.1f} and {moved[1]:+.1f} degrees from where they were; the potentiometer has "
             "slipped on its axis, the muscles or their mounting have changed, or the spec is of another arm"
         )
-        yield Finding("not as calibrated", name, detail, _AGAIN)
+        yield Complaint("not as calibrated", name, detail, _AGAIN)
 
 
 _AGAIN = "Check it, then calibrate again with `pneumarm arm calibrate`"
 
 
-def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
+def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Complaint]:
     test = checkup.joints[j]
     everything = np.concatenate([trace.angle for m in test.muscles for trace in (m.whole, m.pulse)])
     low, high = checkup.spec.angle_range
@@ -236,14 +240,14 @@ def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
         dead = everything[0] <= low or everything[0] >= high
         remedy = "Check the potentiometer's wires" if dead else "Check the potentiometer's axis and its wires"
         detail = f"it reads {everything[0]:.0f} no matter what moves"
-        yield Finding("angle dead" if dead else "angle frozen", name, detail, remedy)
+        yield Complaint("angle dead" if dead else "angle frozen", name, detail, remedy)
     for m in range(2):
         if _is_frozen(test, m):
             detail = f"it reads {test.rest.pressure[0, m]:.0f} no matter what moves"
-            yield Finding("pressure frozen", f"{name}, muscle {m + 1}", detail, "Check the pressure sensor's wires")
+            yield Complaint("pressure frozen", f"{name}, muscle {m + 1}", detail, "Check the pressure sensor's wires")
 
 
-def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
+def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Complaint]:
     test = checkup.joints[j]
     for what, values in (
         ("angle", test.rest.angle),
@@ -256,11 +260,11 @@ def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Finding]:
         if unlikely and abs(correlation[worst]) > WHITE:
             detail = f"at rest its readings {worst} apart have a correlation of {correlation[worst]:.2f}"
             remedy = "Look for hum of the mains, a bad ground, or a filter; medians of such readings help little"
-            yield Finding("noise not white", f"{name}, {what}", detail, remedy)
+            yield Complaint("noise not white", f"{name}, {what}", detail, remedy)
         elif clean.std() > NOISY and not (what == "angle" and len(_worn(test)[0])):
             detail = f"at rest its readings vary by {clean.std():.1f} counts, independently of each other"
             remedy = "Let the board take the median of more conversions (thesis A.1.3); check ground and shield"
-            yield Finding("noise", f"{name}, {what}", detail, remedy)
+            yield Complaint("noise", f"{name}, {what}", detail, remedy)
 
 
 _CLEAR = 5.0  # standard deviations of the noise: what stands out of hundreds of readings
@@ -268,13 +272,13 @@ _LIKELY = 90.0
 """White noise gives a larger statistic of Ljung and Box once in 10^10 times, with 20 lags."""
 
 
-def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, name: str) -> Iterator[Finding]:
+def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, name: str) -> Iterator[Complaint]:
     if not np.isnan(figures.halves) and not 1 / LOGARITHMIC < figures.halves < LOGARITHMIC:
         detail = (
             f"the upper half of the pressure difference turns it {figures.halves:.2f} times as far as the lower half"
         )
         remedy = "Put in a linear one, or let `pneumarm arm calibrate` linearise it"
-        yield Finding("angle logarithmic", name, detail, remedy)
+        yield Complaint("angle logarithmic", name, detail, remedy)
     worn, off = _worn(test)
     if len(worn):
         degrees = checkup.spec.degrees(worn)
@@ -282,7 +286,7 @@ def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, 
         places = " and ".join(f"{z[0]:.0f}" if len(z) == 1 else f"{z[0]:.0f} to {z[-1]:.0f}" for z in zones)
         detail = f"readings are off by up to {off.max():.0f} counts at {places} degrees"
         remedy = "Put in a new potentiometer, and mount it so that nothing presses on its axis (thesis A.1.2)"
-        yield Finding("angle worn", name, detail, remedy)
+        yield Complaint("angle worn", name, detail, remedy)
 
 
 _APART = 6.0  # degrees between two worn zones

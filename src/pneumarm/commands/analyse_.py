@@ -22,8 +22,6 @@ def analyse_(db: Path, sim: Path, /, *, out: Path, json: Json = False) -> None:
         The simulation, from ``pneumarm fit``.
     out
         Folder for the page and its figures; created if it does not exist.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     require_folder(out)
     simulation = Simulation.load(sim)

@@ -57,8 +57,6 @@ def check_(
         Folder for a page with curves; created if it does not exist.
     seed
         Of a virtual arm's noise.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     if out is not None:
         require_folder(out)
@@ -148,8 +146,6 @@ def calibrate_(
         ... or counts of the pressure sensors per bar, by their data sheet.
     seed
         Of a virtual arm's noise.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     require_folder(out)
     known = Known(angles, counts_per_degree, supply, counts_per_bar)
@@ -208,19 +204,17 @@ def errors_(
         Page to write, errors.html.
     seed
         Of the virtual arm; 0 is the nominal one.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
-    from pneumarm.appendix_a.errors import lived
+    from pneumarm.appendix_a.errors import play_errors
     from pneumarm.appendix_a.page import errors_page
 
     require_folder(out)
     with progress("playing the errors") as report:
-        errors = lived(seed, settings, progress=report)
+        errors = play_errors(seed, settings, progress=report)
     write_text(out, errors_page(errors, f"virtual:seed={seed}" if seed else "the nominal virtual arm"))
     say(f"page: {out}")
     result = {
-        error.title: {
+        error.words.title: {
             case.name: {
                 "checkup": list(case.complaints),
                 "monitor": list(case.monitor),
@@ -249,8 +243,6 @@ def sensors_(arm: str, /, *, seconds: float = 60.0, every: float = 0.2, json: Js
         For how long [s]; Ctrl-C ends it sooner.
     every
         Time between two lines [s].
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     if not (0 < seconds <= 86400 and 0.01 <= every <= 60):
         raise UnusableInput(f"sensors are shown for up to 86400 s, every 0.01 to 60 s, got {seconds}, {every}")
@@ -312,8 +304,6 @@ def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Jso
         How long each is open [s].
     pause
         How long all are closed after each [s].
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     if not (0 < open_for <= 5 and 0 <= pause <= 60):
         raise UnusableInput(f"a valve can be open for up to 5 s with pauses of up to 60 s, got {open_for}, {pause}")

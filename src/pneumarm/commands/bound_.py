@@ -31,8 +31,6 @@ def bound_(
         collection measures the range of goals.
     seed
         Of the begin states, the goals and the noise; those of ``pneumarm transfer`` with the same seed.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     opened = open_arm(arm, seed)
     if not isinstance(opened, VirtualArm):

@@ -39,8 +39,6 @@ def claims_(
         Folder of the laboratory, as of ``pneumarm experiment``; the page is claims.html in it.
     markdown
         Print the table as Markdown, for a note or a paper.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     judged = judge(read_results(out))
     page = out / PAGE

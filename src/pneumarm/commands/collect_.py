@@ -39,8 +39,6 @@ def collect_(
         What acts: random, keyboard, a CSV file of valves, or an agent (thesis section 3.2.2).
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     require_enough(transitions)
     with (

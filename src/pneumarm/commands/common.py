@@ -4,8 +4,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-Json = Annotated[bool, Parameter(name="--json", negative="")]
-"""The flag that every command has: print one JSON object on stdout and nothing else there."""
+Json = Annotated[
+    bool, Parameter(name="--json", negative="", help="Print one JSON object on stdout and nothing else there.")
+]
+"""The flag that every command has."""
 Settings = Parameter(name="*")
 """Marks a dataclass of settings whose fields become options."""
 OwnMethod = Annotated[str | None, Parameter(name="--method")]

@@ -14,8 +14,6 @@ def coverage_(db: Path, /, *, json: Json = False) -> None:
     ----------
     db
         The store.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     with Store.open(db) as store:
         found = enough_data(store, Window(store.joints))

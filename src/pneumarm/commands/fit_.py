@@ -23,8 +23,6 @@ def fit_(
         The store.
     out
         File of the simulation to write.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     require_folder(out)
     with Store.open(db) as store, progress("fitting") as report:

@@ -19,8 +19,6 @@ def import_(csv: Path, db: Path, /, *, mapping: Path, json: Json = False) -> Non
         The store to make.
     mapping
         TOML file with columns, units, sequences and sampling period.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     imported = asdict(import_recording(csv, mapping, db))
     show(imported, json, lambda: [table(("imported", ""), list(imported.items()))])

@@ -40,8 +40,6 @@ def move_(
         Of a virtual arm's noise.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     with open_arm(arm, seed) as opened:
         mover, spec, goal_range = open_tracking(controller, opened, settings.tolerance, method=method)

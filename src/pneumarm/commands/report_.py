@@ -14,8 +14,6 @@ def report_(folder: Path, /, *, json: Json = False) -> None:
     ----------
     folder
         The folder of the run.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     page = write_report(folder)
     show({"report": str(page)}, json, lambda: [str(page)])

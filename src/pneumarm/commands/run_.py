@@ -24,8 +24,6 @@ def run_(
     ----------
     out
         Folder of the run; created if it does not exist.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     results = Run(out, settings, progress).do()
     phases = {

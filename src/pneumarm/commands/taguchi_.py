@@ -44,8 +44,6 @@ def analyse_(
         What the results are, for the pictures.
     out
         Folder for page.html; created if it does not exist.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     read = read_table(results, columns)
     chosen = load_design(design) if design else thesis_design()

@@ -42,8 +42,6 @@ def test_(
         Of the begin states, the goals and the noise.
     method
         The method that trained it, MODULE:NAME, if that is one of your own that is not installed.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     trained, simulation = open_agent(agent, method), Simulation.load(sim)
     with Store.open(db) as store:

@@ -39,8 +39,6 @@ def train_(
         Of the initial weights, the exploration and the begin states.
     agents
         Agents trained at once, of which the best is kept; by default as many as the method's settings say.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     require_folder(out)
     chosen = settings.chosen if agents is None else with_agents(settings.chosen, agents)

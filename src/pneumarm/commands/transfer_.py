@@ -36,8 +36,6 @@ def transfer_(
         Folder for episodes.csv, the store of all movements and the adapted agent; created if it does not exist.
     method
         The method that trained it, MODULE:NAME, if that is one of your own that is not installed.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     trained = open_agent(agent, method)
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:

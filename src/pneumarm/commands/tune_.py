@@ -34,8 +34,6 @@ def tune_(
         File for the controller, JSON.
     seed
         Of what is tried, and of a virtual arm's noise.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     require_folder(out)
     with open_arm(arm, seed) as opened, progress("tuning") as report:

@@ -20,8 +20,6 @@ def versions_(folder: Path, /, *, to: int | None = None, json: Json = False) -> 
         The folder of a transfer or a run.
     to
         Number of the version to put back into adapted.safetensors. The others are kept.
-    json
-        Print one JSON object on stdout and nothing else there.
     """
     history = read_history(folder) if to is None else put_back(folder, to)
     made = {event.version: event for event in history.events if event.what == "accepted"}

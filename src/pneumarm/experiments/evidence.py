@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.experiments.differences import Interval, interval
-from pneumarm.experiments.experiment import Row, Rows
+from pneumarm.experiments.experiment import Row, TrialRows
 from pneumarm.report.page import Table
 
 Array = NDArray[np.float64]
@@ -23,18 +23,18 @@ _SHORT = 12  # letters that are not broken over lines
 # Rows -----------------------------------------------------------------------------------------------------------
 
 
-def of_trial(rows: Rows, trial: int) -> list[list[Row]]:
+def of_trial(rows: TrialRows, trial: int) -> list[list[Row]]:
     """Return the rows of ``trial`` arm by arm."""
     return [[row for row in rows.rows if (row.arm, row.trial) == (arm, trial)] for arm in rows.arms]
 
 
-def values(rows: Rows, figure: str, trial: int) -> Array:
+def values(rows: TrialRows, figure: str, trial: int) -> Array:
     """Return ``figure`` of ``trial``, shape (arms, runs); NaN in rows that have none, as no successes no actions."""
     found = [[row.figures.get(figure, math.nan) for row in runs] for runs in of_trial(rows, trial)]
     return np.array(found, np.float64)
 
 
-def blocks(rows: Rows, figure: str, trial: int) -> Array:
+def blocks(rows: TrialRows, figure: str, trial: int) -> Array:
     """Return the course of ``figure`` in ``trial`` as of :func:`~.moving.course`, shape (arms, runs, blocks).
 
     A block in which nothing succeeded has no actions; there are as many blocks as there are of rewards.
@@ -58,7 +58,7 @@ def from_series(figures: Mapping[str, float], name: str) -> Array:
     return np.array(found)
 
 
-def series_of(rows: Rows, name: str, trial: int) -> Array:
+def series_of(rows: TrialRows, name: str, trial: int) -> Array:
     """Return what :func:`series` put into all rows of ``trial``, one after the other."""
     return np.concatenate([from_series(row.figures, name) for runs in of_trial(rows, trial) for row in runs])
 
@@ -78,7 +78,7 @@ def by_arm(table: ArrayLike) -> Array:
     return np.array([runs.mean() if len(runs) else math.nan for runs in known])
 
 
-def samples(rows: Rows, figure: str, trial: int) -> Array:
+def samples(rows: TrialRows, figure: str, trial: int) -> Array:
     """Return ``figure`` of ``trial``: its means by arm, shape (arms,), or by run where there is one arm."""
     return by_arm(values(rows, figure, trial))
 
@@ -90,17 +90,17 @@ def over_arms(table: ArrayLike) -> Interval:
     return interval(known) if len(known) else Interval(math.nan, math.inf, 0)
 
 
-def mean(rows: Rows, figure: str, trial: int) -> Interval:
+def mean(rows: TrialRows, figure: str, trial: int) -> Interval:
     """Return the mean of ``figure`` in ``trial`` over arms."""
     return over_arms(values(rows, figure, trial))
 
 
-def difference(rows: Rows, figure: str, trial: int, reference: int) -> Interval:
+def difference(rows: TrialRows, figure: str, trial: int, reference: int) -> Interval:
     """Return by how much ``figure`` is more in ``trial`` than in ``reference``, within runs."""
     return over_arms(values(rows, figure, trial) - values(rows, figure, reference))
 
 
-def change(rows: Rows, figure: str, trial: int, reference: int) -> Interval:
+def change(rows: TrialRows, figure: str, trial: int, reference: int) -> Interval:
     """Return by how many percent ``figure`` is larger in ``trial`` than in ``reference``, arm by arm."""
     return interval(100 * (samples(rows, figure, trial) / samples(rows, figure, reference) - 1))
 
@@ -121,16 +121,16 @@ class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     thesis: Mapping[str, float] | None = None
     """What the thesis has, by the words of the trial."""
 
-    def interval(self, rows: Rows, trial: int) -> Interval:
+    def interval(self, rows: TrialRows, trial: int) -> Interval:
         """Return the mean in ``trial`` as it is shown."""
         return over_arms(self.factor * values(rows, self.figure, trial))
 
-    def text(self, rows: Rows, trial: int) -> str:
+    def text(self, rows: TrialRows, trial: int) -> str:
         """Return the mean in ``trial`` for people."""
         return f"{self.interval(rows, trial):.{self.digits}f}"
 
 
-def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], caption: str) -> Table:
+def table(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column], caption: str) -> Table:
     """Return the means of ``columns`` by trial with their intervals, and beside them what the thesis has."""
     header = ["trial"]
     for column in columns:
@@ -146,12 +146,12 @@ def table(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column], capt
     return Table(header, lines, caption)
 
 
-def by_trial(rows: Rows, trials: Mapping[int, str], figure: str) -> dict[str, Any]:
+def by_trial(rows: TrialRows, trials: Mapping[int, str], figure: str) -> dict[str, Any]:
     """Return the means of ``figure`` by trial for programs."""
     return {words: mean(rows, figure, trial)._asdict() for trial, words in trials.items()}
 
 
-def numbers(rows: Rows, trials: Mapping[int, str], columns: Sequence[Column]) -> dict[str, Any]:
+def numbers(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column]) -> dict[str, Any]:
     """Return for programs what :func:`table` shows."""
     found = {
         column.figure: {

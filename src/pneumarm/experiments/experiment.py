@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Figures = Mapping[str, float]
 """What was measured, by name."""
 Report = Callable[[float, float], None]
-"""Told what is done and the total."""
+"""Called with what is done and the total."""
 ARMS = tuple(f"virtual:seed={number}" for number in range(1, 6))
 """Five different arms to develop on; those to judge on are ``virtual:seed=1001`` to ``1010``."""
 
@@ -63,12 +63,12 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def key(self) -> tuple[str, int, int]:
-        """What a row is told from the others by."""
+        """What identifies the row."""
         return self.arm, self.trial, self.run
 
 
 @dataclass(frozen=True)
-class Rows:
+class TrialRows:
     """The rows of an experiment, sorted by arm, trial and run."""
 
     rows: tuple[Row, ...]
@@ -83,10 +83,10 @@ class Rows:
         """Names of the figures that every row has."""
         return frozenset.intersection(*(frozenset(row.figures) for row in self.rows)) if self.rows else frozenset()
 
-    def of(self, trials: Iterable[int]) -> "Rows":
+    def of(self, trials: Iterable[int]) -> "TrialRows":
         """Return the rows of ``trials`` alone."""
         wanted = set(trials)
-        return Rows(tuple(row for row in self.rows if row.trial in wanted))
+        return TrialRows(tuple(row for row in self.rows if row.trial in wanted))
 
     @property
     def runs(self) -> int:
@@ -176,7 +176,7 @@ class Experiment(ABC):
     def measure(self, material: Any, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Return the figures of ``trial`` in ``run``. The same arguments give the same figures, bit for bit."""
 
-    def analyse(self, rows: Rows) -> Analysis:
+    def analyse(self, rows: TrialRows) -> Analysis:
         """Return what the complete ``rows`` say; runs nothing.
 
         By default the module ``analysis`` beside that of the experiment knows; it is imported here, so that processes
@@ -195,6 +195,6 @@ def run_seed(settings: LaboratorySettings, run: int) -> int:
     return int(np.random.SeedSequence([settings.seed, run]).generate_state(1)[0])
 
 
-def sorted_rows(rows: Iterable[Row]) -> Rows:
+def sorted_rows(rows: Iterable[Row]) -> TrialRows:
     """Return ``rows`` in their order."""
-    return Rows(tuple(sorted(rows, key=lambda row: row.key)))
+    return TrialRows(tuple(sorted(rows, key=lambda row: row.key)))

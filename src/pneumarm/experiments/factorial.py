@@ -16,7 +16,7 @@ from pneumarm.experiments.design.assignment import Design, Factor
 from pneumarm.experiments.design.effects import effects
 from pneumarm.experiments.design.loss import loss
 from pneumarm.experiments.differences import Interval, above, below, interval
-from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, Rows
+from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, TrialRows
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, Trainings, train_and_test, with_settings
 from pneumarm.experiments.words import Words
@@ -34,7 +34,7 @@ def _goal(criterion: str) -> Goal:
 _IN_WORDS = {**CRITERIA, "gain": "change of the reward by training on"}
 Analyses = Mapping[str, TableAnalysis]
 """By criterion."""
-Finding = Callable[["Factorial", Rows, Analyses, Analyses], Claim]
+Finding = Callable[["Factorial", TrialRows, Analyses, Analyses], Claim]
 """Makes a claim of the rows, their analyses and the thesis'."""
 
 
@@ -106,7 +106,7 @@ class Factorial(Trainings):
         later = train_and_test(material, longer, run, settings, self.goal)
         return {**later, "gain": later["reward"] - found["reward"], "episodes": found["episodes"]}
 
-    def analyse(self, rows: Rows) -> Analysis:
+    def analyse(self, rows: TrialRows) -> Analysis:
         """Return rankings, effects and tests of every criterion, beside the thesis'."""
         from pneumarm.experiments.design.page import table_sections
 
@@ -139,7 +139,7 @@ class Factorial(Trainings):
         """What the letters of the factors mean."""
         return "; ".join(f"{factor.label}: {factor.name}" for factor in self.design.factors) + "."
 
-    def analyses(self, rows: Rows) -> tuple[Analyses, Analyses]:
+    def analyses(self, rows: TrialRows) -> tuple[Analyses, Analyses]:
         """Return the analyses of ``rows`` and of the thesis' tables."""
         names = [name for name in self.criteria if name in rows.figures]
         tables = {name: rows.table(name, list(self.trials)) for name in names}
@@ -149,7 +149,7 @@ class Factorial(Trainings):
         )
         return ours, theirs
 
-    def claims(self, rows: Rows, ours: Analyses, theirs: Analyses) -> tuple[Claim, ...]:
+    def claims(self, rows: TrialRows, ours: Analyses, theirs: Analyses) -> tuple[Claim, ...]:
         """Return what the thesis says of single effects, its effect next to ours, and what else it concludes."""
         found = []
         for said in self.said:
@@ -161,7 +161,7 @@ class Factorial(Trainings):
         return (*found, *(find(self, rows, ours, theirs) for find in self.findings))
 
     def effect(
-        self, rows: Rows, criterion: str, column: int, analysis: TableAnalysis, loss_name: Spread = "mean"
+        self, rows: TrialRows, criterion: str, column: int, analysis: TableAnalysis, loss_name: Spread = "mean"
     ) -> Interval:
         """Return the signed effect of a column of two levels with its interval.
 
@@ -174,20 +174,20 @@ class Factorial(Trainings):
         found = [effects(self.design.array, loss(table, loss_name)) for table in tables]
         return interval([effect.signed[column - 1] for effect in found])
 
-    def _answer(self, rows: Rows, ours: Analyses) -> list[str]:
-        """Return in words which factors surely matter, how much is due to one trial, and which settings are best."""
+    def _answer(self, rows: TrialRows, ours: Analyses) -> list[str]:
+        """Return in words which factors matter, how much is due to one trial, and which settings are best."""
         judged_alike = not any(factor.setting.startswith("reward.") for factor in self.design.factors)
         name = next(iter(ours)) if judged_alike else "switches"
         analysis, text = ours[name], []
         if all(len(factor.levels) == _TWO for factor in self.design.factors):
             found = {f.label: self.effect(rows, name, f.column, analysis) for f in self.design.factors}
-            surely = [
+            significant = [
                 f"{self.design.factor(label).name} {_step(self.design.factor(label))} ({effect})"
                 for label, effect in found.items()
                 if abs(effect.mean) > effect.half
             ]
             text.append(
-                f"What surely has an effect on the {_IN_WORDS[name]}: {', '.join(surely) or 'none of the factors'}."
+                f"Significant effects on the {_IN_WORDS[name]}: {', '.join(significant) or 'none of the factors'}."
             )
             means = analysis.results.mean(axis=1)
             far = int(np.argmax(np.abs(means - np.median(means))))
@@ -200,7 +200,7 @@ class Factorial(Trainings):
         best = "reward" if "reward" in ours else name
         return [*text, self._best(ours[best], _IN_WORDS[best])] if judged_alike else text
 
-    def _averages(self, rows: Rows, ours: Analyses) -> str:
+    def _averages(self, rows: TrialRows, ours: Analyses) -> str:
         """Return in words the means over all trials, and beside them the thesis' where it has some."""
         said = []
         for name in [name for name in ours if name in self.thesis or not self.thesis]:
@@ -211,8 +211,8 @@ class Factorial(Trainings):
         beside = ", in brackets the thesis'" if self.thesis else ""
         return f"Means over all trials{beside}: {'; '.join(said)}."
 
-    def _met(self, rows: Rows) -> str:
-        """Return in words how many agents met the criterion; of training on, how those ended that were slow to."""
+    def _met(self, rows: TrialRows) -> str:
+        """Return in words how many agents met the criterion; with longer training, how the slow ones ended."""
         if "met" not in rows.figures:
             return ""
         if self.continued is None:
@@ -225,7 +225,7 @@ class Factorial(Trainings):
                 for arm in rows.arms
             ]
         )
-        ended = "better" if found.low > 0 else "worse" if found.high < 0 else "neither surely better nor worse"
+        ended = "better" if found.low > 0 else "worse" if found.high < 0 else "neither significantly better nor worse"
         return (
             f" Agents that needed more episodes to meet the criterion are {ended} in the end: the rank correlation "
             f"of these episodes with the last reward is {found} within arms."
@@ -235,7 +235,7 @@ class Factorial(Trainings):
         settings = ", ".join(
             f"{self.design.factor(f).name} {_level(level)}" for f, level in first.best.settings.items()
         )
-        return f"Best settings for the {words} by the ranked effects here, sure or not: {settings}" + (
+        return f"Best settings for the {words} by the ranked effects here, significant or not: {settings}" + (
             f" (trial {first.best.trial})." if first.best.trial else " (not among the trials)."
         )
 
@@ -263,7 +263,7 @@ def _level(level: Any) -> str:
 
 
 def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis, effect: Interval) -> Claim:
-    """Return whether an effect has the sign that the thesis says, beyond what chance could make of it."""
+    """Return whether an effect has the sign that the thesis says, beyond chance."""
     column, design = said.column, our.design
     theirs = float(their.effects[said.loss].signed[column - 1])
     factor = design.on(column)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from pneumarm.experiments.design.anova import Source, anova
 from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best, within
-from pneumarm.experiments.experiment import Claim, Rows
+from pneumarm.experiments.experiment import Claim, TrialRows
 from pneumarm.experiments.factorial import Analyses, Factorial
 from pneumarm.experiments.trainings import LEARNING
 
@@ -17,8 +17,8 @@ _MARGINAL = 8.0  # reward: what a switch costs (section 5.4.1)
 _TRACES, _PUNISHMENT = 11, 12  # columns of table 5.3; in appendix C.1 the second holds the punishment
 
 
-def weights_matter_more_than_settings(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
-    """Compare what other weights make of the reward with the same settings, with what all settings together do."""
+def weights_matter_more_than_settings(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Compare the effect of other weights with the same settings on the reward with that of all settings."""
     tables = [rows.table("reward", list(made.trials), arm) for arm in rows.arms]
     claim = "With the same settings other initial weights make more of the reward than all settings together"
     thesis = f"{100 * _within_settings(theirs['reward'].results):.0f} % of the variance (table C.7)"
@@ -39,8 +39,8 @@ def _within_settings(table: NDArray[np.float64]) -> float:
     return within / (within + between) if within > 0 else 0.0
 
 
-def weights_dominate(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
-    """Compare what runs, that is initial weights, make of the reward with what any column does.
+def weights_dominate(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Compare the effect of runs, that is of initial weights, on the reward with that of any column.
 
     Shares are of the sum of squares within arms, without what chance would contribute, so that no difference between
     arms counts as one of weights.
@@ -68,7 +68,7 @@ def _shares(sources: tuple[Source, ...]) -> dict[str, float]:
 
 
 def _dominance(shares: list[dict[str, float]]) -> tuple[str, Verdict]:
-    """Return in words how much runs and the largest column explain on arms, and whether the runs surely explain more.
+    """Return in words how much runs and the largest column explain, and whether runs explain significantly more.
 
     The largest column is chosen among all, so more than the usual confidence is asked for.
     """
@@ -80,8 +80,8 @@ def _dominance(shares: list[dict[str, float]]) -> tuple[str, Verdict]:
     return text, above(interval(weights - by_source[largest], of_the_best(len(by_source))))
 
 
-def traces_are_marginal(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
-    """Ask whether the effect of the traces on the mean reward is surely smaller than the price of a switch."""
+def traces_are_marginal(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
+    """Ask whether the effect of the traces on the mean reward is significantly smaller than the price of a switch."""
     found = made.effect(rows, "reward", _TRACES, ours["reward"])
     their = theirs["reward"]
     effect = float(their.effects["mean"].signed[_TRACES - 1])
@@ -94,7 +94,7 @@ def traces_are_marginal(made: Factorial, rows: Rows, ours: Analyses, theirs: Ana
     )
 
 
-def nearly_all_succeed(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+def nearly_all_succeed(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
     """Ask whether agents reach nearly all goals in the test, and tell how many while they learn on."""
     greedy, learning = (
         interval(rows.samples(rows.table(name, list(made.trials)).mean(axis=0)))
@@ -109,7 +109,7 @@ def nearly_all_succeed(made: Factorial, rows: Rows, ours: Analyses, theirs: Anal
     )
 
 
-def fewest_switches(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+def fewest_switches(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
     """Ask whether 2.5 switches are the least that a movement takes, of agents that reach their goals."""
     switches, success = (rows.table(name, list(made.trials)) for name in ("switches", "success_rate"))
     able = np.where(success >= _NEARLY_ALL, switches, np.inf).reshape(len(made.trials), len(rows.arms), -1)
@@ -130,7 +130,7 @@ def fewest_switches(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyse
     )
 
 
-def trial_10_is_good(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+def trial_10_is_good(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
     """Compare trial 10 with what the other trials do on average, and tell its rank."""
     reward = rows.table("reward", list(made.trials))
     others = np.arange(1, len(reward) + 1) != _TRIAL_10
@@ -151,27 +151,27 @@ def _rank(reward: NDArray[np.float64]) -> int:
     return 1 + int((means > means[_TRIAL_10 - 1]).sum())
 
 
-def training_on_improves(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+def training_on_improves(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
     """Ask whether training on raises the reward."""
     found, their = _gains(made, rows, theirs)
     return Claim("Training on raises the reward", their, str(found), above(found), "long-training")
 
 
-def training_on_improves_little(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+def training_on_improves_little(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
     """Ask whether training on changes the reward by less than the price of a switch."""
     found, their = _gains(made, rows, theirs)
     text = f"It raises it by little: less than a switch costs ({_MARGINAL:g})"
     return Claim(text, their, str(found), below(found, _MARGINAL), "long-training")
 
 
-def _gains(made: Factorial, rows: Rows, theirs: Analyses) -> tuple[Interval, str]:
+def _gains(made: Factorial, rows: TrialRows, theirs: Analyses) -> tuple[Interval, str]:
     """Return the mean gain over trials, and the thesis' in words."""
     gain, their = rows.table("gain", list(made.trials)), theirs["gain"].results
     words = f"{their.mean():+.2f}; {int((their > 0).sum())} of {their.size} results are better (table 5.8)"
     return interval(rows.samples(gain.mean(axis=0))), words
 
 
-def agents_meet_the_criterion(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+def agents_meet_the_criterion(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
     """Ask whether nearly all agents meet the criterion."""
     met = rows.table("met", list(made.trials))
     found, count = interval(rows.samples(met.mean(axis=0))), theirs["episodes"].results.size
@@ -184,7 +184,7 @@ def agents_meet_the_criterion(made: Factorial, rows: Rows, ours: Analyses, their
     )
 
 
-def punishment_costs_actions(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+def punishment_costs_actions(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
     """Compare the actions of movements that reach their goal, with the punishment and without.
 
     A movement that fails takes as many actions as are allowed, so those of the others follow from both means. In the
@@ -207,7 +207,7 @@ def punishment_costs_actions(made: Factorial, rows: Rows, ours: Analyses, theirs
     )
 
 
-def punishment_halves_switches(made: Factorial, rows: Rows, ours: Analyses, theirs: Analyses) -> Claim:
+def punishment_halves_switches(made: Factorial, rows: TrialRows, ours: Analyses, theirs: Analyses) -> Claim:
     """Compare the switches of agents that are punished for them with those of agents that are not."""
     at = made.design.array.column(_PUNISHMENT)
     their, our = (

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.evidence import Array, Column, over_arms, samples, table
-from pneumarm.experiments.experiment import Rows
+from pneumarm.experiments.experiment import TrialRows
 from pneumarm.experiments.words import SectionWords
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, key, legend_below, panels, styled
@@ -144,7 +144,9 @@ class Axis(NamedTuple):
     log: bool = False
 
 
-def against(rows: Rows, trials: Mapping[int, str], axis: Axis, columns: Sequence[Column], caption: str) -> Picture:
+def against(
+    rows: TrialRows, trials: Mapping[int, str], axis: Axis, columns: Sequence[Column], caption: str
+) -> Picture:
     """Return ``columns`` against the trials, a panel each: every arm thin, the mean with its interval, the thesis'.
 
     Args:
@@ -163,7 +165,7 @@ def against(rows: Rows, trials: Mapping[int, str], axis: Axis, columns: Sequence
 
 
 @styled
-def _against(rows: Rows, trials: Mapping[int, str], along: Axis, columns: Sequence[Column]) -> Figure:
+def _against(rows: TrialRows, trials: Mapping[int, str], along: Axis, columns: Sequence[Column]) -> Figure:
     height = -(-len(columns) // _WIDE)
     width = -(-len(columns) // height)
     figure, axes = panels(height, width, 0.4 + 2.5 * height)
@@ -200,7 +202,7 @@ def _against(rows: Rows, trials: Mapping[int, str], along: Axis, columns: Sequen
 
 def section(
     words: SectionWords,
-    rows: Rows,
+    rows: TrialRows,
     trials: Mapping[int, str],
     axis: Axis | None = None,
     *,

@@ -1,4 +1,4 @@
-"""Rows on disk: one JSON object a line, durable as soon as it is appended, never computed twice."""
+"""TrialRows on disk: one JSON object a line, durable as soon as it is appended, never computed twice."""
 
 import os
 from pathlib import Path

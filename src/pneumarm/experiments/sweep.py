@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, Row, Rows, sorted_rows
+from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, Row, TrialRows, sorted_rows
 from pneumarm.experiments.preparation import SETTINGS, claim
 from pneumarm.experiments.rows import RowWriter
 from pneumarm.files import require_folder
@@ -30,9 +30,9 @@ Progress = Callable[[str], AbstractContextManager[Report]]
 class Sweep:
     """A finished sweep."""
 
-    rows: Rows
+    rows: TrialRows
     computed: int
-    """Rows that were missing."""
+    """TrialRows that were missing."""
     seconds: float
     """Wall time of computing them [s], without preparing arms."""
 

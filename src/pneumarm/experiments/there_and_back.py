@@ -1,6 +1,6 @@
 """From an arm and back to it: collect, fit, train, move; with what an experiment varies on the way.
 
-Collecting and fitting belong to an arm (:func:`prepared`), training and moving to a row (:func:`trained_and_moved`).
+Collecting and fitting belong to an arm (:func:`prepared`), training and moving to a row (:func:`train_and_move`).
 What such experiments have in common is :class:`ThereAndBack`.
 """
 
@@ -202,7 +202,7 @@ def over_joints(values: NDArray[np.float64]) -> dict[str, float]:
     return {name: float(value) for name, value in zip(QUANTITIES, rms, strict=True)}
 
 
-def trained_and_moved(
+def train_and_move(
     material: Prepared,
     train_settings: Any,
     run: int,
@@ -235,7 +235,7 @@ def trained_and_moved(
     numbers = range(min(MOVEMENTS, settings.test_episodes))
     with opened(material.arm, seed % 2**31, recipe.frequency) as arm:
         closes = recipe.close_while_computing
-        rows = moved(agent, arm, span, numbers, seed, close_while_computing=closes)
+        rows = greedy_movements(agent, arm, span, numbers, seed, close_while_computing=closes)
     made = of_rows(one.row() for one in rows)
     return {
         BEFORE + "reward": float(simulated.reward.mean()),
@@ -247,7 +247,7 @@ def trained_and_moved(
     }
 
 
-def moved(
+def greedy_movements(
     agent: Acts,
     arm: Arm,
     goals: NDArray[np.float64],

@@ -93,7 +93,7 @@ def with_settings(settings: TrainSettings, changes: Mapping[str, Any]) -> TrainS
 def train_and_test(
     material: Simulated, settings: TrainSettings, run: int, laboratory: LaboratorySettings, goal: float | None = None
 ) -> Figures:
-    """Train one agent and return what it makes of the test.
+    """Train one agent and return how it does in the test.
 
     All agents of a run begin with the same weights, for each number of hidden units, and all agents are tested with
     the same begin states and goals.

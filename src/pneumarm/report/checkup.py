@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.arm.spec_file import SoundState
-from pneumarm.checkup.diagnose import WHITE, WORN, Finding
+from pneumarm.checkup.diagnose import WHITE, WORN, Complaint
 from pneumarm.checkup.figures import (
     JOINT_HEADER,
     MUSCLE_HEADER,
@@ -24,7 +24,7 @@ from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
 _LINES = ((DARK, "-"), (MIDDLE, "--"))
 
 
-def checkup_page(checkup: Checkup, findings: Sequence[Finding], sound: SoundState | None = None) -> str:
+def checkup_page(checkup: Checkup, findings: Sequence[Complaint], sound: SoundState | None = None) -> str:
     """Return the page as HTML text; ``sound`` is what the arm did when it was calibrated."""
     name = checkup.spec.name
     verdict = [f"{len(findings)} thing(s) to see to." if findings else "Nothing is wrong with it."]

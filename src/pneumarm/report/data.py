@@ -7,7 +7,7 @@ may be large the record holds a sample; a few ten thousand rows are plenty for a
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +25,16 @@ class Record:
 
     file: ClassVar[str]
     """Name of its file in the folder of a run."""
-    shapes: ClassVar[dict[str, str]]
-    """Shape of every array, such as ``n joints 4``; equal letters must be equal numbers."""
+
+    @classmethod
+    def shapes(cls) -> dict[str, str]:
+        """Return the shapes of the arrays by name, as annotated: ``n joints 4``; equal words are equal numbers."""
+        hints = get_type_hints(cls, include_extras=True)
+        return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}
 
     def __post_init__(self) -> None:
         sizes: dict[str, int] = {}
-        for name, shape in self.shapes.items():
+        for name, shape in self.shapes().items():
             array = np.asarray(getattr(self, name))
             object.__setattr__(self, name, array)
             words = shape.split()
@@ -48,8 +52,8 @@ class Record:
     def save(self, folder: Path, name: str | None = None) -> Path:
         """Write the record to its file in ``folder`` and return the path."""
         path = folder / (name or self.file)
-        settings = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in self.shapes}
-        write_arrays(path, self._kind(), settings, {k: getattr(self, k) for k in self.shapes})
+        settings = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in self.shapes()}
+        write_arrays(path, self._kind(), settings, {k: getattr(self, k) for k in self.shapes()})
         return path
 
     @classmethod
@@ -79,18 +83,17 @@ class CoverageData(Record):
     """What was collected, and what the filter made of it."""
 
     file = "coverage.safetensors"
-    shapes = {"observation": "n joints 4", "cells_holding": "counts", "growth": "points 2"}  # noqa: RUF012
 
-    observation: Array
-    """A sample of the observations, shape (n, joints, 4) [sensor units]."""
-    cells_holding: NDArray[np.int64]
-    """Number of the grid's cells that hold exactly i transitions, shape (most + 1,): ``np.bincount(count)``."""
+    observation: Annotated[Array, "n joints 4"]
+    """A sample of the observations [sensor units]."""
+    cells_holding: Annotated[NDArray[np.int64], "counts"]
+    """Number of the grid's cells that hold exactly i transitions: ``np.bincount(count)``."""
     cells: int
     """Cells of the grid."""
     per_cell: int
     """Most transitions of a cell that are kept."""
-    growth: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
-    """Transitions collected and cells occupied by then, shape (points, 2), for the test whether data is enough."""
+    growth: Annotated[NDArray[np.int64], "points 2"] = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    """Transitions collected and cells occupied by then, for the test whether data is enough."""
 
 
 @dataclass(frozen=True)
@@ -98,30 +101,21 @@ class QualityData(Record):
     """How well the simulation predicts transitions that it was not fitted to."""
 
     file = "quality.safetensors"
-    shapes = {  # noqa: RUF012
-        "observation": "n joints 4",
-        "target": "n joints 4",
-        "predicted": "n joints 4",
-        "command": "n joints 2",
-        "time": "n",
-        "propagation": "steps joints 4",
-        "weights": "inputs outputs",
-    }
 
-    observation: Array
-    """o_k, shape (n, joints, 4) [sensor units]; the first 200 rows are transitions in order of time."""
-    target: Array
+    observation: Annotated[Array, "n joints 4"]
+    """o_k [sensor units]; the first 200 rows are transitions in order of time."""
+    target: Annotated[Array, "n joints 4"]
     """o_{k+1}, the same shape."""
-    predicted: Array
+    predicted: Annotated[Array, "n joints 4"]
     """sim_{k+1} (eq. 3.1), the same shape."""
-    command: Array
-    """a_k, shape (n, joints, 2): valves -1, 0, +1 or a continuous command."""
-    time: Array
-    """Time of o_k since the collecting began, shape (n,) [s]."""
-    propagation: Array = field(default_factory=lambda: np.empty((0, 1, 4)))
-    """Standard deviation of the error after k+1 steps simulated freely, shape (steps, joints, 4) [sensor units]."""
-    weights: Array = field(default_factory=lambda: np.empty((0, 0)))
-    """Standardised weights of a least-squares fit, shape (inputs, outputs); none where none was fitted."""
+    command: Annotated[Array, "n joints 2"]
+    """a_k: valves -1, 0, +1 or a continuous command."""
+    time: Annotated[Array, "n"]
+    """Time of o_k since the collecting began [s]."""
+    propagation: Annotated[Array, "steps joints 4"] = field(default_factory=lambda: np.empty((0, 1, 4)))
+    """Standard deviation of the error after k+1 steps simulated freely [sensor units]."""
+    weights: Annotated[Array, "inputs outputs"] = field(default_factory=lambda: np.empty((0, 0)))
+    """Standardised weights of a least-squares fit; none where none was fitted."""
     inputs: Sequence[str] = ()
     """Names of the inputs."""
     outputs: Sequence[str] = ()
@@ -143,14 +137,13 @@ class MarkedData(Record):
     """Which of the stored rows are marked, so that nothing is learned from them."""
 
     file = "marked.safetensors"
-    shapes = {"spans": "n 2", "reason": "n", "ends": "stages"}  # noqa: RUF012
 
-    spans: NDArray[np.int64]
-    """First row of each marked stretch and the one after its last, in the order of recording, shape (n, 2)."""
-    reason: NDArray[np.int64]
-    """Index of its reason, shape (n,)."""
-    ends: NDArray[np.int64]
-    """Rows recorded by the end of each stage, shape (stages,)."""
+    spans: Annotated[NDArray[np.int64], "n 2"]
+    """First row of each marked stretch and the one after its last, in the order of recording."""
+    reason: Annotated[NDArray[np.int64], "n"]
+    """Index of its reason."""
+    ends: Annotated[NDArray[np.int64], "stages"]
+    """Rows recorded by the end of each stage."""
     reasons: Sequence[str] = ()
     """Why rows are marked, in words."""
     stages: Sequence[str] = ()
@@ -167,21 +160,15 @@ class TrainingData(Record):
     """How all agents learned, and their validation."""
 
     file = "training_curves.safetensors"
-    shapes = {  # noqa: RUF012
-        "curves": "drawn rows columns",
-        "evaluated": "drawn",
-        "reward": "agents",
-        "success": "agents",
-    }
 
-    curves: Array
-    """Training curves, shape (agents, rows, columns), or none; behind an agent's ``evaluated`` rows is nothing."""
-    evaluated: NDArray[np.int64]
-    """Rows that each agent took before its training ended, shape (agents,)."""
-    reward: Array
-    """Mean reward of each agent in the validation, shape (agents,)."""
-    success: Array
-    """Its success rate, shape (agents,)."""
+    curves: Annotated[Array, "drawn rows columns"]
+    """Training curves, or none; behind an agent's ``evaluated`` rows is nothing."""
+    evaluated: Annotated[NDArray[np.int64], "drawn"]
+    """Rows that each agent took before its training ended."""
+    reward: Annotated[Array, "agents"]
+    """Mean reward of each agent in the validation."""
+    success: Annotated[Array, "agents"]
+    """Its success rate."""
     chosen: int
     """Index of the agent that is kept."""
     columns: Sequence[str] = ()
@@ -227,24 +214,17 @@ class Demonstration(Record):
     """One movement on the arm, with what the arm does after it where that was recorded."""
 
     file = "demonstration.safetensors"
-    shapes = {  # noqa: RUF012
-        "time": "n",
-        "angle": "n joints",
-        "pressure": "n joints 2",
-        "valves": "n joints 2",
-        "goal": "joints",
-    }
 
-    time: Array
-    """Of the readings, shape (n,) [s]."""
-    angle: Array
-    """Shape (n, joints) [counts]."""
-    pressure: Array
-    """Shape (n, joints, 2) [counts]."""
-    valves: Array
-    """In force from each reading to the next, shape (n, joints, 2)."""
-    goal: Array
-    """Shape (joints,) [counts]."""
+    time: Annotated[Array, "n"]
+    """Of the readings [s]."""
+    angle: Annotated[Array, "n joints"]
+    """In counts."""
+    pressure: Annotated[Array, "n joints 2"]
+    """In counts."""
+    valves: Annotated[Array, "n joints 2"]
+    """In force from each reading to the next."""
+    goal: Annotated[Array, "joints"]
+    """In counts."""
     end: float | None
     """When the goal was reached [s], None if it was not."""
     name: str
@@ -256,11 +236,10 @@ class MovingData(Record):
     """Goals that were moved to and held, one after the other."""
 
     file = "moving.safetensors"
-    shapes = {"time": "n", "angle": "n joints", "wanted": "n joints"}  # noqa: RUF012
 
-    time: Array
-    """Of the readings, shape (n,) [s]."""
-    angle: Array
-    """Shape (n, joints) [counts]."""
-    wanted: Array
-    """The goal at that time, shape (n, joints) [counts]."""
+    time: Annotated[Array, "n"]
+    """Of the readings [s]."""
+    angle: Annotated[Array, "n joints"]
+    """[counts]"""
+    wanted: Annotated[Array, "n joints"]
+    """The goal at that time [counts]."""

@@ -71,7 +71,7 @@ def _ledger_row(name: str, episodes: Movements, *, on_arm: bool) -> list[str]:
 def _summarised(figures: Mapping[str, Any]) -> tuple[str, str, str, str]:
     """Return reward, success, actions and switches as ``results.json`` holds them of a test, for people."""
 
-    def told(name: str, form: str) -> str:
+    def in_words(name: str, form: str) -> str:
         means, ends = figures[name], figures["intervals"][name]
         if not isinstance(means, list):
             means, ends = [means], [ends]
@@ -81,10 +81,10 @@ def _summarised(figures: Mapping[str, Any]) -> tuple[str, str, str, str]:
         )
 
     return (
-        told("reward", "{:.2f}"),
-        told("success_rate", "{:.1%}"),
-        told("actions", "{:.1f}"),
-        told("switches", "{:.2f}"),
+        in_words("reward", "{:.2f}"),
+        in_words("success_rate", "{:.1%}"),
+        in_words("actions", "{:.1f}"),
+        in_words("switches", "{:.2f}"),
     )
 
 
@@ -152,7 +152,7 @@ def beside_thesis(
         *_collected(results),
         *_simulated(results, quality, spec),
         *_learned(results, test),
-        *_moved(test, transfer),
+        *_on_the_arm(test, transfer),
     ]
     return Table(
         ("", "ours", "thesis", "where in the thesis"),
@@ -224,7 +224,7 @@ def _learned(results: Mapping[str, Any], test: Movements | None) -> list[list[st
     ]  # fmt: skip
 
 
-def _moved(test: Movements | None, transfer: TransferData | None) -> list[list[str]]:
+def _on_the_arm(test: Movements | None, transfer: TransferData | None) -> list[list[str]]:
     if test is None or transfer is None or transfer.before.n == 0:
         return []
     came, home = transfer.before, test

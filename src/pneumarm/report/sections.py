@@ -22,7 +22,7 @@ from pneumarm.report.data import (
     TrainingData,
     TransferData,
 )
-from pneumarm.report.figures import Classification, Mark, Phase
+from pneumarm.report.figures import Classification, CurveMark, Phase
 from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Picture, Section, Table
@@ -119,7 +119,7 @@ def overview(run: RunData) -> Section:
         "those of the thesis."
     ]
     if "missing" in bound:
-        text.append(f"What could be achieved on this arm at all is not told: {bound['missing']}.")
+        text.append(f"What can be achieved on this arm at all is unknown: {bound['missing']}.")
     return Section(
         "Results",
         text,
@@ -361,7 +361,7 @@ def transferred(data: TransferData, test: Movements | None) -> Section:
 
 def adapted(data: Adapted) -> Section:
     """Return how the simulation predicted the arm, when it was found to have changed, and the agent's versions."""
-    marks = [Mark(event.movement, event.what) for event in data.events]
+    marks = [CurveMark(event.movement, event.what) for event in data.events]
     happened = data.sentences
     text = [
         "After every movement the simulation's errors on the arm are compared with those of its fit. Where a "

@@ -6,9 +6,9 @@ Five factors of the method on L16, eight runs from different weights, tested on 
 
 On arms 1 to 5, four runs each, other weights with the same settings make 65 ± 15 % of the variance (in the thesis'
 own table 83 %). A learning rate of 0.10, 10 neurons and traces cost 18 ± 5, 8 ± 7 and 16 ± 7 of reward, largely
-because together with gamma 0.98 (trial 14) they diverge; SARSA and Q-learning are not told apart. Agents reach 85 %
-of their goals in the test, where the thesis' reach nearly all, and 96 % while they learn on, which is what the
-criterion is about: an agent that is stuck unlearns the action that holds it, and the same weights, frozen, stay
+because together with gamma 0.98 (trial 14) they diverge; SARSA and Q-learning do not differ significantly. Agents
+reach 85 % of their goals in the test, where the thesis' reach nearly all, and 96 % while they learn on, which is what
+the criterion is about: an agent that is stuck unlearns the action that holds it, and the same weights, frozen, stay
 stuck.
 """
 

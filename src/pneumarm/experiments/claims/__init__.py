@@ -41,11 +41,11 @@ class Conclusion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """That test it."""
 
 
-class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _ConclusionsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     conclusions: tuple[Conclusion, ...]
 
 
-class Found(msgspec.Struct, frozen=True):
+class FoundClaim(msgspec.Struct, frozen=True):
     """A claim in ``results.json``."""
 
     claim: str
@@ -62,7 +62,7 @@ class Results(msgspec.Struct, frozen=True):
     arms: tuple[str, ...]
     runs: int
     """On each arm."""
-    claims: tuple[Found, ...]
+    claims: tuple[FoundClaim, ...]
 
     @property
     def sample(self) -> str:
@@ -83,7 +83,7 @@ class Judged:
     """A conclusion with the claims that were found on it."""
 
     conclusion: Conclusion
-    claims: tuple[tuple[Results, Found], ...]
+    claims: tuple[tuple[Results, FoundClaim], ...]
     missing: tuple[str, ...]
     """Experiments that have no results yet."""
 
@@ -119,7 +119,7 @@ _PARTS = ("holds", "does not hold", "open")
 def conclusions() -> tuple[Conclusion, ...]:
     """Return what the thesis concludes, in its order."""
     text = (resources.files(__name__) / "conclusions.toml").read_text(encoding="utf-8")
-    return msgspec.convert(tomllib.loads(text), _File).conclusions
+    return msgspec.convert(tomllib.loads(text), _ConclusionsFile).conclusions
 
 
 def keys_of(experiment: str) -> frozenset[str]:

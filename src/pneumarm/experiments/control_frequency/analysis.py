@@ -5,13 +5,13 @@ from typing import Any
 from pneumarm.experiments.control_frequency.frequencies import THESIS_FREQUENCY, ControlFrequency
 from pneumarm.experiments.differences import Interval, interval
 from pneumarm.experiments.evidence import change, difference, mean, numbers, samples
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.pictures import Axis, section
 from pneumarm.experiments.there_and_back import AFTER_A_SECOND
 
 
-def analysis(experiment: ControlFrequency, rows: Rows) -> Analysis:
-    """Return errors and what agents make of them by frequency."""
+def analysis(experiment: ControlFrequency, rows: TrialRows) -> Analysis:
+    """Return errors and the performance of agents by frequency."""
     found, trials = measured(experiment, rows), experiment.trials
     words = experiment.words.filled(
         {
@@ -27,7 +27,7 @@ def analysis(experiment: ControlFrequency, rows: Rows) -> Analysis:
     return words.analysis(found, numbers(rows, trials, words.columns), sections)
 
 
-def measured(experiment: ControlFrequency, rows: Rows) -> dict[str, Any]:
+def measured(experiment: ControlFrequency, rows: TrialRows) -> dict[str, Any]:
     """Return what claims are judged by."""
     low, middle, high = (1 + experiment.frequencies.index(f) for f in (20.0, THESIS_FREQUENCY, 40.0))
 

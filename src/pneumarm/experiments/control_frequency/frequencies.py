@@ -15,7 +15,7 @@ from pneumarm.experiments.there_and_back import (
     Prepared,
     ThereAndBack,
     prepared,
-    trained_and_moved,
+    train_and_move,
     usual,
 )
 from pneumarm.experiments.words import words_of
@@ -77,5 +77,5 @@ class ControlFrequency(ThereAndBack):
         """Train an agent and move the arm with it, to goals in the range that 30 Hz reached."""
         chosen = material[trial - 1]
         goals = material[self.frequencies.index(THESIS_FREQUENCY)].simulation.goal_range
-        found = trained_and_moved(chosen, self.train_settings(trial), run, settings, goals)
+        found = train_and_move(chosen, self.train_settings(trial), run, settings, goals)
         return {**chosen.figures, **found}

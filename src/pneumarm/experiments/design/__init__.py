@@ -7,7 +7,7 @@ settings and their confirmation; :mod:`.analysis` does it all.
 
 from pneumarm.experiments.design.analysis import TableAnalysis, analyse_table
 from pneumarm.experiments.design.arrays import NAMES, OrthogonalArray, orthogonal_array
-from pneumarm.experiments.design.assignment import Design, Factor, Wanted, assign, load_design, thesis_design
+from pneumarm.experiments.design.assignment import Design, Factor, WantedFactor, assign, load_design, thesis_design
 from pneumarm.experiments.design.table import ResultTable, read_table
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "OrthogonalArray",
     "ResultTable",
     "TableAnalysis",
-    "Wanted",
+    "WantedFactor",
     "analyse_table",
     "assign",
     "load_design",

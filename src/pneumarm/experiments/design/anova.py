@@ -1,4 +1,4 @@
-"""Analysis of variance of trials and runs: how much of what varied each column explains, and how surely.
+"""Analysis of variance of trials and runs: how much of the variation each column explains, and its significance.
 
 In an orthogonal array the sums of squares of the columns add up. With y_tr the result of trial t in run r,
 

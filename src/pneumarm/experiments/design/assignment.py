@@ -123,7 +123,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedFactor:
     """A factor whose column may still be open."""
 
     label: str
@@ -133,7 +133,7 @@ class Wanted:
     setting: str = ""
 
 
-def assign(array: OrthogonalArray, factors: Sequence[Wanted], interactions: Sequence[str] = ()) -> Design:
+def assign(array: OrthogonalArray, factors: Sequence[WantedFactor], interactions: Sequence[str] = ()) -> Design:
     """Return the design in which no factor and no wanted interaction shares a column with another of them.
 
     The first such assignment in the order of the columns is taken; factors that have a column keep it.
@@ -172,7 +172,7 @@ def _is_whole(array: OrthogonalArray, first: int, second: int, columns: Sequence
 
 
 def _assignments(
-    array: OrthogonalArray, factors: Sequence[Wanted], pairs: Sequence[tuple[int, int]], chosen: tuple[int, ...]
+    array: OrthogonalArray, factors: Sequence[WantedFactor], pairs: Sequence[tuple[int, int]], chosen: tuple[int, ...]
 ) -> Iterator[tuple[int, ...]]:
     """Give all assignments that begin with ``chosen``."""
     used = list(chosen)
@@ -180,7 +180,7 @@ def _assignments(
         if second < len(chosen):
             found = array.interaction(chosen[first], chosen[second])
             if not _is_whole(array, chosen[first], chosen[second], found):
-                return  # it spreads over columns and cannot be told apart
+                return  # it spreads over columns and cannot be separated
             used.extend(found)
     if len(set(used)) != len(used):
         return
@@ -194,16 +194,16 @@ def _assignments(
             yield from _assignments(array, factors, pairs, (*chosen, column))
 
 
-class _File(msgspec.Struct, forbid_unknown_fields=True):
+class _DesignFile(msgspec.Struct, forbid_unknown_fields=True):
     array: str
-    factors: tuple[Wanted, ...]
+    factors: tuple[WantedFactor, ...]
     interactions: tuple[str, ...] = ()
 
 
 def parse_design(text: str, source: str) -> Design:
     """Return the design in the TOML ``text`` of a file ``source``; see :func:`load_design`."""
     try:
-        read = msgspec.convert(tomllib.loads(text), _File)
+        read = msgspec.convert(tomllib.loads(text), _DesignFile)
     except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise UnusableInput(
             f"{source}: expected a design: array = 'L16', interactions = ['ab', ...] and for each factor a table "

@@ -35,7 +35,7 @@ class Criterion:
 
 
 @dataclass(frozen=True)
-class Step:
+class FixedFactor:
     """One factor fixed."""
 
     factor: str
@@ -51,13 +51,13 @@ class Step:
 
 @dataclass(frozen=True)
 class Best:
-    """Settings and how they were come by."""
+    """Settings and how they were derived."""
 
     levels: Mapping[str, int]
     """Number of the level, from 0, by the factor's label."""
     settings: Mapping[str, Level]
     """The levels themselves."""
-    steps: tuple[Step, ...]
+    steps: tuple[FixedFactor, ...]
     trial: int | None
     """Trial of the array that has these settings, if one has."""
 
@@ -65,12 +65,12 @@ class Best:
 def derive(design: Design, criteria: Sequence[Criterion]) -> Best:
     """Return the best settings of ``design`` by its ranked effects, see the module."""
     levels: dict[str, int] = {}
-    steps: list[Step] = []
+    steps: list[FixedFactor] = []
     waiting: list[tuple[int, Criterion, int]] = []
 
     def fix(factor: str, level: int, column: int, criterion: Criterion, rank: int) -> None:
         levels[factor] = level
-        steps.append(Step(factor, level, column, criterion.name, rank))
+        steps.append(FixedFactor(factor, level, column, criterion.name, rank))
         for item in list(waiting):
             if item in waiting and _deducible(design, item[0], levels):
                 waiting.remove(item)

@@ -15,7 +15,7 @@ from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, panels, 
 _STYLES = tuple((colour, line) for line in ("-", "--", ":", "-.") for colour in (DARK, MIDDLE, LIGHT, GREY))
 _MARKERS = "osD^vP*X"
 _PER_ROW = 16  # columns of an array side by side
-_MOST_NAMED = 8  # lines that can be told apart; more are drawn alike
+_MOST_NAMED = 8  # lines that can be distinguished; more are drawn alike
 _LABEL, _HALF_LABEL = 34, 40  # letters in a line of an axis label
 _REACH = 0.32  # of a column's levels to both sides of its place
 
@@ -105,7 +105,7 @@ def half_normal_runs_figure(analysis: TableAnalysis, quantity: str) -> Figure:
 
 
 def _drawn(number: int, of: int) -> dict[str, Any]:
-    """Return how line ``number`` is drawn: told apart from the others where they are few, else thin."""
+    """Return how line ``number`` is drawn: distinguishable where there are few, else thin."""
     if of > _MOST_NAMED:
         return {"color": GREY, "linewidth": 0.7, "alpha": 0.7}
     colour, style = _STYLES[number % len(_STYLES)]

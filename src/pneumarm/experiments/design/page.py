@@ -103,7 +103,7 @@ def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
 
 
 def derivation(analysis: TableAnalysis) -> list[str]:
-    """Return in words how the best settings were come by."""
+    """Return in words how the best settings were derived."""
     design, best = analysis.design, analysis.best
     steps = [
         f"{design.factor(s.factor).name} {design.factor(s.factor).levels[s.level]} "

@@ -8,7 +8,7 @@ from pneumarm.arm import ArmSpec
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.displacement.typical import AFTER, SERIES, Displacement
 from pneumarm.experiments.evidence import Column, from_series, mean, over_arms, series_of, values
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.pictures import section
 from pneumarm.experiments.words import SectionWords
 from pneumarm.report.figures import against_displacement, against_displacement_alt, movement, movement_alt
@@ -18,7 +18,7 @@ _THIRDS = (("success", 1, 100.0), ("actions", 2, 1.0), ("switches", 2, 1.0), ("r
 _TYPICAL = (("success", 1, 100.0), ("seconds", 2, 1.0), ("out of the way", 1, 1.0), ("ringing", 1, 1.0))
 
 
-def analysis(experiment: Displacement, rows: Rows) -> Analysis:
+def analysis(experiment: Displacement, rows: TrialRows) -> Analysis:
     """Return the pictures of section 5.5.2 and what they say."""
     spec = ArmSpec()
     distance, actions, switches = (series_of(rows, name, 1) for name in ("distance", "actions", "switches"))
@@ -54,7 +54,7 @@ def analysis(experiment: Displacement, rows: Rows) -> Analysis:
     )
 
 
-def measured(rows: Rows, displacements: Sequence[float]) -> dict[str, Interval]:
+def measured(rows: TrialRows, displacements: Sequence[float]) -> dict[str, Interval]:
     """Return what claims are judged by; ``displacements`` are the small, the middle and the large one [degrees]."""
     small, middle, large = (f"{degrees:g}°" for degrees in displacements)
 
@@ -73,7 +73,7 @@ def measured(rows: Rows, displacements: Sequence[float]) -> dict[str, Interval]:
     }
 
 
-def _thirds(words: SectionWords, rows: Rows) -> Table:
+def _thirds(words: SectionWords, rows: TrialRows) -> Table:
     lines = [
         [called, *(Column(f"{name}, {key}", "", digits, factor).text(rows, 1) for name, digits, factor in _THIRDS)]
         for called, key in (("shortest third", "short"), ("longest third", "long"))
@@ -81,7 +81,7 @@ def _thirds(words: SectionWords, rows: Rows) -> Table:
     return Table(["displacement", "success [%]", "actions", "switches", "switches an action"], lines, words.table)
 
 
-def _typical(words: SectionWords, rows: Rows, spec: ArmSpec, displacements: Sequence[float]) -> Section:
+def _typical(words: SectionWords, rows: TrialRows, spec: ArmSpec, displacements: Sequence[float]) -> Section:
     lines, pictures = [], []
     for degrees, figure in zip(displacements, ("5.18", "5.17", "5.19"), strict=True):
         name = f"{degrees:g}°: "

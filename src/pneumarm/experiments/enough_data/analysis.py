@@ -6,14 +6,14 @@ import numpy as np
 
 from pneumarm.experiments.enough_data.minutes import EnoughData
 from pneumarm.experiments.evidence import difference, mean, numbers
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.pictures import Axis, section
 
 _THESIS = 120.0  # minutes (section 3.2.2)
 _MARGIN = 2.0  # reward that does not matter: two actions of some seventeen
 
 
-def analysis(experiment: EnoughData, rows: Rows) -> Analysis:
+def analysis(experiment: EnoughData, rows: TrialRows) -> Analysis:
     """Return coverage, fit and performance by minutes."""
     found, trials = measured(experiment, rows), experiment.trials
     words = experiment.words.filled(found)
@@ -22,7 +22,7 @@ def analysis(experiment: EnoughData, rows: Rows) -> Analysis:
     return words.analysis(found, numbers(rows, trials, words.columns), sections)
 
 
-def measured(experiment: EnoughData, rows: Rows) -> dict[str, Any]:
+def measured(experiment: EnoughData, rows: TrialRows) -> dict[str, Any]:
     """Return what claims are judged by, and the words that they need."""
     trials, last = experiment.trials, len(experiment.minutes)
     usual = 1 + int(np.argmin([abs(minutes - _THESIS) for minutes in experiment.minutes]))
@@ -46,7 +46,7 @@ def measured(experiment: EnoughData, rows: Rows) -> dict[str, Any]:
     }
 
 
-def _fewest(rows: Rows, last: int) -> int | None:
+def _fewest(rows: TrialRows, last: int) -> int | None:
     """Return the first trial from which on no reward is shown to be worse than the last by the margin or more."""
     good = [difference(rows, "reward", trial, last).low > -_MARGIN for trial in range(1, last)]
     return next((trial for trial in range(1, last) if all(good[trial - 1 :])), None)

@@ -21,7 +21,7 @@ from pneumarm.experiments.there_and_back import (
     collected,
     place,
     quality,
-    trained_and_moved,
+    train_and_move,
 )
 from pneumarm.experiments.words import words_of
 from pneumarm.files import write_json
@@ -86,4 +86,4 @@ class EnoughData(ThereAndBack):
         """Train an agent on the part of ``trial`` and move the arm with it, to goals in the range of all data."""
         chosen = material[trial - 1]
         goals = material[-1].simulation.goal_range
-        return {**chosen.figures, **trained_and_moved(chosen, TRAINING, run, settings, goals)}
+        return {**chosen.figures, **train_and_move(chosen, TRAINING, run, settings, goals)}

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.experiments.differences import above, interval
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.fine_tuning.levels import FineTuning
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.trainings import CRITERIA
@@ -18,8 +18,8 @@ from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
 _GAMMAS = (0.95, 0.98, 0.99)  # of returns_figure: the thesis' levels, and the highest here
 
 
-def analysis(experiment: FineTuning, rows: Rows) -> Analysis:
-    """Return the analysis of the array, and what the settings chosen by odd runs make of the even ones."""
+def analysis(experiment: FineTuning, rows: TrialRows) -> Analysis:
+    """Return the analysis of the array, and how the settings chosen by odd runs do in the even ones."""
     array, trials = experiment.array, experiment.trials
     of_array = array.analyse(rows.of(array.trials))
     found = confirmation(experiment, rows)
@@ -45,7 +45,7 @@ def analysis(experiment: FineTuning, rows: Rows) -> Analysis:
     return replace(made, summary=[*made.summary, *of_array.summary[1:]])
 
 
-def confirmation(experiment: FineTuning, rows: Rows) -> dict[str, str]:
+def confirmation(experiment: FineTuning, rows: TrialRows) -> dict[str, str]:
     """Return whether the trial that is best in odd runs beats trial 10 in even ones, and which it is in words."""
     reward = rows.table("reward", list(experiment.trials))
     odd = np.tile(np.arange(1, rows.runs + 1) % 2 == 1, len(rows.arms))

@@ -1,12 +1,12 @@
 """What the rows say of the costs of precision."""
 
 from pneumarm.experiments.evidence import Column, by_trial, difference, mean
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.goal_area.areas import AREAS, GoalArea
 from pneumarm.experiments.pictures import dots, section
 
 
-def analysis(experiment: GoalArea, rows: Rows) -> Analysis:
+def analysis(experiment: GoalArea, rows: TrialRows) -> Analysis:
     """Return what each goal area costs."""
     trials, base = experiment.trials, 1
     costs = {t: difference(rows, "reward", t, base) for t in AREAS if t != base}

@@ -4,9 +4,10 @@ The first three runs of all-goals, trained on; ``gain`` is what that changed in 
 
     pneumarm experiment long-training
 
-On arms 1 to 5, four runs each, training on raises the reward by 13 ± 6, in the thesis by 3.6, and no factor surely
-decides by how much. It spreads more with Q-learning than with SARSA, as in the thesis. Slow learners do not overtake
-the fast ones: the rank correlation of the episodes until the criterion with the last reward is -0.20 ± 0.13.
+On arms 1 to 5, four runs each, training on raises the reward by 13 ± 6, in the thesis by 3.6, and no factor
+significantly decides by how much. It spreads more with Q-learning than with SARSA, as in the thesis. Slow learners do
+not overtake the fast ones: the rank correlation of the episodes until the criterion with the last reward is -0.20 ±
+0.13.
 """
 
 from pneumarm.experiments.all_goals import BASE

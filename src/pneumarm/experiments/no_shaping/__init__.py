@@ -6,8 +6,8 @@ of training is looked for after every episode, as table C.22 shows.
     pneumarm experiment no-shaping
 
 On arms 1 to 5, four runs each, 316 of 320 agents meet the criterion without shaping, as all do in the thesis, and no
-setting surely matters to what they earn. Over all trials their reward is -18 on average, against -10 in all-goals
-with the same arms and runs; shaping-settings compares both within runs.
+setting significantly matters to what they earn. Over all trials their reward is -18 on average, against -10 in
+all-goals with the same arms and runs; shaping-settings compares both within runs.
 """
 
 from dataclasses import replace

@@ -6,7 +6,7 @@ import numpy as np
 
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.evidence import difference, mean, numbers, over_arms, values
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.noise_for_transfer.noises import NoiseForTransfer
 from pneumarm.experiments.pictures import Axis, against, section
 from pneumarm.simulation.noise import NoiseSettings
@@ -14,7 +14,7 @@ from pneumarm.simulation.noise import NoiseSettings
 _THESIS = NoiseSettings()  # correlated, less for a slow arm, as large as the fit's error (section 3.4)
 
 
-def analysis(experiment: NoiseForTransfer, rows: Rows) -> Analysis:
+def analysis(experiment: NoiseForTransfer, rows: TrialRows) -> Analysis:
     """Return what becomes of each noise on the arm."""
     trials, found = experiment.trials, measured(experiment, rows)
     gains = {t: difference(rows, "reward", t, 1) for t in trials if t != 1}
@@ -45,7 +45,7 @@ def analysis(experiment: NoiseForTransfer, rows: Rows) -> Analysis:
     )
 
 
-def measured(experiment: NoiseForTransfer, rows: Rows) -> dict[str, Interval]:
+def measured(experiment: NoiseForTransfer, rows: TrialRows) -> dict[str, Interval]:
     """Return what claims are judged by."""
     trial, once = experiment.trial, _THESIS.factor
     usual, most = (trial(_THESIS.kind, _THESIS.by_velocity, factor) for factor in (once, max(experiment.factors)))

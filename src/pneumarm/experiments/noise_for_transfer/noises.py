@@ -13,7 +13,7 @@ from pneumarm.experiments.there_and_back import (
     Prepared,
     ThereAndBack,
     prepared,
-    trained_and_moved,
+    train_and_move,
     usual,
 )
 from pneumarm.experiments.words import words_of
@@ -57,7 +57,7 @@ class NoiseForTransfer(ThereAndBack):
     def measure(self, material: Prepared, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train an agent with the noise of ``trial``, and move the arm with it."""
         noise = self.noises[self.trials[trial]]
-        return trained_and_moved(material, replace(TRAINING, noise=noise), run, settings)
+        return train_and_move(material, replace(TRAINING, noise=noise), run, settings)
 
     def trial(self, kind: str, by_velocity: bool, factor: float) -> int:
         """Return the number of a trial."""

@@ -2,7 +2,7 @@
 
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.evidence import by_trial, difference, mean, of_trial
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.on_the_arm_only.from_scratch import IN_SIMULATION, ON_ARM, OnTheArmOnly
 from pneumarm.experiments.on_the_arm_only.progress import progress_alt, progress_figure
 from pneumarm.experiments.pictures import dots, section
@@ -10,7 +10,7 @@ from pneumarm.report.page import Picture
 from pneumarm.statistics import wilson
 
 
-def analysis(experiment: OnTheArmOnly, rows: Rows) -> Analysis:
+def analysis(experiment: OnTheArmOnly, rows: TrialRows) -> Analysis:
     """Return the hours beside the thesis' guess."""
     trials = experiment.trials
     by_arm = [[row.figures for row in runs] for runs in of_trial(rows, ON_ARM)]

@@ -6,7 +6,7 @@ from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import interval
 from pneumarm.experiments.evidence import Array
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.optimal_settings.confirmation import DerivedSettings
 from pneumarm.experiments.trainings import CRITERIA
 
@@ -14,7 +14,7 @@ _CRITERIA = ("reward", "actions", "switches", "episodes")
 _TRIAL_10 = 10
 
 
-def analysis(experiment: DerivedSettings, rows: Rows) -> Analysis:
+def analysis(experiment: DerivedSettings, rows: TrialRows) -> Analysis:
     """Return both settings beside the thesis', and the difference within the runs."""
     trials = experiment.trials
     ours = {name: rows.table(name, list(trials)) for name in _CRITERIA}

@@ -4,7 +4,7 @@ import numpy as np
 
 from pneumarm.experiments.differences import Interval, above
 from pneumarm.experiments.evidence import Array, blocks, over_arms
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.overnight.days import DAYS, FROZEN, LEARNING, NO_NIGHT, Overnight
 from pneumarm.experiments.pictures import Curve, courses, section
 from pneumarm.report.page import Table
@@ -13,7 +13,7 @@ _SPAN = 3  # blocks before the night, and at the end, that are the level of a da
 _LABELS = {"reward": "reward [-]", "actions": "actions of\nsuccesses [-]", "switches": "switches of\nsuccesses [-]"}
 
 
-def analysis(experiment: Overnight, rows: Rows) -> Analysis:
+def analysis(experiment: Overnight, rows: TrialRows) -> Analysis:
     """Return the drop after the night and what brings the reward back."""
     sizes = experiment.sizes
     rewards = {trial: blocks(rows, "reward", trial) for trial in DAYS}
@@ -47,12 +47,12 @@ def analysis(experiment: Overnight, rows: Rows) -> Analysis:
 
 
 def answer(lost: Interval, frozen: Interval) -> str:
-    """Return in words for whom the night surely costs reward."""
+    """Return in words for whom the night significantly costs reward."""
     agents = {"an agent that learns": lost, "one that never learns": frozen}
     costs = [words for words, found in agents.items() if above(found) == "holds"]
     if costs:
         return f"The night costs {' and '.join(costs)} reward."
-    return "No drop is shown, so that it cannot be seen what would bring the reward back."
+    return "No drop is shown, so what would restore the reward cannot be seen."
 
 
 def _gain(course: Array, place: int) -> Array:

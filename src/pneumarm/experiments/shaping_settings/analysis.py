@@ -13,7 +13,7 @@ from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import Interval, Verdict, below, interval
 from pneumarm.experiments.evidence import Array
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
 from pneumarm.experiments.trainings import CRITERIA, LEARNING
@@ -32,15 +32,17 @@ Differences = Mapping[str, list[Interval | None]]
 """By figure, each trial's difference from its reference, None for a reference itself."""
 
 
-def analysis(experiment: ShapingSettings, rows: Rows) -> Analysis:
+def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     """Return every trial's results and its difference from the thesis' settings within runs."""
     tables = {name: rows.table(name, list(experiment.trials)) for name in _CRITERIA}
     # From here on columns are samples: runs where there is one arm, else the arms.
     samples = {name: np.stack([rows.samples(line) for line in table]) for name, table in tables.items()}
     differences = {name: _differences(experiment, table) for name, table in samples.items()}
     found = measured(experiment, tables, samples, len(rows.arms))
-    surely = {f"surely_{name}": _surely(experiment, name, differences) for name in ("reward", "episodes")}
-    words = experiment.words.filled(found | surely)
+    significant = {
+        f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")
+    }
+    words = experiment.words.filled(found | significant)
     strategy, results = words.sections
     drawn = Picture(
         strategy_figure(experiment.train_settings(1), ArmSpec()),
@@ -102,15 +104,15 @@ def _differences(experiment: ShapingSettings, table: Array) -> list[Interval | N
     return [None if n == of else interval(table[n - 1] - table[of - 1]) for n, of in references.items()]
 
 
-def _surely(experiment: ShapingSettings, name: str, differences: Differences) -> str:
+def _significant(experiment: ShapingSettings, name: str, differences: Differences) -> str:
     """Return in words what matters beyond chance."""
     named = zip(experiment.trials.values(), differences[name], strict=True)
-    surely = [
+    significant = [
         f"{words} ({each if name == 'reward' else _whole(each)})"
         for words, each in named
         if each and abs(each.mean) > each.half
     ]
-    return "; ".join(surely) or "none"
+    return "; ".join(significant) or "none"
 
 
 def _results(
@@ -136,7 +138,7 @@ def _results(
 
 
 def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Verdict]:
-    """Return both standard deviations on an arm, and whether the first is surely smaller (Pitman and Morgan).
+    """Return both standard deviations on an arm, and whether the first is significantly smaller (Pitman and Morgan).
 
     Runs are pairs; the variances differ where sum and difference of the pairs are correlated.
     """

@@ -36,7 +36,7 @@ class ShapingTrial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Whether the potentiometer is."""
 
 
-class _Trials(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _TrialsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     trials: tuple[ShapingTrial, ...]
 
 
@@ -61,7 +61,7 @@ class ShapingSettings(Experiment):
     runs: int = 4
     arms: tuple[str, ...] = ARMS
     plan: tuple[ShapingTrial, ...] = field(
-        default_factory=lambda: msgspec.convert(tomllib.loads(_packaged("trials.toml")), _Trials).trials
+        default_factory=lambda: msgspec.convert(tomllib.loads(_packaged("trials.toml")), _TrialsFile).trials
     )
     wear: str = field(default_factory=lambda: _packaged("worn.toml"))
 

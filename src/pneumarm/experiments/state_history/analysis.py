@@ -6,7 +6,7 @@ import msgspec
 
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.evidence import Column, change, difference, numbers
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.pictures import Axis, against, section
 from pneumarm.experiments.state_history.histories import StateHistory
 from pneumarm.report.page import Table
@@ -14,7 +14,7 @@ from pneumarm.report.page import Table
 _THESIS = 3  # observations in the state (eq. 3.5)
 
 
-def analysis(experiment: StateHistory, rows: Rows) -> Analysis:
+def analysis(experiment: StateHistory, rows: TrialRows) -> Analysis:
     """Return errors and agents by history."""
     found, trials, count = measured(experiment, rows), experiment.trials, len(experiment.histories)
     words = experiment.words.filled({**found, "known": "{known}"})
@@ -37,7 +37,7 @@ def analysis(experiment: StateHistory, rows: Rows) -> Analysis:
     )
 
 
-def measured(experiment: StateHistory, rows: Rows) -> dict[str, Interval]:
+def measured(experiment: StateHistory, rows: TrialRows) -> dict[str, Interval]:
     """Return what claims are judged by."""
     one, three = (1 + experiment.histories.index(history) for history in (1, _THESIS))
     four, period = three + 1, three + len(experiment.histories)
@@ -53,7 +53,7 @@ def measured(experiment: StateHistory, rows: Rows) -> dict[str, Interval]:
     }
 
 
-def _nested(rows: Rows, trials: Mapping[int, str], count: int, columns: tuple[Column, ...]) -> Table:
+def _nested(rows: TrialRows, trials: Mapping[int, str], count: int, columns: tuple[Column, ...]) -> Table:
     """Return how much what is added to the state changes the errors."""
     pairs = {f"{trials[t]} against {trials[t - 1]}": (t, t - 1) for t in range(2, count + 1)}
     pairs |= {f"{trials[t]} against without": (t, t - count) for t in range(count + 1, 2 * count + 1)}

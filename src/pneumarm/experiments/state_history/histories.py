@@ -19,7 +19,7 @@ from pneumarm.experiments.there_and_back import (
     ThereAndBack,
     over_joints,
     prepared,
-    trained_and_moved,
+    train_and_move,
     usual,
 )
 from pneumarm.experiments.words import words_of
@@ -164,7 +164,7 @@ class StateHistory(ThereAndBack):
         return {
             **{f"std {name}": value for name, value in over_joints(made.held_out.std).items()},
             **{f"{name}{AFTER_A_SECOND}": value for name, value in over_joints(ahead.measured[-1]).items()},
-            **trained_and_moved(mine, TRAINING, run, settings),
+            **train_and_move(mine, TRAINING, run, settings),
         }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.evidence import Array, blocks, difference, mean, over_arms, values
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.moving import SIMULATION
 from pneumarm.experiments.pictures import Curve, courses, dots, section
 from pneumarm.experiments.transfer.conditions import (
@@ -37,7 +37,7 @@ _SIMULATIONS = (
 )
 
 
-def analysis(experiment: TransferToTheArm, rows: Rows) -> Analysis:
+def analysis(experiment: TransferToTheArm, rows: TrialRows) -> Analysis:
     """Return the courses beside the thesis', the causes, and what holds of section 5.5.1."""
     causes = causes_of_the_drop(rows)
     largest = max((name for name in causes if name != _ALL_THREE), key=lambda name: causes[name].mean)
@@ -65,7 +65,7 @@ def analysis(experiment: TransferToTheArm, rows: Rows) -> Analysis:
     )
 
 
-def measured(rows: Rows, progress: int) -> dict[str, Any]:
+def measured(rows: TrialRows, progress: int) -> dict[str, Any]:
     """Return what claims are judged by; ``progress`` is the block in which the thesis sees some."""
     frozen, slow = (blocks(rows, "reward", trial) for trial in (1, 2))
     return {
@@ -83,7 +83,7 @@ def measured(rows: Rows, progress: int) -> dict[str, Any]:
     }
 
 
-def _arrival(rows: Rows, trial: int, figure: str) -> Array:
+def _arrival(rows: TrialRows, trial: int, figure: str) -> Array:
     """Return by how much ``figure`` is lower in the first block than in the simulation, shape (arms, runs)."""
     return values(rows, EXPLORING + figure, trial) - values(rows, f"{figure} @1", trial)
 
@@ -93,7 +93,7 @@ def _last(course: Array) -> Array:
     return np.asarray(course[:, :, -max(1, course.shape[-1] // 4) :].mean(axis=-1))
 
 
-def causes_of_the_drop(rows: Rows) -> dict[str, Interval]:
+def causes_of_the_drop(rows: TrialRows) -> dict[str, Interval]:
     """Return what each cause takes from the reward of a greedy agent."""
     from_arm, quiet = (values(rows, prefix + "reward", AS_IT_IS) for prefix in (FROM_ARM, WITHOUT_NOISE))
     return {
@@ -107,7 +107,7 @@ def causes_of_the_drop(rows: Rows) -> dict[str, Interval]:
     }
 
 
-def _on_the_arm(words: SectionWords, rows: Rows, block: int) -> Section:
+def _on_the_arm(words: SectionWords, rows: TrialRows, block: int) -> Section:
     shown = {}
     for figure, label, factor in (
         ("reward", "reward [-]", 1.0),
@@ -123,7 +123,7 @@ def _on_the_arm(words: SectionWords, rows: Rows, block: int) -> Section:
     return section(words, rows, {}, figures=[courses(shown, block, words.figure)])
 
 
-def _causes(words: SectionWords, rows: Rows, causes: Mapping[str, Interval]) -> Section:
+def _causes(words: SectionWords, rows: TrialRows, causes: Mapping[str, Interval]) -> Section:
     drawn = dots(list(causes), {"lost reward [-]": list(causes.values())}, words.figure, zero=True)
     made = section(words, rows, CONDITIONS, figures=[drawn])
     simulated = [

@@ -1,7 +1,7 @@
 """What the rows say of what agents lose on the way to the arm."""
 
 from pneumarm.experiments.evidence import by_trial, difference, mean, over_arms, values
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.moving import SIMULATION
 from pneumarm.experiments.pictures import dots, section
 from pneumarm.experiments.transferability.kinds import (
@@ -15,7 +15,7 @@ from pneumarm.experiments.transferability.kinds import (
 )
 
 
-def analysis(experiment: Transferability, rows: Rows) -> Analysis:
+def analysis(experiment: Transferability, rows: TrialRows) -> Analysis:
     """Return what every kind of agent earns, and what it loses on the arm."""
     trials = experiment.trials
     lost = {t: values(rows, SIMULATION + "reward", t) - values(rows, "reward", t) for t in KINDS}

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.evidence import Array, change, difference, mean, numbers, samples
-from pneumarm.experiments.experiment import Analysis, Rows
+from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.pictures import Axis, section
 from pneumarm.experiments.valves_closed.inflation import CLOSED, OPEN, ValvesClosed
 from pneumarm.report.page import Picture
 from pneumarm.report.style import DARK, MIDDLE, panels, styled
 
 
-def analysis(experiment: ValvesClosed, rows: Rows) -> Analysis:
+def analysis(experiment: ValvesClosed, rows: TrialRows) -> Analysis:
     """Return fit and performance each way."""
     trials, found = experiment.trials, measured(rows)
     period, pause = (mean(rows, name, OPEN).mean for name in ("period", "pause"))
@@ -51,7 +51,7 @@ def analysis(experiment: ValvesClosed, rows: Rows) -> Analysis:
     )
 
 
-def measured(rows: Rows) -> dict[str, Interval]:
+def measured(rows: TrialRows) -> dict[str, Interval]:
     """Return what claims are judged by, each of valves left as they are against closed ones."""
     return {
         "error": change(rows, "relative angle", OPEN, CLOSED),

@@ -16,7 +16,7 @@ from pneumarm.experiments.there_and_back import (
     ThereAndBack,
     opened,
     prepared,
-    trained_and_moved,
+    train_and_move,
     usual,
 )
 from pneumarm.experiments.words import words_of
@@ -83,7 +83,7 @@ class ValvesClosed(ThereAndBack):
         """Train an agent and move the arm with it; inflate a muscle and watch it."""
         chosen = material[trial - 1]
         goals = material[0].simulation.goal_range
-        found = trained_and_moved(chosen, TRAINING, run, settings, goals)
+        found = train_and_move(chosen, TRAINING, run, settings, goals)
         spec = chosen.simulation.spec
         seed = run_seed(settings, run) % 2**31
         pause = spec.latency or _PAUSE

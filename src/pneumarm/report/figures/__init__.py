@@ -4,7 +4,7 @@ Beside every function ``name`` that draws stands a function ``name_alt`` that sa
 main numbers, for those who do not see it.
 """
 
-from pneumarm.report.figures.adaptation import Mark, adaptation_curves, adaptation_curves_alt
+from pneumarm.report.figures.adaptation import CurveMark, adaptation_curves, adaptation_curves_alt
 from pneumarm.report.figures.baselines import Baseline, baselines, baselines_alt
 from pneumarm.report.figures.coverage import cells, cells_alt, new_share, projections, projections_alt
 from pneumarm.report.figures.displacement import against_displacement, against_displacement_alt
@@ -33,7 +33,7 @@ from pneumarm.report.figures.transfer import Phase, transfer_curves, transfer_cu
 __all__ = [
     "Baseline",
     "Classification",
-    "Mark",
+    "CurveMark",
     "Phase",
     "adaptation_curves",
     "adaptation_curves_alt",

@@ -15,7 +15,7 @@ RATIO_WINDOW = 20
 """Movements in a moving mean."""
 
 
-class Mark(NamedTuple):
+class CurveMark(NamedTuple):
     """Something that happened after a movement."""
 
     movement: int
@@ -28,7 +28,9 @@ _MARKS["rolled back"] = (INK, "X", "version taken back")
 
 
 @styled
-def adaptation_curves(squares: Array, quantities: Sequence[str], marks: Sequence[Mark], tolerated: float) -> Figure:
+def adaptation_curves(
+    squares: Array, quantities: Sequence[str], marks: Sequence[CurveMark], tolerated: float
+) -> Figure:
     """Draw the error of the simulation on the arm over that of its fit.
 
     Args:
@@ -71,7 +73,7 @@ def adaptation_curves(squares: Array, quantities: Sequence[str], marks: Sequence
     return figure
 
 
-def adaptation_curves_alt(squares: Array, quantities: Sequence[str], marks: Sequence[Mark]) -> str:
+def adaptation_curves_alt(squares: Array, quantities: Sequence[str], marks: Sequence[CurveMark]) -> str:
     """Say in words what :func:`adaptation_curves` shows."""
     if len(squares) == 0:
         return "No movements were made on the arm."

@@ -169,23 +169,8 @@ def fit(
     if len(training.inputs) <= window.input_size:
         raise UnusableInput(f"{len(training.inputs)} transitions are too few to fit; collect at least 2,000")
     began = time.perf_counter()
-    scaling = Scaling.of(training, window, valves)
-    simulation = Simulation(
-        spec=_widened(window.spec(spec), window, training),
-        window=window,
-        scaling=scaling,
-        networks=(),
-        velocity="network" if window.velocity == "measured" else settings.velocity,
-        error_std=np.zeros((spec.joints, len(QUANTITIES))),
-        goal_range=np.asarray(goal_range, np.float64).reshape(spec.joints, 2),
-        pressure_range=_pressure_range(training, window),
-        commands=_commands(training, window) if valves else "continuous",
-        held_out=settings.held_out,
-        seed=settings.seed,
-        further_std=np.zeros(len(window.further)),
-        further_range=_further_range(training, window),
-    )
-    places = simulation.outputs
+    simulation = _unfitted(training, spec, goal_range, valves, settings)
+    scaling, places = simulation.scaling, simulation.outputs
     change = training.target[:, places].astype(np.float64) - training.observation[:, places]
     spread = change.std(axis=0)
     spread[spread == 0] = 1.0
@@ -216,6 +201,28 @@ def fit(
         converged=[one.converged for one in fits],
         rows=len(x),
         seconds=seconds,
+    )
+
+
+def _unfitted(
+    training: Transitions, spec: ArmSpec, goal_range: NDArray[np.float64], valves: bool, settings: FitSettings
+) -> Simulation:
+    """Return the simulation without its networks."""
+    window = Window.of(spec, settings.history, settings.sensors)
+    return Simulation(
+        spec=_widened(window.spec(spec), window, training),
+        window=window,
+        scaling=Scaling.of(training, window, valves),
+        networks=(),
+        velocity="network" if window.velocity == "measured" else settings.velocity,
+        error_std=np.zeros((spec.joints, len(QUANTITIES))),
+        goal_range=np.asarray(goal_range, np.float64).reshape(spec.joints, 2),
+        pressure_range=_pressure_range(training, window),
+        commands=_commands(training, window) if valves else "continuous",
+        held_out=settings.held_out,
+        seed=settings.seed,
+        further_std=np.zeros(len(window.further)),
+        further_range=_further_range(training, window),
     )
 
 

@@ -179,76 +179,23 @@ def collect(
     settings = settings or CollectSettings()
     _check(arm, store, transitions, seed)
     begun = wall_clock.perf_counter()
-    run = store.resume_run(PURPOSE, _as_settings(settings, seed, controller))
-    entries = [entry.transitions for entry in store.catalogue(run)]
-    done, number = sum(entries), len(entries)
-    tally = _restored(arm, store, resumed=number > 0)
-    guard = guarded(arm)
-    if watch is not None and number and (seen := store.state("watch")) is not None:
-        watch.set_state(seen)
-    if watch is not None:
-        warm_up(watch, arm.spec)
-    wrong = 0
-
-    def keep_broken(recorded: Recorded) -> None:
-        """Store what there is of a sequence that no arm can make again."""
-        state = {"collect": json.dumps(asdict(tally)).encode()}
-        if watch is not None:
-            recorded = replace(recorded, marks=(*watch.marks(recorded), *recorded.marks))
-            keep_watch(store, watch, run)
-            state["watch"] = watch.get_state()
-        store.append(recorded, state)
-
+    collection = _Collection(arm, store, seed, settings, controller, goals, watch)
     try:
-        while done < transitions:
-            random = np.random.default_rng([seed, number])
-            recorded = _sequence(guard, tally, settings, random, controller, goals, watch, keep_broken)
-            state = {"collect": json.dumps(asdict(tally)).encode()}
-            if (arm_state := guard.get_state()) is not None:
-                state["arm"] = arm_state
-            if watch is not None:
-                recorded = replace(recorded, marks=watch.marks(recorded))
-                done -= keep_watch(store, watch, run)
-                state["watch"] = watch.get_state()
-                wrong = _still_wrong(arm, watch, wrong)
-            store.append(recorded, state)
-            done += recorded.transitions
-            number += 1
+        while collection.done < transitions:
+            collection.make_sequence()
             if progress is not None:
-                progress(min(done, transitions), transitions)
+                progress(min(collection.done, transitions), transitions)
     except BaseException as error:
         with suppress(Exception):  # the first failure is the one to tell of
             arm.close()
         if isinstance(error, PneumarmError) or not isinstance(error, Exception):
             raise
+        number = collection.number
         raise ArmFailure(
             f"{arm.spec.name}: failed while collecting sequence {number + 1} ({type(error).__name__}: {error}); "
             f"the {number} sequences before it are stored. Check the arm and run the same command again"
         ) from error
-    return CollectResult(
-        transitions=done,
-        sequences=number,
-        seconds=tally.seconds,
-        wall_seconds=wall_clock.perf_counter() - begun,
-        peak_pressure=np.array(tally.peak_pressure),
-        interventions=Interventions(**tally.interventions),
-        missed_deadlines=tally.missed_deadlines,
-        link=tally.link,
-        marked=store.marked_rows(run),
-    )
-
-
-def _still_wrong(arm: Arm, watch: Watch, before: int) -> int:
-    """Return for how many sequences something has been wrong; raise ArmFailure where that is no passing trouble."""
-    found = watch.spoiled_since()
-    if found is None:
-        return 0
-    if before + 1 >= MOST_SPOILED:
-        raise ArmFailure(
-            f"{arm.spec.name}: {found[1]}, for {MOST_SPOILED} sequences now; nothing can be learned from that: "
-            "see to the arm and run the same command again"
-        )
-    return before + 1
+    return collection.result(wall_clock.perf_counter() - begun)
 
 
 def enough(transitions: int) -> bool | str:
@@ -274,62 +221,115 @@ def _check(arm: Arm, store: Store, transitions: int, seed: int) -> None:
         raise UnusableInput(f"{store.path}: was made for another arm ({'; '.join(different)}); give another file")
 
 
-def _as_settings(settings: CollectSettings, seed: int, controller: Controller | None) -> dict[str, object]:
-    name = None if controller is None else type(controller).__name__
-    return {"seed": seed, "controller": name, **asdict(settings)}
+class _Collection:
+    """One collection, made sequence after sequence, from where an earlier call has left it."""
 
+    def __init__(
+        self,
+        arm: Arm,
+        store: Store,
+        seed: int,
+        settings: CollectSettings,
+        controller: Controller | None,
+        goals: ArrayLike | None,
+        watch: Watch | None,
+    ) -> None:
+        self._store, self._seed, self._settings = store, seed, settings
+        self._controller, self._goals, self._watch = controller, goals, watch
+        name = None if controller is None else type(controller).__name__
+        self._run = store.resume_run(PURPOSE, {"seed": seed, "controller": name, **asdict(settings)})
+        entries = [entry.transitions for entry in store.catalogue(self._run)]
+        self.done, self.number = sum(entries), len(entries)
+        """Transitions and sequences that are stored."""
+        kept = {name: store.state(name) if self.number else None for name in ("collect", "arm", "watch")}
+        self._tally = _Tally(**json.loads(kept["collect"])) if kept["collect"] is not None else _Tally()
+        if kept["arm"] is not None:
+            arm.set_state(kept["arm"])
+        self._arm = guarded(arm)
+        self._wrong = 0  # sequences in a row
+        if watch is not None:
+            if kept["watch"] is not None:
+                watch.set_state(kept["watch"])
+            warm_up(watch, arm.spec)
 
-def _restored(arm: Arm, store: Store, resumed: bool) -> _Tally:
-    """Put the arm back to where the last stored sequence left it, and return what was counted until then."""
-    kept = store.state("collect")
-    if not resumed or kept is None:
-        return _Tally()
-    state = store.state("arm")
-    if state is not None:
-        arm.set_state(state)
-    return _Tally(**json.loads(kept))
+    def make_sequence(self) -> None:
+        """Bring the arm to a begin state, carry out one sequence, and store it."""
+        arm, random = self._arm, np.random.default_rng([self._seed, self.number])
+        cycle = ControlCycle(arm, self._settings.close_while_computing)
+        before, start = Counts.now(cycle), arm.read().time
+        self._settings.begin.reach(arm, random)
+        kind, actor, info = self._actor(random)
+        remaining = iter(range(self._settings.actions))
 
+        def decide(reading: Reading) -> Command | None:
+            return None if next(remaining, None) is None else actor.act(reading)
 
-def _sequence(
-    arm: GuardedArm,
-    tally: _Tally,
-    settings: CollectSettings,
-    random: np.random.Generator,
-    controller: Controller | None,
-    goals: ArrayLike | None,
-    watch: Watch | None,
-    keep_broken: Callable[[Recorded], None],
-) -> Recorded:
-    """Bring the arm to a begin state, carry out one sequence, and return what was read."""
-    cycle = ControlCycle(arm, settings.close_while_computing)
-    before = Counts.now(cycle)
-    start = arm.read().time
-    settings.begin.reach(arm, random)
-    info: Mapping[str, object] = {}
-    actor: Controller
-    if controller is None:
-        kind, actor = random_actions(arm.spec, settings, random)
-        actor.reset(np.zeros(arm.spec.joints))
-    else:
-        kind, actor = "controller", controller
-        goal = _goal(arm, goals, random)
-        info = {"goal": goal.tolist()}
-        _told(actor, goal)
-    remaining = iter(range(settings.actions))
+        def broken(steps: list[Step], why: BaseException) -> None:
+            recorded = broken_off(steps, arm.spec, why, kind=kind, at_rest=True, info=info)
+            self._tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start if steps else 0.0)
+            if recorded is not None and arm.get_state() is None:  # no arm can make it again
+                with suppress(Exception):  # the first failure is the one to tell of
+                    self._keep(recorded, whole=False)
 
-    def decide(reading: Reading) -> Command | None:
-        return None if next(remaining, None) is None else actor.act(reading)
+        steps = watched(cycle.run(decide), self._watch, at_rest=True, broken=broken)
+        self._tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start)
+        self._keep(Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info), whole=True)
 
-    def broken(steps: list[Step], why: BaseException) -> None:
-        recorded = broken_off(steps, arm.spec, why, kind=kind, at_rest=True, info=info)
-        tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start if steps else 0.0)
-        if recorded is not None and arm.get_state() is None:
-            with suppress(Exception):  # the first failure is the one to tell of
-                keep_broken(recorded)
+    def _actor(self, random: np.random.Generator) -> tuple[str, Controller, Mapping[str, object]]:
+        """Return the kind of the next sequence, what acts in it, and what else is kept with it."""
+        spec = self._arm.spec
+        if self._controller is None:
+            kind, actor = random_actions(spec, self._settings, random)
+            return kind, actor, {}
+        span = np.asarray(spec.angle_range if self._goals is None else self._goals, np.float64)
+        low, high = np.broadcast_to(span, (spec.joints, 2)).T
+        goal = random.uniform(low, high)
+        try:
+            self._controller.reset(goal)
+        except Exception as error:
+            raise PneumarmError(f"the controller failed at a new goal ({type(error).__name__}: {error})") from error
+        return "controller", self._controller, {"goal": goal.tolist()}
 
-    steps = watched(cycle.run(decide), watch, at_rest=True, broken=broken)
-    tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start)
-    return Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info)
+    def _keep(self, recorded: Recorded, *, whole: bool) -> None:
+        """Store a sequence with all that is needed to go on after it, unless it broke off."""
+        state, watch = {"collect": json.dumps(asdict(self._tally)).encode()}, self._watch
+        if whole and (arm_state := self._arm.get_state()) is not None:
+            state["arm"] = arm_state
+        if watch is not None:
+            recorded = replace(recorded, marks=(*watch.marks(recorded), *recorded.marks))
+            self.done -= keep_watch(self._store, watch, self._run)
+            state["watch"] = watch.get_state()
+            if whole:
+                self._judge(watch)
+        self._store.append(recorded, state)
+        if whole:
+            self.done += recorded.transitions
+            self.number += 1
+
+    def _judge(self, watch: Watch) -> None:
+        """Count the sequences in which something is wrong; raise ArmFailure where that is no passing trouble."""
+        found = watch.spoiled_since()
+        self._wrong = 0 if found is None else self._wrong + 1
+        if found is not None and self._wrong >= MOST_SPOILED:
+            raise ArmFailure(
+                f"{self._arm.spec.name}: {found[1]}, for {MOST_SPOILED} sequences now; nothing can be learned from "
+                "that: see to the arm and run the same command again"
+            )
+
+    def result(self, wall_seconds: float) -> CollectResult:
+        """Return what there is of it now, after a call that took ``wall_seconds`` [s]."""
+        tally = self._tally
+        return CollectResult(
+            transitions=self.done,
+            sequences=self.number,
+            seconds=tally.seconds,
+            wall_seconds=wall_seconds,
+            peak_pressure=np.array(tally.peak_pressure),
+            interventions=tally.counts.interventions,
+            missed_deadlines=tally.missed_deadlines,
+            link=tally.link,
+            marked=self._store.marked_rows(self._run),
+        )
 
 
 def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
@@ -348,16 +348,3 @@ def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.G
         shares = random.uniform(shortest, 1.0, commands.shape)
         commands *= np.where(random.random(commands.shape) < settings.pulses, shares, 1.0)
     return kind, Trajectory(commands[drawn, np.arange(spec.joints)])
-
-
-def _goal(arm: Arm, goals: ArrayLike | None, random: np.random.Generator) -> NDArray[np.float64]:
-    spec = arm.spec
-    span = np.broadcast_to(np.asarray(spec.angle_range if goals is None else goals, np.float64), (spec.joints, 2))
-    return random.uniform(span[:, 0], span[:, 1])
-
-
-def _told(controller: Controller, goal: NDArray[np.float64]) -> None:
-    try:
-        controller.reset(goal)
-    except Exception as error:
-        raise PneumarmError(f"the controller failed at a new goal ({type(error).__name__}: {error})") from error

@@ -51,11 +51,11 @@ _LONGEST_SEQUENCE = 10_000  # rows; a longer one is stored in parts, which costs
 _BAR_RANGE = (-0.2, 1.2)  # of max_pressure
 
 
-class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _MappingTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of the mapping in which an unknown key is a mistake."""
 
 
-class Angle(_Table, frozen=True, forbid_unknown_fields=True):
+class AngleColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The column of a joint's angle; 0 rad and 0 deg are the middle of the arm's range."""
 
     column: str
@@ -63,7 +63,7 @@ class Angle(_Table, frozen=True, forbid_unknown_fields=True):
     range: tuple[float, float] | None = None
 
 
-class Pressure(_Table, frozen=True, forbid_unknown_fields=True):
+class PressureColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The column of a muscle's gauge pressure."""
 
     column: str
@@ -72,14 +72,14 @@ class Pressure(_Table, frozen=True, forbid_unknown_fields=True):
     range: tuple[float, float] | None = None
 
 
-class Command(_Table, frozen=True, forbid_unknown_fields=True):
+class CommandColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The column of a muscle's command."""
 
     column: str
     range: tuple[float, float] | None = None
 
 
-class Velocity(_Table, frozen=True, forbid_unknown_fields=True):
+class VelocityColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The column of a joint's velocity that a sensor of its own measured."""
 
     column: str
@@ -87,33 +87,33 @@ class Velocity(_Table, frozen=True, forbid_unknown_fields=True):
     range: tuple[float, float] | None = None
 
 
-class Further(_Table, frozen=True, forbid_unknown_fields=True):
+class FurtherColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The column of an accelerometer [m/s2] or a thermometer [Celsius]."""
 
     column: str
     range: tuple[float, float] | None = None
 
 
-class Joint(_Table, frozen=True, forbid_unknown_fields=True):
+class JointColumns(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The columns of one joint; those of further sensors where it has them."""
 
-    angle: Angle
-    pressure_1: Pressure
-    pressure_2: Pressure
-    command_1: Command
-    command_2: Command
-    velocity: Velocity | None = None
-    acceleration: Further | None = None
-    temperature_1: Further | None = None
-    temperature_2: Further | None = None
+    angle: AngleColumn
+    pressure_1: PressureColumn
+    pressure_2: PressureColumn
+    command_1: CommandColumn
+    command_2: CommandColumn
+    velocity: VelocityColumn | None = None
+    acceleration: FurtherColumn | None = None
+    temperature_1: FurtherColumn | None = None
+    temperature_2: FurtherColumn | None = None
 
 
-class Mapping(_Table, frozen=True, forbid_unknown_fields=True):
+class Mapping(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """What the columns of a recording are."""
 
     commands: Literal["valves", "pulses", "continuous"]
     arm: dict[str, object]
-    joint: list[Joint]
+    joint: list[JointColumns]
     sequence: str | None = None
     time: str | None = None
 
@@ -207,14 +207,14 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
         raise UnusableInput(message if message.startswith(str(path)) else f"{path}: {message}") from error
 
 
-def _measures_velocity(joints: list[Joint]) -> bool:
+def _measures_velocity(joints: list[JointColumns]) -> bool:
     given = [joint.velocity is not None for joint in joints]
     if any(given) and not all(given):
         raise UnusableInput("needs the velocity of every [[joint]], or of none")
     return all(given)
 
 
-def _sensors(joints: list[Joint]) -> tuple[Sensor, ...]:
+def _sensors(joints: list[JointColumns]) -> tuple[Sensor, ...]:
     """Return the accelerometers and thermometers that there are columns of."""
     found = []
     for number, joint in enumerate(joints, start=1):
@@ -244,13 +244,13 @@ def _columns(mapping: Mapping, spec: ArmSpec) -> list[_Column]:
     return found
 
 
-def _velocity(velocity: Velocity, spec: ArmSpec) -> _Column:
+def _velocity(velocity: VelocityColumn, spec: ArmSpec) -> _Column:
     per_degree = spec.counts_per_degree / 1e3
     factor = {"rad/s": math.degrees(per_degree), "deg/s": per_degree, "counts/ms": 1.0}[velocity.unit]
     return _Column(velocity.column, *(velocity.range or (-math.inf, math.inf)), factor)
 
 
-def _angle(angle: Angle, spec: ArmSpec) -> _Column:
+def _angle(angle: AngleColumn, spec: ArmSpec) -> _Column:
     middle = sum(spec.angle_range) / 2
     per_unit = {"rad": spec.counts_per_degree * 180 / math.pi, "deg": spec.counts_per_degree, "counts": 1.0}
     factor = per_unit[angle.unit]
@@ -259,7 +259,7 @@ def _angle(angle: Angle, spec: ArmSpec) -> _Column:
     return _Column(angle.column, low, high, factor, offset)
 
 
-def _pressure(pressure: Pressure, spec: ArmSpec) -> _Column:
+def _pressure(pressure: PressureColumn, spec: ArmSpec) -> _Column:
     if not (math.isfinite(pressure.full_scale) and pressure.full_scale > 0):
         raise UnusableInput(f"the full_scale of {pressure.column!r} must be over 0 bar, got {pressure.full_scale}")
     per_unit = {

@@ -30,17 +30,17 @@ def learner(simulation: Simulation, settings: ServoSettings = SMALL, number: int
 @pytest.mark.parametrize(("joints", "history", "direct"), [(1, 3, False), (2, 2, True), (1, 1, True)])
 def test_the_gradient_is_that_of_the_price(joints: int, history: int, direct: bool):
     one = learner(synthetic_simulation(joints, history, direct=direct))
-    one._prepare(np.random.default_rng(1))
+    one._prepare(np.random.default_rng(1), np.ones(SMALL.arms, bool))
     weights, random = one.net.flat, np.random.default_rng(2)
     weights[:] = random.normal(0, 0.3, weights.size)
     task = one.task._replace(commands=one.task.commands._replace(shortest=1e-6, leak=0.0))  # what has no slope
-    learn_once(task, one.net, one._tape)
+    learn_once(task, one.net, one.tape)
     gradient = one.net.gradient.copy()
     way = gradient / np.linalg.norm(gradient)
     found = []
     for distance in (2e-3, -2e-3):
         weights += np.float32(distance) * way
-        found.append(learn_once(task, one.net, one._tape))
+        found.append(learn_once(task, one.net, one.tape))
         weights -= np.float32(distance) * way
     assert (found[0] - found[1]) / 4e-3 == pytest.approx(np.linalg.norm(gradient), rel=0.02)
 

@@ -59,6 +59,9 @@ class CollectBegin(BeginState):
     """Longest time that a muscle is inflated again [s] (thesis section 3.2.2: 1.2)."""
 
 
+_SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse sequence
+
+
 @dataclass(frozen=True)
 class CollectSettings(Settings):
     """How transitions are collected."""
@@ -69,9 +72,12 @@ class CollectSettings(Settings):
     """Share of sequences whose actions are held (the thesis decides "randomly")."""
     longest_hold: int = 10
     """Most control periods that an action is held, the least is 1 (the thesis does not say)."""
-    pulses: float = 0.0
+    pulses: float = 0.6
     """Share of the openings that are pulses of random length, where the arm can do them; the others last the whole
-    period, as in the thesis. A record of both serves controllers with pulses and without."""
+    period, as in the thesis (0). A record of both serves controllers with pulses and without."""
+    sparse: float = 0.5
+    """Share of the sequences of unheld actions in which most steps keep the valves closed and pulses are short, where
+    there are pulses: what brings a joint to rest exactly where it should be."""
     begin: CollectBegin = field(default_factory=CollectBegin)
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5)."""
     close_while_computing: bool = False
@@ -83,6 +89,7 @@ class CollectSettings(Settings):
             "velocity_share": 0 <= self.velocity_share <= 1,
             "longest_hold": self.longest_hold >= 1,
             "pulses": 0 <= self.pulses <= 1,
+            "sparse": 0 <= self.sparse <= 1,
         }
 
 
@@ -333,7 +340,7 @@ class _Collection:
 
 
 def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
-    """Return one of the two kinds of random sequences: its name and its commands."""
+    """Return one of the kinds of random sequences: its name and its commands."""
     actions = random.integers(ACTIONS, size=(settings.actions, spec.joints))
     drawn = np.tile(np.arange(settings.actions)[:, None], spec.joints)  # which action each step and joint does
     kind = "zero-velocity"
@@ -346,5 +353,9 @@ def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.G
     if settings.pulses and spec.pulses:
         shortest = min(spec.shortest_pulse / spec.period, 1.0)
         shares = random.uniform(shortest, 1.0, commands.shape)
+        if kind == "zero-velocity" and random.random() < settings.sparse:
+            kind = "sparse"
+            opened = random.random(commands.shape) < _SPARSE
+            return kind, Trajectory(commands * opened * np.maximum(shares**2, shortest))
         commands *= np.where(random.random(commands.shape) < settings.pulses, shares, 1.0)
     return kind, Trajectory(commands[drawn, np.arange(spec.joints)])

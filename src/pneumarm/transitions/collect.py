@@ -38,7 +38,7 @@ from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.watch import Watch, keep_watch, warm_up, watched
 
-KINDS = ("zero-velocity", "velocity", "controller")
+KINDS = ("zero-velocity", "velocity", "sparse", "controller")
 """Kinds of the sequences made here."""
 FEWEST_TRANSITIONS = 2_000
 """Fewer cannot be learnt from."""

@@ -222,7 +222,7 @@ def train(
         UnusableInput: begin states and simulation do not fit, or the checkpoint is of another training.
 
     """
-    settings = (method or METHODS["policy"]).settings() if settings is None else settings
+    settings = (method or METHODS["servo"]).settings() if settings is None else settings
     method = method or next((one for one in METHODS.values() if isinstance(settings, one.settings)), None)
     if method is None:
         raise UnusableInput(f"{type(settings).__name__} are the settings of no method here; say of which")

@@ -15,7 +15,7 @@ from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.commands import command_parameters, shortest_share
 from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.gradient import ServoTask
-from pneumarm.learning.servo.inputs import input_parameters, input_size
+from pneumarm.learning.servo.inputs import seen_parameters, input_size
 from pneumarm.learning.servo.price import PriceParameters
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.networks.layers import weight_count
@@ -113,7 +113,7 @@ def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:
     """Return what does not change while a servo learns or acts."""
     return ServoTask(
         simulation=simulation_parameters(simulation),
-        inputs=input_parameters(simulation, settings.preview, settings.tolerance),
+        inputs=seen_parameters(simulation, settings.preview, settings.tolerance),
         commands=command_parameters(simulation, settings.dead, shortest_share(simulation.spec)),
         prices=PriceParameters(settings.precision, settings.far, settings.flat, settings.change),
     )
@@ -121,5 +121,5 @@ def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:
 
 def servo_sizes(simulation: Simulation, settings: ServoSettings) -> tuple[int, ...]:
     """Return the units of each layer of the policy, inputs first."""
-    inputs = input_parameters(simulation, settings.preview, settings.tolerance)
+    inputs = seen_parameters(simulation, settings.preview, settings.tolerance)
     return (input_size(inputs), *settings.hidden, 2 * simulation.window.joints)

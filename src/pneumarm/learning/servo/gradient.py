@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel
 from pneumarm.learning.servo.commands import CommandParameters, write_commands
-from pneumarm.learning.servo.inputs import InputParameters, input_size, inputs_back, write_inputs
+from pneumarm.learning.servo.inputs import SeenParameters, input_size, inputs_back, write_inputs
 from pneumarm.learning.servo.price import PriceParameters, price_of_changes, price_of_error
 from pneumarm.networks.layers import Trainable, backward, forward, through_weights
 from pneumarm.networks.tansig import FASTMATH
@@ -30,7 +30,7 @@ class ServoTask(NamedTuple):
     """What does not change while a servo learns."""
 
     simulation: SimulationParameters
-    inputs: InputParameters
+    inputs: SeenParameters
     commands: CommandParameters
     prices: PriceParameters
 

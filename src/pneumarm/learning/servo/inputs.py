@@ -22,8 +22,8 @@ _FAR = np.float32(0.05)  # tolerances to an input of the usual size
 _BENDS = np.array([1 / 6, 1 / 1.2], np.float32)
 
 
-class InputParameters(NamedTuple):
-    """What the inputs are made by. Made by :func:`input_parameters`."""
+class SeenParameters(NamedTuple):
+    """What the inputs are made by. Made by :func:`seen_parameters`."""
 
     rate: NDArray[np.float32]
     """R, shape (joints,)."""
@@ -36,12 +36,12 @@ class InputParameters(NamedTuple):
     """Numbers in an observation."""
 
 
-def input_parameters(simulation: Simulation, preview: tuple[float, ...], tolerance: float) -> InputParameters:
+def seen_parameters(simulation: Simulation, preview: tuple[float, ...], tolerance: float) -> SeenParameters:
     """Return the parameters for looking ``preview`` [s] ahead, with a ``tolerance`` in degrees."""
     window, scaling, spec = simulation.window, simulation.scaling, simulation.spec
     scale = window.of_joints(scaling.observation_scale)
     steps = sorted({max(1, round(ahead / spec.period)) for ahead in preview})
-    return InputParameters(
+    return SeenParameters(
         rate=(scale[:, 0] / (1e3 * spec.period * scale[:, 1])).astype(np.float32),
         tolerances=(scale[:, 0] / (spec.counts_per_degree * tolerance)).astype(np.float32),
         steps=np.array(steps, np.int64),
@@ -50,7 +50,7 @@ def input_parameters(simulation: Simulation, preview: tuple[float, ...], toleran
     )
 
 
-def input_size(parameters: InputParameters) -> int:
+def input_size(parameters: SeenParameters) -> int:
     """Return how many inputs there are."""
     joints, history = parameters.rate.size, parameters.history
     return joints * (1 + (history - 1) + 4 + 2 * (history - 1) + 3 * parameters.steps.size)

@@ -15,7 +15,7 @@ from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.commands import command_parameters, shortest_share
 from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.gradient import ServoTask
-from pneumarm.learning.servo.inputs import seen_parameters, input_size
+from pneumarm.learning.servo.inputs import input_size, seen_parameters
 from pneumarm.learning.servo.price import PriceParameters
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.networks.layers import weight_count

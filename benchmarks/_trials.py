@@ -58,12 +58,14 @@ class Rows:
         return tuple(row[key] for key in self.keys)
 
 
-def collected(path: Path, arm: int, seed: int, transitions: int = 0, minutes: float = 0.0) -> tuple[int, float]:
+def collected(
+    path: Path, arm: int, seed: int, transitions: int = 0, minutes: float = 0.0, pulses: float = 0.0
+) -> tuple[int, float]:
     """Collect on a virtual arm until there are so many ``transitions`` and so many ``minutes`` have passed for it.
 
     Whole sequences are stored, so there may be one more than needed. Returns the transitions and the minutes.
     """
-    return there_and_back.collected(path, f"virtual:seed={arm}", seed, Recipe(transitions, minutes))
+    return there_and_back.collected(path, f"virtual:seed={arm}", seed, Recipe(transitions, minutes, pulses=pulses))
 
 
 def fitted(path: Path, seed: int) -> tuple[StoreFit, BeginStates]:

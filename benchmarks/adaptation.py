@@ -53,7 +53,7 @@ from pneumarm.simulation import FitSettings, fit_store
 from pneumarm.statistics import moving_mean
 from pneumarm.task import begin_states
 from pneumarm.task.movements import joined
-from pneumarm.transitions import KINDS, Store, collect
+from pneumarm.transitions import KINDS, WHOLE_PERIODS, Store, collect
 
 Floats = NDArray[np.float64]
 NIGHT = 14 * 3600.0
@@ -189,7 +189,7 @@ class Bench:
         with tempfile.TemporaryDirectory() as place:
             arm = changed_arm(change, seed, 3000 + seed)
             with Store.for_arm(Path(place) / "db", arm.spec) as store:
-                collect(arm, store, self.collected, seed)
+                collect(arm, store, self.collected, seed, settings=WHOLE_PERIODS)
                 simulation = fit_store(store, FitSettings(seed=seed)).simulation
                 return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
 

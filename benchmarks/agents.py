@@ -28,7 +28,7 @@ from pneumarm.learning import AnyAgent, LearnSettings, PolicySettings, Training,
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
-from pneumarm.transitions import KINDS, Store, collect
+from pneumarm.transitions import KINDS, WHOLE_PERIODS, Store, collect
 
 TRANSITIONS = 200_000
 SEED_OF_MOVEMENTS = 0
@@ -71,7 +71,7 @@ def prepared(folder: Path, arm: int) -> tuple[Simulation, BeginStates]:
     db, file = folder / f"{arm}.db", folder / f"{arm}.sim"
     if not db.exists():
         with open_arm(f"virtual:seed={arm}", arm) as opened, Store.for_arm(db, opened.spec) as store:
-            collect(opened, store, TRANSITIONS, arm)
+            collect(opened, store, TRANSITIONS, arm, settings=WHOLE_PERIODS)
     with Store.open(db) as store:
         if not file.exists():
             fit_store(store, FitSettings(seed=arm)).simulation.save(file)

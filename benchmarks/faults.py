@@ -51,7 +51,7 @@ from pneumarm.simulation import Simulation
 from pneumarm.simulation.fit import FitSettings, fit_store
 from pneumarm.statistics import wilson
 from pneumarm.task.begin import begin_states
-from pneumarm.transitions import CollectSettings, Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store, collect
 from pneumarm.transitions.collect import random_actions
 from pneumarm.transitions.rows import Mark, Recorded
 from pneumarm.transitions.watch import Watch
@@ -391,7 +391,7 @@ def fitted(folder: Path, arm: int) -> Simulation:
     if not file.exists():
         opened = VirtualArm(draw_parameters(arm), seed=arm)
         with Store.for_arm(folder / f"{arm}.db", opened.spec) as store:
-            collect(opened, store, TRANSITIONS, arm)
+            collect(opened, store, TRANSITIONS, arm, settings=WHOLE_PERIODS)
             fit_store(store, FitSettings(epochs=30)).simulation.save(file)
     return Simulation.load(file)
 

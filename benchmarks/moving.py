@@ -37,6 +37,7 @@ from pneumarm.learning import train
 from pneumarm.moving import Moved, MoveSettings, move, track
 from pneumarm.moving.movement import valve_changes
 from pneumarm.task.reference import counts_of, parse_reference
+from pneumarm.transitions import CollectSettings
 
 CONTROLLERS = "agent,pid,pid@200,scheduled,pwm,sliding,sliding@200"
 RANGE = 30.0
@@ -95,7 +96,7 @@ def prepared(plan: Plan, name: str, arm: int, seed: int) -> str:
         if not agent.exists():
             with tempfile.TemporaryDirectory() as place:
                 db = Path(place) / "arm.db"
-                collected(db, arm, seed, minutes=plan.minutes)
+                collected(db, arm, seed, minutes=plan.minutes, pulses=CollectSettings().pulses)
                 made, begin = fitted(db, seed)
             made.simulation.save(simulation)
             train(made.simulation, begin, None, seed).agent.save(agent)

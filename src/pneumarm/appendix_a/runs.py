@@ -17,7 +17,7 @@ from pneumarm.checkup import Checkup, CheckupSettings, diagnose, measure
 from pneumarm.control.monitor import Monitor
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation import FitSettings, Simulation, fit_store
-from pneumarm.transitions import Store, collect, enough
+from pneumarm.transitions import WHOLE_PERIODS, Store, collect, enough
 from pneumarm.transitions.choice import joined
 from pneumarm.transitions.rows import Rows
 
@@ -93,7 +93,7 @@ def run(
     """
     checkup = measure(arm, CLOSELY) if checked else None
     with tempfile.TemporaryDirectory() as folder, Store.for_arm(Path(folder) / "db", arm.spec) as store:
-        collect(arm, store, settings.transitions, seed)
+        collect(arm, store, settings.transitions, seed, settings=WHOLE_PERIODS)
         fitted = fit_store(store, FitSettings(epochs=settings.epochs, seed=seed))
         apart = joined(list(fitted.filtered.stream("held-out")))
         found = findings(store.blocks(), Monitor(arm.spec, before))

@@ -10,7 +10,7 @@ from pneumarm.experiments.experiment import LaboratorySettings, Report
 from pneumarm.files import write_json, write_text
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.task import BeginStates, begin_states
-from pneumarm.transitions import Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, Store, collect
 
 STORE = "transitions.db"
 SIMULATION = "simulation.safetensors"
@@ -43,7 +43,7 @@ def simulated(arm: str, folder: Path, settings: LaboratorySettings, progress: Re
         arm = f"{arm}{',' if ':' in arm else ':'}faults={folder / PLAN}"
     if not (folder / SIMULATION).exists():
         with open_arm(arm, settings.seed) as opened, Store.for_arm(folder / STORE, opened.spec) as store:
-            collect(opened, store, settings.transitions, settings.seed, progress=progress)
+            collect(opened, store, settings.transitions, settings.seed, progress=progress, settings=WHOLE_PERIODS)
         with Store.open(folder / STORE) as store:
             fit_store(store, FitSettings(seed=settings.seed)).simulation.save(folder / SIMULATION)
     simulation = Simulation.load(folder / SIMULATION)

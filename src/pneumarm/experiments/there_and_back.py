@@ -86,6 +86,8 @@ class Recipe:
     """Of control [Hz]; None for the arm's own."""
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting."""
+    pulses: float = 0.0
+    """Share of the openings that are pulses (thesis: none)."""
     fit: FitSettings = field(default_factory=FitSettings)
 
 
@@ -102,7 +104,7 @@ def collected(
     Whole sequences are stored, so there may be one more than needed. Returns the transitions and the minutes on the
     arm's clock, those between its sequences included.
     """
-    collecting = CollectSettings(close_while_computing=recipe.close_while_computing)
+    collecting = CollectSettings(close_while_computing=recipe.close_while_computing, pulses=recipe.pulses)
     with opened(arm, seed, recipe.frequency) as there, Store.for_arm(path, there.spec) as store:
         first = max(recipe.transitions, FEWEST_TRANSITIONS)
         done = collect(there, store, first, seed, settings=collecting, progress=progress)

@@ -24,7 +24,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.statistics import FEWEST, mean_estimate
 from pneumarm.task import Reward, TaskSettings
 from pneumarm.task.movements import Movements, of_rows
-from pneumarm.transitions import Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, Store, collect
 
 Baseline = Literal["open_loop", "closed_loop", "simulated"]
 """True physics planned once without noise, true physics planned every turn, learned simulation planned every turn."""
@@ -86,7 +86,7 @@ class Planned:
 def measured_goal_range(arm: Arm, seed: int = 0) -> NDArray[np.float64]:
     """Return the range of goals (joints, 2) [counts] that a short collecting on ``arm`` finds."""
     with TemporaryDirectory() as folder, Store.for_arm(Path(folder) / "range.db", arm.spec) as store:
-        collect(arm, store, RANGE_TRANSITIONS, seed)
+        collect(arm, store, RANGE_TRANSITIONS, seed, settings=WHOLE_PERIODS)
         found: NDArray[np.float64] = store.percentiles()
     return found
 

@@ -4,6 +4,7 @@ from pneumarm.transitions.choice import held_out
 from pneumarm.transitions.collect import (
     FEWEST_TRANSITIONS,
     KINDS,
+    WHOLE_PERIODS,
     CollectBegin,
     CollectResult,
     CollectSettings,
@@ -23,6 +24,7 @@ __all__ = [
     "FEWEST_TRANSITIONS",
     "KINDS",
     "QUANTITIES",
+    "WHOLE_PERIODS",
     "CollectBegin",
     "CollectResult",
     "CollectSettings",

@@ -93,6 +93,10 @@ class CollectSettings(Settings):
         }
 
 
+WHOLE_PERIODS = CollectSettings(pulses=0.0)
+"""As in the thesis: every valve that opens is open for whole control periods."""
+
+
 @dataclass(frozen=True)
 class CollectResult:
     """What was collected, interrupted or not."""

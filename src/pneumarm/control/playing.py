@@ -38,7 +38,7 @@ from pneumarm.simulation.kernel import Places, places, shift
 from pneumarm.task.begin import draw_interval
 from pneumarm.task.movements import Movements, movements
 from pneumarm.task.noting import goes_on, note_action
-from pneumarm.task.reward import RewardParameters, at_goal, is_switch, paid
+from pneumarm.task.reward import RewardParameters, is_near, is_slow, is_switch, paid
 
 Array = NDArray[np.float64]
 _missed, _action, _velocity = part(missed_turns), part(action_of), part(derived_velocity)
@@ -349,7 +349,8 @@ def _judge(watched, rules, goal, velocity, turn, gained):  # type: ignore[no-unt
     """Set what each joint has ``gained`` by its last action and whether it switched; return whether all are there."""
     is_reached = True
     for j in range(goal.size):
-        is_reached = is_reached and at_goal(rules.reward, watched.angle[j], velocity[j], goal[j])
+        is_reached = is_reached and is_near(rules.reward, watched.angle[j], goal[j])
+        is_reached = is_reached and is_slow(rules.reward, velocity[j])
     for j in range(goal.size):
         action = _action(watched.applied[j, 0], watched.applied[j, 1])
         turn.switched[j] = 1 if is_switch(turn.last[j], action) else 0

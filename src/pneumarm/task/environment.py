@@ -25,7 +25,7 @@ from pneumarm.simulation.kernel import (
 from pneumarm.simulation.noise import NoiseParameters, noise_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginParameters, BeginStates, begin_parameters, draw_begin
-from pneumarm.task.reward import RewardParameters, at_goal, is_switch, paid
+from pneumarm.task.reward import RewardParameters, is_near, is_slow, is_switch, paid
 from pneumarm.task.settings import TaskSettings
 
 GOES_ON, REACHED, CUT_OFF = 0, 1, 2
@@ -180,7 +180,9 @@ def velocity(task, episode, joint):  # type: ignore[no-untyped-def]
 def reached(task, episode):  # type: ignore[no-untyped-def]
     """Return whether every joint is at its goal and slow (thesis eq. 5.1, 5.2)."""
     for joint in range(episode.goal.shape[0]):
-        if not at_goal(task.reward, angle(task, episode, joint), velocity(task, episode, joint), episode.goal[joint]):
+        if not is_near(task.reward, angle(task, episode, joint), episode.goal[joint]):
+            return False
+        if not is_slow(task.reward, velocity(task, episode, joint)):
             return False
     return True
 

@@ -1,7 +1,8 @@
 """When a goal is reached, what a switch is, and what is paid for an action (thesis sections 4.2.1, 5.1 and 5.4.1).
 
-The rules are the functions at the end of this module. Loops are compiled from them, a joint at a time, and Python
-calls them as they are, for all joints at once: they take a :class:`Reward` or its :class:`RewardParameters` alike.
+The rules are the functions at the end of this module. Loops are compiled from them, and Python calls them as they
+are: they take a :class:`Reward` or its :class:`RewardParameters` alike. A goal is reached where all joints are near
+to it and slow.
 """
 
 import math
@@ -56,7 +57,8 @@ class Reward(Settings):
 
     def reached(self, angle: ArrayLike, velocity: ArrayLike, goal: ArrayLike) -> bool:
         """Return whether all joints are at their goals; all arguments (joints,) in [counts], [counts/ms]."""
-        return bool(at_goal.py_func(self, np.asarray(angle), np.asarray(velocity), np.asarray(goal)).all())
+        near = is_near.py_func(self, np.asarray(angle), np.asarray(goal))
+        return bool(near.all() and is_slow.py_func(self, np.asarray(velocity)).all())
 
     def of(self, reached: bool, switched: ArrayLike) -> NDArray[np.float64]:
         """Return what each joint is paid for an action (joints,), ``switched`` being whether it was a switch."""
@@ -65,15 +67,21 @@ class Reward(Settings):
 
 
 @part
-def at_goal(reward, angle, velocity, goal):  # type: ignore[no-untyped-def]
-    """Return whether a joint is at its ``goal`` and slow (thesis eq. 5.1, 5.2)."""
-    return (abs(angle - goal) <= reward.angle_tolerance) & (abs(velocity) <= reward.velocity_tolerance)
+def is_near(reward, angle, goal):  # type: ignore[no-untyped-def]
+    """Return whether a joint is at its ``goal`` (thesis eq. 5.1)."""
+    return abs(angle - goal) <= reward.angle_tolerance
+
+
+@part
+def is_slow(reward, velocity):  # type: ignore[no-untyped-def]
+    """Return whether a joint is slow enough to have reached a goal that it is at (thesis eq. 5.2)."""
+    return abs(velocity) <= reward.velocity_tolerance
 
 
 @part
 def is_switch(before, action):  # type: ignore[no-untyped-def]
     """Return whether a joint's ``action`` is a switch after the one ``before`` it, -1 where it is the first."""
-    return (before >= 0) & (before != action)
+    return before >= 0 and before != action
 
 
 @part

@@ -43,7 +43,8 @@ class PolicyActor:
         if not self._decided:
             decide(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
             arm = single.fleet
-            arm.switched[...] = is_switch.py_func(arm.actions, single.actions)
+            for joint, action in enumerate(single.actions[0]):
+                arm.switched[0, joint] = is_switch.py_func(arm.actions[0, joint], action)
             arm.actions[...] = single.actions
             self._decided = True
         return single.actions[0].copy()

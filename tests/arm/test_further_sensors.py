@@ -252,7 +252,7 @@ def test_a_board_passes_them_on(tmp_path):
 def test_a_controller_without_a_channel_for_a_sensor_refuses_it():
     velocity, sensors = usual_sensors(ALL.split("+"))
     arm = VirtualArm(velocity_sensor=velocity, sensors=sensors)
-    with pytest.raises(UnusableInput, match=r"joint_1_temperature_2 needs one of the controller's 2 extra channels"):
+    with pytest.raises(UnusableInput, match=r"joint_1_temperature_2 needs one of the board's 2 extra channels"):
         SerialArm(BoardLine(EmulatedBoard(arm)), arm.spec)
 
 

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pneumarm.appendix_a.errors import board
+from pneumarm.appendix_a.case_pictures import covariance
 from pneumarm.appendix_a.headless import HeadlessArm
-from pneumarm.appendix_a.pictures import covariance
+from pneumarm.appendix_a.playing_errors import board
 from pneumarm.appendix_a.runs import findings
 from pneumarm.arm.virtual import StuckValve, VirtualArm, draw_parameters
 from pneumarm.cli import main

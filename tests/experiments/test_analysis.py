@@ -15,8 +15,8 @@ from pneumarm.experiments.design import WantedFactor, analyse_table, assign, ort
 from pneumarm.experiments.design.anova import anova, smallest
 from pneumarm.experiments.design.best import Criterion, confirm, derive, level_at, predict
 from pneumarm.experiments.design.distributions import f_tail, half_normal_quantile, incomplete_beta, t_quantile
+from pneumarm.experiments.design.effect_plots import half_normal_figure
 from pneumarm.experiments.design.effects import effects
-from pneumarm.experiments.design.figures import half_normal_figure
 from pneumarm.experiments.design.half_normal import lenth, percentages, positions
 from pneumarm.experiments.design.loss import loss
 

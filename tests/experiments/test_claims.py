@@ -15,8 +15,8 @@ from pneumarm.experiments.claims import conclusions, judge, keys_of, read_result
 from pneumarm.experiments.experiment import Analysis, Claim, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import Factorial
 from pneumarm.experiments.findings import weights_dominate
-from pneumarm.experiments.page import write_page
 from pneumarm.experiments.registry import PLACES, experiment
+from pneumarm.experiments.results import write_page
 from pneumarm.experiments.switch_punishment import EXPERIMENT as PUNISHMENT
 
 OF_THE_THESIS = {

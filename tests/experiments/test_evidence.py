@@ -10,7 +10,9 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import spearmanr
 
 from pneumarm.experiments.differences import Interval, interval, within
-from pneumarm.experiments.evidence import (
+from pneumarm.experiments.experiment import Row, TrialRows, sorted_rows
+from pneumarm.experiments.factorial import rank_correlation
+from pneumarm.experiments.means import (
     Column,
     change,
     difference,
@@ -22,8 +24,6 @@ from pneumarm.experiments.evidence import (
     series,
     table,
 )
-from pneumarm.experiments.experiment import Row, TrialRows, sorted_rows
-from pneumarm.experiments.factorial import rank_correlation
 from pneumarm.experiments.overnight.analysis import answer
 from pneumarm.experiments.pictures import Axis, Curve, against, courses, dots
 from pneumarm.experiments.words import ClaimWords, Words

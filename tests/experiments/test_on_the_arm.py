@@ -15,8 +15,8 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments import registry
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.displacement import typical
-from pneumarm.experiments.evidence import blocks, values
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, TrialRows, run_seed, sorted_rows
+from pneumarm.experiments.means import blocks, values
 from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,
@@ -28,8 +28,8 @@ from pneumarm.experiments.moving import (
 )
 from pneumarm.experiments.on_the_arm_only import from_scratch
 from pneumarm.experiments.overnight.days import DAYS
-from pneumarm.experiments.page import write_page
 from pneumarm.experiments.preparation import Simulated
+from pneumarm.experiments.results import write_page
 from pneumarm.experiments.transfer import conditions
 from pneumarm.learning import Shaping
 from pneumarm.simulation import Simulation

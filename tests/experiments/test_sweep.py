@@ -13,8 +13,8 @@ from children import child, end, wait_until
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import LaboratorySettings, Row, run_seed, sorted_rows
-from pneumarm.experiments.page import write_page
-from pneumarm.experiments.rows import RowWriter, read_rows
+from pneumarm.experiments.results import write_page
+from pneumarm.experiments.row_file import RowWriter, read_rows
 from pneumarm.experiments.sweep import ROWS, arm_folder, sweep
 
 ROW = Row("virtual", 1, 1, {"sum": 1.5}, 0.25)

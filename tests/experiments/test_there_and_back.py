@@ -16,8 +16,8 @@ from pneumarm.experiments.control_frequency.frequencies import at_frequency
 from pneumarm.experiments.enough_data import EnoughData
 from pneumarm.experiments.experiment import Claim, Experiment, LaboratorySettings, Row, TrialRows, sorted_rows
 from pneumarm.experiments.noise_for_transfer import NoiseForTransfer
-from pneumarm.experiments.page import write_page
 from pneumarm.experiments.registry import experiment
+from pneumarm.experiments.results import write_page
 from pneumarm.experiments.state_history import StateHistory
 from pneumarm.experiments.state_history.histories import errors_with_period, shortened
 from pneumarm.experiments.sweep import sweep

@@ -205,8 +205,8 @@ def errors_(
     seed
         Of the virtual arm; 0 is the nominal one.
     """
-    from pneumarm.appendix_a.errors import play_errors
-    from pneumarm.appendix_a.page import errors_page
+    from pneumarm.appendix_a.errors_page import errors_page
+    from pneumarm.appendix_a.playing_errors import play_errors
 
     require_folder(out)
     with progress("playing the errors") as report:

@@ -6,8 +6,8 @@ from typing import Annotated
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.experiments.experiment import LaboratorySettings
-from pneumarm.experiments.page import write_page
 from pneumarm.experiments.registry import experiment
+from pneumarm.experiments.results import write_page
 from pneumarm.experiments.sweep import sweep
 
 

@@ -65,7 +65,7 @@ def analyse_(
 
 
 def _write(analysis: TableAnalysis, out: Path, quantity: str, results: Path) -> None:
-    from pneumarm.experiments.design.page import table_sections
+    from pneumarm.experiments.design.table_sections import table_sections
     from pneumarm.report.page import render
 
     require_folder(out)

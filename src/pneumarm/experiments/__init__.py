@@ -24,7 +24,7 @@ What experiments have in common is in the class that theirs are of: trainings in
 (:class:`~.trainings.Trainings`), an agent that moves the arm or agents that are compared on it
 (:class:`~.moving.OnTheArm`, :class:`~.moving.AgentsByTrial`), and all the way from an arm, however it is collected
 from, back to it (:class:`~.there_and_back.ThereAndBack`). What rows say over arms, with intervals and tables, is
-:mod:`.evidence`, and :mod:`.pictures` draws it.
+:mod:`.means`, and :mod:`.pictures` draws it.
 
 Trainings of the thesis' agent by an orthogonal array need no code: :class:`~.factorial.Factorial` is such an
 experiment. :mod:`.design` is of use for tables from anywhere (``pneumarm taguchi analyse``).

@@ -108,7 +108,7 @@ class Factorial(Trainings):
 
     def analyse(self, rows: TrialRows) -> Analysis:
         """Return rankings, effects and tests of every criterion, beside the thesis'."""
-        from pneumarm.experiments.design.page import table_sections
+        from pneumarm.experiments.design.table_sections import table_sections
 
         ours, theirs = self.analyses(rows)
         results = {n: a.results for n, a in ours.items()}

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.evidence import Array, Column, over_arms, samples, table
 from pneumarm.experiments.experiment import TrialRows
+from pneumarm.experiments.means import Array, Column, over_arms, samples, table
 from pneumarm.experiments.words import SectionWords
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, key, legend_below, panels, styled

@@ -17,7 +17,7 @@ from typing import Any
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, Row, TrialRows, sorted_rows
 from pneumarm.experiments.preparation import SETTINGS, claim
-from pneumarm.experiments.rows import RowWriter
+from pneumarm.experiments.row_file import RowWriter
 from pneumarm.files import require_folder
 from pneumarm.learning.training import cores
 

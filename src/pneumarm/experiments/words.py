@@ -13,8 +13,8 @@ from typing import Any
 import msgspec
 
 from pneumarm.experiments.differences import Interval, Verdict, above, all_hold, below, within
-from pneumarm.experiments.evidence import Column
 from pneumarm.experiments.experiment import Analysis, Claim
+from pneumarm.experiments.means import Column
 from pneumarm.report.page import Section
 
 _RULE = re.compile(r"(\|?)(\w+)\|? ([<>]) (-?[\d.]+)")

@@ -20,8 +20,8 @@ from typing import Any, Literal
 import msgspec
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.page import RESULTS
 from pneumarm.experiments.registry import PLACES, experiment
+from pneumarm.experiments.results import RESULTS
 from pneumarm.report.page import Section, Table
 
 FEWEST_ARMS, FEWEST_RUNS = 5, 16

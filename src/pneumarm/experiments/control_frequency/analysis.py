@@ -4,8 +4,8 @@ from typing import Any
 
 from pneumarm.experiments.control_frequency.frequencies import THESIS_FREQUENCY, ControlFrequency
 from pneumarm.experiments.differences import Interval, interval
-from pneumarm.experiments.evidence import change, difference, mean, numbers, samples
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import change, difference, mean, numbers, samples
 from pneumarm.experiments.pictures import Axis, section
 from pneumarm.experiments.there_and_back import AFTER_A_SECOND
 

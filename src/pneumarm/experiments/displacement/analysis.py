@@ -7,8 +7,8 @@ import numpy as np
 from pneumarm.arm import ArmSpec
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.displacement.typical import AFTER, SERIES, Displacement
-from pneumarm.experiments.evidence import Column, from_series, mean, over_arms, series_of, values
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import Column, from_series, mean, over_arms, series_of, values
 from pneumarm.experiments.pictures import section
 from pneumarm.experiments.words import SectionWords
 from pneumarm.report.figures import against_displacement, against_displacement_alt, movement, movement_alt

@@ -11,10 +11,10 @@ from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import BEGIN, move
 from pneumarm.control.playing import Player
-from pneumarm.experiments.evidence import (
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
+from pneumarm.experiments.means import (
     series,
 )
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, draws, new_arm
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import Agent

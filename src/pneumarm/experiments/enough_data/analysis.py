@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from pneumarm.experiments.enough_data.minutes import EnoughData
-from pneumarm.experiments.evidence import difference, mean, numbers
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import difference, mean, numbers
 from pneumarm.experiments.pictures import Axis, section
 
 _THESIS = 120.0  # minutes (section 3.2.2)

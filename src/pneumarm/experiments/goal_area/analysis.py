@@ -1,8 +1,8 @@
 """What the rows say of the costs of precision."""
 
-from pneumarm.experiments.evidence import Column, by_trial, difference, mean
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.goal_area.areas import AREAS, GoalArea
+from pneumarm.experiments.means import Column, by_trial, difference, mean
 from pneumarm.experiments.pictures import dots, section
 
 

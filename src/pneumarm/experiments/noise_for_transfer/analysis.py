@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.evidence import difference, mean, numbers, over_arms, values
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import difference, mean, numbers, over_arms, values
 from pneumarm.experiments.noise_for_transfer.noises import NoiseForTransfer
 from pneumarm.experiments.pictures import Axis, against, section
 from pneumarm.simulation.noise import NoiseSettings

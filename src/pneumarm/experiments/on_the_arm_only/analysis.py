@@ -1,8 +1,8 @@
 """What the rows say of learning on the arm alone, beside the thesis' guess."""
 
 from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.evidence import by_trial, difference, mean, of_trial
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import by_trial, difference, mean, of_trial
 from pneumarm.experiments.on_the_arm_only.from_scratch import IN_SIMULATION, ON_ARM, OnTheArmOnly
 from pneumarm.experiments.on_the_arm_only.progress import progress_alt, progress_figure
 from pneumarm.experiments.pictures import dots, section

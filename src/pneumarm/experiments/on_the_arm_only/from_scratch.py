@@ -8,10 +8,10 @@ import numpy as np
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control.movement import BEGIN
 from pneumarm.control.playing import Player
-from pneumarm.experiments.evidence import (
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
+from pneumarm.experiments.means import (
     series,
 )
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,

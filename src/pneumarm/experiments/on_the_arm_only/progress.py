@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
-from pneumarm.experiments.evidence import from_series
+from pneumarm.experiments.means import from_series
 from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
 
 _STYLES = ((DARK, "-"), (MIDDLE, "--"), (GREY, "-."), (LIGHT, "-"), (DARK, ":"))

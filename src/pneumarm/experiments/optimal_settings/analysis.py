@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import interval
-from pneumarm.experiments.evidence import Array
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import Array
 from pneumarm.experiments.optimal_settings.confirmation import DerivedSettings
 from pneumarm.experiments.trainings import CRITERIA
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from pneumarm.experiments.differences import Interval, above
-from pneumarm.experiments.evidence import Array, blocks, over_arms
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import Array, blocks, over_arms
 from pneumarm.experiments.overnight.days import DAYS, FROZEN, LEARNING, NO_NIGHT, Overnight
 from pneumarm.experiments.pictures import Curve, courses, section
 from pneumarm.report.page import Table

@@ -12,8 +12,8 @@ from pneumarm.arm import ArmSpec
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import Interval, Verdict, below, interval
-from pneumarm.experiments.evidence import Array
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import Array
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
 from pneumarm.experiments.trainings import CRITERIA, LEARNING

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import msgspec
 
 from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.evidence import Column, change, difference, numbers
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import Column, change, difference, numbers
 from pneumarm.experiments.pictures import Axis, against, section
 from pneumarm.experiments.state_history.histories import StateHistory
 from pneumarm.report.page import Table

@@ -8,8 +8,8 @@ import msgspec
 import numpy as np
 
 from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.evidence import Array, blocks, difference, mean, over_arms, values
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import Array, blocks, difference, mean, over_arms, values
 from pneumarm.experiments.moving import SIMULATION
 from pneumarm.experiments.pictures import Curve, courses, dots, section
 from pneumarm.experiments.transfer.conditions import (

@@ -1,7 +1,7 @@
 """What the rows say of what agents lose on the way to the arm."""
 
-from pneumarm.experiments.evidence import by_trial, difference, mean, over_arms, values
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import by_trial, difference, mean, over_arms, values
 from pneumarm.experiments.moving import SIMULATION
 from pneumarm.experiments.pictures import dots, section
 from pneumarm.experiments.transferability.kinds import (

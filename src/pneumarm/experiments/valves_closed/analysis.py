@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.evidence import Array, change, difference, mean, numbers, samples
 from pneumarm.experiments.experiment import Analysis, TrialRows
+from pneumarm.experiments.means import Array, change, difference, mean, numbers, samples
 from pneumarm.experiments.pictures import Axis, section
 from pneumarm.experiments.valves_closed.inflation import CLOSED, OPEN, ValvesClosed
 from pneumarm.report.page import Picture

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from pneumarm.appendix_a.errors import PlayedError
+from pneumarm.appendix_a.playing_errors import PlayedError
 from pneumarm.appendix_a.runs import Case
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.style import quantities

@@ -6,8 +6,8 @@ import numpy as np
 
 from pneumarm.experiments.design.analysis import TableAnalysis
 from pneumarm.experiments.design.assignment import Level
+from pneumarm.experiments.design.effect_plots import effects_figure, half_normal_figure, half_normal_runs_figure
 from pneumarm.experiments.design.effects import Effects
-from pneumarm.experiments.design.figures import effects_figure, half_normal_figure, half_normal_runs_figure
 from pneumarm.report.page import Picture, Section, Table
 
 _MOST_RUNS = 8  # side by side; of more only the losses are shown

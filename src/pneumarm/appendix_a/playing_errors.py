@@ -8,7 +8,7 @@ from importlib import resources
 import msgspec
 from matplotlib.figure import Figure
 
-from pneumarm.appendix_a import pictures
+from pneumarm.appendix_a import case_pictures
 from pneumarm.appendix_a.headless import HeadlessArm
 from pneumarm.appendix_a.runs import Case, RunsSettings, run
 from pneumarm.arm import Arm, ArmSpec
@@ -31,7 +31,7 @@ class PictureWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A picture of several cases side by side."""
 
     draw: str
-    """Function of :mod:`.pictures`."""
+    """Function of :mod:`.case_pictures`."""
     caption: str
     quantities: tuple[int, ...] = ()
     """That it shows, where it can show several."""
@@ -63,7 +63,7 @@ class PlayedError:
     def drawn(self) -> list[tuple[Figure, str]]:
         """Return the pictures that reveal it, with their captions."""
         return [
-            (getattr(pictures, one.draw)(self.cases, *([one.quantities] if one.quantities else [])), one.caption)
+            (getattr(case_pictures, one.draw)(self.cases, *([one.quantities] if one.quantities else [])), one.caption)
             for one in self.words.pictures
         ]
 

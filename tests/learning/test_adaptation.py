@@ -14,7 +14,7 @@ from pneumarm.adaptation import (
     RefitSettings,
     TrialSettings,
     WatchSettings,
-    adaptation,
+    adaptation_of,
     sentences,
 )
 from pneumarm.adaptation.refit import _outputs_fitted, refit, rehearse
@@ -307,11 +307,11 @@ def test_the_policy_gets_better_in_the_new_simulation(agent: PolicyAgent, change
 
 
 def test_only_what_can_adapt_does(agent: PolicyAgent) -> None:
-    assert adaptation(agent, AdaptationSettings()) is not None
-    assert adaptation(agent, AdaptationSettings(every=0)) is None
+    assert adaptation_of(agent, AdaptationSettings()) is not None
+    assert adaptation_of(agent, AdaptationSettings(every=0)) is None
     linear = replace(agent, simulation=synthetic_simulation(direct=True))
-    assert adaptation(linear, AdaptationSettings()) is None
-    assert adaptation(PlanAgent(agent.simulation), AdaptationSettings()) is None
+    assert adaptation_of(linear, AdaptationSettings()) is None
+    assert adaptation_of(PlanAgent(agent.simulation), AdaptationSettings()) is None
     for wrong in (
         lambda: AdaptationSettings(growth=1.0),
         lambda: RefitSettings(folds=1),

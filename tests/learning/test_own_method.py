@@ -8,7 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, Self
@@ -26,10 +26,9 @@ from pneumarm.files import kind_of, read_arrays, write_arrays
 from pneumarm.learning import Method, SimulationAgent, Training, find_method, fingerprint, load_agent, test
 from pneumarm.learning.methods import GROUP
 from pneumarm.run import Run, RunSettings
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Valid
 from pneumarm.simulation import FitSettings, Simulation
-from pneumarm.simulation.noise import NoiseSettings
-from pneumarm.task import BeginStates, Reward, begin_states
+from pneumarm.task import BeginStates, TaskSettings, begin_states
 from pneumarm.transitions import KINDS, Store
 
 # ---- The method: it pushes towards the goal until that is near, and tries at random how near that is.
@@ -39,13 +38,9 @@ DOWN, CLOSED, UP = 2, 4, 6  # actions
 
 
 @dataclass(frozen=True)
-class PushSettings(Settings):
+class PushSettings(TaskSettings):
     trials: int = 4
     episodes: int = 50
-    reward: Reward = field(default_factory=Reward)
-    cutoff: int = 100
-    noise: NoiseSettings = field(default_factory=NoiseSettings)
-    begin_weights: tuple[float, ...] = (1.0,)
 
     def _valid(self) -> Valid:
         return {"trials": self.trials >= 1 or "1 or more", "episodes": self.episodes >= 1}

@@ -1,6 +1,6 @@
 """Adaptation: an agent goes on learning from the arm that it moves."""
 
-from pneumarm.adaptation.adaptation import Adaptation, AdaptationSettings, adaptation
+from pneumarm.adaptation.adaptation import Adaptation, AdaptationSettings, adaptation_of
 from pneumarm.adaptation.change import WatchSettings
 from pneumarm.adaptation.events import Event, sentences
 from pneumarm.adaptation.refit import RefitSettings
@@ -13,6 +13,6 @@ __all__ = [
     "RefitSettings",
     "TrialSettings",
     "WatchSettings",
-    "adaptation",
+    "adaptation_of",
     "sentences",
 ]

@@ -250,7 +250,7 @@ class Adaptation:
         self.agent, self._trusted = (with_plastic(self._origin, part) for part in np.split(numbers, 2))
 
 
-def adaptation(agent: Acts, settings: AdaptationSettings, seed: int = 0) -> Adaptation | None:
+def adaptation_of(agent: Acts, settings: AdaptationSettings, seed: int = 0) -> Adaptation | None:
     """Return how ``agent`` adapts to an arm between movements; None for agents that do not.
 
     A linear simulation, without hidden units, cannot be fitted further.

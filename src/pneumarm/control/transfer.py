@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pneumarm.adaptation import AdaptationSettings, adaptation
+from pneumarm.adaptation import AdaptationSettings, adaptation_of
 from pneumarm.arm import Arm, ControlCycle, Controller, guarded
 from pneumarm.arm.counts import Counts
 from pneumarm.control.agent import AgentController, controller_of, warm_up
@@ -157,7 +157,7 @@ class Transfer:
         self._number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": fingerprint(agent)})
         self._done = [dict(entry.info) for entry in self._stored()]
         """What is stored beside each movement: its phase, its figures, and the errors of simulations in it."""
-        self._adapting = adaptation(agent, settings.adaptation, seed)
+        self._adapting = adaptation_of(agent, settings.adaptation, seed)
         self._learning: _Learning | None = None
         if isinstance(agent, Learns) and self._adapting is None:
             self._learning = _Learning(agent, settings.learning_rate, seed)
@@ -272,15 +272,8 @@ class Transfer:
         agent = self._arrived
         draw = draw_movement(agent.goal_range, self._seed, test, number)
         BEGIN.reach(self._cycle.arm, draw.random)
-        return move(
-            self._cycle,
-            controller,
-            draw.goal,
-            agent.settings,
-            self._watch,
-            self._broken.append,
-            agent.window.velocity,
-        )
+        velocity = agent.window.velocity
+        return move(self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity)
 
     def _adapt(self) -> None:
         """Let the agent adapt where that is due."""

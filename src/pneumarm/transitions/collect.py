@@ -38,7 +38,7 @@ from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.watch import Watch, keep_watch, warm_up, watched
 
-KINDS = ("zero-velocity", "velocity", "sparse", "controller")
+KINDS = ("zero-velocity", "velocity", "pulses", "sparse", "controller")
 """Kinds of the sequences made here."""
 FEWEST_TRANSITIONS = 2_000
 """Fewer cannot be learnt from."""
@@ -59,6 +59,7 @@ class CollectBegin(BeginState):
     """Longest time that a muscle is inflated again [s] (thesis section 3.2.2: 1.2)."""
 
 
+_LONGEST_PULSES = 4  # most periods in a row in which a muscle gets the same pulse
 _SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse sequence
 
 
@@ -72,12 +73,11 @@ class CollectSettings(Settings):
     """Share of sequences whose actions are held (the thesis decides "randomly")."""
     longest_hold: int = 10
     """Most control periods that an action is held, the least is 1 (the thesis does not say)."""
-    pulses: float = 0.6
-    """Share of the openings that are pulses of random length, where the arm can do them; the others last the whole
-    period, as in the thesis (0). A record of both serves controllers with pulses and without."""
-    sparse: float = 0.5
-    """Share of the sequences of unheld actions in which most steps keep the valves closed and pulses are short, where
-    there are pulses: what brings a joint to rest exactly where it should be."""
+    pulses: float = 0.55
+    """Share of the sequences in which valves open for pulses of random length, where the arm can do them; in the
+    others they are open for whole periods, as in the thesis. A record of both serves controllers of both kinds."""
+    sparse: float = 0.45
+    """Share of those in which most steps keep the valves closed and pulses are short, as near to rest."""
     begin: CollectBegin = field(default_factory=CollectBegin)
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5)."""
     close_while_computing: bool = False
@@ -353,13 +353,21 @@ def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.G
         for joint in range(spec.joints):
             lengths = random.integers(1, settings.longest_hold, size=settings.actions, endpoint=True)
             drawn[:, joint] = np.repeat(drawn[:, joint], lengths)[: settings.actions]
-    commands = to_valves(actions).astype(np.float64)
-    if settings.pulses and spec.pulses:
-        shortest = min(spec.shortest_pulse / spec.period, 1.0)
-        shares = random.uniform(shortest, 1.0, commands.shape)
-        if kind == "zero-velocity" and random.random() < settings.sparse:
-            kind = "sparse"
-            opened = random.random(commands.shape) < _SPARSE
-            return kind, Trajectory(commands * opened * np.maximum(shares**2, shortest))
-        commands *= np.where(random.random(commands.shape) < settings.pulses, shares, 1.0)
-    return kind, Trajectory(commands[drawn, np.arange(spec.joints)])
+    if settings.pulses and spec.pulses and random.random() < settings.pulses:
+        return _random_pulses(spec, settings, random)
+    return kind, Trajectory(to_valves(actions)[drawn, np.arange(spec.joints)].astype(np.float64))
+
+
+def _random_pulses(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
+    """Return a sequence of pulses, every muscle for itself: some repeated over a few periods, or few short ones."""
+    shortest = min(spec.shortest_pulse / spec.period, 1.0)
+    shape = (settings.actions, spec.joints, 2)
+    valves, shares = random.integers(-1, 2, shape), random.uniform(shortest, 1.0, shape)
+    if random.random() < settings.sparse:
+        opened = random.random(shape) < _SPARSE
+        return "sparse", Trajectory(valves * opened * np.maximum(shares**2, shortest))
+    commands = (valves * shares).reshape(settings.actions, -1)
+    for muscle in range(commands.shape[1]):
+        lengths = random.integers(1, _LONGEST_PULSES, size=settings.actions, endpoint=True)
+        commands[:, muscle] = np.repeat(commands[:, muscle], lengths)[: settings.actions]
+    return "pulses", Trajectory(commands.reshape(shape))

@@ -244,9 +244,7 @@ class Stage:
         pass
 
 
-def watched_steps(
-    arm: Arm, monitor: Watch, seed: int, settings: CollectSettings = CollectSettings()
-) -> Iterator[Step]:
+def watched_steps(arm: Arm, monitor: Watch, seed: int, settings: CollectSettings = WHOLE_PERIODS) -> Iterator[Step]:
     """Collect for ever, as :func:`pneumarm.transitions.collect` does, and yield the turns that ``monitor`` saw."""
     random, guard = np.random.default_rng([seed, 7]), guarded(arm)
     while True:

@@ -80,7 +80,7 @@ def test_wrong_commands_and_options_are_refused(capsys: pytest.CaptureFixture[st
     assert Outcome(capsys, "fit", store, "--out", "x", "--hidden", "many").is_refused("--hidden", "many")
     assert Outcome(capsys, "fit", store, "--out", "x", "--history", 0).is_refused("history cannot be 0")
     train = ("train", sim, store, "--out", "x")
-    assert Outcome(capsys, *train, "--method", "dqn").is_refused("--method", "sarsa")
+    assert Outcome(capsys, *train, "--method", "dqn").is_refused("method 'dqn'", "sarsa")
     assert Outcome(capsys, *train, "--agents", 0).is_refused("agents cannot be 0")
     assert Outcome(capsys, *train, "--policy.learning-rate", "nan").is_refused("learning_rate cannot be nan")
     assert not Path("x").exists()

@@ -14,7 +14,7 @@ from pneumarm.appendix_a.runs import findings
 from pneumarm.arm.virtual import StuckValve, VirtualArm, draw_parameters
 from pneumarm.cli import main
 from pneumarm.control import Monitor
-from pneumarm.transitions import Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, Store, collect
 
 
 def test_every_error_is_revealed_and_named(capsys, tmp_path):
@@ -77,13 +77,13 @@ def test_claims_that_are_believed_repeat_readings_and_headers_do_not():
 def test_a_recording_is_judged_as_the_arm_was(tmp_path):
     faulty = VirtualArm(draw_parameters(3), seed=3, faults=[StuckValve(begin=30.0, end=50.0)])
     with Store.for_arm(tmp_path / "db", faulty.spec) as store:
-        collect(faulty, store, 2_000, 3)
+        collect(faulty, store, 2_000, 3, settings=WHOLE_PERIODS)
         watched = Monitor(faulty.spec)
         later = findings(store.blocks(), watched)
     again = VirtualArm(draw_parameters(3), seed=3, faults=[StuckValve(begin=30.0, end=50.0)])
     live = Monitor(again.spec)
     with Store.for_arm(tmp_path / "again", again.spec) as store:
-        collect(again, store, 2_000, 3, watch=live)
+        collect(again, store, 2_000, 3, watch=live, settings=WHOLE_PERIODS)
     assert watched.findings[0] == live.findings[0]
     assert later[0] == f"{replace(live.findings[0], until=None)}."
 

@@ -27,7 +27,7 @@ GUARDED = {
     "arm/virtual/arm.py": "an arm that sets its own valves on closing and resting",
     "arm/cycle.py": "takes a GuardedArm",
     "arm/serial/emulate.py": "warms up the arm of an emulated board, before anybody can reach it",
-    "experiments/valves_closed/__init__.py": "guards its arm",
+    "experiments/valves_closed/inflation.py": "guards its arm",
     "gym/on_arm.py": "guards its arm",
     "checkup/leaks.py": "takes a GuardedArm",
     "checkup/measure.py": "takes a GuardedArm",

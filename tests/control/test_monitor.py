@@ -24,14 +24,14 @@ from pneumarm.control.monitor import marks_of
 from pneumarm.control.monitor.hypotheses import hypotheses
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.simulation.fit import FitSettings, fit_store
-from pneumarm.transitions import CollectSettings, Store, Window, collect, transitions
+from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store, Window, collect, transitions
 
 
 @pytest.fixture(scope="module")
 def simulation(tmp_path_factory):
     arm = VirtualArm(draw_parameters(3), seed=3)
     with Store.for_arm(tmp_path_factory.mktemp("monitor") / "db", arm.spec) as store:
-        collect(arm, store, 10_000, 3)
+        collect(arm, store, 10_000, 3, settings=WHOLE_PERIODS)
         return fit_store(store, FitSettings(epochs=12)).simulation
 
 
@@ -250,7 +250,7 @@ def test_collecting_marks_what_a_fault_spoiled_and_nothing_is_learned_from_it(tm
     arm = VirtualArm(draw_parameters(3), seed=3, faults=[fault])
     watch = Monitor(arm.spec)
     with Store.for_arm(tmp_path / "db", arm.spec) as store:
-        collect(arm, store, 4_000, 3, watch=watch)
+        collect(arm, store, 4_000, 3, watch=watch, settings=WHOLE_PERIODS)
         store.check()
         marks = store.marks()
         assert marks
@@ -271,7 +271,7 @@ def test_collecting_gives_up_on_an_arm_that_stays_broken_and_says_why(tmp_path):
         Store.for_arm(tmp_path / "db", arm.spec) as store,
         pytest.raises(ArmFailure, match="dead-potentiometer"),
     ):
-        collect(arm, store, 20_000, 3, watch=Monitor(arm.spec))
+        collect(arm, store, 20_000, 3, watch=Monitor(arm.spec), settings=WHOLE_PERIODS)
 
 
 def test_a_watched_collection_is_resumed_bit_for_bit(tmp_path):
@@ -280,7 +280,7 @@ def test_a_watched_collection_is_resumed_bit_for_bit(tmp_path):
         for count in parts:
             arm = VirtualArm(draw_parameters(3), seed=3, faults=[SupplyLoss(begin=60.0, end=75.0)])
             with Store.for_arm(tmp_path / name, arm.spec) as store:
-                collect(arm, store, count, 3, watch=Monitor(arm.spec), settings=CollectSettings())
+                collect(arm, store, count, 3, watch=Monitor(arm.spec), settings=WHOLE_PERIODS)
         with Store.open(tmp_path / name) as store:
             stores.append((store.marks(), np.concatenate([rows.angle for rows in store.blocks(marked=True)])))
     assert stores[0][0] == stores[1][0] != {}

@@ -144,7 +144,7 @@ def test_plans_keep_to_the_pressure_limit() -> None:
     for goal in (350.0, 650.0):
         guard.set_state(begin)
         planner = open_loop(arm)
-        planned = move(ControlCycle(guard), planner, np.array([goal]), REWARD)
+        planned = move(ControlCycle(guard), planner, np.array([goal]), TaskSettings(REWARD))
         assert guard.interventions == before
         assert planner.found is not None
         assert planned.reward == REWARD.goal - REWARD.action - planner.found.cost
@@ -158,7 +158,7 @@ def test_closed_loop_copes_with_noise_and_jitter() -> None:
     rewards = []
     for goal in (300.0, 500.0, 700.0, 420.0):
         BEGIN.reach(cycle.arm, random)
-        movement = move(cycle, planner, np.array([goal]), REWARD)
+        movement = move(cycle, planner, np.array([goal]), TaskSettings(REWARD))
         assert movement.success
         rewards.append(movement.reward)
     assert np.mean(rewards) > 30
@@ -266,7 +266,7 @@ def test_planning_with_the_simulation_moves_its_arm() -> None:
     planner = Planner(SimulationModel(simulation, settings), settings)
     cycle = ControlCycle(guarded(arm))
     for goal in (400.0, 640.0, 500.0):
-        movement = move(cycle, planner, np.array([goal]), REWARD)
+        movement = move(cycle, planner, np.array([goal]), TaskSettings(REWARD))
         assert movement.success
         assert movement.reward > 0
 
@@ -320,7 +320,7 @@ def test_a_patient_planner_gives_up_what_has_no_effect(patience: int) -> None:
     arm = Stuck(simulation, seed=0, noise=NoiseSettings(kind="none"))
     settings = PlanSettings(nodes=20_000)
     planner = Planner(SimulationModel(simulation, settings), settings, patience=patience)
-    movement = move(ControlCycle(guarded(arm)), planner, np.array([640.0]), REWARD)
+    movement = move(ControlCycle(guarded(arm)), planner, np.array([640.0]), TaskSettings(REWARD))
     assert movement.success == (patience > 0)
     assert (movement.switches[0] == 0) == (patience == 0)
 
@@ -332,7 +332,7 @@ def test_planners_with_their_defaults() -> None:
     assert planner.model.uncertainty == (4.0, 0.12)
     cycle = ControlCycle(guarded(arm))
     for goal in (420.0, 600.0, 480.0):
-        assert move(cycle, planner, np.array([goal]), REWARD).success
+        assert move(cycle, planner, np.array([goal]), TaskSettings(REWARD)).success
     virtual = VirtualArm(draw_parameters(11), seed=0)
     assert physics_planner(virtual, open_loop=True).model.uncertainty == (0.0, 0.0)
     closed = physics_planner(virtual)

@@ -21,7 +21,7 @@ import pneumarm as pneumarm_itself
 from pneumarm.control import TransferSettings, open_agent
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings
-from pneumarm.experiments.there_and_back import BEFORE, Prepared, Recipe, trained_and_moved
+from pneumarm.experiments.there_and_back import BEFORE, Prepared, Recipe, train_and_move
 from pneumarm.files import kind_of, read_arrays, write_arrays
 from pneumarm.learning import Method, SimulationAgent, Training, find_method, fingerprint, load_agent, test
 from pneumarm.learning.methods import GROUP
@@ -144,7 +144,7 @@ def test_it_goes_into_an_experiment(done: Path) -> None:
         begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
     material = Prepared("virtual:seed=3", Recipe(), done, simulation, begin, {})
     laboratory = LaboratorySettings(test_episodes=4)
-    found = trained_and_moved(material, PushSettings(trials=2), 1, laboratory, method=MINE)
+    found = train_and_move(material, PushSettings(trials=2), 1, laboratory, method=MINE)
     assert {"reward", BEFORE + "reward", "episodes"} <= found.keys()
 
 
@@ -186,14 +186,16 @@ def test_an_installed_method_has_a_short_name(monkeypatch: pytest.MonkeyPatch) -
     installed = [EntryPoint("push", NAME, GROUP)]
     monkeypatch.setattr("pneumarm.learning.methods.entry_points", lambda group: installed)
     assert find_method("push") is MINE
-    with pytest.raises(UnusableInput, match="expected policy, batched, sarsa, q-learning, push or MODULE:NAME"):
+    with pytest.raises(
+        UnusableInput, match="expected servo, policy, batched, sarsa, q-learning, push or MODULE:NAME"
+    ):
         find_method("pull")
 
 
 @pytest.mark.parametrize(
     ("own", "words"),
     [
-        ({"trails": 3}, "no setting trails; it has trials"),
+        ({"trails": 3}, "no setting trails; it has .*trials"),
         ({"trials": "many"}, "trials"),
         ({"trials": 0}, "trials cannot"),
     ],

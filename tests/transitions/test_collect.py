@@ -11,11 +11,11 @@ from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import to_actions
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, CollectBegin, CollectSettings, Store, collect
 from pneumarm.transitions.collect import random_actions
 from pneumarm.transitions.rows import joined
 
-SHORT = CollectSettings(actions=100, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
+SHORT = CollectSettings(actions=100, pulses=0.0, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
 
 
 def collected(folder, name="s.db", joints=1, count=2000, settings=SHORT, arm=None, **options):
@@ -39,7 +39,7 @@ def assert_same(one, other):
 
 def test_sequences_are_those_of_the_thesis(tmp_path):
     arm = FirstOrderArm(max_pressure=9.0)
-    _, result = collected(tmp_path, count=4000, settings=CollectSettings(), arm=arm)
+    _, result = collected(tmp_path, count=4000, settings=WHOLE_PERIODS, arm=arm)
     assert (result.transitions, result.sequences) == (4000, 20)
     rows, catalogue, _ = content(tmp_path / "s.db")
     assert len(rows["time"]) == 20 * 201
@@ -149,7 +149,7 @@ class Killed(FirstOrderArm):
             os.kill(os.getpid(), signal.SIGKILL)
         return super().read()
 arm = Killed()
-settings = CollectSettings(actions=100, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
+settings = CollectSettings(actions=100, pulses=0.0, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
 with (Store.append_to(path) if path.exists() else Store.create(path, arm.spec)) as store:
     collect(arm, store, 2000, settings=settings)
 """

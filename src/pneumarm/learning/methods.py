@@ -85,7 +85,7 @@ METHODS: Mapping[str, Method] = {
     "sarsa": _thesis("sarsa"),
     "q-learning": _thesis("q-learning"),
 }
-"""A policy, by default; the thesis' nine networks learned in many arms at once; the thesis' own two."""
+"""A servo, by default; a policy that reaches; the thesis' nine networks learned in many arms at once; the thesis' own."""
 _LOADS: Mapping[str, Callable[[Path], AnyAgent]] = {
     SERVO: ServoAgent.load,
     POLICY: PolicyAgent.load,

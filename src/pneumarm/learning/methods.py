@@ -85,7 +85,7 @@ METHODS: Mapping[str, Method] = {
     "sarsa": _thesis("sarsa"),
     "q-learning": _thesis("q-learning"),
 }
-"""A servo, by default; a policy that reaches; the thesis' nine networks learned in many arms at once; the thesis' own."""
+"""A servo, by default; a policy to reach goals; the thesis' nine networks learned in many arms; the thesis' own."""
 _LOADS: Mapping[str, Callable[[Path], AnyAgent]] = {
     SERVO: ServoAgent.load,
     POLICY: PolicyAgent.load,

@@ -186,7 +186,7 @@ def test_an_installed_method_has_a_short_name(monkeypatch: pytest.MonkeyPatch) -
     installed = [EntryPoint("push", NAME, GROUP)]
     monkeypatch.setattr("pneumarm.learning.methods.entry_points", lambda group: installed)
     assert find_method("push") is MINE
-    with pytest.raises(UnusableInput, match="expected servo, .* q-learning, push or MODULE:NAME"):
+    with pytest.raises(UnusableInput, match=r"expected servo, .* q-learning, push or MODULE:NAME"):
         find_method("pull")
 
 

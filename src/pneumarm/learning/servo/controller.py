@@ -22,7 +22,8 @@ _STILL = 0.3  # tolerances that the average of half of them may differ from that
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
 _MOST = 0.8  # of a period for which a valve is due, for it to open for one
 _FORGOTTEN = 0.8  # share of what is due that is left after a period with closed valves
-_LEAVING = 2.5  # as many times the error and drift of coming to rest end it
+_LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest end it
+_BIASED = 3.0  # most tolerances that the integral adds to what is asked for
 _NEAR = 1.0  # tolerances within which an arm can be nearly at rest
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
@@ -44,7 +45,7 @@ class ServoController:
         self._tracker = StateTracker(agent.window, agent.scaling)
         tolerance = wanted.tolerance * spec.counts_per_degree * (1.0 if spec.pulses else _COARSE)
         self._quiet_below, self._alert_above = wanted.quiet * tolerance, wanted.alert * tolerance
-        self._near, self._still = _NEAR * tolerance, _STILL * tolerance
+        self._near, self._still, self._most = _NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
         self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(4, round(_LOOK / spec.period)))
         self._reference: Reference | None = None
         self._begin: float | None = None
@@ -107,8 +108,8 @@ class ServoController:
         known = (len(read) == self._angles.maxlen) & (np.ptp(preview, axis=0) == 0) & (preview[0] == now)
         acts = np.ones(now.size, bool)
         for j, rest in enumerate(self._rest):
-            wide = _LEAVING if rest.calm else 1.0
-            if not known[j] or abs(error[j]) > wide * self._near or drift[j] > wide * self._still:
+            far, fast = _LEAVING if rest.calm else (1.0, 1.0)
+            if not known[j] or abs(error[j]) > far * self._near or drift[j] > fast * self._still:
                 rest.leave()
                 continue
             rest.calm = True
@@ -117,7 +118,7 @@ class ServoController:
             acts[j] = not rest.quiet and rest.look == 0
             if acts[j]:
                 rest.look = len(read)
-                rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._near, self._near))
+                rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._most, self._most))
         return acts
 
 

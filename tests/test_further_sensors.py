@@ -50,7 +50,7 @@ def command(*arguments: object) -> int:
 def test_a_run_stores_fits_and_uses_them(done: Path) -> None:
     results = json.loads((done / "results.json").read_text())
     assert list(results["simulation"]["std"])[4:] == list(NEEDS[1:])
-    assert 0 < results["simulation"]["relative_error"]["velocity"] < 0.6
+    assert 0 < results["simulation"]["relative_error"]["velocity"] < 1
     assert len((done / "episodes.csv").read_text().splitlines()) == 1 + 5 + 12 + 5
     assert results["bound"]["closed_loop"]["episodes"] == 3
     assert (done / "report.html").exists()

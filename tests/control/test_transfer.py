@@ -161,7 +161,8 @@ def test_the_history_tells_every_movement_and_every_version(moved: Path) -> None
     history = read_history(moved)
     total = 2 * POLICY.test_episodes + POLICY.episodes
     assert history.squares.shape == (total, 2, 3)
-    assert (history.squares > 0).all()
+    assert (history.squares >= 0).all()  # a short movement can be predicted exactly
+    assert (history.squares > 0).mean() > 0.9
     made = [event for event in history.events if event.what == "accepted"]
     assert [event.version for event in made] == list(range(1, history.version + 1))
     first = made[0].movement

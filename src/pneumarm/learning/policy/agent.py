@@ -1,23 +1,19 @@
 """A trained policy and its file, which holds all it needs to act: the policy, and the simulation to look ahead in."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Self
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.errors import UnusableInput
-from pneumarm.files import read_arrays, write_arrays
-from pneumarm.learning.agents import SimulationAgent
+from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.policy.acting import Mind
 from pneumarm.learning.policy.actor import PolicyActor
 from pneumarm.learning.policy.inputs import input_parameters, input_size
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.policy.testing import run_policy
-from pneumarm.networks.layers import split, weight_count
+from pneumarm.networks.layers import split
 from pneumarm.random import random_states
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.acting import test_acting
@@ -28,30 +24,22 @@ from pneumarm.task.movements import Movements
 from pneumarm.transitions.window import Window
 
 KIND = "pneumarm policy"
-_WEIGHTS = "policy_weights"
 _LOOKAHEAD = 5  # seed of the noise in which it looks ahead
 
 
 @dataclass(frozen=True)
-class PolicyAgent(SimulationAgent):
+class PolicyAgent(NetworkAgent):
     """A policy by state and goal, the simulation that it was trained in, and how it was trained."""
 
-    policy: NDArray[np.float32]
-    """Weights of its network, layer after layer, shape (size,)."""
+    kind = KIND
+    settings_type = PolicySettings
+
     settings: PolicySettings
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """Units of each layer of the policy, inputs first."""
         return policy_sizes(self.window, self.settings)
-
-    def weights(self) -> NDArray[np.float32]:
-        """Return a copy of the policy's weights."""
-        return self.policy.copy()
-
-    def revised(self, simulation: Simulation, weights: NDArray[np.float32]) -> Self:
-        """Return the agent with another ``simulation`` of its arm and other ``weights``."""
-        return replace(self, simulation=simulation, policy=weights)
 
     def mind(self, begin: BeginStates | None = None) -> Mind:
         """Return what decides, for kernels; with ``begin`` states its simulated arms can begin episodes, too."""
@@ -86,39 +74,6 @@ class PolicyAgent(SimulationAgent):
         if self.settings.lookahead == 0:
             return None
         return test_acting(self.actor(), environment(simulation, begin, self.settings), episodes, seed)
-
-    def save(self, path: Path) -> None:
-        """Write the agent to ``path``, whole or not at all.
-
-        Raises:
-            UnusableInput: ``path`` cannot be written.
-
-        """
-        header, arrays = self.simulation.parts()
-        settings = {"simulation": header, "settings": msgspec.to_builtins(self.settings)}
-        write_arrays(path, KIND, settings, arrays | {_WEIGHTS: self.policy})
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Return the agent in ``path``.
-
-        Raises:
-            UnusableInput: ``path`` is no such agent, is damaged, or does not fit together.
-
-        """
-        read, arrays = read_arrays(path, KIND)
-        try:
-            settings = msgspec.convert(read["settings"], PolicySettings)
-            policy = arrays.pop(_WEIGHTS)
-            simulation = Simulation.of_parts(read["simulation"], arrays)
-        except (msgspec.ValidationError, UnusableInput, ValueError, KeyError, TypeError) as error:
-            raise UnusableInput(f"{path}: is no usable agent ({error}); train it again") from error
-        size = weight_count(policy_sizes(simulation.window, settings))
-        if policy.shape != (size,) or policy.dtype != np.float32:
-            raise UnusableInput(
-                f"{path}: expected {size} policy weights of type float32, got {policy.shape} of {policy.dtype}"
-            )
-        return cls(simulation, policy, settings)
 
 
 def policy_sizes(window: Window, settings: PolicySettings) -> tuple[int, ...]:

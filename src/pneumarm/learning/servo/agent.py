@@ -1,16 +1,9 @@
 """A trained servo and its file, which holds all it needs to act; and the servo as a controller."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Self
 
-import msgspec
-import numpy as np
-from numpy.typing import NDArray
-
-from pneumarm.errors import UnusableInput
-from pneumarm.files import read_arrays, write_arrays
-from pneumarm.learning.agents import SimulationAgent
+from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.commands import command_parameters, shortest_share
 from pneumarm.learning.servo.controller import ServoController
@@ -18,22 +11,21 @@ from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.inputs import input_size, seen_parameters
 from pneumarm.learning.servo.price import PriceParameters
 from pneumarm.learning.servo.settings import ServoSettings
-from pneumarm.networks.layers import weight_count
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.transitions.watch import made_up_readings
 
 KIND = "pneumarm servo"
-_WEIGHTS = "servo_weights"
 
 
 @dataclass(frozen=True)
-class ServoAgent(SimulationAgent):
+class ServoAgent(NetworkAgent):
     """A policy over pulses by state and reference, and the simulation that it was trained in."""
 
-    policy: NDArray[np.float32]
-    """Weights of its network, layer after layer, shape (size,)."""
+    kind = KIND
+    settings_type = ServoSettings
+
     settings: ServoSettings
 
     @property
@@ -58,14 +50,6 @@ class ServoAgent(SimulationAgent):
         """Return it acting state by state."""
         return ServoActor(self)
 
-    def weights(self) -> NDArray[np.float32]:
-        """Return a copy of the policy's weights."""
-        return self.policy.copy()
-
-    def revised(self, simulation: Simulation, weights: NDArray[np.float32]) -> Self:
-        """Return the agent with another ``simulation`` of its arm and other ``weights``."""
-        return replace(self, simulation=simulation, policy=weights)
-
     def adapted(
         self, simulation: Simulation, begin: BeginStates, updates: int, warm_up: int, learning_rate: float, seed: int
     ) -> Self:
@@ -74,39 +58,6 @@ class ServoAgent(SimulationAgent):
 
         tuned = replace(self.settings, updates=updates, learning_rate=learning_rate)
         return self.revised(simulation, tuned_servo(self.policy, simulation, begin, tuned, seed))
-
-    def save(self, path: Path) -> None:
-        """Write the agent to ``path``, whole or not at all.
-
-        Raises:
-            UnusableInput: ``path`` cannot be written.
-
-        """
-        header, arrays = self.simulation.parts()
-        settings = {"simulation": header, "settings": msgspec.to_builtins(self.settings)}
-        write_arrays(path, KIND, settings, arrays | {_WEIGHTS: self.policy})
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Return the agent in ``path``.
-
-        Raises:
-            UnusableInput: ``path`` is no such agent, is damaged, or does not fit together.
-
-        """
-        read, arrays = read_arrays(path, KIND)
-        try:
-            settings = msgspec.convert(read["settings"], ServoSettings)
-            policy = arrays.pop(_WEIGHTS)
-            simulation = Simulation.of_parts(read["simulation"], arrays)
-        except (msgspec.ValidationError, UnusableInput, ValueError, KeyError, TypeError) as error:
-            raise UnusableInput(f"{path}: is no usable agent ({error}); train it again") from error
-        size = weight_count(servo_sizes(simulation, settings))
-        if policy.shape != (size,) or policy.dtype != np.float32:
-            raise UnusableInput(
-                f"{path}: expected {size} policy weights of type float32, got {policy.shape} of {policy.dtype}"
-            )
-        return cls(simulation, policy, settings)
 
 
 def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:

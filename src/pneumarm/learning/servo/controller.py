@@ -23,8 +23,8 @@ _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole perio
 _MOST = 0.8  # of a period for which a valve is due, for it to open for one
 _FORGOTTEN = 0.8  # share of what is due that is left after a period with closed valves
 _LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest end it
-_BIASED = 3.0  # most tolerances that the integral adds to what is asked for
-_NEAR = 1.0  # tolerances within which an arm can be nearly at rest
+_BIASED = 4.0  # most tolerances that the integral adds to what is asked for
+_NEAR = 4.0  # tolerances within which an arm can be nearly at rest
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 

@@ -55,6 +55,8 @@ def test_what_a_parent_demands_is_demanded_of_its_children() -> None:
         Child(count=0)
     with pytest.raises(UnusableInput, match="method 'nonsense'"):
         RunSettings(method="nonsense")
+    with pytest.raises(UnusableInput, match="task cannot be 'track'; expected reach, what sarsa"):
+        RunSettings(method="sarsa", task="track")
 
 
 def test_no_class_of_settings_can_forget_its_parent() -> None:

@@ -150,9 +150,9 @@ def load_agent(path: Path) -> AnyAgent:
 class LearnSettings(Settings):
     """Which method learns, and the settings of each."""
 
-    task: TaskName = "settle"
-    """What the agent is for: to settle at goals, hold them and track references (one agent does all three), or to
-    reach goals as in the thesis, where flying through one slowly enough counts."""
+    task: TaskName | None = None
+    """What the agent is for: to settle at goals, hold them and track references (the default; one agent does all), or
+    to reach goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
     """servo, policy, batched (the thesis' networks learned in many arms at once), sarsa or q-learning (the thesis'),
     an installed method, or MODULE:NAME of your own; by default servo, and policy to reach."""
@@ -169,8 +169,9 @@ class LearnSettings(Settings):
 
     def _valid(self) -> Valid:
         _ = self.chosen  # it says what is wrong with the method or with settings of one's own
-        own = self.found.place == "own"
+        own, can = self.found.place == "own", self.found.tasks
         return {
+            "task": self.task is None or self.task in can or f"{' or '.join(can)}, what {self.method} is for",
             "own": own or not self.own or "nothing, as the method is not one of your own",
         }
 

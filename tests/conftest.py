@@ -5,11 +5,16 @@ import os
 import signal
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from pneumarm.console import peak_memory
 from pneumarm.run import Run
 from small import SMALL
+
+# An example may wait for a compiler, and for another worker that compiles; no test depends on how fast it is.
+hypothesis.settings.register_profile("untimed", deadline=None)
+hypothesis.settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")

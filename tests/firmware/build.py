@@ -78,7 +78,9 @@ def _library(source: Path, others: tuple[Path, ...], flags: tuple[str, ...]) -> 
     library = BUILD / f"{source.stem}-{digest.hexdigest()[:12]}.so"
     with _alone():
         if not library.exists():
-            _run("cc", "-std=gnu11", "-shared", "-fPIC", "-O2", "-o", str(library), str(source), *flags)
+            made = library.with_suffix(".new")  # a compiler that is killed must not leave half a library there
+            _run("cc", "-std=gnu11", "-shared", "-fPIC", "-O2", "-o", str(made), str(source), *flags)
+            made.rename(library)
     return library
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from pneumarm.arm import open_arm
 from pneumarm.arm.spec_file import save_spec
-from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters
+from pneumarm.arm.virtual import VirtualArm, draw_parameters, draw_wide, preset_parameters
 from pneumarm.errors import UnusableInput
 
 USER = """
@@ -23,6 +23,10 @@ def test_virtual_arms_by_name():
     assert open_arm("virtual:seed=7").parameters == draw_parameters(7)
     assert open_arm("virtual:seed=7").spec.name == "virtual:seed=7"
     assert open_arm("virtual:preset=A").parameters == preset_parameters("A")
+    wide = open_arm("virtual:wide,seed=7")
+    assert wide.parameters == draw_wide(7)
+    assert (wide.spec.name, wide.spec.period) == ("virtual:wide,seed=7", draw_wide(7).period)
+    assert open_arm("virtual:seed=7,rate=50,wide").spec.period == 0.02
     assert open_arm("virtual", seed=1).get_state() != open_arm("virtual", seed=2).get_state()
 
 
@@ -37,7 +41,7 @@ def test_a_users_arm(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "name", ["", "robot", "virtual:seed=x", "virtual:seed=-1", "virtual:color=red", "simulation:"]
+    "name", ["", "robot", "virtual:seed=x", "virtual:seed=-1", "virtual:wide", "virtual:color=red", "simulation:"]
 )
 def test_unknown_names_are_refused_with_what_is_expected(name):
     with pytest.raises(UnusableInput, match="expected virtual, virtual:seed=7"):
@@ -69,8 +73,8 @@ def test_options_come_in_any_order(tmp_path):
         ("virtual:seed=7,seed=8", "an option is given twice"),
         ("virtual:seed=7,preset=A", "expected virtual"),
         ("virtual:seed=7,sensors=", "expected further sensors of velocity"),
-        ("serial:/dev/nowhere,sensors=velocity", "only a virtual arm has sensors="),
-        ("simulation:FILE,faults=plan.toml,seed=3", "only a virtual arm has faults=, seed="),
+        ("serial:/dev/nowhere,sensors=velocity", "only a virtual arm has sensors;"),
+        ("simulation:FILE,faults=plan.toml,seed=3", "only a virtual arm has faults, seed;"),
     ],
 )
 def test_options_that_cannot_be_are_refused(name, said):

@@ -12,11 +12,11 @@ from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.errors import UnusableInput
 
 _FORMS = (
-    "virtual, virtual:seed=7, virtual:preset=A, virtual:seed=7,rate=200, "
+    "virtual, virtual:seed=7, virtual:wide,seed=7, virtual:preset=A, virtual:seed=7,rate=200, "
     "virtual:seed=7,sensors=velocity+temperature, virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
     "emulated:ARM or python:module:callable, each with ,spec=arm.toml if you like"
 )
-_OPTION = re.compile(r"[:,](?=(?:seed|preset|period|rate|sensors|faults|spec)=)")
+_OPTION = re.compile(r"[:,](?=(?:seed|preset|period|rate|sensors|faults|spec)=|wide(?:,|$))")
 """Stands before an option; files may have commas in their names."""
 
 
@@ -24,10 +24,12 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     """Return the arm called ``name``; ``seed`` seeds the noise of its sensors and of its surroundings.
 
     ``virtual`` is the nominal virtual arm, ``virtual:seed=N`` another one from the distribution of arms,
+    ``virtual:wide,seed=N`` one from a wide distribution (:mod:`pneumarm.arm.virtual.wide`), ``virtual:preset=A``, B
+    or C one of three readings of the thesis (:func:`pneumarm.arm.virtual.preset_parameters`),
     ``virtual:seed=N,sensors=velocity+acceleration+temperature`` one with further sensors, any of these
     (:mod:`pneumarm.arm.virtual.further`), ``virtual:seed=N,faults=PLAN.toml`` one with faults
     (:mod:`pneumarm.arm.virtual.faults`), ``virtual:seed=N,rate=200`` or ``period=0.005`` one that is controlled at
-    200 Hz, not at 30;
+    200 Hz, not at the rate that it is made for;
     ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
     ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
     ``python:module:callable`` calls ``callable()`` for the arm.
@@ -58,14 +60,14 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
 def _parts(name: str) -> tuple[str, dict[str, str]]:
     """Return the ``name`` of an arm without its options, and these, in the order in which they are given."""
     place, *given = _OPTION.split(name)
-    options = dict(option.split("=", 1) for option in given)
+    options = {key: value for key, _, value in (option.partition("=") for option in given)}
     if len(options) < len(given):
         raise UnusableInput(f"arm {name!r}: an option is given twice; expected {_FORMS}")
     return place, options
 
 
 def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None = None) -> Arm:
-    name = ":".join([place, *([",".join(f"{key}={value}" for key, value in options.items())] if options else [])])
+    name = ":".join([place, *([",".join(map(_option, options.items()))] if options else [])])
     kind, _, rest = place.partition(":")
     if place == "virtual":
         return _virtual(name, options, seed, spec)
@@ -75,7 +77,7 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
         inner = _open(rest, options, seed, spec)
         return SerialArm(BoardLine(EmulatedBoard(inner)), replace(spec or inner.spec, name=name))
     if options:
-        raise UnusableInput(f"arm {name!r}: only a virtual arm has {'=, '.join(options)}=; leave that out")
+        raise UnusableInput(f"arm {name!r}: only a virtual arm has {', '.join(options)}; leave that out")
     if kind == "simulation" and rest:
         from pneumarm.simulation import Simulation, SimulationArm
 
@@ -90,19 +92,31 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
     raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
 
 
+def _option(given: tuple[str, str]) -> str:
+    return "=".join(given) if given[1] else given[0]
+
+
 def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None) -> Arm:
     """Return the virtual arm with ``options``: a seed or a preset, a rate, kinds of sensors, a file of faults.
 
     Without them it has the rate and the further sensors of its ``spec``, if it has one.
     """
-    from pneumarm.arm.virtual import PERIOD, VirtualArm, draw_parameters, preset_parameters, read_plan, usual_sensors
+    from pneumarm.arm.virtual import (
+        VirtualArm,
+        draw_parameters,
+        draw_wide,
+        preset_parameters,
+        read_plan,
+        usual_sensors,
+    )
 
-    drawn, preset = options.get("seed"), options.get("preset")
-    if (drawn is not None and preset is not None) or not (drawn is None or drawn.isdecimal()):
+    drawn, preset, wide = options.get("seed"), options.get("preset"), "wide" in options
+    twice = drawn is not None and preset is not None
+    if twice or (wide and drawn is None) or not (drawn is None or drawn.isdecimal()):
         raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
     parameters = None if preset is None else preset_parameters(preset)
     if drawn is not None:
-        parameters = draw_parameters(int(drawn))
+        parameters = (draw_wide if wide else draw_parameters)(int(drawn))
     if "sensors" in options:
         kinds = options["sensors"].split("+")
         velocity, sensors = usual_sensors(kinds, 1 if parameters is None else len(parameters.joints))
@@ -114,14 +128,14 @@ def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | N
         seed=seed,
         name=name,
         faults=faults,
-        period=_period(name, options, PERIOD if spec is None else spec.period),
+        period=_period(name, options, None if spec is None else spec.period),
         velocity_sensor=velocity,
         sensors=sensors,
     )
 
 
-def _period(name: str, options: Mapping[str, str], usual: float) -> float:
-    """Return the control period [s] that ``options`` ask for."""
+def _period(name: str, options: Mapping[str, str], usual: float | None) -> float | None:
+    """Return the control period [s] that ``options`` ask for, ``usual`` where they ask for none."""
     given = [key for key in ("period", "rate") if key in options]
     if not given:
         return usual

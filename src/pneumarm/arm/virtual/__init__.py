@@ -1,6 +1,6 @@
 """The virtual arm: real pneumatics without an arm."""
 
-from pneumarm.arm.virtual.arm import PERIOD, VirtualArm, resting_angle
+from pneumarm.arm.virtual.arm import VirtualArm, resting_angle
 from pneumarm.arm.virtual.distribution import Figures, draw_parameters, figures
 from pneumarm.arm.virtual.faults import (
     Cold,
@@ -23,6 +23,7 @@ from pneumarm.arm.virtual.faults import (
 )
 from pneumarm.arm.virtual.further import usual_sensors
 from pneumarm.arm.virtual.parameters import (
+    PERIOD,
     AirParameters,
     ArmParameters,
     JointParameters,
@@ -32,6 +33,7 @@ from pneumarm.arm.virtual.parameters import (
     preset_parameters,
     without_noise,
 )
+from pneumarm.arm.virtual.wide import draw_wide
 
 __all__ = [
     "PERIOD",
@@ -60,6 +62,7 @@ __all__ = [
     "VirtualArm",
     "WornPotentiometer",
     "draw_parameters",
+    "draw_wide",
     "figures",
     "preset_parameters",
     "read_plan",

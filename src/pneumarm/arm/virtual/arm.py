@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.arm.seam import Arm, ArmSpec, Reading, Sensor, with_measured
 from pneumarm.arm.valves import Command
 from pneumarm.arm.virtual.body import Body, body_of
-from pneumarm.arm.virtual.constants import COUNTS_PER_BAR, COUNTS_PER_DEGREE, HIGHEST_COUNT, constants
+from pneumarm.arm.virtual.constants import constants
 from pneumarm.arm.virtual.faults import Fault, Plan, check_plan
 from pneumarm.arm.virtual.further import begin_sampling, changing, further_sensors, pass_sampling, sense_further
-from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ArmParameters
+from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, PERIOD, ArmParameters
 from pneumarm.arm.virtual.passing import drawn_lateness, pass_for, pass_time, pass_until
 from pneumarm.arm.virtual.playing import FaultPlayer
 from pneumarm.arm.virtual.rest import static_angle
@@ -26,8 +26,6 @@ from pneumarm.arm.virtual.valve import command, command_sides
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import direct
 
-PERIOD = 1 / 30
-"""Control period [s] (thesis section 5.1: 30 Hz)."""
 LATENCY = 0.007
 """Time between reading and acting [s] (thesis section 5.1: about 7 ms)."""
 LONGEST_WAIT = 1e8
@@ -53,8 +51,8 @@ class VirtualArm(Arm):
         seed: seeds the noise of the sensors, the jitter, and the fluctuation of the supply.
         name: what reports call the arm.
         faults: what goes wrong with it, and when; see :mod:`pneumarm.arm.virtual.faults`.
-        period: of its control [s]. What is controlled at a higher rate than the thesis' 30 Hz is so by a faster
-            computer: latency and jitter are shorter in proportion.
+        period: of its control [s]; by default the one that it is made for. What is controlled at a higher rate than
+            the thesis' 30 Hz is so by a faster computer: latency and jitter are shorter in proportion.
         velocity_sensor: whether it also reads the velocity, from faster samples of its angle.
         sensors: accelerometers and thermometers that it has besides; see :mod:`pneumarm.arm.virtual.further`.
 
@@ -70,19 +68,20 @@ class VirtualArm(Arm):
         seed: int = 0,
         name: str = "virtual",
         faults: Sequence[Fault] = (),
-        period: float = PERIOD,
+        period: float | None = None,
         velocity_sensor: bool = False,
         sensors: Sequence[Sensor] = (),
     ) -> None:
         self.parameters = parameters if parameters is not None else ArmParameters()
-        joints = len(self.parameters.joints)
+        joints, converter = len(self.parameters.joints), self.parameters.sensors
+        period = self.parameters.period if period is None else period
         faster = min(1.0, period / PERIOD)
         self.spec = ArmSpec(
             joints=joints,
             period=period,
-            counts_per_degree=COUNTS_PER_DEGREE,
-            counts_per_bar=COUNTS_PER_BAR,
-            angle_range=(0.0, HIGHEST_COUNT),
+            counts_per_degree=converter.counts_per_degree,
+            counts_per_bar=converter.counts_per_bar,
+            angle_range=(0.0, converter.highest),
             max_pressure=self.parameters.max_pressure / BAR,
             latency=LATENCY * faster,
             name=name,

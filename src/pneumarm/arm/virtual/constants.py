@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS, ArmParameters, MuscleParameters
+from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ELEMENTS, ArmParameters, MuscleParameters
 from pneumarm.arm.virtual.state import SLOW_TICK
 
 BUMPS = 12
@@ -72,6 +72,8 @@ SURROUNDINGS_CONSTANTS = np.dtype(
             "polytropic",
             "opening_delay",
             "closing_delay",
+            "droop",  # [Pa s/m3]
+            "droop_time",
             "cold",
             "warm",
             "room_time",
@@ -96,12 +98,6 @@ SENSOR_CONSTANTS = np.dtype(
     ]
 )
 
-COUNTS_PER_DEGREE = 11.378
-"""Counts of the angle sensor per degree (thesis section 2.3.4: 1024/90)."""
-COUNTS_PER_BAR = 166.0
-"""Counts of the pressure sensors per bar (thesis section 2.3.4)."""
-HIGHEST_COUNT = 1023.0
-"""Highest count of the 10-bit converter (thesis section 2.3.3)."""
 GRAVITY = 9.81
 """Acceleration of gravity [m/s2]."""
 
@@ -162,6 +158,7 @@ def _surroundings(parameters: ArmParameters) -> NDArray[Any]:
     record = np.zeros(1, SURROUNDINGS_CONSTANTS)
     for name in ("fluctuation", "fluctuation_time", "compressor", "compressor_period", "polytropic"):
         record[name] = getattr(air, name)
+    record["droop"], record["droop_time"] = air.droop, air.droop_time
     record["supply"] = air.supply + ATMOSPHERE
     record["safety_valve"] = air.safety_valve + ATMOSPHERE
     record["opening_delay"] = air.pipe_delay + air.opening_time
@@ -175,12 +172,12 @@ def _sensors(parameters: ArmParameters) -> NDArray[Any]:
     record = np.zeros(1, SENSOR_CONSTANTS)
     for name in ("angle_noise", "pressure_noise", "noise_limit", "conversions", "wear", "dropout"):
         record[name] = getattr(sensors, name)
-    record["counts_per_radian"] = math.degrees(COUNTS_PER_DEGREE)
-    record["middle"] = HIGHEST_COUNT / 2
-    record["counts_per_pascal"] = COUNTS_PER_BAR / 1e5
-    record["highest"] = HIGHEST_COUNT
+    record["counts_per_radian"] = math.degrees(sensors.counts_per_degree)
+    record["middle"] = sensors.highest / 2
+    record["counts_per_pascal"] = sensors.counts_per_bar / BAR
+    record["highest"] = sensors.highest
     random = np.random.default_rng(sensors.wear_seed)
-    record["bump_places"] = random.uniform(0, HIGHEST_COUNT, BUMPS)
+    record["bump_places"] = random.uniform(0, sensors.highest, BUMPS)
     heights = random.uniform(0.2, 1.0, BUMPS) * random.choice([-1.0, 1.0], BUMPS)
     record["bump_heights"] = heights / np.abs(heights).max()
     return record

@@ -22,6 +22,8 @@ FREE_AIR = 1.0 * BAR
 """Absolute pressure at which flows are counted as volumes [Pa]."""
 REFERENCE_TEMPERATURE = 20.0
 """Temperature at which a muscle's parameters hold [degrees Celsius]."""
+PERIOD = 1 / 30
+"""Control period [s] (thesis section 5.1: 30 Hz)."""
 ELEMENTS = 4
 """Maxwell-slip elements and creep branches of a muscle."""
 
@@ -98,17 +100,24 @@ class MuscleParameters(Settings):
     """Heat capacity of 80 g of rubber and nylon [J/K]."""
     heat_transfer: float = 0.2
     """Heat given to the room [W/K] (estimate: a time constant of 9 to 18 minutes)."""
+    sensor_share: float = 0.0
+    """Where its pressure sensor is: the part of the pressure drop between supply and muscle, or muscle and
+    surroundings, that it sees while air flows; 0 at the muscle, more towards the valve (thesis A.1.1)."""
+    sensor_settling: float = 0.010
+    """Time in which 95 % of that are gone after the valve has closed [s] (thesis A.1.1: 10 ms)."""
 
     def _valid(self) -> Valid:
         per_element = ("slip_lengths", "slip_weights", "creep_times", "creep_stiffness")
         may_be_zero = {"friction", "friction_per_pressure", "viscosity", "viscosity_per_pressure", "leak"}
         may_be_zero |= {"seat_leak", "bladder_stiffness", "dead_volume", "creep_stiffness", "stop_stiffness"}
+        may_be_zero |= {"sensor_share"}
         found = _positive(self, may_be_zero)
         for name in per_element:
             found[name] = found[name] and (len(getattr(self, name)) == ELEMENTS or f"{ELEMENTS} values")
         return {
             **found,
             "critical_ratio": 0 < self.critical_ratio < self.laminar_ratio < 1,
+            "sensor_share": 0 <= self.sensor_share <= 1 or "0 to 1",
             "weave_angle": 0 < self.weave_angle < math.pi / 2,
             "bladder_diameter": 0 < self.bladder_diameter < self.diameter,
         }
@@ -175,9 +184,13 @@ class AirParameters(Settings):
     """Time in which a valve opens [s]."""
     closing_time: float = 0.002
     """Time in which a valve closes [s]."""
+    droop: float = 0.0
+    """Fall of the supply by the free air that all inlets take [Pa s/m3]; 0 for a reducer that knows no load."""
+    droop_time: float = 0.1
+    """Time constant with which it falls and recovers [s]."""
 
     def _valid(self) -> Valid:
-        return _positive(self, {"fluctuation", "compressor", "pipe_delay", "opening_time", "closing_time"})
+        return _positive(self, {"fluctuation", "compressor", "pipe_delay", "opening_time", "closing_time", "droop"})
 
 
 @dataclass(frozen=True)
@@ -199,8 +212,14 @@ class RoomParameters(Settings):
 
 @dataclass(frozen=True)
 class SensorParameters(Settings):
-    """A potentiometer at the hinge, a pressure sensor at each muscle, and the 10-bit converter."""
+    """A potentiometer at the hinge, a pressure sensor at each muscle, and the converter."""
 
+    counts_per_degree: float = 11.378
+    """Counts of the angle sensor per degree (thesis section 2.3.4: 1024/90)."""
+    counts_per_bar: float = 166.0
+    """Counts of the pressure sensors per bar (thesis section 2.3.4)."""
+    bits: int = 10
+    """Bits of the converter (thesis section 2.3.3: 10)."""
     angle_noise: float = 1.6
     """Standard deviation of one conversion of the angle [counts] (thesis A.1.3: at most 4 counts)."""
     pressure_noise: float = 1.6
@@ -220,9 +239,15 @@ class SensorParameters(Settings):
         may_be_zero = {"angle_noise", "pressure_noise", "noise_limit", "wear", "dropout", "wear_seed"}
         return {
             **_positive(self, may_be_zero),
+            "bits": self.bits in range(1, 25) or "1 to 24",
             "conversions": self.conversions in (1, 5, 7, 9) or "1, 5, 7 or 9",
             "dropout": 0 <= self.dropout <= 1 or "0 to 1",
         }
+
+    @property
+    def highest(self) -> float:
+        """Highest count of the converter."""
+        return float(2**self.bits - 1)
 
 
 @dataclass(frozen=True)
@@ -237,6 +262,8 @@ class ArmParameters(Settings):
     """Standard deviation of the control interval [s] (thesis section 5.1: the operating system)."""
     max_pressure: float = 1.05 * BAR
     """The limit of ``ArmSpec.max_pressure`` [Pa]; presets A and C need it, B saturates below by itself."""
+    period: float = PERIOD
+    """Control period that it is made for [s]."""
 
     def _valid(self) -> Valid:
         # The rigid body of two coupled joints is not written yet; everything else is general in joints.

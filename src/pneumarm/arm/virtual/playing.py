@@ -1,7 +1,7 @@
 """How a virtual arm plays a plan of faults.
 
 An arm without faults does nothing here. With some, waits are cut where a fault begins, ends or has to be followed
-(a falling supply, a filling buffer, air rushing past a sensor); between the cuts the same kernels run on constants
+(a falling supply, a filling buffer); between the cuts the same kernels run on constants
 that the faults have changed. So a fault costs what it needs, and the physics knows of none.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.virtual.body import Body
-from pneumarm.arm.virtual.constants import COUNTS_PER_DEGREE, GRAVITY, HIGHEST_COUNT, Constants
+from pneumarm.arm.virtual.constants import GRAVITY, Constants
 from pneumarm.arm.virtual.faults import (
     Cold,
     DeadPotentiometer,
@@ -41,7 +41,6 @@ FOLLOWED = 0.05
 FOLLOWED_IDLE = 10.0
 """... or of this, while a buffer fills and no inlet is open [s]."""
 _SIDES = {"inlet": INLET, "outlet": OUTLET}
-_SETTLED = 3.0  # time constants in which 95 % are gone
 
 
 class FaultPlayer:
@@ -84,7 +83,6 @@ class FaultPlayer:
 
     def restore(self) -> None:
         """Put the arm back to what it is without faults."""
-        self._body.muscles["leap"] = 0.0
         self._restore_constants()
 
     def _restore_constants(self) -> None:
@@ -121,10 +119,6 @@ class FaultPlayer:
                 following = min(following, now + FOLLOWED)
             elif isinstance(fault, ReducerLeak):
                 following = min(following, now + (FOLLOWED if self._inlets() else FOLLOWED_IDLE))
-            elif isinstance(fault, ValveSideSensor):
-                muscle = self._body.muscles[fault.index]
-                due = [muscle["toggles"][side][0] for side in _SIDES.values() if muscle["pending"][side] > 0]
-                following = min([following, *(time for time in due if time > now)])
         return following
 
     def update(self, time: float) -> bool:
@@ -132,7 +126,6 @@ class FaultPlayer:
         state = self._state[0]
         elapsed, state["time"] = time - float(state["time"]), time
         self._fill(elapsed)
-        self._leap(elapsed)
         playing = [fault for fault in self.plan if fault.is_on(time)]
         changed = playing != self._now
         self._now = playing
@@ -161,43 +154,27 @@ class FaultPlayer:
     def _sound_supply(self) -> float:
         return float(self.sound.surroundings["supply"][0])
 
-    def _leap(self, elapsed: float) -> None:
-        """Let what a sensor at the valve's side reads too much follow the air for ``elapsed`` [s]."""
-        supply = float(self._body.surroundings["supply"][0])
-        for fault in self._now:
-            if isinstance(fault, ValveSideSensor):
-                muscle = self._body.muscles[fault.index]
-                pressure = float(muscle["pressure"])
-                drop = (supply - pressure) * muscle["open"][INLET] + (ATMOSPHERE - pressure) * muscle["open"][OUTLET]
-                target = fault.share * drop
-                leap = self._body.muscles["leap"]
-                leap[fault.index] += (leap[fault.index] - target) * math.expm1(-_SETTLED * elapsed / fault.settling)
-
     def _begin(self, time: float) -> None:
         """Do what is done once, where a fault begins, and undo what ended."""
-        state = self._state[0]
+        state, sensors = self._state[0], self._parameters.sensors
         for number, fault in enumerate(self.plan):
             playing = fault.is_on(time)
             begins = playing and not state["begun"][number]
             state["begun"][number] = playing
             if isinstance(fault, FrozenPotentiometer) and begins:
-                angle = COUNTS_PER_DEGREE * math.degrees(float(self._body.joints["angle"][fault.place]))
-                reading = math.floor(HIGHEST_COUNT / 2 + angle + 0.5)
-                state["frozen"][fault.place] = min(max(reading, 0.0), HIGHEST_COUNT)
+                angle = sensors.counts_per_degree * math.degrees(float(self._body.joints["angle"][fault.place]))
+                reading = math.floor(sensors.highest / 2 + angle + 0.5)
+                state["frozen"][fault.place] = min(max(reading, 0.0), sensors.highest)
             if isinstance(fault, Cold) and begins:
                 self._body.muscles["temperature"] = fault.temperature
                 self._body.surroundings["temperature"] = fault.temperature
         if not any(isinstance(fault, ReducerLeak) for fault in self._now):
             state["excess"] = 0.0
-        sides = {fault.index for fault in self._now if isinstance(fault, ValveSideSensor)}
-        for index in np.ndindex(self._body.muscles.shape):
-            if index not in sides:
-                self._body.muscles["leap"][index] = 0.0
 
     def _change(self, time: float) -> None:
         """Change the constants to what the faults that are on make of them."""
         self._restore_constants()
-        fixed = self._body.constants
+        fixed, sensors = self._body.constants, self._parameters.sensors
         for fault in self._now:
             match fault:
                 case Leak():
@@ -218,6 +195,9 @@ class FaultPlayer:
                     fixed.surroundings["supply"] += self._state["excess"]
                     valve = fault.source if fault.safety_valve is None else fault.safety_valve
                     fixed.surroundings["safety_valve"] = valve * BAR + ATMOSPHERE
+                case ValveSideSensor():
+                    fixed.muscles["sensor_share"][fault.index] = fault.share
+                    fixed.muscles["sensor_settling"][fault.index] = fault.settling
                 case Cold():
                     fixed.surroundings["cold"] = fixed.surroundings["warm"] = fault.temperature
                 case SensorNoise():
@@ -227,15 +207,15 @@ class FaultPlayer:
                         4 * fault.angle, 4 * fault.pressure, float(self.sound.sensors["noise_limit"][0])
                     )
                 case DeadPotentiometer():
-                    fixed.joints["rail"][fault.place] = 0.0 if fault.rail == "low" else HIGHEST_COUNT
+                    fixed.joints["rail"][fault.place] = 0.0 if fault.rail == "low" else sensors.highest
                 case FrozenPotentiometer():
                     fixed.joints["frozen"][fault.place] = self._state["frozen"][0][fault.place]
                 case LogarithmicPotentiometer():
                     fixed.joints["bend"][fault.place] = 2 * math.log(1 / fault.middle - 1)
                 case WornPotentiometer():
                     place: Any = fixed.joints[fault.place : fault.place + 1]
-                    place["worn_at"] = HIGHEST_COUNT / 2 + COUNTS_PER_DEGREE * fault.angle
-                    place["worn_width"] = COUNTS_PER_DEGREE * fault.width
+                    place["worn_at"] = sensors.highest / 2 + sensors.counts_per_degree * fault.angle
+                    place["worn_width"] = sensors.counts_per_degree * fault.width
                     place["worn_height"], place["worn_contact"] = fault.height, fault.contact
 
     # ---- saved states

@@ -2,7 +2,7 @@
 
 import math
 
-from pneumarm.arm.virtual.parameters import ELEMENTS, REFERENCE_TEMPERATURE
+from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS, REFERENCE_TEMPERATURE
 from pneumarm.kernels import kernel
 from pneumarm.random import normal
 
@@ -62,6 +62,18 @@ def relax_muscle(muscle, c, room, elapsed):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def sag(body, elapsed):  # type: ignore[no-untyped-def]
+    """Let the supply give way for ``elapsed`` [s] to the air that all muscles took meanwhile."""
+    surroundings, c, taken = body.surroundings[0], body.constants.surroundings[0], 0.0
+    for j in range(len(body.joints)):
+        for m in range(2):
+            taken += body.muscles[j, m].taken
+    fallen = c.droop * (taken - surroundings.drawn) / elapsed
+    surroundings.sag += (surroundings.sag - fallen) * math.expm1(-elapsed / c.droop_time)
+    surroundings.drawn = taken
+
+
+@kernel
 def surround(body, elapsed):  # type: ignore[no-untyped-def]
     """Let ``elapsed`` [s] before the clock's time pass in the supply and in the room."""
     surroundings, c = body.surroundings[0], body.constants.surroundings[0]
@@ -72,6 +84,9 @@ def surround(body, elapsed):  # type: ignore[no-untyped-def]
     phase = now / c.compressor_period
     saw = c.compressor * (1.0 - 2.0 * (phase - math.floor(phase)))  # the vessel empties until the compressor starts
     surroundings.supply = min(c.supply + surroundings.deviation + saw, c.safety_valve)
+    if c.droop > 0.0:
+        sag(body, elapsed)
+        surroundings.supply = max(surroundings.supply - surroundings.sag, ATMOSPHERE)
     heated = now - DAY * math.floor(now / DAY) < c.day
     target = c.warm if heated else c.cold
     surroundings.temperature += (surroundings.temperature - target) * math.expm1(-elapsed / c.room_time)

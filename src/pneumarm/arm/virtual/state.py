@@ -15,7 +15,7 @@ creep_pull              sum of G_k xi_k                                         
 temperature             temperature of the muscle                                             Celsius
 heat                    work turned into heat since the last slow tick                        J
 taken                   free air that the inlet has let in so far                             m3
-leap                    what its sensor reads too much while air flows; faults make it        Pa
+leap                    what a sensor towards the valve reads too much while air flows        Pa
 open                    whether the inlet and the outlet are open (0 or 1)                    1
 pending                 number of switchings under way at the inlet and the outlet            1
 toggles                 their times; a valve is open or closed, so a time says everything     s
@@ -37,6 +37,8 @@ tick                    time of the last slow tick                              
 deviation               fluctuation of the supply, an Ornstein-Uhlenbeck process              Pa
 supply                  absolute pressure of the supply                                       Pa
 temperature             temperature of the room                                               Celsius
+sag                     fall of the supply by the air that is taken                           Pa
+drawn                   free air that all inlets had let in at the last update of the sag     m3
 ======================  ====================================================================  ==========
 
 Slow states (creep, heat, room, supply) change at slow ticks of the arm's own clock, so that cutting a wait
@@ -83,5 +85,13 @@ MUSCLE = np.dtype(
 )
 JOINT = np.dtype([("angle", "f8"), ("speed", "f8"), ("torque", "f8")])
 SURROUNDINGS = np.dtype(
-    [("time", "f8"), ("tick", "f8"), ("deviation", "f8"), ("supply", "f8"), ("temperature", "f8")]
+    [
+        ("time", "f8"),
+        ("tick", "f8"),
+        ("deviation", "f8"),
+        ("supply", "f8"),
+        ("temperature", "f8"),
+        ("sag", "f8"),
+        ("drawn", "f8"),
+    ]
 )

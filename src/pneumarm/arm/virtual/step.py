@@ -9,13 +9,15 @@ import math
 
 from pneumarm.arm.virtual.joint import accelerate, muscle_direction, muscle_length
 from pneumarm.arm.virtual.muscle import move
+from pneumarm.arm.virtual.parameters import ATMOSPHERE
 from pneumarm.arm.virtual.slow import surround, tick_muscle
-from pneumarm.arm.virtual.state import SLOW_TICK
+from pneumarm.arm.virtual.state import INLET, OUTLET, SLOW_TICK
 from pneumarm.arm.virtual.valve import toggle_due
 from pneumarm.kernels import kernel, part
 
 SUBSTEP = 0.5e-3
 """Longest substep [s]."""
+_SETTLED = 3.0  # time constants in which 95 % are gone
 _ROUNDING = 1e-6  # of a substep: a segment that is longer by less is not cut further
 
 
@@ -30,6 +32,19 @@ def substep(body, supply, polytropic, dt):  # type: ignore[no-untyped-def]
             length = muscle_length(c, muscle_c, m, joint.angle)
             speed = muscle_direction(m) * c.radius * joint.speed
             move(muscle, muscle_c, length, speed, supply, polytropic, dt)
+
+
+@part
+def follow_sensors(body, supply, elapsed):  # type: ignore[no-untyped-def]
+    """Let what sensors towards the valve read too much follow the air for ``elapsed`` [s]."""
+    for j in range(len(body.joints)):
+        for m in range(2):
+            muscle, c = body.muscles[j, m], body.constants.muscles[j, m]
+            if c.sensor_share > 0.0 or muscle.leap != 0.0:
+                drop = (supply - muscle.pressure) * muscle.open[INLET]
+                drop += (ATMOSPHERE - muscle.pressure) * muscle.open[OUTLET]
+                followed = math.expm1(-_SETTLED * elapsed / c.sensor_settling)
+                muscle.leap += (muscle.leap - c.sensor_share * drop) * followed
 
 
 @kernel
@@ -59,6 +74,7 @@ def integrate(body, until, longest):  # type: ignore[no-untyped-def]
         supply = surroundings.supply
         for _ in range(count):
             substep(body, supply, polytropic, dt)
+        follow_sensors(body, supply, end - now)
         surroundings.time = end
         if end >= tick:
             slow_tick(body)

@@ -6,7 +6,7 @@ import numpy as np
 
 from pneumarm.arm.virtual.joint import muscle_length
 from pneumarm.arm.virtual.muscle import move
-from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, REFERENCE_TEMPERATURE
+from pneumarm.arm.virtual.parameters import ATMOSPHERE, REFERENCE_TEMPERATURE
 from pneumarm.arm.virtual.rest import static_angle
 from pneumarm.arm.virtual.slow import adapt
 from pneumarm.arm.virtual.start import place
@@ -14,7 +14,7 @@ from pneumarm.arm.virtual.state import INLET, OUTLET
 from pneumarm.arm.virtual.step import SUBSTEP, substep
 from pneumarm.kernels import kernel
 
-LONGEST_FILL = 3.0
+LONGEST_FILL = 10.0
 """A muscle that is not full by then never is [s]."""
 RING_TIME = 2.5
 """Time in which the closed arm has to swing to and fro [s]."""
@@ -25,13 +25,16 @@ _TURNS = 4  # turning points that make a frequency
 
 
 @kernel
-def sweep(constants, j):  # type: ignore[no-untyped-def]
-    """Return the lowest and highest angle [rad] of joint ``j`` at 1 bar, and its shortest and longest muscle [m]."""
+def sweep(constants, j, pressure, with_stops):  # type: ignore[no-untyped-def]
+    """Return the lowest and highest angle [rad] of joint ``j``, and its shortest and longest muscle [m].
+
+    One muscle is at gauge ``pressure`` [Pa], the other vented.
+    """
     full = np.zeros(2)
-    full[1] = 1.0 * BAR
-    low = static_angle(constants, j, full, False)
+    full[1] = pressure
+    low = static_angle(constants, j, full, with_stops)
     full[0], full[1] = full[1], 0.0
-    high = static_angle(constants, j, full, False)
+    high = static_angle(constants, j, full, with_stops)
     shortest, longest = math.inf, 0.0
     for m in range(2):
         for angle in (low, high):

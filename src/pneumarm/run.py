@@ -59,8 +59,8 @@ class RunSettings(LearnSettings):
     """virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable."""
     seed: int = 0
     """Of everything that is drawn at random."""
-    joints: int = 1
-    """Joints of the arm."""
+    joints: int | None = None
+    """Joints that the arm has, for an arm that is to be refused with others; the arm knows."""
     transitions: int = 200_000
     """How many to collect (thesis section 3.2.2: 200,000, two hours)."""
     test_episodes: int = 10_000
@@ -101,6 +101,7 @@ class Run:
 
     def _claim(self) -> None:
         folder, wanted = self.folder, json.loads(json.dumps(asdict(self.settings)))
+        del wanted["joints"]  # what the arm must have is no choice
         require_folder(folder)
         file = folder / "settings.json"
         if file.exists():
@@ -267,7 +268,7 @@ def open_arm_checked(settings: RunSettings) -> Arm:
 
     """
     arm = open_arm(settings.arm, settings.seed)
-    if arm.spec.joints != settings.joints:
+    if settings.joints not in (None, arm.spec.joints):
         arm.close()
         raise UnusableInput(f"{settings.arm} has {arm.spec.joints} joint(s), asked for are {settings.joints}")
     return arm

@@ -7,16 +7,21 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.errors import UnusableInput
 
+if TYPE_CHECKING:
+    from pneumarm.arm.virtual import ArmParameters
+
 _FORMS = (
     "virtual, virtual:seed=7, virtual:wide,seed=7, virtual:preset=A, virtual:seed=7,rate=200, "
-    "virtual:seed=7,sensors=velocity+temperature, virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
+    "virtual:joints=2,seed=7,coupling=0.5, virtual:seed=7,sensors=velocity+temperature, "
+    "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
     "emulated:ARM or python:module:callable, each with ,spec=arm.toml if you like"
 )
-_OPTION = re.compile(r"[:,](?=(?:seed|preset|period|rate|sensors|faults|spec)=|wide(?:,|$))")
+_OPTION = re.compile(r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|faults|spec)=|wide(?:,|$))")
 """Stands before an option; files may have commas in their names."""
 
 
@@ -29,7 +34,8 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     ``virtual:seed=N,sensors=velocity+acceleration+temperature`` one with further sensors, any of these
     (:mod:`pneumarm.arm.virtual.further`), ``virtual:seed=N,faults=PLAN.toml`` one with faults
     (:mod:`pneumarm.arm.virtual.faults`), ``virtual:seed=N,rate=200`` or ``period=0.005`` one that is controlled at
-    200 Hz, not at the rate that it is made for;
+    200 Hz, not at the rate that it is made for, ``virtual:joints=2,seed=N`` a chain of several joints, up to 4, and
+    with ``coupling=0.5`` one whose joints act on each other half as much;
     ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
     ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
     ``python:module:callable`` calls ``callable()`` for the arm.
@@ -97,29 +103,15 @@ def _option(given: tuple[str, str]) -> str:
 
 
 def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None) -> Arm:
-    """Return the virtual arm with ``options``: a seed or a preset, a rate, kinds of sensors, a file of faults.
+    """Return the virtual arm with ``options``: which one, a rate, kinds of sensors, a file of faults.
 
     Without them it has the rate and the further sensors of its ``spec``, if it has one.
     """
-    from pneumarm.arm.virtual import (
-        VirtualArm,
-        draw_parameters,
-        draw_wide,
-        preset_parameters,
-        read_plan,
-        usual_sensors,
-    )
+    from pneumarm.arm.virtual import VirtualArm, read_plan, usual_sensors
 
-    drawn, preset, wide = options.get("seed"), options.get("preset"), "wide" in options
-    twice = drawn is not None and preset is not None
-    if twice or (wide and drawn is None) or not (drawn is None or drawn.isdecimal()):
-        raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
-    parameters = None if preset is None else preset_parameters(preset)
-    if drawn is not None:
-        parameters = (draw_wide if wide else draw_parameters)(int(drawn))
+    parameters = _parameters(name, options)
     if "sensors" in options:
-        kinds = options["sensors"].split("+")
-        velocity, sensors = usual_sensors(kinds, 1 if parameters is None else len(parameters.joints))
+        velocity, sensors = usual_sensors(options["sensors"].split("+"), len(parameters.joints))
     else:
         velocity, sensors = (spec.velocity_sensor, spec.sensors) if spec is not None else (False, ())
     faults = read_plan(options["faults"]) if "faults" in options else ()
@@ -132,6 +124,34 @@ def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | N
         velocity_sensor=velocity,
         sensors=sensors,
     )
+
+
+def _parameters(name: str, options: Mapping[str, str]) -> "ArmParameters":
+    """Return what the virtual arm with ``options`` is made of: of a preset, drawn, or nominal."""
+    from pneumarm.arm.virtual import draw_parameters, draw_wide, nominal_parameters, preset_parameters
+
+    drawn, preset, joints = options.get("seed"), options.get("preset"), options.get("joints", "1")
+    wide = "wide" in options
+    if not all(number.isdecimal() for number in (drawn or "0", joints)) or (wide and drawn is None):
+        raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
+    if (preset is not None and {"seed", "joints", "wide"} & options.keys()) or (wide and "joints" in options):
+        raise UnusableInput(f"arm {name!r}: these options do not go together; expected {_FORMS}")
+    if preset is not None:
+        parameters = preset_parameters(preset)
+    elif wide:
+        parameters = draw_wide(int(str(drawn)))
+    elif drawn is not None:
+        parameters = draw_parameters(int(drawn), int(joints))
+    else:
+        parameters = nominal_parameters(int(joints))
+    if "coupling" not in options:
+        return parameters
+    if len(parameters.joints) == 1:
+        raise UnusableInput(f"arm {name!r}: one joint is coupled to none; give joints= of 2 or more, or no coupling=")
+    try:
+        return replace(parameters, coupling=float(options["coupling"]))
+    except ValueError as error:
+        raise UnusableInput(f"arm {name!r}: expected a coupling of 0 to 1") from error
 
 
 def _period(name: str, options: Mapping[str, str], usual: float | None) -> float | None:

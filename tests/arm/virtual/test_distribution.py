@@ -24,7 +24,7 @@ def test_the_distribution_has_the_reference_percentiles(drawn):
     assert minus == pytest.approx([-66.0, -55.3, -44.8], abs=4)
     assert percentiles([f.fill[0] for f in found]) == pytest.approx([0.68, 0.85, 1.12], abs=0.1)
     assert percentiles([f.ring for f in found]) == pytest.approx([2.10, 2.56, 3.12], abs=0.35)
-    assert 0.85 < np.mean([f.usable for f in found]) < 1
+    assert 0.85 < np.mean([f.usable() for f in found]) < 1
 
 
 def test_unequal_muscles_shift_the_rest_angle(drawn):
@@ -40,7 +40,7 @@ def test_a_number_is_always_the_same_arm_and_another_is_another():
 
 
 def test_drawn_arms_can_do_the_job():
-    assert all(figures(draw_parameters(seed)).usable for seed in range(100, 110))
+    assert all(figures(draw_parameters(seed)).usable() for seed in range(100, 110))
 
 
 def test_drawn_arms_stay_sane_under_babble():

@@ -65,7 +65,7 @@ def displaced(parameters, pressure, degrees):
         arm.body.joints["angle"] = angle
         for m in range(2):
             muscle, c = arm.body.muscles[0, m], fixed.muscles[0, m]
-            length = c["length_at_zero"] + (2 * m - 1) * fixed.joints[0]["radius"] * angle
+            length = c["length_at_zero"] + (2 * m - 1) * parameters.joints[0].radius * angle
             if i == 0:
                 prepare(muscle, c, length, pressure)
             move(muscle, c, length, 0.0, ATMOSPHERE, fixed.surroundings[0]["polytropic"], 0.0)
@@ -106,7 +106,7 @@ def energy(arm, fixed, polytropic):
     """What a closed arm stores [J], friction's springs included; the reference of each part is arbitrary."""
     joint, total = fixed.joints[0], 0.0
     angle, speed = float(arm.angle[0]), float(arm.speed[0])
-    total += joint["inertia"] * speed**2 / 2 - joint["weight"] * math.cos(angle + joint["tilt"])
+    total += joint["inertias"][0] * speed**2 / 2 - joint["weight"] * math.cos(angle + joint["tilt"])
     beyond = max(0.0, abs(angle) - joint["stop_angle"])
     total += joint["stop_stiffness"] * beyond**2 / 2
     for m in range(2):

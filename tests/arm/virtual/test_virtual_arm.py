@@ -147,8 +147,12 @@ def test_impossible_parameters_are_refused():
         MuscleParameters(slip_weights=(1.0,))
     with pytest.raises(UnusableInput, match="radius cannot be 0"):
         JointParameters(radius=0)
-    with pytest.raises(UnusableInput, match="1 joint in this version"):
-        ArmParameters(joints=(JointParameters(), JointParameters()))
+    with pytest.raises(UnusableInput, match="joints cannot be"):
+        ArmParameters(joints=(JointParameters(),) * 5)
+    with pytest.raises(UnusableInput, match="a radius for each joint that cables pass"):
+        ArmParameters(joints=(JointParameters(), JointParameters(passing=(0.005, 0.005))))
+    with pytest.raises(UnusableInput, match="expected 0 to 1"):
+        ArmParameters(joints=(JointParameters(),) * 2, coupling=1.5)
     with pytest.raises(UnusableInput, match="seed of a virtual arm"):
         VirtualArm(seed=-1)
 

@@ -1,7 +1,7 @@
 """The virtual arm: real pneumatics without an arm."""
 
 from pneumarm.arm.virtual.arm import VirtualArm, resting_angle
-from pneumarm.arm.virtual.distribution import Figures, draw_parameters, figures
+from pneumarm.arm.virtual.distribution import Figures, draw_parameters, figures, nominal_parameters
 from pneumarm.arm.virtual.faults import (
     Cold,
     DeadPotentiometer,
@@ -64,6 +64,7 @@ __all__ = [
     "draw_parameters",
     "draw_wide",
     "figures",
+    "nominal_parameters",
     "preset_parameters",
     "read_plan",
     "resting_angle",

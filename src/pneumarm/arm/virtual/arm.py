@@ -18,10 +18,10 @@ from pneumarm.arm.virtual.further import begin_sampling, changing, further_senso
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, PERIOD, ArmParameters
 from pneumarm.arm.virtual.passing import drawn_lateness, pass_for, pass_time, pass_until
 from pneumarm.arm.virtual.playing import FaultPlayer
-from pneumarm.arm.virtual.rest import static_angle
+from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.start import start
-from pneumarm.arm.virtual.state import INLET, MUSCLE, OUTLET, QUEUE, SLOW_TICK, SURROUNDINGS
+from pneumarm.arm.virtual.state import INLET, JOINT, MUSCLE, OUTLET, QUEUE, SLOW_TICK, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command, command_sides
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import direct
@@ -33,11 +33,11 @@ LONGEST_WAIT = 1e8
 _sense, _pass_for, _pass_until = direct(sense), direct(pass_for), direct(pass_until)
 _open_valves, _open_pulses = direct(command), direct(command)
 _HEADER = struct.Struct("<8sI16s")
-_MAGIC, _VERSION = b"pneumarm", 2
+_MAGIC, _VERSION = b"pneumarm", 3
 
 
 class VirtualArm(Arm):
-    """An arm that exists only as physics: valves, air, braided muscles, a hinge with a weight, and sensors.
+    """An arm that exists only as physics: valves, air, braided muscles, a chain of links with weights, and sensors.
 
     Time passes only in :meth:`wait` and :meth:`wait_until`; reading and setting valves take none. ``wait`` is
     exact; ``wait_until`` ends late, as under an operating system that is not real-time: by an exponentially
@@ -361,6 +361,6 @@ def resting_angle(parameters: ArmParameters, pressures: ArrayLike, *, end_stops:
     Without dry friction and after all creep, at 20 degrees Celsius.
     """
     fixed = constants(parameters)
-    pressures = np.asarray(pressures, np.float64).reshape(fixed.muscles.shape)
-    angles = [static_angle(fixed, j, pressures[j], end_stops) for j in range(len(fixed.joints))]
-    return np.array(angles)
+    joints = np.zeros(len(fixed.joints), JOINT)
+    stand(fixed, np.asarray(pressures, np.float64).reshape(fixed.muscles.shape), end_stops, joints)
+    return joints["angle"].copy()

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ELEMENTS, ArmParameters, MuscleParameters
+from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, ELEMENTS, MOST_JOINTS, ArmParameters, MuscleParameters
 from pneumarm.arm.virtual.state import SLOW_TICK
 
 BUMPS = 12
@@ -38,11 +38,16 @@ MUSCLE_CONSTANTS = np.dtype(
 )
 JOINT_CONSTANTS = np.dtype(
     [
+        ("inertias", "f8", (MOST_JOINTS,)),  # row of the links' A (see pneumarm.arm.virtual.chain) [kg m2]
+        ("cables", "f8", (MOST_JOINTS,)),  # radii at which its cables run over it and over inner joints [m]
+    ]
+    + [
         (name, "f8")
         for name in (
-            "radius",
-            "inertia",
-            "weight",  # m g L [N m]
+            "length",  # of the link, to the next hinge [m]
+            "weight",  # g h [N m]
+            "own_inertia",  # what the mass matrix has besides where coupling is turned down [kg m2]
+            "own_weight",  # and gravity [N m]
             "tilt",
             "stop_angle",
             "stop_stiffness",
@@ -123,12 +128,41 @@ def constants(parameters: ArmParameters) -> Constants:
     for j, joint in enumerate(parameters.joints):
         for m, muscle in enumerate(joint.muscles):
             _fill_muscle(muscles[j, m], muscle)
-        for name in ("radius", "inertia", "tilt", "stop_angle", "stop_stiffness", "stop_damping", "viscosity"):
+        for name in ("length", "tilt", "stop_angle", "stop_stiffness", "stop_damping", "viscosity"):
             hinges[j][name] = getattr(joint, name)
-        hinges[j]["weight"] = joint.mass * GRAVITY * joint.distance
+        for k, radius in enumerate(joint.passing):
+            hinges[j]["cables"][k] = parameters.coupling * radius
+        hinges[j]["cables"][j] = joint.radius
     hinges["rail"] = hinges["frozen"] = math.nan
     hinges["worn_width"] = 1.0
-    return Constants(muscles, hinges, _surroundings(parameters), _sensors(parameters))
+    made = Constants(muscles, hinges, _surroundings(parameters), _sensors(parameters))
+    for j, joint in enumerate(parameters.joints):
+        hang(made, j, joint.distance, joint.mass, parameters.coupling)
+        _spread(made, j, joint.link_inertia, parameters.coupling)
+    return made
+
+
+def hang(constants: Constants, link: int, distance: float, mass: float, coupling: float) -> None:
+    """Hang a ``mass`` [kg] on ``link``, ``distance`` [m] from its hinge; ``coupling`` is the arm's."""
+    joints = constants.joints
+    arms = np.where(np.arange(len(joints)) < link, joints["length"], 0.0)
+    arms[link] = distance
+    joints["inertias"][:, : len(joints)] += coupling * (mass * np.outer(arms, arms))
+    joints["weight"] += coupling * (mass * GRAVITY * arms)
+    reach = _outward(arms)  # of the mass about each joint, with the others at 0
+    joints["own_inertia"] += (1 - coupling) * mass * reach**2
+    joints["own_weight"] += (1 - coupling) * mass * GRAVITY * reach
+
+
+def _spread(constants: Constants, link: int, inertia: float, coupling: float) -> None:
+    """Give ``link`` a moment of ``inertia`` [kg m2] about its own centre."""
+    constants.joints["inertias"][link, link] += coupling * inertia
+    constants.joints["own_inertia"][: link + 1] += (1 - coupling) * inertia
+
+
+def _outward(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return for each link the sum of ``values`` from there on."""
+    return values[::-1].cumsum()[::-1]
 
 
 def _fill_muscle(record: Any, muscle: MuscleParameters) -> None:

@@ -2,8 +2,8 @@
 
     velocity        (median angle now - median angle 16 ms ago) / 16 ms, sampled every millisecond, as the
                     controller's firmware does it (thesis sections 5.1 and 7.3)
-    acceleration    r d2theta/dt2 + g sin(theta + tilt) along the link's path, at r from the hinge: an accelerometer
-                    cannot tell gravity from acceleration
+    acceleration    r d2phi/dt2 + g sin(phi) across the link, at r from its hinge, phi from where it hangs straight
+                    down, and that of its hinge: an accelerometer cannot tell gravity from acceleration
     temperature     that of the muscle as a whole, without a delay of the thermometer's own
 
 What an accelerometer or a thermometer says goes through the same converter as the other sensors. They draw their
@@ -131,6 +131,23 @@ def pass_sampling(body, further, until):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def felt_along(body, j):  # type: ignore[no-untyped-def]
+    """Return what an accelerometer across link ``j`` feels [m/s2]."""
+    joints, c = body.joints, body.constants.joints
+    angle = 0.0
+    for i in range(j + 1):
+        angle += joints[i].angle + c[i].tilt
+    turned, speed, acceleration, felt = 0.0, 0.0, 0.0, 0.0
+    for i in range(j):  # how the hinges move that are further in
+        turned += joints[i].angle + c[i].tilt
+        speed += joints[i].speed
+        acceleration += joints[i].acceleration
+        apart = turned - angle
+        felt += c[i].length * (acceleration * math.cos(apart) - speed * speed * math.sin(apart))
+    return felt + MOUNTED * (acceleration + joints[j].acceleration) + GRAVITY * math.sin(angle)
+
+
+@kernel
 def sense_further(body, further, values):  # type: ignore[no-untyped-def]
     """Write what the further sensors say now into ``values``, in the order of :attr:`ArmSpec.further`."""
     c = body.constants.sensors[0]
@@ -141,9 +158,7 @@ def sense_further(body, further, values):  # type: ignore[no-untyped-def]
     for i in range(further.feelers.shape[0]):
         feeler = further.feelers[i]
         if feeler.acceleration:
-            joint, hinge = body.joints[feeler.joint], body.constants.joints[feeler.joint]
-            felt = MOUNTED * joint.torque / hinge.inertia + GRAVITY * math.sin(joint.angle + hinge.tilt)
-            felt = min(max(felt, -MOST_ACCELERATION), MOST_ACCELERATION)
+            felt = min(max(felt_along(body, feeler.joint), -MOST_ACCELERATION), MOST_ACCELERATION)
         else:
             felt = body.muscles[feeler.joint, feeler.muscle].temperature
         converted = (felt - feeler.offset) / feeler.scale

@@ -1,14 +1,7 @@
-"""The hinge: gravity, end stops, bearings, and where its angle puts the muscles."""
+"""The hinge: end stops, bearings, the cables of the muscles, and what all of it does to the angles."""
 
-import math
-
+from pneumarm.arm.virtual.chain import hanging_torque, solve, swing
 from pneumarm.kernels import kernel, part
-
-
-@kernel
-def muscle_length(c, muscle_c, which, angle):  # type: ignore[no-untyped-def]
-    """Return the length [m] of muscle ``which`` (0 or 1) at ``angle`` [rad]: l = lc -+ r theta."""
-    return muscle_c.length_at_zero + muscle_direction(which) * c.radius * angle
 
 
 @kernel
@@ -17,10 +10,23 @@ def muscle_direction(which):  # type: ignore[no-untyped-def]
     return 2.0 * which - 1.0
 
 
+@part
+def cable_run(constants, joints, j):  # type: ignore[no-untyped-def]
+    """Return how far [m] the cables of joint ``j`` have run from where all angles are 0, and how fast they run [m/s].
+
+    They run over the joint's own pulley and, where its muscles sit further in, over the hinges that they pass.
+    """
+    run, speed = 0.0, 0.0
+    for k in range(j + 1):
+        run += constants.joints[j].cables[k] * joints[k].angle
+        speed += constants.joints[j].cables[k] * joints[k].speed
+    return run, speed
+
+
 @kernel
-def gravity_torque(c, angle):  # type: ignore[no-untyped-def]
-    """Return the torque of the hanging weight [N m]."""
-    return -c.weight * math.sin(angle + c.tilt)
+def muscle_length(c, which, run):  # type: ignore[no-untyped-def]
+    """Return the length l = lc -+ run [m] of muscle ``which`` (0 or 1) whose cable has run so far, ``run`` [m]."""
+    return c.length_at_zero + muscle_direction(which) * run
 
 
 @kernel
@@ -34,14 +40,36 @@ def stop_torque(c, angle, speed):  # type: ignore[no-untyped-def]
 
 
 @part
-def accelerate(body, dt):  # type: ignore[no-untyped-def]
-    """Sum the torques, and move all joints by one semi-implicit Euler step: speed first, then angle."""
-    for j in range(len(body.joints)):
-        joint, c = body.joints[j], body.constants.joints[j]
-        torque = gravity_torque(c, joint.angle) + stop_torque(c, joint.angle, joint.speed)
-        torque -= c.viscosity * joint.speed
+def joint_torque(body, j, torque):  # type: ignore[no-untyped-def]
+    """Return the sum of all torques on joint ``j`` [N m]: ``torque`` of the links, end stop, bearing and cables."""
+    joint, c = body.joints[j], body.constants.joints[j]
+    torque += stop_torque(c, joint.angle, joint.speed)
+    torque -= c.viscosity * joint.speed
+    for i in range(j, len(body.joints)):
         for m in range(2):
-            torque -= muscle_direction(m) * c.radius * body.muscles[j, m].tension
-        joint.torque = torque
-        joint.speed += dt * torque / c.inertia
-        joint.angle += dt * joint.speed
+            torque -= muscle_direction(m) * body.constants.joints[i].cables[j] * body.muscles[i, m].tension
+    return torque
+
+
+@part
+def turn(joint, change, dt):  # type: ignore[no-untyped-def]
+    """Give ``joint`` a ``change`` of its speed [rad/s], and let it turn for ``dt`` [s]."""
+    joint.acceleration = change / dt
+    joint.speed += change
+    joint.angle += dt * joint.speed
+
+
+@part
+def accelerate(body, dt):  # type: ignore[no-untyped-def]
+    """Sum the torques, and move all joints by one semi-implicit Euler step: speeds first, then angles."""
+    joints = body.joints
+    if len(joints) == 1:  # a pendulum needs no matrix, which would take a tenth more time
+        torque = joint_torque(body, 0, hanging_torque(body.constants, joints, 0))
+        turn(joints[0], dt * torque / body.constants.joints[0].inertias[0], dt)
+        return
+    swing(body)
+    for j in range(len(joints)):
+        joints[j].torque = dt * joint_torque(body, j, joints[j].torque)
+    solve(joints)
+    for j in range(len(joints)):
+        turn(joints[j], joints[j].torque, dt)

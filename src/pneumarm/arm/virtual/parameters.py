@@ -24,6 +24,8 @@ REFERENCE_TEMPERATURE = 20.0
 """Temperature at which a muscle's parameters hold [degrees Celsius]."""
 PERIOD = 1 / 30
 """Control period [s] (thesis section 5.1: 30 Hz)."""
+MOST_JOINTS = 4
+"""Joints that an arm has at most."""
 ELEMENTS = 4
 """Maxwell-slip elements and creep branches of a muscle."""
 
@@ -125,20 +127,25 @@ class MuscleParameters(Settings):
 
 @dataclass(frozen=True)
 class JointParameters(Settings):
-    """A hinge with a pulley, a hanging arm with a weight at its end, and two antagonistic muscles."""
+    """A hinge with a pulley, a hanging link with a weight on it, and two antagonistic muscles."""
 
     muscles: tuple[MuscleParameters, MuscleParameters] = (MuscleParameters(), MuscleParameters())
     """Muscle 1 turns the joint to positive angles, muscle 2 to negative ones."""
     radius: float = 0.034
     """Radius of the pulley [m] (computed from a sweep of 90 degrees)."""
+    passing: tuple[float, ...] = ()
+    """Radii [m] at which the cables of its muscles pass the joints further in, the first at the base; none where the
+    muscles sit on the link before this one, and pull on nothing else."""
     mass: float = 0.37
-    """Mass of the weight [kg]."""
+    """Mass of the weight, of a link within an arm all of its mass [kg]."""
     distance: float = 0.21
     """Distance of the weight from the hinge [m]."""
+    length: float = 0.21
+    """Distance of the next hinge from this one, where there is one [m]."""
     link_inertia: float = 0.004
-    """Moment of inertia of the rest of the arm [kg m2]."""
+    """Moment of inertia of the rest of the link [kg m2]."""
     tilt: float = 0.0
-    """Angle of the joint at which the weight would hang freely is ``-tilt`` [rad]."""
+    """Angle of the joint at which the weight would hang freely is ``-tilt`` [rad], the joints further in at 0."""
     stop_angle: float = math.radians(47)
     """Angle of the end stops either side [rad] (assumption)."""
     stop_stiffness: float = 60.0
@@ -150,9 +157,9 @@ class JointParameters(Settings):
 
     def _valid(self) -> Valid:
         may_be_zero = {"mass", "link_inertia", "stop_stiffness", "stop_damping", "viscosity"}
-        found = _positive(self, may_be_zero, {"muscles", "tilt"})
+        found = _positive(self, may_be_zero, {"muscles", "passing", "tilt"})
         found["mass"] = found["mass"] and (self.inertia > 0 or "above 0 where link_inertia is 0")
-        return {**found, "tilt": math.isfinite(self.tilt)}
+        return {**found, "passing": all(map(math.isfinite, self.passing)), "tilt": math.isfinite(self.tilt)}
 
     @property
     def inertia(self) -> float:
@@ -255,6 +262,10 @@ class ArmParameters(Settings):
     """A whole virtual arm; the defaults are the nominal one."""
 
     joints: tuple[JointParameters, ...] = (JointParameters(),)
+    """From the base outwards: each hangs on the link of the one before."""
+    coupling: float = 1.0
+    """How strongly the joints of a chain act on each other, by inertia, gravity and cables: 1 as in nature, 0 each as
+    if alone (:mod:`pneumarm.arm.virtual.chain`). All have one supply and one board in any case."""
     air: AirParameters = field(default_factory=AirParameters)
     room: RoomParameters = field(default_factory=RoomParameters)
     sensors: SensorParameters = field(default_factory=SensorParameters)
@@ -266,10 +277,11 @@ class ArmParameters(Settings):
     """Control period that it is made for [s]."""
 
     def _valid(self) -> Valid:
-        # The rigid body of two coupled joints is not written yet; everything else is general in joints.
+        passed = all(len(joint.passing) in (0, j) for j, joint in enumerate(self.joints))
         return {
             **_positive(self, {"jitter"}, {"joints", "air", "room", "sensors"}),
-            "joints": len(self.joints) == 1 or "1 joint in this version",
+            "joints": 1 <= len(self.joints) <= MOST_JOINTS and (passed or "a radius for each joint that cables pass"),
+            "coupling": 0 <= self.coupling <= 1 or "0 to 1",
         }
 
 

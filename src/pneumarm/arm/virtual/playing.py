@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.virtual.body import Body
-from pneumarm.arm.virtual.constants import GRAVITY, Constants
+from pneumarm.arm.virtual.constants import Constants, hang
 from pneumarm.arm.virtual.faults import (
     Cold,
     DeadPotentiometer,
@@ -180,10 +180,8 @@ class FaultPlayer:
                 case Leak():
                     fixed.muscles["leak"][fault.index] *= fault.factor
                 case Payload():
-                    joint: Any = fixed.joints[fault.place : fault.place + 1]
-                    weight = self._parameters.joints[fault.place]
-                    joint["inertia"] += fault.mass * weight.distance**2
-                    joint["weight"] += fault.mass * GRAVITY * weight.distance
+                    distance = self._parameters.joints[fault.place].distance
+                    hang(fixed, fault.place, distance, fault.mass, self._parameters.coupling)
                 case SupplyLoss():
                     left = max(0.0, 1 - (time - fault.begin) / fault.over) if fault.over else 0.0
                     low = min(fault.to * BAR + ATMOSPHERE, self._sound_supply)

@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from pneumarm.arm.virtual.joint import gravity_torque, muscle_direction, muscle_length, stop_torque
+from pneumarm.arm.virtual.chain import hanging_torque
+from pneumarm.arm.virtual.joint import cable_run, muscle_direction, muscle_length, stop_torque
 from pneumarm.arm.virtual.muscle import move, static_tension
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, FREE_AIR
 from pneumarm.arm.virtual.slow import relax_muscle, surround
@@ -35,6 +36,7 @@ LONGEST_STEP = 60.0
 VENTED = 0.001 * BAR
 """A muscle whose outlet is open counts as vented below this gauge pressure [Pa]."""
 _TOLERANCE = 1e-9  # of the equilibrium [rad]
+_MOST_SWEEPS = 100  # over the joints of a chain, until each stands where the others let it
 _LARGEST = 0.05  # an equilibrium farther away than this was no rest [rad]
 
 
@@ -80,8 +82,8 @@ def fast_forward(body, until):  # type: ignore[no-untyped-def]
                 muscle, c = body.muscles[j, m], body.constants.muscles[j, m]
                 relax_muscle(muscle, c, surroundings.temperature, elapsed)
                 leak(muscle, c, body.constants.surroundings[0], elapsed)
-            if not settle(body, j, trial[j]):
-                return False
+        if not settle(body, trial):
+            return False
     return True
 
 
@@ -100,46 +102,85 @@ def leak(muscle, c, surroundings_c, elapsed):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def resting_torque(body, j, trial, angle):  # type: ignore[no-untyped-def]
-    """Return the torque [N m] of joint ``j`` after an infinitely slow move to ``angle`` [rad].
+def resting_torque(body, trial, j):  # type: ignore[no-untyped-def]
+    """Return the torque [N m] of joint ``j`` after an infinitely slow move from the muscles' lengths to the angles.
 
-    ``trial`` (2,) holds its muscles then.
+    ``trial`` (joints, 2) holds the muscles then whose cables run over the joint.
     """
-    c, supply = body.constants.joints[j], body.surroundings[0].supply
+    joint, supply = body.joints[j], body.surroundings[0].supply
     polytropic = body.constants.surroundings[0].polytropic
-    torque = gravity_torque(c, angle) + stop_torque(c, angle, 0.0)
-    for m in range(2):
-        muscle_c = body.constants.muscles[j, m]
-        trial[m] = body.muscles[j, m]
-        if trial[m].open[OUTLET]:
-            trial[m].engagement = 0.0  # an open muscle is not compressed
-        move(trial[m], muscle_c, muscle_length(c, muscle_c, m, angle), 0.0, supply, polytropic, 0.0)
-        torque -= muscle_direction(m) * c.radius * trial[m].tension
+    torque = hanging_torque(body.constants, body.joints, j)
+    torque += stop_torque(body.constants.joints[j], joint.angle, 0.0)
+    for i in range(j, len(body.joints)):
+        if body.constants.joints[i].cables[j] != 0.0:
+            run, _ = cable_run(body.constants, body.joints, i)
+            for m in range(2):
+                muscle_c = body.constants.muscles[i, m]
+                trial[i, m] = body.muscles[i, m]
+                if trial[i, m].open[OUTLET]:
+                    trial[i, m].engagement = 0.0  # an open muscle is not compressed
+                move(trial[i, m], muscle_c, muscle_length(muscle_c, m, run), 0.0, supply, polytropic, 0.0)
+                torque -= muscle_direction(m) * body.constants.joints[i].cables[j] * trial[i, m].tension
     return torque
 
 
 @kernel
-def settle(body, j, trial):  # type: ignore[no-untyped-def]
-    """Move joint ``j`` to its equilibrium near by; return False if there is none. ``trial`` (2,) is workspace.
+def torque_at(body, trial, j, angle):  # type: ignore[no-untyped-def]
+    """Return :func:`resting_torque` with joint ``j`` at ``angle`` [rad]."""
+    body.joints[j].angle = angle
+    return resting_torque(body, trial, j)
+
+
+@kernel
+def settle(body, trial):  # type: ignore[no-untyped-def]
+    """Move the joints to their equilibrium near by; False where there is none. ``trial`` (joints, 2) is workspace.
+
+    One joint after the other, with the others held, until none moves: they stand on each other only weakly.
+    """
+    begin = np.empty(len(body.joints))
+    for j in range(len(body.joints)):
+        begin[j] = body.joints[j].angle
+    for _ in range(_MOST_SWEEPS):
+        moved = 0.0
+        for j in range(len(body.joints)):
+            before = body.joints[j].angle
+            if not settle_joint(body, trial, j):
+                for i in range(len(body.joints)):
+                    body.joints[i].angle = begin[i]
+                return False
+            moved = max(moved, abs(body.joints[j].angle - before))
+        if len(body.joints) == 1 or moved <= 2.0 * _TOLERANCE:
+            break
+    for j in range(len(body.joints)):
+        resting_torque(body, trial, j)
+    for j in range(len(body.joints)):
+        for m in range(2):
+            body.muscles[j, m] = trial[j, m]
+    return True
+
+
+@kernel
+def settle_joint(body, trial, j):  # type: ignore[no-untyped-def]
+    """Move joint ``j`` to its equilibrium near by; return False if there is none.
 
     The torque falls with the angle, so the equilibrium is bracketed by growing steps and found by the Illinois
     variant of regula falsi.
     """
-    joint = body.joints[j]
-    near = joint.angle
-    torque_near = resting_torque(body, j, trial, near)
+    begin = body.joints[j].angle
+    near = begin
+    torque_near = torque_at(body, trial, j, near)
     step = 1e-6 if torque_near > 0.0 else -1e-6
     far, torque_far = near, torque_near
     while torque_far * torque_near > 0.0:
         near, torque_near = far, torque_far
         far += step
         step *= 3.0
-        if abs(far - joint.angle) > _LARGEST:
+        if abs(far - begin) > _LARGEST:
             return False
-        torque_far = resting_torque(body, j, trial, far)
+        torque_far = torque_at(body, trial, j, far)
     while abs(far - near) > _TOLERANCE and torque_far != 0.0:
         middle = far - torque_far * (far - near) / (torque_far - torque_near)
-        torque = resting_torque(body, j, trial, middle)
+        torque = torque_at(body, trial, j, middle)
         if torque * torque_far < 0.0:
             near, torque_near = far, torque_far
         else:
@@ -148,29 +189,43 @@ def settle(body, j, trial):  # type: ignore[no-untyped-def]
             far, torque_far = middle, torque
             break
         far, torque_far = middle, torque
-    joint.angle = far
-    resting_torque(body, j, trial, far)
-    for m in range(2):
-        body.muscles[j, m] = trial[m]
+    body.joints[j].angle = far
     return True
 
 
 @kernel
-def static_angle(constants, j, pressures, with_stops):  # type: ignore[no-untyped-def]
-    """Return at which angle [rad] joint ``j`` rests at gauge ``pressures`` (2,) [Pa], without friction or creep."""
-    c = constants.joints[j]
-    low, high = -1.5, 1.5
-    for _ in range(60):
-        angle = 0.5 * (low + high)
-        torque = gravity_torque(c, angle)
-        if with_stops:
-            torque += stop_torque(c, angle, 0.0)
-        for m in range(2):
-            muscle_c = constants.muscles[j, m]
-            length = muscle_length(c, muscle_c, m, angle)
-            torque -= muscle_direction(m) * c.radius * static_tension(muscle_c, pressures[m], length)
-        if torque > 0.0:
-            low = angle
-        else:
-            high = angle
-    return 0.5 * (low + high)
+def static_torque(constants, pressures, with_stops, joints, j):  # type: ignore[no-untyped-def]
+    """Return the torque [N m] of joint ``j`` at gauge ``pressures`` (joints, 2) [Pa], without friction or creep."""
+    torque = hanging_torque(constants, joints, j)
+    if with_stops:
+        torque += stop_torque(constants.joints[j], joints[j].angle, 0.0)
+    for i in range(j, len(joints)):
+        if constants.joints[i].cables[j] != 0.0:
+            run, _ = cable_run(constants, joints, i)
+            for m in range(2):
+                muscle_c = constants.muscles[i, m]
+                tension = static_tension(muscle_c, pressures[i, m], muscle_length(muscle_c, m, run))
+                torque -= muscle_direction(m) * constants.joints[i].cables[j] * tension
+    return torque
+
+
+@kernel
+def stand(constants, pressures, with_stops, joints):  # type: ignore[no-untyped-def]
+    """Set the angles of ``joints`` (JOINT) to where they rest at gauge ``pressures`` (joints, 2) [Pa].
+
+    Without friction and after all creep. One joint after the other, as in :func:`settle`.
+    """
+    for _ in range(_MOST_SWEEPS):
+        moved = 0.0
+        for j in range(len(joints)):
+            before, low, high = joints[j].angle, -1.5, 1.5
+            for _ in range(60):
+                joints[j].angle = 0.5 * (low + high)
+                if static_torque(constants, pressures, with_stops, joints, j) > 0.0:
+                    low = joints[j].angle
+                else:
+                    high = joints[j].angle
+            joints[j].angle = 0.5 * (low + high)
+            moved = max(moved, abs(joints[j].angle - before))
+        if len(joints) == 1 or moved <= _TOLERANCE:
+            break

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from pneumarm.arm.virtual.joint import muscle_length
+from pneumarm.arm.virtual.joint import cable_run, muscle_length
 from pneumarm.arm.virtual.muscle import braid, move
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS
-from pneumarm.arm.virtual.rest import static_angle
+from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.slow import adapt, surround
 from pneumarm.kernels import kernel
 
@@ -18,11 +18,12 @@ def start(body):  # type: ignore[no-untyped-def]
     surroundings.temperature = cold
     surround(body, 1e9)  # so late that the fluctuation has forgotten its begin
     surroundings.temperature = cold
+    stand(fixed, np.zeros(body.muscles.shape), True, body.joints)
     for j in range(len(body.joints)):
-        body.joints[j].angle = static_angle(fixed, j, np.zeros(2), True)
+        run, _ = cable_run(fixed, body.joints, j)
         for m in range(2):
             muscle, c = body.muscles[j, m], fixed.muscles[j, m]
-            place(muscle, c, muscle_length(fixed.joints[j], c, m, body.joints[j].angle))
+            place(muscle, c, muscle_length(c, m, run))
             muscle.temperature = cold
             adapt(muscle, c)
             move(muscle, c, muscle.length, 0.0, surroundings.supply, 1.0, 0.0)

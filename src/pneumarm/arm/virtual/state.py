@@ -26,7 +26,10 @@ bladder_stiffness ...   parameters at the muscle's temperature, named as in Musc
 JOINT                   meaning                                                               unit
 ======================  ====================================================================  ==========
 angle, speed            angle theta and its derivative                                        rad, rad/s
-torque                  sum of all torques                                                    N m
+acceleration            its second derivative over the last substep                           rad/s2
+hanging, swinging       absolute angle phi of the link and its derivative, when last used     rad, rad/s
+torque                  workspace: torque about the joint, and what is made of it             N m
+inertia                 workspace: row of the mass matrix                                     kg m2
 ======================  ====================================================================  ==========
 
 ======================  ====================================================================  ==========
@@ -47,7 +50,7 @@ into pieces does not change them.
 
 import numpy as np
 
-from pneumarm.arm.virtual.parameters import ELEMENTS
+from pneumarm.arm.virtual.parameters import ELEMENTS, MOST_JOINTS
 
 QUEUE = 8
 """Switchings that can be under way in one valve at a time."""
@@ -83,7 +86,17 @@ MUSCLE = np.dtype(
         ("friction_per_pressure", "f8"),
     ]
 )
-JOINT = np.dtype([("angle", "f8"), ("speed", "f8"), ("torque", "f8")])
+JOINT = np.dtype(
+    [
+        ("angle", "f8"),
+        ("speed", "f8"),
+        ("acceleration", "f8"),
+        ("hanging", "f8"),
+        ("swinging", "f8"),
+        ("torque", "f8"),
+        ("inertia", "f8", (MOST_JOINTS,)),
+    ]
+)
 SURROUNDINGS = np.dtype(
     [
         ("time", "f8"),

@@ -7,7 +7,7 @@ count in the nominal arm, and below half a count rms in any of 20 drawn ones (la
 
 import math
 
-from pneumarm.arm.virtual.joint import accelerate, muscle_direction, muscle_length
+from pneumarm.arm.virtual.joint import accelerate, cable_run, muscle_direction, muscle_length
 from pneumarm.arm.virtual.muscle import move
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
 from pneumarm.arm.virtual.slow import surround, tick_muscle
@@ -26,12 +26,11 @@ def substep(body, supply, polytropic, dt):  # type: ignore[no-untyped-def]
     """Advance joints and muscles by ``dt`` [s] with the valves as they are."""
     accelerate(body, dt)
     for j in range(len(body.joints)):
-        joint, c = body.joints[j], body.constants.joints[j]
+        run, speed = cable_run(body.constants, body.joints, j)
         for m in range(2):
-            muscle, muscle_c = body.muscles[j, m], body.constants.muscles[j, m]
-            length = muscle_length(c, muscle_c, m, joint.angle)
-            speed = muscle_direction(m) * c.radius * joint.speed
-            move(muscle, muscle_c, length, speed, supply, polytropic, dt)
+            muscle, c = body.muscles[j, m], body.constants.muscles[j, m]
+            length = muscle_length(c, m, run)
+            move(muscle, c, length, muscle_direction(m) * speed, supply, polytropic, dt)
 
 
 @part

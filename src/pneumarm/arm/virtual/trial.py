@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from pneumarm.arm.virtual.joint import muscle_length
+from pneumarm.arm.virtual.joint import cable_run, muscle_length
 from pneumarm.arm.virtual.muscle import move
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, REFERENCE_TEMPERATURE
-from pneumarm.arm.virtual.rest import static_angle
+from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.slow import adapt
 from pneumarm.arm.virtual.start import place
-from pneumarm.arm.virtual.state import INLET, OUTLET
+from pneumarm.arm.virtual.state import INLET, JOINT, OUTLET
 from pneumarm.arm.virtual.step import SUBSTEP, substep
 from pneumarm.kernels import kernel
 
@@ -28,19 +28,26 @@ _TURNS = 4  # turning points that make a frequency
 def sweep(constants, j, pressure, with_stops):  # type: ignore[no-untyped-def]
     """Return the lowest and highest angle [rad] of joint ``j``, and its shortest and longest muscle [m].
 
-    One muscle is at gauge ``pressure`` [Pa], the other vented.
+    One muscle of each joint is at gauge ``pressure`` [Pa], the other vented. Angles are those that are reached at
+    least, whichever muscles of the other joints are full.
     """
-    full = np.zeros(2)
-    full[1] = pressure
-    low = static_angle(constants, j, full, with_stops)
-    full[0], full[1] = full[1], 0.0
-    high = static_angle(constants, j, full, with_stops)
-    shortest, longest = math.inf, 0.0
-    for m in range(2):
-        for angle in (low, high):
-            length = muscle_length(constants.joints[j], constants.muscles[j, m], m, angle)
+    n = len(constants.joints)
+    joints, pressures = np.zeros(n, JOINT), np.zeros((n, 2))
+    lowest, highest, shortest, longest = -math.inf, math.inf, math.inf, 0.0
+    for ends in range(1 << n):
+        for i in range(n):
+            high = (ends >> i) & 1
+            pressures[i, 0], pressures[i, 1] = high * pressure, (1 - high) * pressure
+        stand(constants, pressures, with_stops, joints)
+        if (ends >> j) & 1:
+            highest = min(highest, joints[j].angle)
+        else:
+            lowest = max(lowest, joints[j].angle)
+        run, _ = cable_run(constants, joints, j)
+        for m in range(2):
+            length = muscle_length(constants.muscles[j, m], m, run)
             shortest, longest = min(shortest, length), max(longest, length)
-    return low, high, shortest, longest
+    return lowest, highest, shortest, longest
 
 
 @kernel
@@ -71,18 +78,21 @@ def fill_time(body, j, m, target):  # type: ignore[no-untyped-def]
 
 @kernel
 def pose(body, j, pressure, away):  # type: ignore[no-untyped-def]
-    """Move joint ``j``, closed at gauge ``pressure`` [Pa], slowly ``away`` [rad] from where it rests."""
-    joint, c, polytropic = body.joints[j], body.constants.joints[j], body.constants.surroundings[0].polytropic
-    rest = static_angle(body.constants, j, np.full(2, pressure), True)
-    joint.speed = 0.0
+    """Close all muscles at gauge ``pressure`` [Pa] and move joint ``j`` slowly ``away`` [rad] from where it rests."""
+    joints, fixed, polytropic = body.joints, body.constants, body.constants.surroundings[0].polytropic
+    stand(fixed, np.full(body.muscles.shape, pressure), True, joints)
+    rest = joints[j].angle
     for i in range(_PATH + 1):
-        joint.angle = rest + away * i / _PATH
-        for m in range(2):
-            muscle, muscle_c = body.muscles[j, m], body.constants.muscles[j, m]
-            length = muscle_length(c, muscle_c, m, joint.angle)
-            if i == 0:
-                prepare(muscle, muscle_c, length, pressure)
-            move(muscle, muscle_c, length, 0.0, ATMOSPHERE, polytropic, 0.0)
+        joints[j].angle = rest + away * i / _PATH
+        for k in range(len(joints)):
+            joints[k].speed = 0.0
+            run, _ = cable_run(fixed, joints, k)
+            for m in range(2):
+                muscle, c = body.muscles[k, m], fixed.muscles[k, m]
+                length = muscle_length(c, m, run)
+                if i == 0:
+                    prepare(muscle, c, length, pressure)
+                move(muscle, c, length, 0.0, ATMOSPHERE, polytropic, 0.0)
 
 
 @kernel
@@ -91,8 +101,7 @@ def ring_frequency(body, j, pressure):  # type: ignore[no-untyped-def]
 
     All valves are closed, at gauge ``pressure`` [Pa]; the other joints begin at rest.
     """
-    for other in range(len(body.joints)):
-        pose(body, other, pressure, RELEASE if other == j else 0.0)
+    pose(body, j, pressure, RELEASE)
     turns, first, last, before = 0, 0.0, 0.0, 0.0
     for i in range(int(RING_TIME / SUBSTEP)):
         substep(body, ATMOSPHERE, body.constants.surroundings[0].polytropic, SUBSTEP)

@@ -56,6 +56,10 @@ COMMANDS = {
         "Have an arm follow a reference.",
         "pneumarm track arm.pid --arm virtual:seed=7 --reference sine:0.5Hz,20deg",
     ),
+    "live": (
+        "Show an arm in the browser, moving; drag its goal, draw a movement, stop it.",
+        "pneumarm live arm.agent --arm virtual:seed=7",
+    ),
     "tune": (
         "Tune a classical controller on an arm: pid, scheduled, pwm or sliding.",
         "pneumarm tune pid --arm virtual:seed=7 --out arm.pid",

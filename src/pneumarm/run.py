@@ -14,6 +14,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
@@ -42,6 +44,7 @@ from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.task import BeginStates, begin_states, read_episodes, write_episodes
 from pneumarm.transitions import KINDS, CollectSettings, Store, collect, enough
 
+SETTINGS = "settings.json"
 Progress = Callable[[str], AbstractContextManager[Report]]
 
 
@@ -83,14 +86,20 @@ class RunSettings(LearnSettings):
 class Run:
     """A run in a folder. Every stage leaves its files first and then its figures in ``results.json``."""
 
-    def __init__(self, folder: Path, settings: RunSettings, progress: Progress = silent) -> None:
-        """Take up the run in ``folder``, or begin it.
+    def __init__(
+        self,
+        folder: Path,
+        settings: RunSettings,
+        progress: Progress = silent,
+        seen_by: Callable[[Arm], Arm] = lambda arm: arm,
+    ) -> None:
+        """Take up the run in ``folder``, or begin it; ``seen_by`` may put something around the arm that shows it.
 
         Raises:
             UnusableInput: the folder's parent is missing, it holds something else, or a run with other settings.
 
         """
-        self.folder, self.settings, self.progress = folder, settings, progress
+        self.folder, self.settings, self.progress, self._seen_by = folder, settings, progress, seen_by
         self.results: dict[str, Any] = {}
         self.store = folder / "transitions.db"
         self.simulation = folder / "simulation.safetensors"
@@ -103,7 +112,7 @@ class Run:
         folder, wanted = self.folder, json.loads(json.dumps(asdict(self.settings)))
         del wanted["joints"]  # what the arm must have is no choice
         require_folder(folder)
-        file = folder / "settings.json"
+        file = folder / SETTINGS
         if file.exists():
             found = _read_json(file)
             if found != wanted:
@@ -156,7 +165,7 @@ class Run:
         wanted = self.settings
         with (
             self.progress("collecting") as report,
-            open_arm_checked(wanted) as arm,
+            self._seen_by(open_arm_checked(wanted)) as arm,
             Store.for_arm(self.store, arm.spec) as store,
         ):
             watch = Monitor(arm.spec)
@@ -203,7 +212,7 @@ class Run:
         wanted = self.settings
         with (
             self.progress("moving on the arm") as report,
-            open_arm_checked(wanted) as arm,
+            self._seen_by(open_arm_checked(wanted)) as arm,
             Store.append_to(self.store) as store,
         ):
             moved = transfer(
@@ -230,7 +239,7 @@ class Run:
         found: dict[str, Any] = {"settle": None, "track": []}
         if not isinstance(agent, Tracks):
             return found
-        with self.progress("moving to goals") as report, open_arm_checked(wanted) as arm:
+        with self.progress("moving to goals") as report, self._seen_by(open_arm_checked(wanted)) as arm:
             tried = try_moving(
                 arm, agent.controller(), agent.goal_range, wanted.moving, seed=wanted.seed, progress=report
             )
@@ -272,6 +281,22 @@ def open_arm_checked(settings: RunSettings) -> Arm:
         arm.close()
         raise UnusableInput(f"{settings.arm} has {arm.spec.joints} joint(s), asked for are {settings.joints}")
     return arm
+
+
+def settings_in(folder: Path) -> RunSettings | None:
+    """Return the settings of the run in ``folder``; None where it holds none.
+
+    Raises:
+        UnusableInput: they are damaged, or of another version.
+
+    """
+    file = folder / SETTINGS
+    if not file.exists():
+        return None
+    try:
+        return msgspec.convert(_read_json(file), RunSettings)
+    except msgspec.ValidationError as error:
+        raise UnusableInput(f"{file}: holds no settings of a run that can be used ({error})") from error
 
 
 def _read_json(path: Path) -> Any:

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Arm, Reading, checked
 from pneumarm.arm.spec_file import ArmFile
 from pneumarm.errors import UnusableInput
 
 
-class CorrectedArm(Arm):
+class CorrectedArm(PassedOn):
     """``arm`` with the spec and the corrections of its file; everything else is the arm's own."""
 
     def __init__(self, arm: Arm, known: ArmFile) -> None:
@@ -29,7 +30,8 @@ class CorrectedArm(Arm):
             raise UnusableInput(
                 f"the file names sensors that {arm.spec.name} lacks ({', '.join(missing)}); remove them from it"
             )
-        self.arm, self.spec, self.known = arm, known.spec, known
+        super().__init__(arm)
+        self.spec, self.known = known.spec, known
 
     def read(self) -> Reading:
         """Return what the sensors say, put right."""
@@ -40,42 +42,6 @@ class CorrectedArm(Arm):
             velocity = correction.angle(raw.angle + velocity / 2) - correction.angle(raw.angle - velocity / 2)
         return replace(raw, angle=angle, pressure=correction.pressure(raw.pressure), velocity=velocity)
 
-    def set_valves(self, valves: NDArray[np.int8]) -> None:
-        """Set the valves."""
-        self.arm.set_valves(valves)
-
     def set_pulses(self, command: NDArray[np.float64]) -> bool:
         """Set pulses, of an arm whose control period is that of the file."""
         return self.spec.period == self.arm.spec.period and self.arm.set_pulses(command)
-
-    def air_used(self) -> float | None:
-        """Return the air that the arm has used."""
-        return self.arm.air_used()
-
-    def wait(self, seconds: float) -> None:
-        """Let time pass [s]."""
-        self.arm.wait(seconds)
-
-    def wait_until(self, time: float) -> None:
-        """Let time pass until the arm's clock shows ``time`` [s]."""
-        self.arm.wait_until(time)
-
-    def make_ready(self) -> None:
-        """Prepare to move after a pause."""
-        self.arm.make_ready()
-
-    def link_counts(self) -> dict[str, int]:
-        """Return what has happened on the link to the arm."""
-        return self.arm.link_counts()
-
-    def get_state(self) -> bytes | None:
-        """Return the state of the arm."""
-        return self.arm.get_state()
-
-    def set_state(self, state: bytes) -> None:
-        """Restore the state of the arm."""
-        self.arm.set_state(state)
-
-    def close(self) -> None:
-        """Close the arm."""
-        self.arm.close()

@@ -142,21 +142,30 @@ def _from_file(path: Path, spec: ArmSpec, *, jumps: bool) -> Reference:
     if not (np.isfinite(values).all() and (np.diff(times) > 0).all()):
         raise UnusableInput(f"{expected}; a number is not finite or a time is not after the one before")
     angles = counts_of(values[:, 1:], spec)
-    if jumps:
+    return _held(times, angles) if jumps else through(times, angles)
 
-        def at(time: float) -> NDArray[np.float64]:
-            return angles[max(int(np.searchsorted(times, time, "right")) - 1, 0)]
-    else:
-        slopes = np.gradient(angles, times, axis=0) if len(times) > 1 else np.zeros_like(angles)
 
-        def at(time: float) -> NDArray[np.float64]:
-            if not times[0] < time < times[-1]:
-                return angles[0 if time <= times[0] else -1]
-            i = int(np.searchsorted(times, time, "right")) - 1
-            step = times[i + 1] - times[i]
-            s = (time - times[i]) / step
-            way = s * s * (3 - 2 * s)
-            bent = s * (1 - s) * step * ((1 - s) * slopes[i] - s * slopes[i + 1])
-            return angles[i] + way * (angles[i + 1] - angles[i]) + bent
+def _held(times: NDArray[np.float64], angles: NDArray[np.float64]) -> Reference:
+    """Return the reference that jumps to each of the ``angles`` (n, joints) [counts] at its time and stays there."""
 
-    return Reference(at, smooth=not jumps, duration=float(times[-1]))
+    def at(time: float) -> NDArray[np.float64]:
+        return angles[max(int(np.searchsorted(times, time, "right")) - 1, 0)]
+
+    return Reference(at, smooth=False, duration=float(times[-1]))
+
+
+def through(times: NDArray[np.float64], angles: NDArray[np.float64]) -> Reference:
+    """Return the reference through ``angles`` (n, joints) [counts] at ``times`` (n,) [s], with a cubic between."""
+    slopes = np.gradient(angles, times, axis=0) if len(times) > 1 else np.zeros_like(angles)
+
+    def at(time: float) -> NDArray[np.float64]:
+        if not times[0] < time < times[-1]:
+            return angles[0 if time <= times[0] else -1]
+        i = int(np.searchsorted(times, time, "right")) - 1
+        step = times[i + 1] - times[i]
+        s = (time - times[i]) / step
+        way = s * s * (3 - 2 * s)
+        bent = s * (1 - s) * step * ((1 - s) * slopes[i] - s * slopes[i + 1])
+        return angles[i] + way * (angles[i + 1] - angles[i]) + bent
+
+    return Reference(at, duration=float(times[-1]))

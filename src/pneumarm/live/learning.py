@@ -1,0 +1,155 @@
+"""Making a controller while people look on: the whole job, with the arm, the progress and the figures on the page."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm import Arm
+from pneumarm.arm.passed_on import PassedOn
+from pneumarm.arm.seam import Reading
+from pneumarm.console import Report
+from pneumarm.control import TransferSettings
+from pneumarm.errors import PneumarmError
+from pneumarm.live.screen import Screen
+from pneumarm.run import Run, RunSettings, settings_in
+
+TRANSITIONS = 36_000
+"""How much is recorded: 20 minutes of an arm that is controlled at 30 Hz."""
+TRANSFER = TransferSettings(episodes=100, test_episodes=50)
+"""Few movements: people are looking on."""
+STAGES = {
+    "collect": "move about and record",
+    "simulation": "learn a simulation from the recording",
+    "training": "learn a controller in the simulation",
+    "test": "try it in the simulation",
+    "transfer": "move it onto the arm and adapt",
+    "settle": "move to goals and hold them",
+}
+"""Stages of the job by the name of their results, in words."""
+_TELL = 0.2  # s between two looks
+
+
+class LeftOff(PneumarmError):  # noqa: N818 - reads as a sentence where it is raised
+    """Somebody stopped the learning; what was recorded so far is kept."""
+
+
+class Watched(PassedOn):
+    """An arm whose readings are shown on the page, and that stops when somebody wants that."""
+
+    def __init__(self, arm: Arm, screen: Screen, check: Callable[[], None]) -> None:
+        super().__init__(arm)
+        self._screen, self._check = screen, check
+        self._command: NDArray[Any] = np.zeros((arm.spec.joints, 2), np.int8)
+
+    def read(self) -> Reading:
+        """Return what the sensors say, and show it.
+
+        Raises:
+            LeftOff: somebody wants it to stop.
+
+        """
+        self._check()
+        reading = self.arm.read()
+        self._screen.show(self.spec, reading, None, self._command)
+        return reading
+
+    def set_valves(self, valves: NDArray[np.int8]) -> None:
+        """Set the valves."""
+        self._command = valves
+        self.arm.set_valves(valves)
+
+    def set_pulses(self, command: NDArray[np.float64]) -> bool:
+        """Set pulses, if the arm can time them."""
+        self._command = command
+        return self.arm.set_pulses(command)
+
+
+class Learning:
+    """A run that people look at: its stages, what is done of the present one, and their figures are told.
+
+    Args:
+        folder: of the run, which is begun or gone on with.
+        settings: of one that is begun.
+        screen: where it is told.
+        stopped: whether somebody wants it to stop.
+
+    """
+
+    def __init__(self, folder: Path, settings: RunSettings, screen: Screen, stopped: Callable[[], bool]) -> None:
+        self._screen, self._stopped = screen, stopped
+        self._begun, self._told = monotonic(), 0.0
+        self._run = Run(folder, settings_in(folder) or settings, self._progress, self._watched)
+
+    def do(self) -> None:
+        """Do all stages that are not done yet.
+
+        Raises:
+            LeftOff: somebody stopped it.
+
+        """
+        self._tell("", 0.0, 0.0)
+        self._run.do()
+
+    def _watched(self, arm: Arm) -> Arm:
+        return Watched(arm, self._screen, self._check)
+
+    def _check(self) -> None:
+        if self._stopped():
+            raise LeftOff("the learning was stopped; what was recorded so far is kept")
+
+    @contextmanager
+    def _progress(self, title: str) -> Iterator[Report]:
+        def report(done: float, total: float) -> None:
+            self._check()
+            if monotonic() - self._told >= _TELL:
+                self._tell(title, done, total)
+
+        self._tell(title, 0.0, 0.0)
+        yield report
+
+    def _tell(self, title: str, done: float, total: float) -> None:
+        """Tell what is being done, how far it is, and what came of the stages before."""
+        self._told = monotonic()
+        results = self._run.results
+        now = next((name for name in STAGES if name not in results), None)
+        self._screen.tell(
+            learning={
+                "seconds": round(monotonic() - self._begun),
+                "title": title,
+                "share": done / total if total else None,
+                "stages": [
+                    {
+                        "words": words,
+                        "state": "done" if name in results else "now" if name == now else "to come",
+                        "figures": figures_of(name, results) if name in results else "",
+                    }
+                    for name, words in STAGES.items()
+                ],
+            }
+        )
+
+
+def figures_of(stage: str, results: dict[str, Any]) -> str:
+    """Return in words what came of a ``stage`` that is done."""
+    found = results[stage]
+    if stage == "collect":
+        return f"{found['transitions']:,} readings, {found['seconds'] / 60:.0f} min of the arm's time"
+    if stage == "simulation":
+        error = found.get("relative_error", {}).get("angle")
+        error = float(np.mean(error)) if error is not None else None
+        return "" if error is None else f"its error of the angle is {error:.0%} of a step"
+    if stage == "training":
+        return f"{found['episodes']:,} movements in {found['seconds']:.0f} s"
+    if stage == "test":
+        return f"reaches {found['success_rate']:.1%} of its goals"
+    if stage == "transfer":
+        return f"reaches {found['before']['success_rate']:.0%} on arrival, {found['after']['success_rate']:.0%} after"
+    if not found:
+        return ""
+    median = "" if found["median_seconds"] is None else f", median {found['median_seconds']:.2f} s"
+    return f"settles at {found['settled']:.0%} within {found['tolerance_deg']:g}°{median}"

@@ -1,0 +1,283 @@
+// The page of a live arm: shows what comes over the connection, and sends what people want.
+
+import { ArmDrawing } from "./arm.js";
+import { Charts, Paper } from "./charts.js";
+
+const BEAT = 250; // ms between two signs of life: who controls the arm and is silent has it held, then vented
+const SENT = 33; // ms between two goals while one is dragged
+const WORDS = {
+  relaxed: "Relaxed: all muscles are vented", moving: "Holding its goal", following: "Following the curve",
+  stopped: "Stopped: everything is vented", failed: "Failed", learning: "Learning",
+};
+
+const $ = (id) => document.getElementById(id);
+let socket = null, state = null, built = "", again = 500, beaten = 0, joint = 0, muscle = 1, frame = null;
+
+function send(order) {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(order));
+}
+
+const writes = () => state !== null && state.writer === state.you;
+
+function beat() {
+  const now = performance.now();
+  if (now - beaten >= BEAT) {
+    beaten = now;
+    send({ do: "beat" });
+  }
+}
+
+// ---- connection
+
+function connect() {
+  const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+  socket = new WebSocket(`${scheme}//${location.host}/connection${location.search}`);
+  let first = true;
+  socket.onmessage = ({ data }) => {
+    const message = JSON.parse(data);
+    if (message.frame?.angle) showFrame(message.frame);
+    if (message.state) {
+      showState(message.state);
+      if (first && message.state.writer === null) send({ do: "take" });
+      first = false;
+      again = 500;
+    }
+    if (message.refused) notify(message.refused);
+    beat(); // timers sleep in a page that is not looked at; messages do not
+  };
+  socket.onclose = () => {
+    document.body.dataset.role = "lost";
+    $("role").textContent = "not connected: a moving arm holds, then is vented";
+    $("control").hidden = true;
+    state = null;
+    setTimeout(connect, again);
+    again = Math.min(again * 1.6, 4000);
+  };
+}
+
+let silence = 0;
+function notify(text) {
+  $("notice").textContent = text;
+  $("notice").hidden = !text;
+  clearTimeout(silence);
+  if (text) silence = setTimeout(() => { $("notice").hidden = true; }, 9000);
+}
+
+// ---- what is shown
+
+function showFrame(now) {
+  frame = now;
+  if (!built) return;
+  drawing.show(now);
+  charts.add(now);
+  if (state?.mode === "following") paper.follow(now);
+  [...$("angles").children].forEach((place, j) => {
+    place.firstChild.textContent = `${now.angle[j].toFixed(1)}°`;
+    place.lastChild.textContent = now.goal ? `of ${now.goal[j].toFixed(1)}°` : "\u00a0";
+  });
+}
+
+function build(now) {
+  const key = JSON.stringify([now.arm, now.measures, now.range, now.goals, now.most_bar]);
+  if (key === built) return;
+  built = key;
+  drawing.build(now);
+  charts.build(now);
+  paper.build(now.goals, now.range);
+  $("arm-name").textContent = now.arm;
+  $("hint").textContent = "Valves: blue lets air in, orange lets it out." + (now.to_scale ? "" : " The measures of this arm are not known: it is not drawn to scale.");
+  $("angles").replaceChildren(...now.measures.map((_, j) => {
+    const place = document.createElement("div");
+    place.append(document.createElement("b"), document.createElement("span"));
+    if (now.joints > 1) place.title = `joint ${j + 1}`;
+    return place;
+  }));
+  document.querySelectorAll(".joints").forEach((row) => {
+    row.hidden = now.joints < 2;
+    choice(row, Array.from({ length: now.joints }, (_, j) => [j, `joint ${j + 1}`]), () => joint, (j) => {
+      joint = j;
+      charts.choose(j);
+      paper.joint = j;
+      paper.clear();
+      showFaults(state);
+    });
+  });
+  choice($("muscles"), [[1, "muscle 1"], [2, "muscle 2"]], () => muscle, (m) => {
+    muscle = m;
+    showFaults(state);
+  });
+}
+
+function choice(row, options, chosen, choose) {
+  row.replaceChildren(...options.map(([value, words]) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = words;
+    button.setAttribute("aria-pressed", value === chosen());
+    button.onclick = () => {
+      choose(value);
+      [...row.children].forEach((other, i) => other.setAttribute("aria-pressed", options[i][0] === value));
+    };
+    return button;
+  }));
+}
+
+function showState(now) {
+  const before = state;
+  state = now;
+  if (now.measures) build(now);
+  document.body.dataset.mode = now.mode ?? "relaxed";
+  document.body.dataset.role = writes() ? "writer" : "watcher";
+  $("mode").textContent = now.why ? capital(now.why) : WORDS[now.mode] ?? "";
+  const stopped = now.mode === "stopped" || now.mode === "failed";
+  $("stop").textContent = !stopped ? "Stop" : now.mode === "failed" ? "Try again" : "Release";
+  $("stop").disabled = stopped && !writes();
+  for (const id of ["hold", "relax"]) $(id).disabled = stopped || !writes() || now.mode === "learning" || (id === "hold" && !now.controller);
+  showRole(now);
+  showLearning(now);
+  showHealth(now);
+  showChoices(now);
+  showFaults(now);
+  if (now.notice && now.notice !== before?.notice) notify(now.notice);
+  if (before?.mode === "following" && now.mode !== "following") paper.ended();
+  const curve = now.figures?.[now.controller]?.curve;
+  $("followed").textContent = curve == null ? "" : `followed within ${curve.toFixed(2)}° (RMS)`;
+}
+
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+function showRole(now) {
+  const others = now.pages - 1;
+  const watching = others ? `, ${others} other page${others > 1 ? "s" : ""} open` : "";
+  $("role").textContent = (writes() ? "you control the arm" : now.writer === null ? "nobody controls the arm" : "watching") + watching;
+  const button = $("control");
+  button.hidden = false;
+  if (writes()) {
+    button.textContent = now.asking === null ? "Let go" : "Somebody asks: hand over";
+    button.classList.toggle("main", now.asking !== null);
+    button.onclick = () => send({ do: "hand-over" });
+  } else {
+    button.textContent = now.writer === null ? "Take control" : now.asking === now.you ? "Asked for control" : "Ask for control";
+    button.disabled = now.asking === now.you && now.writer !== null;
+    button.classList.toggle("main", now.writer === null);
+    button.onclick = () => send({ do: "take" });
+  }
+  if (writes()) button.disabled = false;
+}
+
+function showLearning(now) {
+  const learning = now.learning, busy = now.mode === "learning";
+  $("learn").hidden = !(now.can_learn || busy);
+  $("learn-words").textContent = busy || now.controller ? "" : "Nothing has learned to move this arm yet.";
+  $("begin").hidden = busy;
+  $("begin").disabled = !writes();
+  $("begin").textContent = `Learn to move it: record ${now.minutes} min of its time`;
+  $("stages").replaceChildren(...(learning?.stages ?? []).map((stage) => {
+    const line = document.createElement("li");
+    line.className = stage.state;
+    line.textContent = stage.words;
+    if (stage.figures) line.append(Object.assign(document.createElement("small"), { textContent: stage.figures }));
+    return line;
+  }));
+  $("progress").hidden = !busy;
+  if (learning?.share == null) $("progress").removeAttribute("value");
+  else $("progress").value = learning.share;
+  $("learn-now").textContent = busy && learning ? `${learning.title || "beginning"}, ${learning.seconds} s so far` : "";
+}
+
+function showHealth(now) {
+  const lines = (now.wrong ?? []).map((text) => ["", text]);
+  if (!lines.length) lines.push(["fine", now.mode === "learning" ? "The report will tell." : "Nothing that has been noticed."]);
+  lines.push(...(now.was_wrong ?? []).map((text) => ["over", text]));
+  $("wrong").replaceChildren(...lines.map(([kind, text]) => Object.assign(document.createElement("li"), { className: kind, textContent: text })));
+  const counts = { "the guard": now.guard, "periods missed": now.missed, "air used": now.air == null ? null : `${now.air.toFixed(2)} l` };
+  $("counts").replaceChildren(...Object.entries(counts).filter(([, value]) => value != null).flatMap(([name, value]) => [
+    Object.assign(document.createElement("dt"), { textContent: name }), Object.assign(document.createElement("dd"), { textContent: value }),
+  ]));
+}
+
+function showChoices(now) {
+  const choices = now.choices ?? [];
+  $("controllers").hidden = !choices.length;
+  $("choices").replaceChildren(...choices.map(([name, version]) => {
+    const row = document.createElement("tr"), figures = now.figures?.[name];
+    const number = (value, digits, unit) => (value == null ? "–" : `${value.toFixed(digits)}${unit}`);
+    const cells = [
+      now.controller === name ? "●" : "", name + (version !== null && version === now.in_use ? " (in use)" : ""),
+      figures?.goals ? `${figures.settled} of ${figures.goals}` : "–",
+      number(figures?.time, 2, " s"), number(figures?.rest, 2, "°"), number(figures?.curve, 2, "°"),
+    ];
+    for (const text of cells) row.append(Object.assign(document.createElement("td"), { textContent: text }));
+    const last = document.createElement("td");
+    if (now.controller !== name) last.append(button("Use", () => send({ do: "choose", controller: name })));
+    if (version !== null && version !== now.in_use) last.append(" ", button("Put back", () => send({ do: "put-back", version })));
+    row.append(last);
+    return row;
+  }));
+}
+
+function button(words, press) {
+  const made = Object.assign(document.createElement("button"), { type: "button", textContent: words, onclick: press });
+  made.disabled = !writes();
+  return made;
+}
+
+function showFaults(now) {
+  $("faults").hidden = !now?.faults;
+  if (!now?.faults) return;
+  $("offered").replaceChildren(...Object.entries(now.offered).map(([kind, [words, place]]) => {
+    const at = [kind, place === "arm" ? 0 : joint + 1, place === "muscle" ? muscle : 0];
+    const on = now.faults.some((one) => one.every((value, i) => value === at[i]));
+    const made = button(words, () => send({ do: "faults", kind, joint: joint + 1, muscle, on: !on }));
+    made.setAttribute("aria-pressed", on);
+    return made;
+  }));
+}
+
+// ---- what people want
+
+let sent = 0, waiting = 0;
+function goTo(degrees, last) {
+  if (state && state.writer === null) send({ do: "take" });
+  clearTimeout(waiting);
+  const now = performance.now(), order = { do: "goal", degrees };
+  if (last || now - sent >= SENT) {
+    sent = now;
+    send(order);
+  } else waiting = setTimeout(() => goTo(degrees, true), SENT);
+}
+
+const drawing = new ArmDrawing($("arm"), goTo);
+const charts = new Charts();
+const paper = new Paper($("paper"), (seconds, values) => {
+  if (state && state.writer === null) send({ do: "take" });
+  const others = drawing.goal;
+  send({ do: "draw", seconds, degrees: values.map((one) => others.map((goal, j) => (j === joint ? one : goal))) });
+  $("again").disabled = false;
+});
+
+// On pressing, not on letting go: a stop is to be quick.
+const stopped = () => state?.mode === "stopped" || state?.mode === "failed";
+$("stop").addEventListener("pointerdown", () => { if (!stopped()) send({ do: "stop" }); else pressedStopped = true; });
+let pressedStopped = false;
+$("stop").addEventListener("click", (event) => {
+  if (event.detail === 0) send({ do: stopped() ? "release" : "stop" }); // by the keyboard
+  else if (pressedStopped) send({ do: "release" });
+  pressedStopped = false;
+});
+addEventListener("keydown", (event) => {
+  if (event.key === "Escape" && !stopped()) send({ do: "stop" });
+});
+$("hold").onclick = () => send({ do: "hold" });
+$("relax").onclick = () => send({ do: "relax" });
+$("begin").onclick = () => send({ do: "learn" });
+$("again").onclick = () => paper.play();
+$("sine").onclick = () => paper.sine();
+$("seconds").onchange = () => {
+  paper.seconds = Number($("seconds").value);
+  paper.clear();
+  $("again").disabled = true;
+};
+
+setInterval(beat, BEAT);
+connect();

@@ -1,0 +1,210 @@
+"""The arm that a page is about, with all that can be done with it: moving, learning, choosing, putting back."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, replace
+from pathlib import Path
+from threading import Event, Lock, Thread
+from typing import Any
+
+from pneumarm.arm import guarded, open_arm
+from pneumarm.control.versions import HISTORY, put_back, read_history
+from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.live.choices import TRAINED, Choice, Mover, choices_in, monitor_for, opened
+from pneumarm.live.desk import Desk
+from pneumarm.live.faults import OFFERED
+from pneumarm.live.learning import Learning, LeftOff
+from pneumarm.live.orders import AnyOrder, Beat, Choose, HandOver, Learn, PutBack, Stop, Take
+from pneumarm.live.pace import in_real_time
+from pneumarm.live.picture import measures_of
+from pneumarm.live.screen import Screen
+from pneumarm.live.session import Mode, Session
+from pneumarm.run import RunSettings, settings_in
+from pneumarm.transitions.watch import warm_up
+
+
+class Rig:
+    """An arm and what can move it. Its thread opens the arm, moves it, and lets it learn when somebody wants that.
+
+    Args:
+        settings: of the arm, and of a run that is begun with it.
+        named: files of controllers that were named, ``plan:SIM`` among them.
+        folder: of the run; None where there is none.
+        method: of one's own that trained the agents, MODULE:NAME, if it is not installed.
+
+    Raises:
+        UnusableInput: there is no such arm or controller.
+
+    """
+
+    def __init__(
+        self, settings: RunSettings, named: Sequence[str], folder: Path | None, method: str | None = None
+    ) -> None:
+        self.settings, self.folder = settings, folder
+        self.screen, self.desk = Screen(), Desk()
+        self._named, self._method = [Choice(Path(name).name, name) for name in named], method
+        self._leave, self._learn, self._stop_learning = Event(), Event(), Event()
+        self._lock = Lock()  # of choosing: one at a time
+        self._failure: BaseException | None = None
+        self._session = self._open(self._choices())
+        self._thread = Thread(target=self._main, name="arm", daemon=True)
+
+    def __enter__(self) -> "Rig":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.leave()
+        self._thread.join()
+        if self._failure is not None and error[0] is None:
+            raise self._failure
+
+    def leave(self) -> None:
+        """Have the arm vented and closed, at the next turn."""
+        self._leave.set()
+        self._stop_learning.set()
+        self._session.leave()
+
+    def told_to(self, page: int) -> dict[str, Any]:
+        """Return how things stand, as ``page`` is told it."""
+        desk = self.desk
+        return self.screen.state | {
+            "you": page,
+            "writer": desk.writer,
+            "asking": desk.asking,
+            "pages": len(desk.pages),
+        }
+
+    def order(self, page: int, order: AnyOrder) -> None:
+        """Do what ``page`` asks for, or have it done; choosing takes a while.
+
+        Raises:
+            UnusableInput: it does not control the arm, or that cannot be done.
+
+        """
+        self.desk.hear(page)
+        if isinstance(order, Beat):
+            return
+        if isinstance(order, Take):
+            self.desk.take(page)
+        elif isinstance(order, HandOver):
+            self.desk.hand_over(page)
+        elif isinstance(order, Stop):  # whoever sees that something goes wrong
+            self._stop_learning.set()
+            self._session.order(order)
+        elif page != self.desk.writer:
+            raise UnusableInput("another page controls the arm; ask for control")
+        elif isinstance(order, Learn):
+            self._begin_learning()
+        elif isinstance(order, Choose):
+            self._choose(order.controller)
+        elif isinstance(order, PutBack):
+            self._put_back(order.version)
+        else:
+            self._session.order(order)
+
+    # ---- the arm's thread
+
+    def _main(self) -> None:
+        try:
+            while not self._leave.is_set():
+                with self._session.arm:
+                    self._session.run()
+                if self._learn.is_set() and not self._leave.is_set():
+                    self._do_learning()
+                if not self._leave.is_set():
+                    self._session = self._open(self._choices())
+        except BaseException as error:
+            self._failure = error
+            self.screen.tell(mode=Mode.FAILED, why=f"{error}; end pneumarm and begin again")
+
+    def _open(self, choices: list[Choice]) -> Session:
+        """Open the arm and the first of ``choices`` for it; nothing moves yet."""
+        arm = open_arm(self.settings.arm, self.settings.seed)
+        try:
+            mover = opened(choices[0], arm, self._method) if choices else None
+            watch = monitor_for(choices[0] if choices else None, arm.spec, self._method)
+            warm_up(watch, arm.spec)
+            paced = in_real_time(arm)
+        except BaseException:
+            arm.close()
+            raise
+        measures, to_scale = measures_of(arm)
+        spec = arm.spec
+        self.screen.tell(
+            arm=self.settings.arm,
+            joints=spec.joints,
+            period=spec.period,
+            range=spec.degrees(spec.angle_range),
+            goals=None if mover is None else spec.degrees(mover.goal_range),
+            most_bar=spec.max_pressure,
+            measures=[asdict(one) for one in measures],
+            to_scale=to_scale,
+            offered={name: [one.words, one.place] for name, one in OFFERED.items()},
+            choices=[[one.name, one.version] for one in choices],
+            in_use=self._in_use(),
+            can_learn=self._can_learn(),
+            minutes=round(self.settings.transitions * spec.period / 60),
+            learning=None,
+        )
+        return Session(guarded(paced), mover, watch, self.screen, lambda: self.desk.silence)
+
+    def _choices(self) -> list[Choice]:
+        return [*self._named, *(choices_in(self.folder) if self.folder is not None else [])]
+
+    def _in_use(self) -> int | None:
+        """Return the version of the agent that is in use in the run's folder."""
+        if self.folder is None or not (self.folder / HISTORY).exists():
+            return None
+        with suppress(UnusableInput):
+            return read_history(self.folder).version
+        return None
+
+    # ---- learning
+
+    def _can_learn(self) -> bool:
+        """Whether there is a folder whose run is not done."""
+        return self.folder is not None and not all((self.folder / name).exists() for name in ("report.html", TRAINED))
+
+    def _begin_learning(self) -> None:
+        if not self._can_learn():
+            raise UnusableInput("there is nothing to learn: no folder of a run was given, or it is done")
+        self._stop_learning.clear()
+        self._learn.set()
+        self._session.leave()
+
+    def _do_learning(self) -> None:
+        assert self.folder is not None
+        self._learn.clear()
+        self.screen.tell(mode="learning", why="", notice="", wrong=[], was_wrong=[], controller=None)
+        try:
+            Learning(self.folder, self._settings(), self.screen, self._stop_learning.is_set).do()
+        except LeftOff as error:
+            self.screen.tell(notice=str(error))
+        except PneumarmError as error:
+            self.screen.tell(notice=f"the learning failed: {error}")
+
+    def _settings(self) -> RunSettings:
+        assert self.folder is not None
+        return settings_in(self.folder) or replace(self.settings, joints=self._session.arm.spec.joints)
+
+    # ---- choosing
+
+    def _choose(self, name: str) -> None:
+        choice = next((one for one in self._choices() if one.name == name), None)
+        if choice is None:
+            raise UnusableInput(f"there is no controller {name!r}")
+        with self._lock:
+            session = self._session
+            session.order(self._opened(choice, session))
+        self.screen.tell(notice="")
+
+    def _opened(self, choice: Choice, session: Session) -> Mover:
+        return opened(choice, session.arm, self._method)
+
+    def _put_back(self, version: int) -> None:
+        if self.folder is None:
+            raise UnusableInput("no folder of a run was given, so there are no versions")
+        with self._lock:
+            put_back(self.folder, version)
+            self.screen.tell(in_use=version, notice=f"version {version} is the one in use from now on")

@@ -1,0 +1,232 @@
+"""The page and its connection: what is shown goes out, orders come in.
+
+Bound to this machine the page needs no token; elsewhere it does, and so does everything that moves the arm. A page of
+another origin is refused in both cases: a foreign site in the same browser must not move an arm.
+"""
+
+import asyncio
+import hmac
+import json
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from importlib.resources import files
+from types import FrameType
+from urllib.parse import urlsplit
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.live.orders import LARGEST, AnyOrder, Choose, PutBack, read_order
+from pneumarm.live.rig import Rig
+
+MOST_PAGES = 50
+"""Pages that may be open at a time."""
+_LOOK = 0.012
+"""Time between two looks at the screen, for a page [s]."""
+_LOCAL = ("127.0.0.1", "localhost", "::1")
+_TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
+_HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'",
+    "Cache-Control": "no-cache",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+_REFUSED, _FULL = 4403, 4429  # codes that a refused connection is closed with
+
+
+class Server:
+    """Serves ``rig`` on ``host`` and ``port``; 0 takes any port that is free.
+
+    Raises:
+        UnusableInput: the host is none of this machine, or the port is taken.
+
+    """
+
+    def __init__(self, rig: Rig, host: str, port: int, token: str | None) -> None:
+        self.rig, self.token = rig, token
+        self._host = host
+        self._socket = _bound(host, port)
+        self._files = dict(_page_files())
+        self._serving: _Uvicorn | None = None
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        port = self._socket.getsockname()[1]
+        host = _own_address() if self._host in ("0.0.0.0", "::") else self._host
+        host = f"[{host}]" if ":" in host else host
+        return f"http://{host}:{port}/" + (f"?token={self.token}" if self.token else "")
+
+    def run(self, opened: Callable[[], None] = lambda: None) -> None:
+        """Serve until the program, or :meth:`end`, asks for the end; ``opened`` is called once it can be reached."""
+        app = Starlette(
+            routes=[
+                WebSocketRoute("/connection", self._connection),
+                Route("/", self._page),
+                Route("/{name:path}", self._file),
+            ]
+        )
+        config = uvicorn.Config(
+            app,
+            log_level="warning",
+            ws="websockets-sansio",
+            ws_max_size=LARGEST,
+            ws_ping_interval=5.0,
+            ws_ping_timeout=10.0,
+            timeout_graceful_shutdown=1,
+            lifespan="off",
+        )
+        self._serving = _Uvicorn(config, self.rig, opened)
+        with _closing(self._socket):
+            self._serving.run(sockets=[self._socket])
+
+    def end(self) -> None:
+        """Have the arm vented and the serving ended, from another thread."""
+        self.rig.leave()
+        if self._serving is not None:
+            self._serving.should_exit = True
+
+    def _allowed(self, connection: HTTPConnection) -> bool:
+        """Whether who asks knows the token, or comes from this machine where there is none."""
+        host = connection.headers.get("host", "")
+        origin = connection.headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc != host:
+            return False
+        if self.token is None:
+            return urlsplit(f"//{host}").hostname in _LOCAL
+        return hmac.compare_digest(connection.query_params.get("token", ""), self.token)
+
+    async def _page(self, request: Request) -> Response:
+        if not self._allowed(request):
+            return Response("open the address that pneumarm has printed, token and all", 403)
+        return self._answer("index.html")
+
+    async def _file(self, request: Request) -> Response:
+        return self._answer(request.path_params["name"])
+
+    def _answer(self, name: str) -> Response:
+        content = self._files.get(name)
+        if content is None:
+            return Response("not found", 404)
+        return Response(content, media_type=_TYPES.get(name.rpartition(".")[2], "text/plain"), headers=_HEADERS)
+
+    async def _connection(self, socket: WebSocket) -> None:
+        await socket.accept()
+        if not self._allowed(socket):
+            await socket.close(_REFUSED)
+            return
+        desk = self.rig.desk
+        if len(desk.pages) >= MOST_PAGES:
+            await socket.close(_FULL)
+            return
+        page = desk.enter()
+        showing = asyncio.create_task(self._show(socket, page))
+        try:
+            await self._listen(socket, page)
+        finally:
+            desk.leave(page)
+            showing.cancel()
+
+    async def _show(self, socket: WebSocket, page: int) -> None:
+        """Send what changes. A page that is slow misses frames; nothing piles up."""
+        screen, desk, frames = self.rig.screen, self.rig.desk, -1
+        told: tuple[int | None, ...] = ()
+        with suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                now = screen.versions, desk.writer, desk.asking, len(desk.pages)
+                if now != told:
+                    told = now
+                    await socket.send_text(json.dumps({"state": self.rig.told_to(page)}))
+                if screen.frames != frames:
+                    frames = screen.frames
+                    await socket.send_text(f'{{"frame": {screen.frame}}}')
+                await asyncio.sleep(_LOOK)
+
+    async def _listen(self, socket: WebSocket, page: int) -> None:
+        doing: set[asyncio.Task[None]] = set()
+        try:
+            while True:
+                text = await socket.receive_text()
+                try:
+                    order = read_order(text, self.rig.screen.state["joints"])
+                    if isinstance(order, Choose | PutBack):  # which take a while
+                        task = asyncio.create_task(self._do(socket, page, order))
+                        doing.add(task)
+                        task.add_done_callback(doing.discard)
+                    else:
+                        self.rig.order(page, order)
+                except UnusableInput as error:
+                    await socket.send_text(json.dumps({"refused": str(error)}))
+        except (WebSocketDisconnect, RuntimeError, KeyError):
+            return
+
+    async def _do(self, socket: WebSocket, page: int, order: AnyOrder) -> None:
+        try:
+            await asyncio.to_thread(self.rig.order, page, order)
+        except PneumarmError as error:
+            with suppress(WebSocketDisconnect, RuntimeError):
+                await socket.send_text(json.dumps({"refused": str(error)}))
+
+
+class _Uvicorn(uvicorn.Server):
+    """Says when it can be reached, and has the arm vented before anything else when it is to end."""
+
+    def __init__(self, config: uvicorn.Config, rig: Rig, opened: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._rig, self._opened = rig, opened
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to serve."""
+        await super().startup(sockets)
+        self._opened()
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Take a signal to end."""
+        self._rig.leave()
+        super().handle_exit(sig, frame)
+
+
+def _page_files() -> Iterator[tuple[str, bytes]]:
+    """Yield the files of the page, by their address."""
+    page = files("pneumarm.live") / "page"
+    for place in page.iterdir():
+        if place.is_dir():
+            yield from ((f"{place.name}/{one.name}", one.read_bytes()) for one in place.iterdir())
+        else:
+            yield place.name, place.read_bytes()
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        bound = socket.socket(family, socket.SOCK_STREAM)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind((host, port))
+    except (OSError, OverflowError) as error:
+        raise UnusableInput(
+            f"the page cannot be served at {host}:{port} ({getattr(error, 'strerror', None) or error}); give another "
+            "--host or --port"
+        ) from error
+    return bound
+
+
+def _own_address() -> str:
+    """Return the address at which others reach this machine; its name where it is in no network."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking, suppress(OSError):
+        asking.connect(("192.0.2.1", 9))  # sends nothing; the address is one that nobody has (RFC 5737)
+        return str(asking.getsockname()[0])
+    return socket.gethostname()
+
+
+@contextmanager
+def _closing(bound: socket.socket) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        bound.close()

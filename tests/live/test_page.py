@@ -1,0 +1,207 @@
+"""The page in a real browser: goals are dragged, movements drawn, faults switched, and a stop vents."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event, Thread
+from time import monotonic
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, Page
+
+from children import wait_until
+from live.browser import WIDTHS, opened_browser, smallest_text, too_wide
+from live.chromium import missing
+from live.serving import ARM, served
+from pneumarm.arm import open_arm
+from pneumarm.arm.passed_on import PassedOn
+from pneumarm.arm.serial.emulate import serve
+from pneumarm.live.rig import Rig
+from pneumarm.live.server import Server
+from pneumarm.run import RunSettings
+
+pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+READABLE = 11.0  # px
+LIMIT = 60.0  # s
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with opened_browser() as browser:
+        yield browser
+
+
+class Noted(PassedOn):
+    """An arm that remembers when its valves were set to what."""
+
+    def __init__(self) -> None:
+        super().__init__(open_arm(ARM))
+        self.valves: list[tuple[float, list[list[int]]]] = []
+
+    def set_valves(self, valves: NDArray[np.int8]) -> None:
+        self.valves.append((monotonic(), valves.tolist()))
+        self.arm.set_valves(valves)
+
+    def vented_after(self, time: float) -> float | None:
+        """Return how long after ``time`` [s] all was vented, and stayed so; None where it was not."""
+        if not self.valves or self.valves[-1][1] != [[-1, -1]]:
+            return None
+        first = len(self.valves) - 1
+        while first and self.valves[first - 1][1] == [[-1, -1]]:
+            first -= 1
+        return max(self.valves[first][0] - time, 0.0)
+
+
+@contextmanager
+def on_board(pid: Path, folder: Path) -> Iterator[tuple[Server, Noted]]:
+    """Serve the page of an arm behind an emulated board and a serial port, in real time."""
+    arm, link, ready, done = Noted(), folder / "arm.port", Event(), Event()
+    board = Thread(target=lambda: serve(arm, lambda path: ready.set(), done.is_set, link=link), daemon=True)
+    board.start()
+    assert ready.wait(60)
+    try:
+        with served(Rig(RunSettings(arm=f"serial:{link}"), [str(pid)], None)) as server:
+            yield server, arm
+    finally:
+        done.set()
+        board.join(30)
+
+
+@contextmanager
+def page_of(browser: Browser, server: Server, width: int = 800, **options: object) -> Iterator[Page]:
+    """Give a page in a window of its own; an error in it fails the test."""
+    context = browser.new_context(viewport={"width": width, "height": WIDTHS[width]}, **options)  # type: ignore[arg-type]
+    page, errors = context.new_page(), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    page.goto(server.url)
+    try:
+        page.locator("#angles b").first.wait_for()
+        yield page
+        assert errors == []
+    finally:
+        context.close()
+
+
+def drag_to(page: Page, degrees: float) -> None:
+    """Drag the goal with the mouse."""
+    reach = page.evaluate("document.querySelector('#arm .weight:last-of-type').cy.baseVal.value")
+    place = page.evaluate(
+        """([degrees, reach]) => {
+          const turned = degrees * Math.PI / 180, matrix = document.getElementById("arm").getScreenCTM();
+          const point = new DOMPoint(reach * Math.sin(turned), reach * Math.cos(turned)).matrixTransform(matrix);
+          return [point.x, point.y];
+        }""",
+        [degrees, reach],
+    )
+    box = page.locator("#arm .handle").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(*place, steps=6)
+    page.mouse.up()
+
+
+def arrive(page: Page, degrees: float, within: float = 2.0) -> None:
+    """Drag the goal there until the arm is there: a board vents the arm where this machine has too much to do."""
+
+    def looked() -> bool:
+        if page.locator("body").get_attribute("data-mode") != "moving":
+            drag_to(page, degrees)
+        return abs(angle(page) - degrees) < within
+
+    drag_to(page, degrees)
+    comes(page, "the arm arrives", looked)
+
+
+def angle(page: Page) -> float:
+    return float(page.locator("#angles b").inner_text().rstrip("°"))
+
+
+def comes(page: Page, what: str, is_so: Callable[[], bool]) -> None:
+    """Wait until something is so, while the page lives."""
+    deadline = monotonic() + LIMIT
+    while not is_so():
+        assert monotonic() < deadline, f"{what}: not within {LIMIT:.0f} s, {page.locator('#mode').inner_text()}"
+        page.wait_for_timeout(20)
+
+
+def test_a_dragged_goal_is_moved_to_and_a_curve_followed(browser: Browser, server: Server) -> None:
+    with page_of(browser, server) as page:
+        page.locator("body[data-role=writer]").wait_for()
+        arrive(page, 20.0)
+        arrive(page, -15.0)
+        page.locator("#seconds").select_option("2")
+        page.locator("#paper").evaluate("paper => paper.scrollIntoView({block: 'center'})")
+        paper = page.locator("#paper").bounding_box()
+        assert paper is not None
+        x, y, width, height = paper["x"], paper["y"], paper["width"], paper["height"]
+        page.mouse.move(x + 5, y + height * 0.6)
+        page.mouse.down()
+        page.mouse.move(x + width - 5, y + height * 0.3, steps=30)
+        page.mouse.up()
+        page.locator("body[data-mode=following]").wait_for()
+        page.get_by_text("followed within").wait_for()
+        page.locator("#relax").click()
+        page.locator("body[data-mode=relaxed]").wait_for()
+
+
+def test_a_fault_is_switched_on_and_told_to_all(browser: Browser, server: Server) -> None:
+    with page_of(browser, server) as page, page_of(browser, server, 400) as other:
+        page.get_by_text("supply falls to 0.5 bar").click()
+        other.locator("button[aria-pressed=true]", has_text="supply falls").wait_for()
+        assert other.locator("#hold").is_disabled()
+
+
+def test_a_stop_on_any_page_vents_an_arm_on_a_board(browser: Browser, pid: Path, tmp_path: Path) -> None:
+    with on_board(pid, tmp_path) as (server, arm), page_of(browser, server) as page:
+        with page_of(browser, server, 400) as watcher:
+            arrive(page, 20.0)
+            drag_to(page, -20.0)
+            begun = monotonic()
+            watcher.locator("#stop").click()
+            watcher.locator("body[data-mode=stopped]").wait_for()
+            comes(page, "everything is vented", lambda: arm.vented_after(begun) is not None)
+        assert (arm.vented_after(begun) or 0.0) < 1.0  # `python -m benchmarks live` says how long it takes
+        drag_to(page, 10.0)
+        page.get_by_text("release it first").wait_for()
+        page.locator("#stop").click()
+        page.locator("body[data-mode=relaxed]").wait_for()
+
+
+def test_an_arm_whose_page_is_killed_is_vented(browser: Browser, pid: Path, tmp_path: Path) -> None:
+    with on_board(pid, tmp_path) as (server, arm):
+        with page_of(browser, server) as page:
+            arrive(page, 20.0, 10.0)
+        begun = monotonic()
+        wait_until("everything is vented", lambda: arm.vented_after(begun) is not None)
+
+
+def test_ten_watch_while_one_moves_the_arm(browser: Browser, server: Server) -> None:
+    with page_of(browser, server) as page:
+        context = browser.new_context(viewport={"width": 400, "height": 860})
+        watchers = [context.new_page() for _ in range(10)]
+        for watcher in watchers:
+            watcher.goto(server.url)
+        drag_to(page, 15.0)
+        for watcher in watchers:
+            comes(watcher, "it sees the arm arrive", lambda watcher=watcher: abs(angle(watcher) - 15) < 2)  # type: ignore[misc]
+            assert watcher.locator("#role").inner_text().startswith("watching")
+        context.close()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_fits_and_can_be_read(browser: Browser, server: Server, width: int, scheme: str) -> None:
+    with page_of(browser, server, width, color_scheme=scheme) as page:
+        drag_to(page, 10.0)
+        comes(page, "the arm moves", lambda: abs(angle(page)) > 3)
+        assert too_wide(page) <= 0
+        size, text = smallest_text(page)
+        assert size >= READABLE, text
+        stop = page.locator("#stop").bounding_box()
+        assert stop is not None
+        assert stop["height"] >= 48
+        assert stop["y"] + stop["height"] <= WIDTHS[width]

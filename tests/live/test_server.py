@@ -1,0 +1,105 @@
+"""The connection of a page: who may open it, who may move the arm, and what comes over it."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from children import wait_until
+from live.serving import ARM, served
+from pneumarm.errors import UnusableInput
+from pneumarm.live.rig import Rig
+from pneumarm.live.server import Server
+from pneumarm.run import RunSettings
+
+
+def joined(server: Server, query: str = "", **options: Any) -> ClientConnection:
+    """Return a connection as a page opens it."""
+    return connect(server.url.replace("http", "ws").partition("?")[0] + "connection" + query, **options)
+
+
+def order(connection: ClientConnection, do: str, **values: Any) -> None:
+    connection.send(json.dumps({"do": do, **values}))
+
+
+def told(connection: ClientConnection, kind: str, is_it: Callable[[Any], bool] = lambda message: True) -> Any:
+    """Return the next message of a ``kind`` that ``is_it``."""
+    found: list[Any] = []
+
+    def came() -> bool:
+        message = json.loads(connection.recv(timeout=60))
+        found.append(message.get(kind))
+        return kind in message and is_it(message[kind])
+
+    wait_until(f"a message of kind {kind}", came)
+    return found[-1]
+
+
+def status(url: str, **headers: str) -> int:
+    try:
+        with urlopen(Request(url, headers=headers), timeout=30) as answer:
+            return int(answer.status)
+    except HTTPError as error:
+        return error.code
+
+
+def test_one_page_moves_the_arm_and_the_others_watch(server: Server) -> None:
+    with joined(server) as first, joined(server) as second:
+        order(first, "take")
+        mine = told(first, "state", lambda state: state["writer"] == state["you"])
+        assert (mine["joints"], mine["mode"], mine["to_scale"]) == (1, "relaxed", True)
+        order(second, "goal", degrees=[10])
+        assert "ask for control" in told(second, "refused")
+        order(first, "goal", degrees=[10])
+        told(second, "frame", lambda frame: frame["goal"] == [10] and abs(frame["angle"][0] - 10) < 2)
+        order(second, "take")
+        told(first, "state", lambda state: state["asking"] is not None)
+        order(first, "hand-over")
+        told(second, "state", lambda state: state["writer"] == state["you"])
+        order(first, "stop")  # whoever looks on may
+        told(second, "state", lambda state: state["mode"] == "stopped")
+
+
+def test_nonsense_is_refused_and_harms_nobody(server: Server) -> None:
+    with joined(server) as page:
+        for text in ("", "{}", "[" * 10_000, '{"do": "goal", "degrees": []}'):
+            page.send(text)
+            assert told(page, "refused")
+        page.send("x" * (1 << 20))
+        with pytest.raises(ConnectionClosed):
+            told(page, "end")
+    with joined(server) as page:
+        assert told(page, "frame")["pressure"]
+
+
+def test_only_this_machine_and_this_page_may_come_without_a_token(server: Server) -> None:
+    assert status(server.url) == 200
+    assert status(server.url + "uplot/LICENSE") == 200
+    assert status(server.url + "../pyproject.toml") == 404
+    assert status(server.url, Host="elsewhere.org") == 403
+    with joined(server, origin="http://elsewhere.org") as page, pytest.raises(ConnectionClosed):  # type: ignore[arg-type]
+        page.recv(timeout=60)
+
+
+def test_with_a_token_nobody_comes_without_it(pid: Path) -> None:
+    with served(Rig(RunSettings(arm=ARM), [str(pid)], None), "secret") as server:
+        assert server.url.endswith("/?token=secret")
+        assert status(server.url) == 200
+        assert status(server.url.replace("secret", "guess")) == 403
+        assert status(server.url.partition("?")[0]) == 403
+        with joined(server) as page, pytest.raises(ConnectionClosed):
+            page.recv(timeout=60)
+        with joined(server, "?token=secret") as page:
+            assert told(page, "frame")
+
+
+def test_a_port_that_is_taken_is_said(server: Server) -> None:
+    port = int(server.url.rstrip("/").rpartition(":")[2])
+    with pytest.raises(UnusableInput, match="another --host or --port"):
+        Server(server.rig, "127.0.0.1", port, None)

@@ -1,0 +1,174 @@
+"""The loop that moves an arm for people: goals, curves, stops, faults, silence, failures. No time is waited for."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pneumarm.arm import Reading, open_arm
+from pneumarm.arm.passed_on import PassedOn
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.control import Monitor
+from pneumarm.errors import ArmFailure
+from pneumarm.live.choices import Choice, opened
+from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
+from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop
+from pneumarm.live.screen import Screen
+from pneumarm.live.session import Mode, Session
+
+
+class Scripted(PassedOn):
+    """A virtual arm whose reads are told: what happens at which of its times is laid down."""
+
+    def __init__(self, arm: VirtualArm) -> None:
+        super().__init__(arm)
+        self.script: list[tuple[float, Callable[[], None]]] = []
+        self.angles: list[float] = []
+        self.times: list[float] = []
+        self.valves: list[NDArray[np.int8]] = []
+
+    def read(self) -> Reading:
+        reading = self.arm.read()
+        while self.script and reading.time >= self.script[0][0]:
+            self.script.pop(0)[1]()
+        self.times.append(reading.time)
+        self.angles.append(float(self.spec.degrees(reading.angle)[0]))
+        return reading
+
+    def set_valves(self, valves: NDArray[np.int8]) -> None:
+        self.valves.append(valves.copy())
+        self.arm.set_valves(valves)
+
+    def at(self, time: float) -> float:
+        """Return the angle [degrees] read last before ``time``."""
+        return self.angles[int(np.searchsorted(self.times, time)) - 1]
+
+
+class Played:
+    """A session and what happens in it, at times of the arm."""
+
+    def __init__(self, pid: Path) -> None:
+        arm = open_arm("virtual:seed=3")
+        assert isinstance(arm, VirtualArm)
+        self.virtual, self.arm = arm, Scripted(arm)
+        mover = opened(Choice("pid", str(pid)), arm)
+        self.silence, self.screen = 0.0, Screen()
+        self.session = Session(self.arm, mover, Monitor(arm.spec), self.screen, lambda: self.silence)
+        self.modes: list[tuple[float, str, str]] = []
+
+    def run(self, *script: tuple[float, Order | Callable[[], None]], until: float) -> None:
+        """Do what the ``script`` says at times [s] after the beginning, ``until`` the end."""
+        begin = self.virtual.time
+        for time, what in script:
+            do = (lambda order: lambda: self.session.order(order))(what) if isinstance(what, Order) else what
+            self.arm.script.append((begin + time, do))
+            self.arm.script.append((begin + time + 0.2, self.note))
+        self.arm.script.append((begin + until, self.session.leave))
+        self.arm.script.sort(key=lambda one: one[0])
+        self.session.run()
+
+    def note(self) -> None:
+        state = self.screen.state
+        self.modes.append((self.virtual.time, state["mode"], state["why"]))
+
+    def be_silent(self, seconds: float) -> Callable[[], None]:
+        def silent() -> None:
+            self.silence = seconds
+
+        return silent
+
+
+@pytest.fixture
+def played(pid: Path) -> Iterator[Played]:
+    played = Played(pid)
+    with played.virtual:
+        yield played
+
+
+VENTED = [[-1, -1]]
+
+
+def test_goals_are_moved_to_held_and_counted(played: Played) -> None:
+    played.run((0.1, Goal([15.0])), (4.0, Goal([-10.0])), (8.0, Goal([1e6])), until=12.0)
+    assert played.arm.at(3.9) == pytest.approx(15, abs=2)
+    assert played.arm.at(7.9) == pytest.approx(-10, abs=2)
+    assert 20 < played.arm.at(11.9) < 60  # as far as it has been seen to go
+    assert {mode for _, mode, _ in played.modes} == {"moving"}
+    assert played.screen.state["figures"]["pid"]["goals"] == 3
+    assert played.arm.valves[-1].tolist() == VENTED
+
+
+def test_a_curve_is_followed_and_its_end_held(played: Played) -> None:
+    times = np.linspace(0, 3, 31)
+    curve = Draw(times.tolist(), (10 * np.sin(np.pi * times))[:, None].tolist())
+    played.run((0.1, Goal([5.0])), (3.0, curve), until=9.0)
+    begin = 3.0 + 1.0
+    off = [played.arm.at(begin + time) - 10 * np.sin(np.pi * time) for time in times]
+    assert np.sqrt(np.mean(np.square(off))) < 3
+    assert played.arm.at(8.9) == pytest.approx(0, abs=2)
+    assert played.screen.state["figures"]["pid"]["curve"] < 3
+
+
+def test_a_stop_vents_and_stays_until_it_is_released(played: Played) -> None:
+    played.run(
+        (0.1, Goal([15.0])), (3.0, Stop()), (4.0, Goal([0.0])), (5.0, Release()), (6.0, Goal([0.0])), until=9.0
+    )
+    assert [mode for _, mode, _ in played.modes] == ["moving", "stopped", "stopped", "relaxed", "moving"]
+    assert played.arm.at(8.9) == pytest.approx(0, abs=2)
+    assert "release" in played.screen.state["notice"]
+
+
+def test_hold_stays_where_the_arm_is_and_relax_lets_the_air_out(played: Played) -> None:
+    played.run((0.1, Goal([20.0])), (0.4, Hold()), (4.0, Relax()), until=7.0)
+    assert played.arm.at(3.9) == pytest.approx(played.arm.at(0.45), abs=6)
+    assert played.virtual.pressure.max() < 5e3
+    assert played.modes[-1][1] == "relaxed"
+
+
+def test_an_arm_whose_page_is_silent_holds_then_is_vented(played: Played) -> None:
+    played.run(
+        (0.1, Goal([15.0])),
+        (3.0, played.be_silent(HOLD_AFTER)),
+        (5.0, played.be_silent(VENT_AFTER)),
+        until=7.0,
+    )
+    (_, first, _), (_, second, why), (_, third, after) = played.modes
+    assert (first, second, third) == ("moving", "moving", "relaxed")
+    assert "not heard" in why
+    assert "vented" in after
+    assert played.virtual.pressure.max() < 5e3
+
+
+def test_a_fault_is_switched_on_found_and_switched_off(played: Played) -> None:
+    goals = [(1.0 + k, Goal([15.0 if k % 2 else -15.0])) for k in range(30)]
+    on, off = Faults("inlet-closed", 1, 1, True), Faults("inlet-closed", 1, 1, False)
+    played.run(*goals, (5.05, on), (28.0, off), until=31.0)
+    kinds = {one.kind for one in played.session._watch.findings if one.since > 4}
+    assert "stuck-valve" in kinds
+    assert played.virtual.faults == ()
+
+
+def test_what_cannot_be_done_is_said(played: Played) -> None:
+    played.run((0.1, Faults("leak", 7, 1, True)), until=1.0)
+    assert "joint 7" in played.screen.state["notice"]
+
+
+def test_a_failure_waits_for_a_release(played: Played) -> None:
+    reads = played.arm.read
+
+    def fail() -> None:
+        def broken() -> Reading:
+            played.arm.read = reads  # type: ignore[method-assign]
+            played.session.order(Release())
+            raise ArmFailure("the plug fell out")
+
+        played.arm.read = broken  # type: ignore[method-assign]
+
+    shown: list[object] = []
+    tell = played.screen.tell
+    played.screen.tell = lambda **state: (shown.append(state.get("mode")), tell(**state))[1]  # type: ignore[method-assign]
+    played.run((0.1, Goal([15.0])), (2.0, fail), (3.0, Goal([5.0])), until=5.0)
+    assert Mode.FAILED in shown
+    assert played.arm.at(4.9) == pytest.approx(5, abs=2)

@@ -39,12 +39,14 @@ def measures_of(arm: Arm) -> tuple[list[Measures], bool]:
     virtual = behind(arm, VirtualArm)
     if virtual is None:
         return [USUAL] * arm.spec.joints, False
+    *inner, last = virtual.parameters.joints
+    links = [*(joint.length for joint in inner), last.distance]
     return [
         Measures(
-            link=joint.distance,
+            link=link,
             pulley=joint.radius,
             muscle=joint.muscles[0].length_at_zero,
             diameter=joint.muscles[0].diameter,
         )
-        for joint in virtual.parameters.joints
+        for joint, link in zip(virtual.parameters.joints, links, strict=True)
     ], True

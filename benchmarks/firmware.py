@@ -21,6 +21,12 @@ def measure() -> Iterator[str]:
         f"at most {max(times.valves):.3f} (limit 0.5); to the reply's last bit: {median(times.reply):.3f} ms, "
         f"at most {max(times.reply):.3f} (limit 1.5); medians of 9, noise at all inputs, {len(times.reply)} exchanges"
     )
+    pulses = figures.pulses()
+    yield (
+        f"{len(pulses.longer)} pulses: {1e3 * min(pulses.longer):+.0f} to {1e3 * max(pulses.longer):+.0f} us longer "
+        f"than asked for (limit 50); from the request's first bit to the last valve pin at most "
+        f"{max(pulses.valves):.3f} ms (limit 0.75), to the reply's last bit {max(pulses.reply):.3f} (limit 1.75)"
+    )
     dead = figures.dead_man()
     yield f"dead-man: {min(dead):.2f} to {max(dead):.2f} ms after the last exchange (limit 251)"
     over = figures.over_pressure()

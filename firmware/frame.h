@@ -1,5 +1,6 @@
 /* Frames: COBS( content | CRC-16/X-25 ) 0x00, where content is type u8, sequence u16, payload. That the two bytes of an
- * EXCHANGE are each other's complement belongs to the frame too: a damaged one is none.
+ * EXCHANGE are each other's complement, and that the sum of a PULSE is right, belongs to the frame too: a damaged one
+ * is none.
  *
  * Nothing here knows the microcontroller, so that tests compile it for their own machine too. */
 #pragma once
@@ -22,8 +23,17 @@ struct receiver {
 	uint8_t length;               /* bytes received; more than LONGEST_FRAME are counted as one more */
 };
 
+/* Return two bytes of a frame as a number. */
+static inline uint16_t u16(const uint8_t *bytes)
+{
+	return bytes[0] | (uint16_t)bytes[1] << 8;
+}
+
 /* CRC-16/X-25 of `length` bytes. */
 uint16_t crc16(const uint8_t *bytes, uint8_t length);
+
+/* Fletcher's sum of `length` bytes: their sum, and above it the sum of the sums of the first one, two, ... of them. */
+uint16_t sum16(const uint8_t *bytes, uint8_t length);
 
 /* Take one byte off the line. After FRAME_TAKEN `bytes` holds the content until the next call. */
 enum frame_event frame_receive(struct receiver *receiver, uint8_t byte);

@@ -4,6 +4,7 @@
 
 #include "converter.h"
 #include "protocol.h"
+#include "pulses.h"
 #include "valves.h"
 
 /* A converter without a whole sweep in this time has stopped [ms]; one takes a quarter of a millisecond. */
@@ -11,13 +12,20 @@
 /* The light blinks with half a period of this many ticks, a power of two. */
 #define BLINK 256
 #define ANY_LATCH (DEAD_MAN | CONVERTER | OVER_PRESSURE_1 | OVER_PRESSURE_2 | OVER_PRESSURE_3 | OVER_PRESSURE_4)
-/* The bits of OVER_PRESSURE_n are those of a mask of muscles in the flags' upper byte. */
-#define FIRST_OVER_PRESSURE 8
+/* The code bits of a muscle. */
+static const uint8_t CODES_OF[MUSCLES] = {0x03, 0x0c, 0x30, 0xc0};
 
 _Static_assert(DEAD_MAN_MS <= UINT8_MAX, "silence is counted in a byte");
 static volatile uint16_t flags;
+static volatile uint8_t latched; /* code bits of the muscles of which OVER_PRESSURE_n is set */
 static volatile uint8_t silence_ms; /* since the dead-man was fed */
 static volatile uint8_t still_ms;   /* since the converter made a sweep */
+
+/* Set the valves, but for muscles that a latch vents. */
+static void set(uint8_t codes)
+{
+	valves_set((codes & ~latched) | (ALL_OUT & latched));
+}
 
 uint16_t latches_flags(void)
 {
@@ -40,7 +48,9 @@ bool latches_arm(void)
 		gone = still_ms < CONVERTER_MS && !converter_over();
 		if (gone) {
 			flags = ARMED;
+			latched = 0;
 			silence_ms = 0;
+			pulses_forget();
 			valves_set(CLOSED);
 		}
 	}
@@ -52,28 +62,51 @@ void latches_disarm(void)
 	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 	{
 		flags &= ~ARMED;
+		pulses_forget(); /* what is vented stays so */
 		valves_set(ALL_OUT);
 	}
 }
 
-bool latches_valves(uint8_t codes)
+bool latches_valves(uint8_t codes, uint8_t pulses, const uint16_t open[MUSCLES])
 {
 	bool armed;
+	pulses_prepare(pulses, open);
 	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 	{
 		armed = flags & ARMED;
 		if (armed) {
 			silence_ms = 0;
-			valves_set(valves_vented(codes, flags >> FIRST_OVER_PRESSURE));
+			set(codes);
+			pulses_start();
 		}
 	}
 	return armed;
 }
 
+bool latches_feed(void)
+{
+	bool armed;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		armed = flags & ARMED;
+		if (armed)
+			silence_ms = 0;
+	}
+	return armed;
+}
+
+void latches_end_pulses(void)
+{
+	uint8_t ended = pulses_ended();
+	if (ended)
+		set(valves_applied() & ~ended);
+}
+
 void latch_over_pressure(uint8_t muscle)
 {
 	flags |= OVER_PRESSURE_1 << muscle;
-	valves_set(valves_vented(valves_applied(), flags >> FIRST_OVER_PRESSURE));
+	latched |= CODES_OF[muscle];
+	set(valves_applied());
 }
 
 static void latch_all(uint16_t flag)

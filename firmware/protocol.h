@@ -2,7 +2,8 @@
 #pragma once
 
 /* Constants */
-#define VERSION 2
+#define VERSION 3
+#define OLDEST_VERSION 2
 #define BAUD 500000UL
 #define JOINTS 2
 #define MUSCLES 4
@@ -13,6 +14,9 @@
 #define VELOCITY_SCALE 64
 #define MOST_VELOCITY_MS 32
 #define LONGEST_FRAME 64
+#define PULSE_UNIT_US 8
+#define LONGEST_PULSE 31250
+#define HOLD 0xffff
 
 /* Requests and the lengths of their payloads */
 #define CONNECT 0x01
@@ -21,6 +25,7 @@
 #define DISARM 0x04
 #define EXCHANGE 0x05
 #define READ 0x06
+#define PULSE 0x07
 
 #define CONNECT_LENGTH 5
 #define CONFIGURE_LENGTH 10
@@ -28,6 +33,7 @@
 #define DISARM_LENGTH 0
 #define EXCHANGE_LENGTH 2
 #define READ_LENGTH 0
+#define PULSE_LENGTH 12
 
 /* Replies and the lengths of their payloads */
 #define HELLO 0x81

@@ -26,11 +26,9 @@ static uint32_t session;
 static uint16_t last_sequence;
 static uint8_t last_type, last_reason;
 static uint16_t seen; /* flags to be told with the next reply */
-
-static uint16_t u16(const uint8_t *bytes)
-{
-	return bytes[0] | (uint16_t)bytes[1] << 8;
-}
+/* The number of the last PULSE, for as long as nothing else has set the valves: none goes on twice. */
+static bool numbered;
+static uint8_t last_number;
 
 static uint32_t u32(const uint8_t *bytes)
 {
@@ -80,10 +78,10 @@ static void put_state(uint16_t more)
 	seen = 0;
 }
 
-static void hello(uint16_t sequence)
+static void hello(uint16_t sequence, uint8_t version)
 {
 	begin(HELLO, sequence);
-	put8(VERSION);
+	put8(version);
 	put32(FIRMWARE);
 	put32(session);
 	put8(reset_cause());
@@ -127,17 +125,19 @@ static void reading(uint16_t sequence, uint16_t more)
 
 static void connect(uint16_t sequence, const uint8_t *payload)
 {
-	if (payload[0] != VERSION) {
+	uint8_t version = payload[0];
+	if (version < OLDEST_VERSION || version > VERSION) {
 		refused(sequence, WRONG_VERSION, 0);
 		return;
 	}
 	latches_disarm();
 	connected = true;
 	configured = false; /* whoever connects says what the limits are */
+	numbered = false;
 	session = u32(payload + 1);
 	last_sequence = sequence;
 	last_type = CONNECT;
-	hello(sequence);
+	hello(sequence, version);
 }
 
 static uint8_t configure(const uint8_t *payload)
@@ -166,7 +166,10 @@ static uint8_t arm(const uint8_t *payload)
 		return WRONG_SESSION;
 	if (!configured)
 		return NOT_CONFIGURED;
-	return latches_arm() ? ACCEPTED : CAUSE_REMAINS;
+	if (!latches_arm())
+		return CAUSE_REMAINS;
+	numbered = false;
+	return ACCEPTED;
 }
 
 static uint8_t exchange(uint8_t codes)
@@ -175,7 +178,31 @@ static uint8_t exchange(uint8_t codes)
 		return NOT_ARMED;
 	if (!valves_known(codes))
 		return BAD_VALUE;
-	return latches_valves(codes) ? ACCEPTED : NOT_ARMED;
+	numbered = false;
+	return latches_valves(codes, 0, 0) ? ACCEPTED : NOT_ARMED;
+}
+
+static uint8_t pulse(const uint8_t *payload)
+{
+	uint8_t number = payload[0], codes = payload[1], pulses = 0;
+	uint16_t open[MUSCLES];
+	if (!latches_armed())
+		return NOT_ARMED;
+	if (numbered && number == last_number)
+		return latches_feed() ? ACCEPTED : NOT_ARMED;
+	if (!valves_known(codes))
+		return BAD_VALUE;
+	for (uint8_t i = 0; i < MUSCLES; i++) {
+		open[i] = u16(payload + 2 + 2 * i);
+		if ((codes >> 2 * i & 3) == CLOSED || open[i] == HOLD)
+			continue;
+		if (open[i] < 1 || open[i] > LONGEST_PULSE)
+			return BAD_VALUE;
+		pulses |= 1 << i;
+	}
+	numbered = true;
+	last_number = number;
+	return latches_valves(codes, pulses, open) ? ACCEPTED : NOT_ARMED;
 }
 
 /* Do what a fresh request asks; return why not, or ACCEPTED. */
@@ -186,6 +213,7 @@ static uint8_t act(uint8_t type, const uint8_t *payload)
 	case ARM: return arm(payload);
 	case DISARM: latches_disarm(); return ACCEPTED;
 	case EXCHANGE: return exchange(payload[0]);
+	case PULSE: return pulse(payload);
 	default: return ACCEPTED; /* READ does nothing but read */
 	}
 }
@@ -218,7 +246,7 @@ static void take(const uint8_t *request)
 	}
 	if (last_reason)
 		refused(sequence, last_reason, repeated);
-	else if (type == EXCHANGE || type == READ)
+	else if (type == EXCHANGE || type == PULSE || type == READ)
 		reading(sequence, repeated);
 	else
 		status(sequence, repeated);

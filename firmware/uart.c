@@ -24,9 +24,12 @@ void uart_start(void)
 	UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
 }
 
-ISR(USART_RX_vect)
+/* Always inline: the interrupt has fewer registers to save than over a call. */
+static inline __attribute__((always_inline)) void take(void)
 {
 	uint8_t errors = UCSR0A; /* belongs to the byte that is read next */
+	if (!(errors & _BV(RXC0)))
+		return;
 	uint8_t byte = UDR0;
 	uint8_t next = (in_head + 1) & (IN_SIZE - 1);
 	if (errors & _BV(DOR0))
@@ -37,6 +40,16 @@ ISR(USART_RX_vect)
 	}
 	in_ring[in_head] = byte;
 	in_head = next;
+}
+
+void uart_take(void)
+{
+	take();
+}
+
+ISR(USART_RX_vect)
+{
+	take();
 }
 
 ISR(USART_UDRE_vect)

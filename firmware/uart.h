@@ -5,6 +5,9 @@
 
 void uart_start(void);
 
+/* Take a byte that waits in the line's register, if one does; interrupts off. */
+void uart_take(void);
+
 /* Take the oldest byte received; return false where there is none. */
 bool uart_receive(uint8_t *byte);
 

@@ -56,14 +56,6 @@ uint8_t valves_applied(void)
 	return applied;
 }
 
-uint8_t valves_vented(uint8_t codes, uint8_t muscles)
-{
-	for (uint8_t muscle = 0, code = OUT, mask = 3; muscle < MUSCLES; muscle++, code <<= 2, mask <<= 2)
-		if (muscles & 1 << muscle)
-			codes = (codes & ~mask) | code;
-	return codes;
-}
-
 void light_set(bool on)
 {
 	/* One instruction each, so that an interrupt that sets valves cannot come in between. */

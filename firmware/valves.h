@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "protocol.h"
+
 /* The codes of all muscles vented, which is also all outputs off. */
 #define ALL_OUT 0xaa
 
@@ -20,9 +22,6 @@ void valves_set(uint8_t codes);
 
 /* Return the codes as applied. */
 uint8_t valves_applied(void);
-
-/* Return `codes` with the muscles of the bit mask `muscles` vented. */
-uint8_t valves_vented(uint8_t codes, uint8_t muscles);
 
 /* Switch the light on D13. */
 void light_set(bool on);

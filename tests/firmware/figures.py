@@ -5,8 +5,9 @@ import random
 import select
 import sys
 import tty
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter, process_time, sleep
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from tests.children import child
 from tests.firmware import wire
 from tests.firmware.board import SimulatedBoard, single_conversions
-from tests.firmware.chip import FREQUENCY, Chip
+from tests.firmware.chip import FREQUENCY, Change, Chip
 from tests.firmware.host import LIMIT, SESSION, Host
 from tests.firmware.wire import CONSTANT
 
@@ -84,6 +85,53 @@ def dead_man(repeats: int = 20, seed: int = 0) -> list[float]:
             times.append(1e3 * (_next_change(host, 0.26) - fed) / FREQUENCY)
             assert host.chip.valve_pins == 0
     return times
+
+
+class Pulses(NamedTuple):
+    """What became of pulses [ms]."""
+
+    longer: list[float]
+    """By how much the valve was open longer than asked for; less than 0 where shorter."""
+    valves: list[float]
+    """From the request's first bit until the last valve opened."""
+    reply: list[float]
+    """From the request's first bit until the reply's last bit had come."""
+
+
+def pulses(commands: int = 60, seed: int = 0) -> Pulses:
+    """Measure pulses of 1 to 30 ms of one to all muscles, at random moments, with noise at all inputs."""
+    rng = random.Random(seed)
+    found = Pulses([], [], [])
+    muscles = range(CONSTANT["MUSCLES"])
+    with armed(conversions=9) as host:
+        chip = host.chip
+        for _ in range(commands):
+            chip.run_until(chip.cycle + rng.randrange(16_000))
+            asked = [(rng.choice(("IN", "OUT", "CLOSED")), rng.randint(125, 3750)) for _ in muscles]
+            if all(code == "CLOSED" for code, _ in asked):
+                continue
+            known = len(chip.changes)
+            host.pulse(*asked)
+            found.reply.append(host.since_begun(host.ended))
+            noise(chip, rng, 0.032)
+            opened = []
+            for muscle, (code, length) in enumerate(asked):
+                if code == "CLOSED":
+                    continue
+                begin, end = open_between(chip.changes[known - 1 :], muscle, code)
+                opened.append(host.since_begun(begin))
+                found.longer.append(1e3 * (end - begin) / FREQUENCY - 1e-3 * CONSTANT["PULSE_UNIT_US"] * length)
+            found.valves.append(max(opened))
+    return found
+
+
+def open_between(changes: Sequence[Change], muscle: int, code: str) -> tuple[int, int]:
+    """Return the cycles at which a muscle's valves took on ``code`` and closed again, once and no more."""
+    levels = {"IN": 0b11, "OUT": 0b00, "CLOSED": 0b10}
+    steps = [(change.cycle, change.pins >> 2 * muscle & 3) for change in changes]
+    steps = [now for before, now in pairwise(steps) if now[1] != before[1]]
+    assert [level for _, level in steps] == [levels[code], levels["CLOSED"]], steps
+    return steps[0][0], steps[1][0]
 
 
 class OverPressure(NamedTuple):

@@ -24,6 +24,8 @@ class Host:
     def __init__(self, chip: Chip) -> None:
         self.chip = chip
         self.sequence = 0
+        self.number = 0
+        """Of the last PULSE."""
         self.begun = 0
         """Cycle at which the first bit of the last request began."""
         self.ended = 0
@@ -73,6 +75,16 @@ class Host:
     def exchange(self, *codes: str, wait: float = LONGEST_REPLY) -> Reply:
         """Set the valves of the muscles named; those not named are closed."""
         return self.ask("EXCHANGE", wire.valves(*codes), wait=wait)
+
+    def pulse(self, *pulses: tuple[str, int], number: int | None = None, wait: float = LONGEST_REPLY) -> Reply:
+        """Open the muscles' valves, each for a length [PULSE_UNIT_US]; those not named are closed.
+
+        It is a new command, unless a ``number`` says otherwise.
+        """
+        self.number = (self.number + 1) % 256 if number is None else number
+        codes, lengths = zip(*pulses, strict=True)
+        closed = [0] * (CONSTANT["MUSCLES"] - len(pulses))
+        return self.ask("PULSE", self.number, wire.valves(*codes), *lengths, *closed, wait=wait)
 
     def ready(self, **configuration: int) -> "Host":
         """Connect, configure and arm."""

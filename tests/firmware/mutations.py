@@ -50,15 +50,20 @@ def is_request(chunk: bytes) -> bytes | None:
     if decoded is None or len(chunk) >= wire.CONSTANT["LONGEST_FRAME"]:
         return None
     content, crc = decoded[:-2], int.from_bytes(decoded[-2:], "little")
-    if content[0] == wire.REQUEST["EXCHANGE"] and tuple(content[3:]) != wire.twice(content[3]):
-        return None
-    return content if wire.crc(content) == crc else None
+    return content if wire.crc(content) == crc and wire.is_said_twice(content) else None
 
 
 def random_request(rng: random.Random, sequence: int) -> bytes:
     """Return the frame of any request, its values at random."""
     name = rng.choice(list(wire.REQUEST))
+    return wire.enclosed(
+        bytes([wire.REQUEST[name]]) + (sequence & 0xFFFF).to_bytes(2, "little") + any_payload(name, rng)
+    )
+
+
+def any_payload(name: str, rng: random.Random) -> bytes:
+    """Return any payload of a request or reply that may be in a frame."""
     payload = rng.randbytes(wire.layout(name).size)
     if name == "EXCHANGE":
-        payload = bytes(wire.twice(payload[0]))
-    return wire.enclosed(bytes([wire.REQUEST[name]]) + (sequence & 0xFFFF).to_bytes(2, "little") + payload)
+        return bytes(wire.twice(payload[0]))
+    return payload[:-2] + wire.summed(payload[:-2]) if name == "PULSE" else payload

@@ -4,16 +4,18 @@ import sys
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pneumarm.arm import ControlCycle, guarded
+from pneumarm.arm import ControlCycle, Reading, guarded
 from pneumarm.arm.seam import checked
-from pneumarm.arm.serial import FaultyLine, SerialArm
+from pneumarm.arm.serial import FaultyLine, LineFaults, SerialArm
+from pneumarm.arm.serial.protocol import OLDEST_VERSION
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, usual_sensors
 from pneumarm.arm.virtual.further import THERMOMETER
 from pneumarm.control import Monitor, TransferSettings, transfer
@@ -21,11 +23,15 @@ from pneumarm.errors import ArmFailure
 from pneumarm.learning import Agent
 from pneumarm.task.movements import joined
 from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
-from tests.firmware.board import SimulatedBoard, single_conversions
+from tests.arm.serial.table_board import TableArm
+from tests.firmware.board import SimulatedBoard, single_conversions, valves_of
 from tests.firmware.build import missing
+from tests.firmware.chip import FREQUENCY
 from tests.firmware.line import SimulatedLine
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+LATEST_CLOSING = 50e-6
+"""By how much a pulse may be longer or shorter than asked for [s]."""
 LONGEST_EXCHANGE = 2e-3
 """Time that a request may take on the board's clock [s]."""
 
@@ -235,3 +241,60 @@ def test_board_that_is_unplugged_and_plugged_in_again(arm: SerialArm) -> None:
     assert board.time - begun < 2
     arm.set_valves(every(1))
     assert board.chip.valve_pins != 0
+
+
+def pulses_at_the_pins(board: SimulatedBoard, since: int, muscle: int) -> list[float]:
+    """Return the pulses of a muscle since a change of the pins, out being negative [s]."""
+    steps = [
+        (change.cycle, valves_of(change.pins & 0xFF, 2).ravel()[muscle]) for change in board.chip.changes[since:]
+    ]
+    steps = [now for before, now in pairwise([(0, 0), *steps]) if now[1] != before[1]]
+    return [int(valve) * (end - begin) / FREQUENCY for (begin, valve), (end, _) in pairwise(steps) if valve]
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.3])
+def test_pulses_of_two_joints_are_those_of_the_controller(lost: float) -> None:
+    """On the real firmware, also where every third frame is lost each way."""
+    table = TableArm(joints=2)
+    line = FaultyLine(SimulatedLine(board := SimulatedBoard(table)))
+    with SerialArm(line, replace(table.spec, name="firmware")) as arm:
+        since = len(board.chip.changes)
+        line.faults = LineFaults(dropped=lost, seed=2)
+        rng, turns = np.random.default_rng(1), iter(range(25))
+
+        def decide(reading: Reading) -> NDArray[np.float64] | None:
+            sign = rng.choice([-1.0, 1.0], (2, 2))
+            return None if next(turns, None) is None else sign * rng.uniform(0.1, 0.4, (2, 2))
+
+        steps = ControlCycle(guarded(arm)).run(decide)
+        applied = np.array([step.valves for step in steps if step.valves is not None])
+        line.faults = LineFaults()
+        for muscle in range(4):
+            expected = applied.reshape(-1, 4)[:, muscle] * arm.spec.period
+            assert pulses_at_the_pins(board, since, muscle) == pytest.approx(expected, abs=LATEST_CLOSING)
+
+
+def test_an_arm_fills_by_pulses_as_by_whole_periods(arm: SerialArm) -> None:
+    """Ten periods of half a pulse let in as much air as five whole ones, with what the valves take to switch."""
+
+    def filled(share: float, turns: int) -> NDArray[np.float64]:
+        """Return the pressures after so many periods."""
+        arm.set_valves(every(-1))
+        arm.wait(1.5)
+        arm.set_valves(every(0))
+        left = iter(range(turns))
+        cycle = ControlCycle(guarded(arm)).run(lambda _: None if next(left, None) is None else np.full((1, 2), share))
+        deque(cycle, maxlen=0)
+        arm.wait(0.3)
+        return arm.read().pressure[0]
+
+    assert filled(0.5, turns=10) == pytest.approx(filled(1.0, turns=5), rel=0.2)
+
+
+def test_an_older_firmware_s_host_and_this_board_understand_each_other(arm: SerialArm, monkeypatch: Any) -> None:
+    monkeypatch.setattr("pneumarm.arm.serial.arm.VERSION", OLDEST_VERSION)
+    arm.rearm()
+    assert arm.version == OLDEST_VERSION
+    assert not arm.set_pulses(np.full((1, 2), 0.5))
+    arm.set_valves(every(1))
+    assert arm._line.board.chip.valve_pins & 0b1111 == 0b1111  # type: ignore[attr-defined]

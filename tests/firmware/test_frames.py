@@ -82,7 +82,7 @@ class Tally(NamedTuple):
     foreign: int
     """Those of them that it let through."""
     moving: int
-    """Those of these that would have moved a valve: EXCHANGE, fresh, all codes known."""
+    """Those of these that would have moved a valve: EXCHANGE or PULSE, fresh, all codes known."""
 
 
 def fuzz(count: int, seed: int) -> Tally:
@@ -110,8 +110,12 @@ def fuzz(count: int, seed: int) -> Tally:
 
 def _moves(content: bytes, sequence: int) -> bool:
     ahead = (int.from_bytes(content[1:3], "little") - sequence) & 0xFFFF
-    known = all(content[3] >> 2 * m & 3 in wire.CODE.values() for m in range(4)) if len(content) == 5 else False
-    return content[0] == wire.REQUEST["EXCHANGE"] and known and ahead <= 0x7FFF
+    place = {wire.REQUEST["EXCHANGE"]: 3, wire.REQUEST["PULSE"]: 4}.get(content[0])
+    return (
+        place is not None
+        and ahead <= 0x7FFF
+        and all(content[place] >> 2 * m & 3 in wire.CODE.values() for m in range(4))
+    )
 
 
 def test_damaged_frames() -> None:

@@ -1,6 +1,7 @@
 """The line to the real .hex: round trip, split, merged and damaged frames, lost bytes."""
 
 import random
+import struct
 
 import pytest
 
@@ -12,6 +13,7 @@ from tests.firmware.mutations import is_request, mutated, random_request
 from tests.firmware.wire import CODE, CONSTANT, FLAG
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+MUSCLES = CONSTANT["MUSCLES"]
 
 
 def test_round_trip() -> None:
@@ -89,11 +91,12 @@ def test_reset_in_the_middle_of_a_reply_costs_that_reply_only() -> None:
 
 
 class Model:
-    """What the board must do with what comes: the protocol, for EXCHANGE and READ of an armed board."""
+    """What the board must do with what comes: the protocol, for EXCHANGE, PULSE and READ of an armed board."""
 
     def __init__(self, host: Host) -> None:
         self.last = (host.sequence, wire.REQUEST["ARM"])
         self.valves = 0
+        self.number: int | None = None
 
     def take(self, content: bytes) -> int | None:
         """Return the sequence of the reply, or None where none may come."""
@@ -104,10 +107,27 @@ class Model:
                 return None
             self.last = (sequence, kind)
             if kind == wire.REQUEST["EXCHANGE"]:
-                codes = content[3]
-                if all(codes >> 2 * m & 3 in CODE.values() for m in range(CONSTANT["MUSCLES"])):
-                    self.valves = codes
+                self.set(content[3])
+            if kind == wire.REQUEST["PULSE"] and content[3] != self.number:
+                self.set(content[4], content[3], struct.unpack_from(f"<{MUSCLES}H", content, 5))
         return sequence
+
+    def set(self, codes: int, number: int | None = None, lengths: tuple[int, ...] = (1,) * MUSCLES) -> None:
+        """Set valves, if they are some."""
+        for muscle, length in enumerate(lengths):
+            code = codes >> 2 * muscle & 3
+            right = 1 <= length <= CONSTANT["LONGEST_PULSE"] or length == CONSTANT["HOLD"]
+            if code not in CODE.values() or (code != CODE["CLOSED"] and not right):
+                return
+        self.valves, self.number = codes, number
+
+
+def any_command(rng: random.Random, sequence: int, codes: int) -> bytes:
+    """Return the frame of an EXCHANGE or a PULSE that is not over before it is looked at."""
+    if rng.random() < 0.5:
+        return wire.request("EXCHANGE", sequence, codes)
+    lengths = [rng.choice((CONSTANT["HOLD"], rng.randint(2_000, CONSTANT["LONGEST_PULSE"]))) for _ in range(MUSCLES)]
+    return wire.request("PULSE", sequence, rng.randrange(4), codes, *lengths)
 
 
 def fuzz(count: int, seed: int) -> dict[str, int]:
@@ -120,18 +140,18 @@ def fuzz(count: int, seed: int) -> dict[str, int]:
         others = [random_request(rng, rng.randrange(65536)) for _ in range(16)]
         sent = {frame[:-1] for frame in others}
         for turn in range(count):
-            frame = wire.request("EXCHANGE", host.sequence + 1, rng.choice(codes))
+            frame = any_command(rng, host.sequence + 1, rng.choice(codes))
             others[turn % len(others)] = frame
             damaged = mutated(frame, rng, [other for other in others if other[1] != wire.REQUEST["CONNECT"]])
-            good = [wire.request("EXCHANGE", host.sequence + 2 + i, rng.choice(codes)) for i in range(2)]
+            good = [any_command(rng, host.sequence + 2 + i, rng.choice(codes)) for i in range(2)]
             stream = damaged + b"".join(good)
             chunks = [chunk for chunk in stream.split(b"\0") if chunk]
             contents = [is_request(chunk) for chunk in chunks]
             kinds = {content[0] for content in contents if content}
-            if kinds - {wire.REQUEST["EXCHANGE"], wire.REQUEST["READ"]}:
+            if kinds - {wire.REQUEST["EXCHANGE"], wire.REQUEST["PULSE"], wire.REQUEST["READ"]}:
                 continue  # another request as it was sent: no damage, and not the model's
             expected = [model.take(content) if content else None for content in contents]
-            replies = host.send(stream, wait=0.0045)
+            replies = host.send(stream, wait=0.0055)
             assert [reply.sequence for reply in replies] == [
                 sequence for sequence in expected if sequence is not None
             ]

@@ -64,11 +64,20 @@ def test_reset_pin_and_boots_are_told(ready: Host) -> None:
     assert ready.exchange("IN").why == "NOT_ARMED"
 
 
-def test_another_version_is_refused_and_changes_nothing(ready: Host) -> None:
+@pytest.mark.parametrize("version", [0, 2 - 1, CONSTANT["VERSION"] + 1, 255])
+def test_another_version_is_refused_and_changes_nothing(ready: Host, version: int) -> None:
     ready.exchange("IN")
-    reply = ready.ask("CONNECT", CONSTANT["VERSION"] + 1, 99, sequence=7)
+    reply = ready.ask("CONNECT", version, 99, sequence=7)
     assert (reply.why, reply.has("ARMED")) == ("WRONG_VERSION", True)
     assert ready.exchange("IN").name == "READING"
+
+
+def test_a_host_of_the_oldest_version_finds_its_board(host: Host) -> None:
+    hello = host.ask("CONNECT", 2, SESSION)
+    assert (hello.name, hello.version, hello.session) == ("HELLO", 2, SESSION)
+    host.configure()
+    assert host.arm().has("ARMED")
+    assert host.exchange("IN", "OUT").valves == wire.valves("IN", "OUT")
 
 
 @pytest.mark.parametrize("conversions", [0, 1, 4, 6, 8, 10, 255])
@@ -176,7 +185,9 @@ def test_what_was_refused_is_refused_again(ready: Host) -> None:
 
 
 def test_other_requests_again(ready: Host) -> None:
-    for name, values in (("READ", ()), ("DISARM", ()), ("CONFIGURE", (5, 16, *FULL)), ("ARM", (SESSION,))):
+    pulse = (1, wire.valves("IN"), 100, 0, 0, 0)
+    requests = (("READ", ()), ("PULSE", pulse), ("DISARM", ()), ("CONFIGURE", (5, 16, *FULL)), ("ARM", (SESSION,)))
+    for name, values in requests:
         first = ready.ask(name, *values)
         again = ready.ask(name, *values, sequence=ready.sequence)
         assert (again.name, again.has("REPEATED")) == (first.name, True)

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from tests.firmware import test_requests, test_safety, wire
+from tests.firmware import test_pulses, test_requests, test_safety, wire
 from tests.firmware.chip import Chip
 from tests.firmware.host import LIMIT, Host
 from tests.firmware.second_machine import SecondChip, missing
@@ -25,7 +25,10 @@ OF_SAFETY = {
     "test_light_is_on_while_armed_and_blinks_while_latched",
 }
 OF_REQUESTS = {name for name in vars(test_requests) if name.startswith("test_")}
-for _module, _names in ((test_safety, OF_SAFETY), (test_requests, OF_REQUESTS)):
+OF_PULSES = {name for name in vars(test_pulses) if name.startswith("test_")} - {
+    "test_pulses_are_as_long_as_asked_for"
+}
+for _module, _names in ((test_safety, OF_SAFETY), (test_requests, OF_REQUESTS), (test_pulses, OF_PULSES)):
     globals().update({name: getattr(_module, name) for name in sorted(_names)})
 
 
@@ -75,8 +78,14 @@ def conversation(chip: Chip | SecondChip, seed: int) -> tuple[list[object], list
             host.configure()
             host.arm()
         sequence = None if rng.random() < 0.9 else (host.sequence + rng.choice((-5, 0))) & 0xFFFF
-        kind = rng.choice(("EXCHANGE", "EXCHANGE", "READ", "DISARM" if turn % 30 == 0 else "READ"))
-        values = [wire.valves(*rng.choices(names, k=CONSTANT["MUSCLES"]))] if kind == "EXCHANGE" else []
+        kind = rng.choice(("EXCHANGE", "PULSE", "READ", "DISARM" if turn % 30 == 0 else "READ"))
+        values = []
+        if kind in ("EXCHANGE", "PULSE"):
+            values = [wire.valves(*rng.choices(names, k=CONSTANT["MUSCLES"]))]
+        if kind == "PULSE":
+            # None ends while a reply is made, which the two may do at slightly different times.
+            lengths = rng.choices((20, 2_000, CONSTANT["HOLD"]), k=CONSTANT["MUSCLES"])
+            values = [rng.randrange(3), *values, *lengths]
         reply = host.ask(kind, *values, sequence=sequence)
         told = None if reply is None else {k: v for k, v in reply.values.items() if k not in ("time", "velocity")}
         replies.append((turn, None if reply is None else reply.name, told))

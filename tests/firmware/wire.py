@@ -97,11 +97,29 @@ def twice(codes: int) -> tuple[int, int]:
     return codes, codes ^ 0xFF
 
 
+def summed(payload: bytes) -> bytes:
+    """Return Fletcher's sum of the beginning of a PULSE's payload, as its last two bytes."""
+    sums = [sum(payload[: i + 1]) for i in range(len(payload))]
+    return bytes([sums[-1] % 256, sum(sums) % 256])
+
+
+def is_said_twice(content: bytes) -> bool:
+    """Return whether content of the right length says twice what it has to."""
+    payload = content[3:]
+    if content[0] == REQUEST["EXCHANGE"]:
+        return tuple(payload) == twice(payload[0])
+    return content[0] != REQUEST["PULSE"] or payload[-2:] == summed(payload[:-2])
+
+
 def request(name: str, sequence: int, *values: int) -> bytes:
-    """Return the frame of a request; of an EXCHANGE the valves suffice, which it says twice."""
+    """Return the frame of a request; an EXCHANGE's complement and a PULSE's sum are added where they are left out."""
     if name == "EXCHANGE" and len(values) == 1:
         values = twice(*values)
-    payload = layout(name).pack(*values)
+    if name == "PULSE" and len(values) == 2 + CONSTANT["MUSCLES"]:
+        payload = layout(name).pack(*values, 0)[:-2]
+        payload += summed(payload)
+    else:
+        payload = layout(name).pack(*values)
     return enclosed(struct.pack("<BH", REQUEST[name], sequence & 0xFFFF) + payload)
 
 

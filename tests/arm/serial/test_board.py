@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from tests.arm.serial.table_board import EmulatedChip, TableArm, armed
-from tests.firmware import test_line, test_requests, test_safety, wire
+from tests.firmware import test_line, test_pulses, test_requests, test_safety, wire
 from tests.firmware.host import SESSION, Host
 
 from pneumarm.arm.serial import EmulatedBoard, board
@@ -34,7 +34,15 @@ OF_SAFETY = {
 OF_REQUESTS = {name for name in vars(test_requests) if name.startswith("test_")} - {
     "test_firmware_is_the_hash_of_the_sources"
 }
-for _module, _names in ((test_line, OF_THE_LINE), (test_safety, OF_SAFETY), (test_requests, OF_REQUESTS)):
+OF_PULSES = {name for name in vars(test_pulses) if name.startswith("test_")} - {
+    "test_pulses_are_as_long_as_asked_for"
+}
+for _module, _names in (
+    (test_line, OF_THE_LINE),
+    (test_safety, OF_SAFETY),
+    (test_requests, OF_REQUESTS),
+    (test_pulses, OF_PULSES),
+):
     globals().update({name: getattr(_module, name) for name in sorted(_names)})
 
 

@@ -236,8 +236,8 @@ def test_controller_that_still_boots_is_waited_for(w: Wired) -> None:
     assert 1.8 <= w.line.now() - begun < 2.0
 
 
-def test_a_controller_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pneumarm.arm.serial.board.VERSION", VERSION - 1)
+def test_a_board_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pneumarm.arm.serial.board.OLDEST_VERSION", VERSION + 1)
     with pytest.raises(UnusableInput, match="flash the firmware"):
         wired()
 

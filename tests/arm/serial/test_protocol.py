@@ -9,7 +9,7 @@ from crc import Calculator, Crc16
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.firmware import wire
-from tests.firmware.mutations import mutated
+from tests.firmware.mutations import any_payload, mutated
 
 from pneumarm.arm.serial import protocol
 from pneumarm.arm.serial.protocol import (
@@ -37,9 +37,7 @@ KINDS = {**wire.REQUEST, **wire.REPLY}
 
 def random_values(name: str, rng: random.Random) -> tuple[int, ...]:
     """Return any payload of a frame, as its values."""
-    if name == "EXCHANGE":
-        return wire.twice(rng.randrange(256))
-    return wire.layout(name).unpack(rng.randbytes(wire.layout(name).size))
+    return wire.layout(name).unpack(any_payload(name, rng))
 
 
 def test_constants_are_those_of_the_page() -> None:
@@ -132,9 +130,8 @@ def oracle(chunk: bytes) -> bytes | None:
     except ValueError:
         return None
     name = next((name for name, number in KINDS.items() if number == content[0]), None)
-    if name == "EXCHANGE" and tuple(content[3:]) != wire.twice(content[3]):
-        return None
-    return content if name is not None and len(content) == 3 + wire.layout(name).size else None
+    right = name is not None and len(content) == 3 + wire.layout(name).size
+    return content if right and wire.is_said_twice(content) else None
 
 
 def damage(count: int, seed: int) -> tuple[int, int]:

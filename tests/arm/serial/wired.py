@@ -8,6 +8,7 @@ from tests.firmware.mutations import is_request
 
 from pneumarm.arm import Arm
 from pneumarm.arm.serial import BoardLine, EmulatedBoard, FaultyLine, SerialArm
+from pneumarm.arm.serial.protocol import VERSION
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 
 DELAY = 0.5e-3
@@ -81,9 +82,9 @@ class Wired:
         return all(valve == -1 for joint in self.applied for valve in joint)
 
 
-def wired(seed: int = 1, period: float = 1 / 30) -> Wired:
+def wired(seed: int = 1, period: float = 1 / 30, version: int = VERSION) -> Wired:
     muscles = WatchedArm(seed)
-    board = EmulatedBoard(muscles)
+    board = EmulatedBoard(muscles, version)
     line = WatchedLine(board, muscles)
     faulty = FaultyLine(line)
     return Wired(muscles, board, line, faulty, SerialArm(faulty, replace(muscles.spec, period=period)))

@@ -46,6 +46,7 @@ class Board {
     cpu.reset = () => (this.wantsReset = true); // the watchdog's
     const clock = new avr8js.AVRClock(cpu, FREQUENCY);
     this.parts = [
+      new avr8js.AVRTimer(cpu, avr8js.timer0Config),
       new avr8js.AVRTimer(cpu, avr8js.timer1Config),
       new avr8js.AVREEPROM(cpu, this.eeprom, avr8js.eepromConfig),
       new avr8js.AVRWatchdog(cpu, avr8js.watchdogConfig, clock),

@@ -3,7 +3,7 @@
 import secrets
 from contextlib import suppress
 from dataclasses import asdict
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,19 @@ from pneumarm.arm.serial.protocol import (
     ANY_OVER_PRESSURE,
     EXTRAS,
     HIGHEST_COUNT,
+    HOLD,
     JOINTS,
     LATCHES,
+    LONGEST_PULSE,
     MUSCLES,
+    OLDEST_VERSION,
     OVER_PRESSURE,
+    PULSES_SINCE,
     SEQUENCES,
     VELOCITY_SCALE,
     VERSION,
     Cause,
+    Code,
     Flag,
     Hello,
     Reason,
@@ -33,7 +38,9 @@ from pneumarm.arm.serial.protocol import (
     Sensors,
     Status,
     pack_valves,
+    pulse_lengths,
     said_twice,
+    summed,
     unpack_valves,
 )
 from pneumarm.errors import ArmFailure, UnusableInput
@@ -45,7 +52,9 @@ VELOCITY_MS = 16
 CUT_OFF = 1.5
 """The board cuts a muscle off at so many times ``spec.max_pressure``; moving closed ones compresses them."""
 FED = 0.1
-"""While waiting the valves are sent again this often [s], so that the board's dead-man is fed."""
+"""While waiting the command is sent again this often [s], so that the board's dead-man is fed."""
+NUMBERS = 256
+"""Numbers of commands before they begin again."""
 BOOT = 3.0
 """Longest time to wait for a board that opening the port has reset [s]."""
 KNOCK = 0.1
@@ -58,8 +67,35 @@ _CAUSES = {
 }
 
 
+class _Command(NamedTuple):
+    """What the board was last told to do with the valves; it is told again while waiting."""
+
+    request: Request
+    values: tuple[int, ...]
+    valves: int
+    """As they are set, a byte of codes."""
+    pulses: tuple[int, ...] = ()
+    """Muscles that close by themselves, from 0."""
+
+    def agrees(self, applied: int) -> bool:
+        """Return whether the valves ``applied`` are those told; pulses may be over."""
+        for muscle in range(MUSCLES):
+            told, code = self.valves >> 2 * muscle & 3, applied >> 2 * muscle & 3
+            if code != told and not (muscle in self.pulses and code == Code.CLOSED):
+                return False
+        return True
+
+
+def _whole(valves: NDArray[np.int8]) -> _Command:
+    """Return the command that sets ``valves`` (joints, 2) until the next one."""
+    packed = pack_valves(valves)
+    return _Command(Request.EXCHANGE, said_twice(packed), packed)
+
+
 class SerialArm(Arm):
     """An arm on a serial line. It is connected, configured and armed on opening; closing vents it.
+
+    The board times pulses. One of an older protocol cannot, and the guard does.
 
     Whatever the board does by itself (vents a muscle over its limit, vents all when the host is silent,
     restarts) makes the next :meth:`set_valves` fail and stays until :meth:`rearm`, or until :meth:`make_ready` before
@@ -101,7 +137,9 @@ class SerialArm(Arm):
         """What the board said of itself when it was connected."""
         self._line = line
         self._clock = BoardClock()
-        self._valves = np.zeros((spec.joints, 2), np.int8)
+        self._closed_valves = np.zeros((spec.joints, 2), np.int8)
+        self._command = _whole(self._closed_valves)
+        self._number = 0
         self._fed = line.now()
         self._closed = False
         limit = min(round((cut_off or CUT_OFF * spec.max_pressure) * spec.counts_per_bar), HIGHEST_COUNT)
@@ -131,7 +169,27 @@ class SerialArm(Arm):
             ArmFailure: the board did not do so, and why.
 
         """
-        self._exchange(np.asarray(valves, np.int8).reshape(self._valves.shape))
+        self._tell(_whole(np.asarray(valves, np.int8).reshape(self.spec.joints, 2)))
+
+    def set_pulses(self, command: NDArray[np.float64]) -> bool:
+        """Open the valves (joints, 2); the board closes each after its share of the control period.
+
+        Returns:
+            Whether it does: not one of an older protocol, and no pulse that is longer than its dead-man waits.
+
+        Raises:
+            ArmFailure: the board did not open them, and why.
+
+        """
+        lengths = pulse_lengths(command, self.spec.period)
+        pulses = tuple(muscle for muscle, length in enumerate(lengths) if 0 < length < HOLD)
+        if self.version < PULSES_SINCE or any(lengths[muscle] > LONGEST_PULSE for muscle in pulses):
+            return False
+        # A command that is sent again keeps its number, so that it does not begin again.
+        self._number = (self._number + 1) % NUMBERS
+        packed = pack_valves(np.sign(command))
+        self._tell(_Command(Request.PULSE, summed(self._number, packed, *lengths), packed, pulses))
+        return True
 
     def wait(self, seconds: float) -> None:
         """Let time pass [s] on the host's clock; the valves hold."""
@@ -144,7 +202,7 @@ class SerialArm(Arm):
             if due >= time or not self._armed:
                 break
             self._line.sleep_until(due)
-            self._exchange(self._valves)
+            self._tell(self._command)
         self._line.sleep_until(time)
 
     def make_ready(self) -> None:
@@ -211,31 +269,38 @@ class SerialArm(Arm):
         self.link.begin()
         self._line.write(b"\0")  # ends whatever an earlier host left unfinished
         self._session = secrets.randbits(32)
-        frame = self.link.knock(Request.CONNECT, VERSION, self._session, wait=KNOCK).frame
-        if frame.kind != Reply.HELLO or frame.values[0] != VERSION:
-            raise UnusableInput(
-                f"{self.spec.name}: the board speaks another protocol than version {VERSION}; "
-                "flash the firmware that came with this pneumarm"
-            )
-        self.hello = Hello(*frame.values)
+        for version in range(VERSION, OLDEST_VERSION - 1, -1):
+            frame = self.link.knock(Request.CONNECT, version, self._session, wait=KNOCK).frame
+            if frame.kind == Reply.HELLO and frame.values[0] == version:
+                self.hello = Hello(*frame.values)
+                return
+        raise UnusableInput(
+            f"{self.spec.name}: the board speaks another protocol than versions {OLDEST_VERSION} to {VERSION}; "
+            "flash the firmware that came with this pneumarm"
+        )
+
+    @property
+    def version(self) -> int:
+        """Version of the protocol that the board speaks."""
+        return OLDEST_VERSION if self.hello is None else self.hello.version
 
     def _arm(self) -> None:
         self._status(self.link.ask(Request.ARM, self._session))
         self._armed = True
-        self._valves = np.zeros_like(self._valves)
+        self._command = _whole(self._closed_valves)
         self._fed = self._line.now()
 
-    def _exchange(self, valves: NDArray[np.int8]) -> None:
-        packed = pack_valves(valves)
-        answer = self.link.ask(Request.EXCHANGE, *said_twice(packed))
+    def _tell(self, command: _Command) -> None:
+        """Have the board carry out ``command``, or go on with it where it was told already."""
+        answer = self.link.ask(command.request, *command.values)
         flags = self._status(answer)
         sensors = Sensors.of(answer.frame.values)
         if flags & LATCHES:
             self._fail(flags)
-        if sensors.valves != packed:
-            applied = unpack_valves(sensors.valves, self.spec.joints)
-            raise ArmFailure(f"{self.spec.name}: valves {valves.tolist()} were asked for, {applied} are set")
-        self._valves = valves
+        if not command.agrees(sensors.valves):
+            asked, applied = (unpack_valves(packed, self.spec.joints) for packed in (command.valves, sensors.valves))
+            raise ArmFailure(f"{self.spec.name}: valves {asked} were asked for, {applied} are set")
+        self._command = command
         self._fed = answer.sent
 
     def _reading(self, answer: Answer) -> Reading:

@@ -8,22 +8,29 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import Arm, Reading, checked, measured
 from pneumarm.arm.serial.line import Line
 from pneumarm.arm.serial.protocol import (
+    ANSWER,
     DEAD_MAN_MS,
     EXTRAS,
     HIGHEST_COUNT,
+    HOLD,
     JOINTS,
     LATCHES,
+    LONGEST_PULSE,
     MOST_VELOCITY_MS,
     MUSCLES,
     NEWEST_AHEAD,
+    OLDEST_VERSION,
     OVER_PRESSURE,
     OVER_PRESSURE_SAMPLES,
+    PULSE_UNIT_US,
+    PULSES_SINCE,
     REQUESTS,
     SEQUENCES,
     VELOCITY_SCALE,
     VERSION,
     WATCHDOG_MS,
     Cause,
+    Code,
     Flag,
     Frame,
     Reason,
@@ -53,16 +60,18 @@ class EmulatedBoard:
 
     Args:
         arm: what is moved; valves, sensors and time are its own.
+        version: of the protocol; that of an older board has no pulses.
 
     Raises:
         UnusableInput: the arm has more joints than the board.
 
     """
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: Arm, version: int = VERSION) -> None:
         if arm.spec.joints > JOINTS:
             raise UnusableInput(f"a board has pins for {JOINTS} joints, {arm.spec.name} has {arm.spec.joints}")
         self.arm = arm
+        self.version = version
         self.boots = 0
         self._hung = False
         self.reset(Cause.POWER_ON)
@@ -93,9 +102,8 @@ class EmulatedBoard:
         self._over = [0] * MUSCLES
         self._sampled = self._time
         self._velocity_s = SAMPLE
-        self._asked = np.full((self.arm.spec.joints, 2), -1, np.int8)
         self._fed = self._time
-        self._apply()
+        self._take_up(np.full((self.arm.spec.joints, 2), -1, np.int8))
         self._earlier = self._now = self._look()
 
     def hang(self) -> None:
@@ -115,7 +123,7 @@ class EmulatedBoard:
             if self._time < velocity_from < step:
                 step = velocity_from  # the velocity is that of the last few milliseconds
             if self.armed:
-                step = min(step, max(self._fed + DEAD_MAN_MS / 1e3, self._time))
+                step = min(step, max(min([self._fed + DEAD_MAN_MS / 1e3, *self._ends.values()]), self._time))
             if self._hung:
                 step = min(step, max(self._hung_at + WATCHDOG_MS / 1e3, self._time))
             if late and step == time:
@@ -123,6 +131,7 @@ class EmulatedBoard:
             else:
                 self.arm.wait(step - self._time)
             self._look_again(velocity_from)
+            self._end_pulses()
             if self._hung and self._time >= self._hung_at + WATCHDOG_MS / 1e3 - 1e-9:
                 self.reset(Cause.WATCHDOG)
             if self.armed and self._time >= self._fed + DEAD_MAN_MS / 1e3 - 1e-9:
@@ -156,7 +165,27 @@ class EmulatedBoard:
 
     def _vent(self, latch: Flag = Flag(0)) -> None:
         self._flags = (self._flags | latch) & ~Flag.ARMED
+        self._ends.clear()
         self._apply()
+
+    def _take_up(self, valves: NDArray[np.int8], number: int | None = None, lengths: tuple[int, ...] = ()) -> None:
+        """Set ``valves`` (joints, 2); for their ``lengths`` [PULSE_UNIT_US], where they are the PULSE ``number``."""
+        self._asked, self._number = valves, number
+        self._ends: dict[int, float] = {  # when pulses end, by muscle [s]
+            muscle: self._time + 1e-6 * PULSE_UNIT_US * length
+            for muscle, (valve, length) in enumerate(zip(valves.ravel().tolist(), lengths, strict=False))
+            if valve and length != HOLD
+        }
+        self._apply()
+
+    def _end_pulses(self) -> None:
+        """Close the valves whose time is over."""
+        ended = [muscle for muscle, end in self._ends.items() if end <= self._time + 1e-9]
+        for muscle in ended:
+            del self._ends[muscle]
+            self._asked.flat[muscle] = 0
+        if ended:
+            self._apply()
 
     def _applied(self) -> NDArray[np.int8]:
         """Return the valves (joints, 2) as they are now."""
@@ -170,7 +199,7 @@ class EmulatedBoard:
 
     def _answered(self, frame: Frame) -> bytes:
         """Return the answer to ``frame``; nothing to one that is stale."""
-        if frame.kind not in REQUESTS:
+        if frame.kind not in REQUESTS or (frame.kind == Request.PULSE and self.version < PULSES_SINCE):
             self._splitter.corrupt += 1
             return b""
         if frame.kind == Request.CONNECT:
@@ -188,12 +217,12 @@ class EmulatedBoard:
 
     def _connected(self, frame: Frame) -> bytes:
         version, session = frame.values
-        if version != VERSION:
+        if not OLDEST_VERSION <= version <= self.version:
             return self._reply(frame, Reason.WRONG_VERSION)
         self._vent()
         self._flags &= ~Flag.CONFIGURED
         self._session, self._last, self._last_reason = session, frame, None
-        return encode(Reply.HELLO, frame.sequence, VERSION, FIRMWARE, session, self._cause, self.boots)
+        return encode(Reply.HELLO, frame.sequence, version, FIRMWARE, session, self._cause, self.boots)
 
     def _act(self, frame: Frame) -> Reason | None:
         """Do what a fresh request asks; return why not, if so."""
@@ -205,13 +234,22 @@ class EmulatedBoard:
         if frame.kind == Request.DISARM:
             self._vent()
         if frame.kind == Request.EXCHANGE:
-            if not self.armed:
-                return Reason.NOT_ARMED
-            valves = unpack_valves(values[0], self.arm.spec.joints)
-            if valves is None:
+            return self._set(values[0])
+        if frame.kind == Request.PULSE:
+            return self._set(values[1], values[0], values[2 : 2 + MUSCLES])
+        return None
+
+    def _set(self, packed: int, number: int | None = None, lengths: tuple[int, ...] = ()) -> Reason | None:
+        """Set the valves in a byte of codes, or go on with the PULSE that they are; return why not, if so."""
+        if not self.armed:
+            return Reason.NOT_ARMED
+        if number is None or number != self._number:
+            valves = unpack_valves(packed, self.arm.spec.joints)
+            opened = [length for m, length in enumerate(lengths) if packed >> 2 * m & 3 != Code.CLOSED]
+            if valves is None or not all(1 <= length <= LONGEST_PULSE or length == HOLD for length in opened):
                 return Reason.BAD_VALUE
-            self._asked, self._fed = valves, self._time
-            self._apply()
+            self._take_up(valves, number, lengths)
+        self._fed = self._time
         return None
 
     def _configure(self, values: tuple[int, ...]) -> Reason | None:
@@ -237,9 +275,8 @@ class EmulatedBoard:
             return Reason.CAUSE_REMAINS
         self._flags = (self._flags & ~LATCHES) | Flag.ARMED
         self._over = [0] * MUSCLES
-        self._asked = np.zeros_like(self._asked)
         self._fed = self._time
-        self._apply()
+        self._take_up(np.zeros_like(self._asked))
         return None
 
     def _reply(self, frame: Frame, reason: Reason | None, extra: Flag = Flag(0)) -> bytes:
@@ -255,7 +292,7 @@ class EmulatedBoard:
             return encode(Reply.REFUSED, frame.sequence, reason, flags, valves)
         now = self._look()
         time = round(1e6 * (now.time - self._booted)) % (1 << 32)
-        if frame.kind not in (Request.EXCHANGE, Request.READ):
+        if ANSWER[Request(frame.kind)] == Reply.STATUS:
             return encode(Reply.STATUS, frame.sequence, time, flags, valves)
         return encode(Reply.READING, frame.sequence, *self._sensors(now, time, flags, valves).packed())
 

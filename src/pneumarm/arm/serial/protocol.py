@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-VERSION = 2
+VERSION = 3
+OLDEST_VERSION = 2
 BAUD = 500_000
 JOINTS = 2
 MUSCLES = 4
@@ -23,11 +24,16 @@ WATCHDOG_MS = 120
 VELOCITY_SCALE = 64
 MOST_VELOCITY_MS = 32
 LONGEST_FRAME = 64
+PULSE_UNIT_US = 8
+LONGEST_PULSE = 31_250
+HOLD = 0xFFFF
 
 SEQUENCES = 1 << 16
 """Sequence numbers before they begin again."""
 NEWEST_AHEAD = SEQUENCES // 2 - 1
 """A request so far ahead of the last accepted one, or less, is fresh."""
+PULSES_SINCE = 3
+"""Version of the protocol from which on a board times pulses."""
 HIGHEST_COUNT = 1023
 """Of the 10-bit converter."""
 
@@ -41,6 +47,7 @@ class Request(IntEnum):
     DISARM = 0x04
     EXCHANGE = 0x05
     READ = 0x06
+    PULSE = 0x07
 
 
 class Reply(IntEnum):
@@ -112,6 +119,7 @@ PAYLOAD: dict[int, struct.Struct] = {
     Request.DISARM: struct.Struct("<"),
     Request.EXCHANGE: struct.Struct("<BB"),
     Request.READ: struct.Struct("<"),
+    Request.PULSE: struct.Struct(f"<BB{MUSCLES}HH"),
     Reply.HELLO: struct.Struct("<BIIBH"),
     Reply.STATUS: struct.Struct("<IHB"),
     Reply.READING: struct.Struct(f"<IHB{JOINTS}H{MUSCLES}H{JOINTS}h{EXTRAS}H"),
@@ -125,6 +133,7 @@ ANSWER = {
     Request.DISARM: Reply.STATUS,
     Request.EXCHANGE: Reply.READING,
     Request.READ: Reply.READING,
+    Request.PULSE: Reply.READING,
 }
 """The reply to each request that is not refused."""
 REQUESTS = frozenset(map(int, Request))
@@ -200,6 +209,22 @@ def said_twice(valves: int) -> tuple[int, int]:
     return valves, valves ^ 0xFF
 
 
+def summed(*values: int) -> tuple[int, ...]:
+    """Return the values of a PULSE: number, valves, a length a muscle, and Fletcher's sum of them."""
+    total = totals = 0
+    for byte in PAYLOAD[Request.PULSE].pack(*values, 0)[:-2]:
+        total += byte
+        totals += total
+    return (*values, total % 256 | totals % 256 << 8)
+
+
+def _is_said_twice(kind: int, values: tuple[int, ...]) -> bool:
+    """Return whether the ``values`` of a frame say twice what its ``kind`` has to."""
+    if kind == Request.EXCHANGE:
+        return values == said_twice(values[0])
+    return kind != Request.PULSE or values == summed(*values[:-1])
+
+
 def encode(kind: int, sequence: int, *values: int) -> bytes:
     """Return the frame of a request or reply, its 0x00 included."""
     content = _HEAD.pack(kind, sequence) + PAYLOAD[kind].pack(*values)
@@ -218,9 +243,7 @@ def decode(frame: bytes) -> Frame | None:
         return None
     kind, sequence = _HEAD.unpack_from(content)
     values = layout.unpack(content[_HEAD.size : -_CRC.size])
-    if kind == Request.EXCHANGE and values != said_twice(values[0]):
-        return None
-    return Frame(kind, sequence, values)
+    return Frame(kind, sequence, values) if _is_said_twice(kind, values) else None
 
 
 _MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
@@ -300,3 +323,17 @@ def unpack_valves(packed: int, joints: int) -> NDArray[np.int8] | None:
     if any(code not in _TO_VALVE for code in codes):
         return None
     return np.array([_TO_VALVE[code] for code in codes[: 2 * joints]], np.int8).reshape(joints, 2)
+
+
+def pulse_lengths(command: NDArray[np.float64], period: float) -> tuple[int, ...]:
+    """Return for how long [PULSE_UNIT_US] each muscle's valve is to be open, HOLD where until the next command.
+
+    Args:
+        command: pulses (joints, 2), shares of the control period.
+        period: the control period [s].
+
+    """
+    units = 1e6 * period / PULSE_UNIT_US
+    shares = np.abs(command).ravel().tolist()
+    lengths = [HOLD if share >= 1 else max(round(share * units), 1) if share else 0 for share in shares]
+    return (*lengths, *[0] * (MUSCLES - len(lengths)))

@@ -96,6 +96,10 @@ COMMANDS = {
         "Serve a virtual arm behind an emulated microcontroller and serial port, in real time.",
         "pneumarm arm emulate virtual:seed=7 --link arm.port",
     ),
+    "arm flash": (
+        "Write the firmware that came with this pneumarm onto a board.",
+        "pneumarm arm flash /dev/ttyACM0",
+    ),
     "taguchi analyse": (
         "Analyse a table of trials and runs by the design of its experiment.",
         "pneumarm taguchi analyse results.csv --goal larger --design design.toml --out analysis",
@@ -122,7 +126,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 _groups = {
-    "arm": App(name="arm", help="Check an arm, calibrate it, try its valves; emulate one."),
+    "arm": App(name="arm", help="Check an arm, calibrate it, try its valves; emulate one, flash its board."),
     "taguchi": App(name="taguchi", help="Design of experiments."),
 }
 for _group in _groups.values():

@@ -56,6 +56,16 @@ def hex_file() -> Path:
     return BUILD / "pneumarm.hex"
 
 
+def hash_of_sources() -> int:
+    """Return what a program of these sources calls itself, by the lists in its Makefile."""
+    makefile = (FIRMWARE / "Makefile").read_text()
+    lists = [line.split(":=")[1].split() for line in makefile.splitlines() if line.startswith(("SOURCES", "HEADERS"))]
+    names = [name for names in lists for name in names]
+    assert set(names) == {path.name for path in FIRMWARE.glob("*.[ch]")}
+    digest = hashlib.sha256(b"".join((FIRMWARE / name).read_bytes() for name in [*names, "Makefile"]))
+    return int(digest.hexdigest()[:8], 16)
+
+
 @functools.cache
 def symbols() -> dict[str, tuple[int, int]]:
     """Return the address in the data memory and the size of each variable of the firmware; ends have no size."""

@@ -1,13 +1,12 @@
 """Requests and replies of the real .hex: sessions, sequences, refusals."""
 
-import hashlib
 import struct
 from collections.abc import Iterator
 
 import pytest
 
 from tests.firmware import wire
-from tests.firmware.build import FIRMWARE, missing
+from tests.firmware.build import hash_of_sources, missing
 from tests.firmware.chip import Chip
 from tests.firmware.figures import armed
 from tests.firmware.host import LIMIT, SESSION, Host
@@ -45,12 +44,7 @@ def test_hello_says_who_is_there(host: Host) -> None:
 
 
 def test_firmware_is_the_hash_of_the_sources(host: Host) -> None:
-    makefile = (FIRMWARE / "Makefile").read_text()
-    lists = [line.split(":=")[1].split() for line in makefile.splitlines() if line.startswith(("SOURCES", "HEADERS"))]
-    names = [name for names in lists for name in names]
-    assert set(names) == {path.name for path in FIRMWARE.glob("*.[ch]")}
-    digest = hashlib.sha256(b"".join((FIRMWARE / name).read_bytes() for name in [*names, "Makefile"]))
-    assert host.connect().firmware == int(digest.hexdigest()[:8], 16)
+    assert host.connect().firmware == hash_of_sources()
 
 
 def test_reset_pin_and_boots_are_told(ready: Host) -> None:

@@ -1,4 +1,4 @@
-"""``pneumarm arm check``, ``calibrate``, ``sensors``, ``valves``, ``errors`` and ``emulate``."""
+"""``pneumarm arm check``, ``calibrate``, ``sensors``, ``valves``, ``errors``, ``emulate`` and ``flash``."""
 
 import sys
 from collections.abc import Sequence
@@ -360,3 +360,18 @@ def emulate_(arm: str, /, *, link: Path | None = None, seed: int = 0, json: Json
 
     with suppress(KeyboardInterrupt):  # that is how it is meant to end
         serve(opened, tell, link=link)
+
+
+def flash_(port: str, /, *, json: Json = False) -> None:
+    """Write the firmware that came with this pneumarm onto an Arduino Uno or Nano, with the air off; needs avrdude.
+
+    Parameters
+    ----------
+    port
+        Where the board is, such as /dev/ttyACM0 or serial:/dev/ttyACM0.
+    """
+    from pneumarm.arm.serial.flash import flash
+
+    place = port.removeprefix("serial:")
+    baud = flash(place)
+    show({"port": place, "baud": baud}, json, lambda: [f"The board at {place} is flashed."])

@@ -7,6 +7,8 @@ import sys
 from cyclopts import App, CycloptsError
 
 from pneumarm import __version__
+from pneumarm.commands.config_file import take_config
+from pneumarm.commands.help_pages import HELP, HELP_ALL, AllOptions, FewOptions
 from pneumarm.console import complain
 from pneumarm.errors import PneumarmError
 from pneumarm.leaving import leave_by_exceptions
@@ -124,6 +126,7 @@ app = App(
     help="Learn to control an arm moved by pneumatic muscles and on/off valves, from its own recordings.",
     version=__version__,
     suppress_keyboard_interrupt=False,
+    help_formatter=FewOptions(),
 )
 _groups = {
     "arm": App(name="arm", help="Check an arm, calibrate it, try its valves; emulate one, flash its board."),
@@ -149,6 +152,10 @@ def main(arguments: list[str] | None = None) -> None:
 def _run(arguments: list[str]) -> int:
     try:
         leave_by_exceptions()
+        arguments, config = take_config(arguments, app)
+        app.config = () if config is None else (config,)
+        app.help_formatter = AllOptions() if HELP_ALL in arguments else FewOptions()
+        arguments = [HELP if one == HELP_ALL else one for one in arguments]
         app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         complain(f"{error} See {' '.join(['pneumarm', *(error.command_chain or ())])} --help.")

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -131,3 +132,18 @@ def _opened(path: Path, expected: str) -> Iterator[tuple[str, Any, Any]]:
 
 def _refuse_constant(name: str) -> Any:
     raise ValueError(f"{name} is not a number")
+
+
+def as_toml(value: Any) -> str:
+    """Return ``value`` as TOML; Python and TOML write numbers alike."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        # A basic string of TOML is one of JSON, but for the characters that only TOML wants escaped.
+        return msgspec.json.encode(value).decode().replace("\x7f", "\\u007f")
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(as_toml, value))}]"
+    if isinstance(value, dict):
+        entries = [f"{key} = {as_toml(entry)}" for key, entry in value.items() if entry is not None]
+        return f"{{{', '.join(entries)}}}"
+    return repr(value)

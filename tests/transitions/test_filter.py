@@ -12,7 +12,7 @@ from stand_ins import make_recorded
 from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import ACTIONS, to_valves
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.transitions import Grid, GridSettings, Store, Window, enough_data, filter_transitions, held_out
+from pneumarm.transitions import Grid, GridSettings, Store, Window, filter_transitions, held_out, new_cells
 from pneumarm.transitions.choice import hashed_uniform, joined, sample, share_held_out
 from pneumarm.transitions.grid import CellCounts, Coverage
 
@@ -256,18 +256,15 @@ def test_pulses_are_divided_and_share_the_cells_of_valves(tmp_path):
     assert cells[0] == cells[1] < cells[2] < cells[3] == cells[4]
 
 
-def test_new_cells_tell_whether_data_is_enough(store):
-    few = enough_data(store, Window(1, 1))  # random rows in 36,864 cells: every second one is new
-    assert not few.enough
+def test_new_cells_are_those_of_the_second_half(store):
+    few = new_cells(store, Window(1, 1))  # random rows in 36,864 cells: every second one is new
+    assert few.share > 0.1
     assert few.half.seen == 3000
     assert few.whole.seen == 6000
-    assert few.new_cells == few.whole.occupied - few.half.occupied
-    assert "collect as much again" in few.verdict
-    many = enough_data(store, Window(1, 1), COARSE)
-    assert many.enough
-    assert many.verdict.endswith("enough")
+    assert few.count == few.whole.occupied - few.half.occupied
+    assert new_cells(store, Window(1, 1), COARSE).share <= 0.1
     for rows in (101, 5000):  # the half does not depend on the blocks
-        assert enough_data(store.blocks(rows=rows), Window(1, 1)) == few
+        assert new_cells(store.blocks(rows=rows), Window(1, 1)) == few
 
 
 def test_mistakes_are_told(store, tmp_path):

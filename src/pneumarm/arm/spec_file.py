@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
-from pneumarm.files import write_text
+from pneumarm.files import as_toml, write_text
 
 _LARGEST = 1 << 18
 """Largest file that is read [bytes]: a thousand times what it needs."""
@@ -206,7 +206,7 @@ def save_arm_file(known: ArmFile, path: Path | str) -> None:
         tables["sound"] = asdict(known.sound)
     lines = ["# An arm as pneumarm knows it: angles and pressures in sensor counts, times in seconds."]
     for name, table in tables.items():
-        entries = [f"{key} = {_toml(value)}" for key, value in table.items() if value is not None and value != ()]
+        entries = [f"{key} = {as_toml(value)}" for key, value in table.items() if value is not None and value != ()]
         lines += ["", f"[{name}]", *entries]
     write_text(Path(path), "\n".join(lines) + "\n")
 
@@ -222,18 +222,3 @@ def _tables(table: Any, name: str) -> list[dict[str, Any]]:
     """Return the tables in the list ``name`` of ``table``; what is no table is refused by its type elsewhere."""
     listed = table.get(name) if isinstance(table, dict) else None
     return [one for one in listed if isinstance(one, dict)] if isinstance(listed, list) else []
-
-
-def _toml(value: Any) -> str:
-    """Return ``value`` as TOML; Python and TOML write numbers alike."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        # A basic string of TOML is one of JSON, but for the characters that only TOML wants escaped.
-        return msgspec.json.encode(value).decode().replace("\x7f", "\\u007f")
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, dict):
-        entries = [f"{key} = {_toml(entry)}" for key, entry in value.items() if entry is not None]
-        return f"{{{', '.join(entries)}}}"
-    return repr(value)

@@ -78,6 +78,9 @@ class Tuned:
                     f"this controller was tuned on an arm whose {name} is {tuned}, that of {arm.spec.name} is {found}"
                 )
 
+    def __repr__(self) -> str:
+        return f"<Tuned {self.kind} for {self.spec.name}, {1 / self.spec.period:.0f} Hz, cost {self.cost:.3f}>"
+
     def save(self, path: Path) -> None:
         """Write it to ``path``, whole or not at all."""
         write_json(path, {"format": _FORMAT, **msgspec.to_builtins(self)})

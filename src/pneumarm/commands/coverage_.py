@@ -4,11 +4,14 @@ from pathlib import Path
 
 from pneumarm.commands.common import Json
 from pneumarm.console import show, table
-from pneumarm.transitions import Store, Window, enough_data
+from pneumarm.simulation.enough import TOO_LITTLE, enough_data
+from pneumarm.transitions import Store, Window, new_cells
 
 
 def coverage_(db: Path, /, *, json: Json = False) -> None:
-    """Say how much of the state space a store covers, and whether its second half still found anything new.
+    """Say how much of the state space a store covers, and whether more would make a simulation of it better.
+
+    Two simulations are fitted, to the first half and to all of it, and compared on sequences that neither knows.
 
     Parameters
     ----------
@@ -16,12 +19,13 @@ def coverage_(db: Path, /, *, json: Json = False) -> None:
         The store.
     """
     with Store.open(db) as store:
-        found = enough_data(store, Window(store.joints))
+        found, judged = new_cells(store, Window(store.joints)), enough_data(store)
     result = {
         **found.whole.summary(),
-        "new_cells": found.new_cells,
+        "new_cells": found.count,
         "new_share": found.share,
-        "enough": found.enough,
-        "verdict": found.verdict,
+        "gain": None if judged is None else judged.gain,
+        "enough": judged is not None and judged.enough,
+        "verdict": TOO_LITTLE if judged is None else judged.verdict,
     }
     show(result, json, lambda: [table(("coverage", ""), list(result.items()))])

@@ -1,7 +1,5 @@
-"""Goals as people give them: degrees or counts, a joint after the other."""
+"""Goals on the command line and on standard input."""
 
-import math
-import re
 import sys
 from collections.abc import Iterable, Iterator
 
@@ -10,8 +8,8 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
+from pneumarm.task.goals import goal_of
 
-_ANGLE = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))\s*(deg|°)?")
 STANDARD_INPUT = "-"
 """The goal that stands for those on standard input, one a line."""
 
@@ -40,32 +38,3 @@ def read_goals(given: Iterable[str], spec: ArmSpec, goal_range: NDArray[np.float
                     yield goal_of(line.strip(), spec, goal_range)
 
     return goals()
-
-
-def goal_of(text: str, spec: ArmSpec, goal_range: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the goal (joints,) [counts] that ``text`` says: 20deg, 650 counts, or 20deg,-5deg for two joints.
-
-    Raises:
-        UnusableInput: it is none, or the arm has not been seen to reach it.
-
-    """
-    parts = text.split(",")
-    if len(parts) != spec.joints:
-        raise UnusableInput(f"goal {text!r}: expected {spec.joints} angle(s) with commas between, got {len(parts)}")
-    goal = np.array([_angle(text, part, spec) for part in parts])
-    for j, (low, high) in enumerate(goal_range):
-        if not low <= goal[j] <= high:
-            lowest, highest = spec.degrees([low, high])
-            raise UnusableInput(
-                f"goal {text!r}: joint {j + 1} has been seen to reach {lowest:.1f}deg to {highest:.1f}deg "
-                f"({low:.0f} to {high:.0f} counts); choose an angle in between"
-            )
-    return goal
-
-
-def _angle(text: str, part: str, spec: ArmSpec) -> float:
-    found = _ANGLE.fullmatch(part.strip())
-    if not found or not math.isfinite(float(found[1])):
-        raise UnusableInput(f"goal {text!r}: expected an angle such as 20deg or -5deg, or 650 (counts), got {part!r}")
-    value = float(found[1])
-    return value if found[2] is None else sum(spec.angle_range) / 2 + value * spec.counts_per_degree

@@ -1,12 +1,16 @@
 """``pneumarm run``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
+
+import msgspec
 
 from pneumarm.commands.common import COLUMNS, Json, Settings
+from pneumarm.commands.config_file import as_config
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.control.condition import complaints
+from pneumarm.files import write_text
 from pneumarm.run import Run, RunSettings
 
 
@@ -14,6 +18,7 @@ def run_(
     *,
     out: Path = Path("pneumarm-run"),
     settings: Annotated[RunSettings, Settings] = RunSettings(),
+    write_config: Path | None = None,
     json: Json = False,
 ) -> None:
     """Do the whole job: collect, fit, train, test, transfer, report.
@@ -24,7 +29,13 @@ def run_(
     ----------
     out
         Folder of the run; created if it does not exist.
+    write_config
+        Write all settings, as they are given, with what each means into this TOML file and do nothing else; change
+        there what you like and call `pneumarm run --config FILE`.
     """
+    if write_config is not None:
+        _write_config(write_config, {"out": str(out), **msgspec.to_builtins(settings)})
+        return
     results = Run(out, settings, progress).do()
     phases = {
         "in the simulation": results["test"],
@@ -39,3 +50,10 @@ def run_(
             say(line)
     seconds = sum(results["wall_seconds"].values())
     say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory")
+
+
+def _write_config(file: Path, settings: dict[str, Any]) -> None:
+    from pneumarm.cli import app  # which has loaded this module
+
+    write_text(file, as_config("run", settings, app))
+    say(f"settings: {file}; use them with `pneumarm run --config {file}`")

@@ -9,7 +9,7 @@ from pneumarm.commands.common import Json
 from pneumarm.console import say, show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_table
-from pneumarm.experiments.design.assignment import load_design, thesis_design
+from pneumarm.experiments.design.assignment import load_design, thesis_design, unnamed
 from pneumarm.experiments.design.table import read_table
 from pneumarm.files import require_folder, write_text
 
@@ -35,7 +35,8 @@ def analyse_(
     goal
         Which results are good: larger or smaller ones.
     design
-        TOML file of the design: array, factors, interactions; by default L16 as in the thesis (tables 5.3 and 5.4).
+        TOML file of the design: array, factors, interactions; by default L16 with factors a to e on
+        the columns 1, 2, 4, 11 and 12 (thesis table 5.3).
     columns
         How the headings of the columns to use begin; by default those that begin with run, or all.
     confirmation
@@ -46,7 +47,7 @@ def analyse_(
         Folder for page.html; created if it does not exist.
     """
     read = read_table(results, columns)
-    chosen = load_design(design) if design else thesis_design()
+    chosen = load_design(design) if design else unnamed(thesis_design())
     if len(read.results) != chosen.array.trials:
         raise UnusableInput(
             f"{results}: {chosen.array.name} needs {chosen.array.trials} trials, got {len(read.results)}; give the "

@@ -4,10 +4,8 @@ from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, OwnMethod
 from pneumarm.console import live, show, table
 from pneumarm.control.named import open_tracking
-from pneumarm.moving import check_seconds, track
+from pneumarm.moving import SECONDS, check_seconds, track
 from pneumarm.task.reference import check_reachable, parse_reference
-
-_SECONDS = 20.0
 
 
 def track_(
@@ -45,7 +43,7 @@ def track_(
     with open_arm(arm, seed) as opened:
         mover, spec, goal_range = open_tracking(controller, opened, method=method)
         wanted = parse_reference(reference, spec, known_ahead=not unforeseen)
-        lasting = seconds if seconds is not None else wanted.duration or _SECONDS
+        lasting = seconds if seconds is not None else wanted.duration or SECONDS
         check_seconds(lasting)
         check_reachable(wanted, lasting, goal_range, spec)
         with live(spec) as seen:

@@ -1,4 +1,4 @@
-"""Controllers that move to goals and follow references, by their name on the command line."""
+"""Controllers that move to goals and follow references: by their name on the command line, or as they are."""
 
 import math
 from pathlib import Path
@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec
 from pneumarm.arm.controller import TrackingController
-from pneumarm.classical import is_tuned, load_tuned
+from pneumarm.classical import Tuned, is_tuned, load_tuned
 from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Tracks
+from pneumarm.learning import AnyAgent, Tracks
 from pneumarm.moving import Holding, at_period
 from pneumarm.planning.agent import PlanAgent
 
@@ -25,8 +25,7 @@ def open_tracking(
 ) -> tuple[TrackingController, ArmSpec, NDArray[np.float64]]:
     """Return the controller called ``name`` for ``arm``, the arm's spec, and the goals (joints, 2) [counts] it knows.
 
-    ``name`` is the file of an agent or of a tuned controller, or ``plan:SIM``. The arm, not yet guarded, is
-    controlled with the period that a tuned controller was tuned for.
+    ``name`` is the file of an agent or of a tuned controller, or ``plan:SIM``; see :func:`tracking_for` for the rest.
 
     Args:
         name: of the controller.
@@ -45,14 +44,29 @@ def open_tracking(
             f"no file {path}"
         )
     if is_tuned(path):
-        tuned = load_tuned(path)
-        tuned.check_fit(arm)
-        if not math.isclose(arm.spec.period, tuned.spec.period, rel_tol=1e-3):
-            at_period(arm, tuned.spec.period)
-        return tuned.controller(), arm.spec, tuned.goal_range
+        return tracking_for(load_tuned(path), arm, tolerance)
     agent = PlanAgent.load(path) if name.startswith(_PLAN) else open_agent(path, method)
-    check_fit(agent, arm)
-    if isinstance(agent, Tracks):
-        return agent.controller(), arm.spec, agent.goal_range
-    warm_up(agent)
-    return Holding(AgentController(agent), arm.spec, agent.goal_range, tolerance), arm.spec, agent.goal_range
+    return tracking_for(agent, arm, tolerance)
+
+
+def tracking_for(
+    made: AnyAgent | Tuned, arm: Arm, tolerance: float = 1.0
+) -> tuple[TrackingController, ArmSpec, NDArray[np.float64]]:
+    """Return what was trained or tuned as a controller for ``arm``, the arm's spec, and the goals it knows.
+
+    The arm, not yet guarded, is controlled with the period that a tuned controller was tuned for.
+
+    Raises:
+        UnusableInput: it is for another arm.
+
+    """
+    if isinstance(made, Tuned):
+        made.check_fit(arm)
+        if not math.isclose(arm.spec.period, made.spec.period, rel_tol=1e-3):
+            at_period(arm, made.spec.period)
+        return made.controller(), arm.spec, made.goal_range
+    check_fit(made, arm)
+    if isinstance(made, Tracks):
+        return made.controller(), arm.spec, made.goal_range
+    warm_up(made)
+    return Holding(AgentController(made), arm.spec, made.goal_range, tolerance), arm.spec, made.goal_range

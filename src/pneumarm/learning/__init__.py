@@ -32,6 +32,7 @@ from pneumarm.learning.online.settings import Exploration, Shaping, TrainSetting
 from pneumarm.learning.online.training import CURVES
 from pneumarm.learning.policy.agent import PolicyAgent
 from pneumarm.learning.policy.settings import PolicySettings
+from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.training import Learner, Progress, Training, train_side_by_side
 
 __all__ = [
@@ -56,6 +57,7 @@ __all__ = [
     "Progress",
     "Saved",
     "SelfTesting",
+    "ServoSettings",
     "Shaping",
     "SimulationAgent",
     "Tracks",

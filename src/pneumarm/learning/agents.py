@@ -159,6 +159,9 @@ class SimulationAgent:
 
     simulation: Simulation
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.simulation!r}>"
+
     @property
     def spec(self) -> ArmSpec:
         """The arm that the simulation is of."""

@@ -18,7 +18,7 @@ from pneumarm.simulation.simulation import Simulation
 _WEIGHTS = "policy_weights"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class NetworkAgent(SimulationAgent):
     """A policy in a network, and the simulation that it was trained in."""
 

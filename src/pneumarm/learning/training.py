@@ -65,6 +65,9 @@ class Training(Generic[AgentT]):
     core_seconds: float = 0.0
     """Processor time of learning, all threads together [s], without compiling and validation."""
 
+    def __repr__(self) -> str:
+        return f"<Training of {self.agent!r}: {int(self.episodes.sum()):,} episodes in {self.seconds:.1f} s>"
+
     def results(self) -> dict[str, Any]:
         """Return what ``train --json`` says."""
         steps = int(self.steps.sum())

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm import Arm, ControlCycle, GuardedArm, Reading, guarded
+from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
 from pneumarm.arm.controller import Controller, TrackingController
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
@@ -24,6 +24,8 @@ KIND = "movement"
 """Kind of the sequence that a movement is."""
 LEAD_IN = 2.0
 """Time in which the arm moves to where a reference begins, before that begins [s]."""
+SECONDS = 20.0
+"""For how long a reference without an end is followed, unless it is said otherwise [s]."""
 Seen = Callable[[Reading, NDArray[np.float64]], None]
 """Called with every reading and the angles (joints,) wanted at that time [counts]."""
 
@@ -71,8 +73,23 @@ class Moved:
     """Air taken from the supply in all tries [normal litres]; None where the arm cannot say."""
     recorded: Recorded
     """The last try."""
-    goal_degrees: NDArray[np.float64]
-    """The goal in degrees from the middle of the range."""
+    spec: ArmSpec
+    """Of the arm."""
+
+    @property
+    def goal_degrees(self) -> NDArray[np.float64]:
+        """The goal in degrees from the middle of the range, shape (joints,)."""
+        return self.spec.degrees(self.goal)
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Times of the readings of the last try, from its beginning, shape (n,) [s]."""
+        return self.recorded.time - self.recorded.time[0]
+
+    @property
+    def degrees(self) -> NDArray[np.float64]:
+        """Angles at the readings of the last try, shape (n, joints) [degrees from the middle of the range]."""
+        return self.spec.degrees(self.recorded.angle)
 
     @property
     def success(self) -> bool:
@@ -92,6 +109,18 @@ class Moved:
             "air_litres": self.air,
         }
 
+    def __repr__(self) -> str:
+        goal, rest = _listed(self.goal_degrees, ".1f"), _listed(self.rest_error, ".2f")
+        after = (
+            "not settled"
+            if self.time_settled is None
+            else f"settled after {self.time_settled - self.time_start:.2f} s"
+        )
+        return f"<Moved to {goal} deg: {after}, rest error {rest} deg>"
+
+    def _repr_html_(self) -> str:
+        return _picture(self.recorded, np.broadcast_to(self.goal, self.recorded.angle.shape), self.spec)
+
 
 @dataclass(frozen=True)
 class Tracked:
@@ -107,6 +136,23 @@ class Tracked:
     recorded: Recorded
     wanted: NDArray[np.float64]
     """What the reference asked for at each reading, shape (n, joints) [counts]."""
+    spec: ArmSpec
+    """Of the arm."""
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Times of the readings, from the beginning of the reference, shape (n,) [s]."""
+        return self.recorded.time - self.recorded.time[0]
+
+    @property
+    def degrees(self) -> NDArray[np.float64]:
+        """Angles at the readings, shape (n, joints) [degrees from the middle of the range]."""
+        return self.spec.degrees(self.recorded.angle)
+
+    @property
+    def wanted_degrees(self) -> NDArray[np.float64]:
+        """What the reference asked for at each reading, shape (n, joints) [degrees from the middle of the range]."""
+        return self.spec.degrees(self.wanted)
 
     def results(self) -> dict[str, Any]:
         """Return it as ``pneumarm track --json`` tells it."""
@@ -117,6 +163,12 @@ class Tracked:
             "switches": self.switches,
             "air_litres": self.air,
         }
+
+    def __repr__(self) -> str:
+        return f"<Tracked for {self.seconds:.1f} s: RMS error {_listed(self.rms_error, '.2f')} deg>"
+
+    def _repr_html_(self) -> str:
+        return _picture(self.recorded, self.wanted, self.spec)
 
 
 def at_period(arm: Arm, period: float) -> Arm:
@@ -189,6 +241,7 @@ def track(
         air=_air_since(cycle.arm, air),
         recorded=recorded,
         wanted=wanted,
+        spec=cycle.arm.spec,
     )
 
 
@@ -271,7 +324,7 @@ def _move_to(
         switches=switches,
         air=_air_since(arm, air),
         recorded=recorded,
-        goal_degrees=spec.degrees(goal),
+        spec=spec,
     )
 
 
@@ -285,3 +338,14 @@ def _settled(times: NDArray[np.float64], error: NDArray[np.float64], tolerance: 
 def _air_since(arm: GuardedArm, before: float | None) -> float | None:
     now = arm.air_used()
     return None if now is None or before is None else now - before
+
+
+def _listed(values: NDArray[np.float64], form: str) -> str:
+    return ", ".join(format(value, form) for value in values)
+
+
+def _picture(recorded: Recorded, wanted: NDArray[np.float64], spec: ArmSpec) -> str:
+    """Return an SVG that plays what was ``recorded``, for a notebook."""
+    from pneumarm.report.figures.moving import moving_arm
+
+    return moving_arm(recorded.time, recorded.angle, wanted, spec)

@@ -20,7 +20,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.settings import TaskSettings
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PlanAgent(SimulationAgent):
     """A simulation that is planned in."""
 

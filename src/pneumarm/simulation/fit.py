@@ -309,6 +309,10 @@ class StoreFit(NamedTuple):
         """The simulation."""
         return self.result.simulation
 
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{name} {np.round(value, 3)}" for name, value in self.result.relative_error.items())
+        return f"<StoreFit of {self.simulation!r}; relative one-step errors: {errors}>"
+
     def results(self) -> dict[str, Any]:
         """Return the figures of the fit as ``results.json`` and ``fit --json`` hold them."""
         result, apart, further = self.result, self.result.generalisation, self.simulation.window.further

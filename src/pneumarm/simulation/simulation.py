@@ -106,6 +106,10 @@ class Simulation:
     further_range: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     """Lowest and highest readings that it predicts of further sensors, shape (further, 2) [sensor units]."""
 
+    def __repr__(self) -> str:
+        ranges = ", ".join(f"{low:.0f} to {high:.0f} deg" for low, high in self.spec.degrees(self.goal_range))
+        return f"<Simulation of {self.spec.name}, {1 / self.spec.period:.0f} Hz, {ranges}>"
+
     @property
     def valves(self) -> bool:
         """Whether its commands are those of on/off valves, for whole periods or in pulses too."""

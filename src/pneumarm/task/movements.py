@@ -75,6 +75,10 @@ class Movements(NamedTuple):
         columns: Iterable[Any] = (column[chosen] for column in self)
         return Movements(*columns)
 
+    def __repr__(self) -> str:
+        means = ", ".join(f"{name} {value:.3g}" for name, value in self.means().items()) if self.n else "none"
+        return f"<{self.n:,} Movements: {means}>"
+
     def results(self) -> dict[str, Any]:
         """Return the means with their 95 % intervals, as ``results.json`` holds them.
 

@@ -12,7 +12,7 @@ from pneumarm.transitions.collect import (
     enough,
     require_enough,
 )
-from pneumarm.transitions.filtering import Enough, Filter, Filtered, enough_data, filter_transitions
+from pneumarm.transitions.filtering import Filter, Filtered, NewCells, filter_transitions, new_cells
 from pneumarm.transitions.grid import Coverage, Grid, GridSettings
 from pneumarm.transitions.players import Keyboard, Trajectory
 from pneumarm.transitions.recording import import_recording
@@ -29,13 +29,13 @@ __all__ = [
     "CollectResult",
     "CollectSettings",
     "Coverage",
-    "Enough",
     "Filter",
     "Filtered",
     "Grid",
     "GridSettings",
     "Keyboard",
     "Mark",
+    "NewCells",
     "Recorded",
     "Rows",
     "Store",
@@ -44,10 +44,10 @@ __all__ = [
     "Window",
     "collect",
     "enough",
-    "enough_data",
     "filter_transitions",
     "held_out",
     "import_recording",
+    "new_cells",
     "require_enough",
     "transitions",
 ]

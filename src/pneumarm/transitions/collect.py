@@ -125,6 +125,10 @@ class CollectResult:
         """What guard, control cycle and link counted."""
         return Counts(self.interventions, self.missed_deadlines, self.link)
 
+    def __repr__(self) -> str:
+        minutes = self.seconds / 60
+        return f"<{self.transitions:,} transitions in {self.sequences:,} sequences, {minutes:.1f} min of the arm>"
+
 
 @dataclass
 class _Tally:

@@ -133,49 +133,30 @@ def _windows(source: Iterable[Rows], window: Window) -> Iterator[Transitions]:
 
 
 @dataclass(frozen=True)
-class Enough:
-    """Whether the data is enough: the first half of it against the whole (thesis section 3.2.3)."""
+class NewCells:
+    """Which cells only the second half of the data reached (thesis section 3.2.3)."""
 
     half: Coverage
     """Of the first half."""
     whole: Coverage
     """Of everything."""
-    much: float
-    """The share of new cells from which on more data is worth collecting."""
 
     @property
-    def new_cells(self) -> int:
+    def count(self) -> int:
         """Cells that only the second half reached."""
         return self.whole.occupied - self.half.occupied
 
     @property
     def share(self) -> float:
         """New cells as a share of all that are occupied."""
-        return self.new_cells / self.whole.occupied
-
-    @property
-    def enough(self) -> bool:
-        """Whether few cells are new."""
-        return self.share <= self.much
-
-    @property
-    def verdict(self) -> str:
-        """What to tell a person."""
-        found = (
-            f"the second half of {self.whole.seen:,} transitions filled {self.new_cells:,} cells anew, "
-            f"{self.share:.1%} of {self.whole.occupied:,}; {self.whole.unseen:.1%} of further transitions would fall "
-            "into empty cells"
-        )
-        return f"{found}: enough" if self.enough else f"{found}: collect as much again"
+        return self.count / self.whole.occupied
 
 
-def enough_data(
-    source: Iterable[Rows], window: Window, settings: GridSettings | None = None, *, much: float = 0.1
-) -> Enough:
+def new_cells(source: Iterable[Rows], window: Window, settings: GridSettings | None = None) -> NewCells:
     """Compare how the first half of the transitions and all of them cover the same grid.
 
-    The thesis collects as much again and looks whether "many more bins are filled"; ``much`` says what is many. On a
-    store of any age this asks whether its second half was still worth its time.
+    The thesis collects as much again and looks whether "many more bins are filled". Whether that is worth it is told
+    by :func:`pneumarm.simulation.enough.enough_data`.
 
     Raises:
         UnusableInput: there are no transitions.
@@ -193,7 +174,7 @@ def enough_data(
         if cut and seen - len(cells) + cut == half:
             coverage_of_half = _coverage(grid, counts, settings)
         counts.add(cells[cut:])
-    return Enough(coverage_of_half, _coverage(grid, counts, settings), much)
+    return NewCells(coverage_of_half, _coverage(grid, counts, settings))
 
 
 def _coverage(grid: Grid, counts: CellCounts, settings: GridSettings) -> Coverage:

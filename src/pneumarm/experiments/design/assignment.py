@@ -3,7 +3,7 @@
 import itertools
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
@@ -235,3 +235,12 @@ def packaged_design(package: str) -> Design:
 def thesis_design() -> Design:
     """Return the design of tables 5.3 and 5.4: five factors on the columns 1, 2, 4, 11 and 12 of L16."""
     return packaged_design("pneumarm.experiments.design")
+
+
+def unnamed(design: Design) -> Design:
+    """Return ``design`` without what its factors and levels mean: another experiment may have used its columns."""
+    factors = (
+        replace(one, name=f"factor {one.label}", levels=tuple(range(1, len(one.levels) + 1)), setting="")
+        for one in design.factors
+    )
+    return replace(design, factors=tuple(factors))

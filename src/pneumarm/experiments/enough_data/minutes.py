@@ -27,10 +27,9 @@ from pneumarm.experiments.words import words_of
 from pneumarm.files import write_json
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.task import begin_states
-from pneumarm.transitions import KINDS, Store, enough_data
+from pneumarm.transitions import KINDS, Store, new_cells
 
 _MINUTES = (1.7, 5.0, 10.0, 20.0, 50.0, 110.0, 220.0)
-_MUCH = 0.1  # share of cells filled anew from which on the distribution has improved
 
 
 @dataclass(frozen=True)
@@ -67,11 +66,11 @@ class EnoughData(ThereAndBack):
                 transitions, took = collected(whole / STORE, arm, seed, recipe, progress)
                 with Store.open(whole / STORE) as store:
                     fitted = fit_store(store, FitSettings(seed=seed))
-                    enough = enough_data(store, fitted.simulation.window, much=_MUCH)
+                    found = new_cells(store, fitted.simulation.window)
                     sequences = store.sequences
                     judged = quality(fitted)
                 fitted.simulation.save(file)
-                figures = {"transitions": transitions, "minutes": took, "new": enough.share, **judged}
+                figures = {"transitions": transitions, "minutes": took, "new": found.share, **judged}
                 write_json(kept, {"sequences": sequences, "figures": figures})
             found = json.loads(kept.read_text(encoding="utf-8"))
             simulation = Simulation.load(file)

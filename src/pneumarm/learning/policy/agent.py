@@ -27,7 +27,7 @@ KIND = "pneumarm policy"
 _LOOKAHEAD = 5  # seed of the noise in which it looks ahead
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PolicyAgent(NetworkAgent):
     """A policy by state and goal, the simulation that it was trained in, and how it was trained."""
 

@@ -19,7 +19,7 @@ from pneumarm.transitions.watch import made_up_readings
 KIND = "pneumarm servo"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ServoAgent(NetworkAgent):
     """A policy over pulses by state and reference, and the simulation that it was trained in."""
 

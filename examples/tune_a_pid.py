@@ -1,0 +1,12 @@
+"""Tune a classical controller on the arm and move by it. It takes minutes of the arm's time and no simulation."""
+
+import pneumarm
+from pneumarm.classical import TuneSettings
+
+ARM = "virtual:seed=7"
+
+tuned = pneumarm.tune("pid", ARM, "arm.pid", settings=TuneSettings(seconds=150))
+print(tuned)
+print(tuned.gains)
+for one in pneumarm.move("arm.pid", ARM, goals_deg=[20, -5, 10]):
+    print(one)

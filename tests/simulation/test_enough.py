@@ -1,0 +1,36 @@
+"""Whether a recording is enough is judged by what its second half was good for."""
+
+from pathlib import Path
+
+import pytest
+
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.simulation.enough import Enough, enough_data
+from pneumarm.transitions import Store, collect
+
+
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("grown") / "arm.db"
+
+
+def judged(path: Path, transitions: int) -> Enough | None:
+    arm = VirtualArm(seed=3)
+    with arm, Store.for_arm(path, arm.spec) as store:
+        collect(arm, store, transitions, 1)
+        return enough_data(store)
+
+
+def test_five_minutes_are_enough_and_two_cannot_be_judged(grown: Path) -> None:
+    """As the README says: what is recorded in the first five minutes is as good as more."""
+    assert judged(grown, 2_000) is None
+    five = judged(grown, 6_000)
+    assert five is not None
+    assert five.enough
+    assert five.verdict.startswith("enough: ")
+
+
+def test_the_verdict_says_what_was_gained() -> None:
+    assert Enough(0.3).verdict == "collect as much again: the second half lowers the simulation's error by 30%"
+    assert Enough(0.04).verdict.endswith("lowers the simulation's error by 4%, less than 10%")
+    assert Enough(-0.01).verdict.endswith("lowers the simulation's error not at all")

@@ -1,0 +1,104 @@
+"""The example scripts run, and the front door of the package is quick, typed, and refuses what cannot be done."""
+
+import inspect
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pneumarm
+from children import python
+from pneumarm.errors import UnusableInput
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder in which first.py has run; it holds arm.db, arm.sim and arm.agent."""
+    folder = tmp_path_factory.mktemp("workshop")
+    done = python(EXAMPLES / "first.py", "--quick", cwd=folder, check=True)
+    (folder / "said.txt").write_text(done.stdout)
+    return folder
+
+
+def test_the_first_script_goes_all_the_way(workshop: Path) -> None:
+    said = (workshop / "said.txt").read_text()
+    assert "transitions in" in said
+    assert said.count("settled after") == 3
+    assert (workshop / "movements.png").read_bytes().startswith(b"\x89PNG")
+    code = [line for line in (EXAMPLES / "first.py").read_text().split('"""')[2].splitlines() if line]
+    assert len(code) <= 25
+
+
+@pytest.mark.parametrize(
+    ("script", "words"),
+    [
+        ("track_a_reference.py", r"RMS error \d"),
+        ("tune_a_pid.py", "Tuned pid"),
+        ("own_arm.py", "settled after"),
+        ("own_learner.py", r"500 Movements: reward"),
+    ],
+)
+def test_an_example_runs(workshop: Path, script: str, words: str) -> None:
+    done = python(EXAMPLES / script, cwd=workshop, check=True)
+    assert re.search(words, done.stdout), done.stdout
+
+
+def test_the_example_with_stable_baselines3_runs(workshop: Path) -> None:
+    pytest.importorskip("stable_baselines3")
+    done = python(EXAMPLES / "gymnasium_and_sb3.py", 2048, cwd=workshop, check=True)
+    assert "500 Movements" in done.stdout
+
+
+def test_importing_is_quick_and_imports_nothing_heavy() -> None:
+    heavy = "{'numba', 'numpy', 'matplotlib', 'scipy', 'rich'}"
+    done = python("-c", f"import pneumarm, sys; print({heavy} & sys.modules.keys())", check=True)
+    assert done.stdout.strip() == "set()"
+
+
+def test_all_that_is_offered_is_documented_and_typed() -> None:
+    assert (Path(pneumarm.__file__).parent / "py.typed").exists()
+    for name in pneumarm.__all__:
+        offered = getattr(pneumarm, name)
+        assert inspect.getdoc(offered)
+        hints = inspect.signature(offered)
+        assert all(one.annotation is not one.empty for one in hints.parameters.values()), name
+        assert hints.return_annotation is not hints.empty, name
+
+
+def test_goals_are_in_degrees_or_counts_and_within_what_the_arm_does(workshop: Path) -> None:
+    controller = pneumarm.load_controller(workshop / "arm.agent")
+    low, high = controller.goal_range_deg[0]
+    assert f"{low:.0f} to {high:.0f} degrees" in repr(controller)
+    with pneumarm.open_arm("virtual:seed=7") as arm:
+        reading = arm.read()
+        controller.reset(goal_deg=20)
+        by_degrees = controller.act(reading)
+        controller.reset(goal=sum(arm.spec.angle_range) / 2 + 20 * arm.spec.counts_per_degree)
+        np.testing.assert_array_equal(controller.act(reading), by_degrees)
+        controller.track("sine:0.5Hz,10deg")  # type: ignore[attr-defined]
+        assert controller.act(reading).shape == (1, 2)
+    for wrong in ({"goal_deg": high + 1}, {"goal": -3.0}, {}, {"goal": 500, "goal_deg": 1}, {"goal": [500, 500]}):
+        with pytest.raises(UnusableInput, match=r"seen to reach|expected one goal|1 finite angle"):
+            controller.reset(**wrong)  # type: ignore[arg-type]
+    with pytest.raises(UnusableInput, match="seen to reach"):
+        pneumarm.move(workshop / "arm.agent", "virtual:seed=7", goals_deg=[90])
+    with pytest.raises(UnusableInput, match="expected goals"):
+        pneumarm.move(workshop / "arm.agent", "virtual:seed=7")
+
+
+def test_a_movement_is_shown_in_a_notebook(workshop: Path) -> None:
+    (moved,) = pneumarm.move(workshop / "arm.agent", "virtual:seed=7", ["10deg"])
+    assert re.fullmatch(r"<Moved to 10.0 deg: settled after \d\.\d\d s, rest error \d\.\d\d deg>", repr(moved))
+    assert moved._repr_html_().startswith("<svg")
+    assert moved.degrees.shape == (len(moved.time), 1)
+
+
+def test_examples_need_nothing_but_the_package(workshop: Path, tmp_path: Path) -> None:
+    """An arm of one's own is opened by name on every command line."""
+    shutil.copy(EXAMPLES / "own_arm.py", tmp_path)
+    done = python("-m", "pneumarm", "arm", "sensors", "python:own_arm:MyArm", "--seconds", 0.2, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr

@@ -1,5 +1,6 @@
 """Make environments by the name of an arm."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,21 +8,25 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm import Arm, open_arm
+from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
+from pneumarm.gym.drawing import Angles, Drawing, Pose, drawn
+from pneumarm.gym.follow import ArmFollow
 from pneumarm.gym.on_arm import ArmPointToPoint
 from pneumarm.gym.simulated import SimulatedPointToPoint
 from pneumarm.gym.spaces import nominal_goals, nominal_scaling
 from pneumarm.gym.vector import PointToPointVector
+from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.simulation.noise import NoiseSettings
-from pneumarm.simulation.simulation import Simulation
+from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.begin import BeginStates, begin_states
 from pneumarm.task.reward import Reward
 from pneumarm.task.settings import TaskSettings
 from pneumarm.transitions import Store
-from pneumarm.transitions.window import Window
+from pneumarm.transitions.window import QUANTITIES, Window
 
 _SIMULATION = "simulation:"
 
@@ -35,6 +40,7 @@ def point_to_point(
     cutoff: int = 100,
     noise: NoiseSettings = NoiseSettings(),
     seed: int = 0,
+    render_mode: str | None = None,
 ) -> gymnasium.Env[Any, Any]:
     """Return an environment in which an arm of pneumatic muscles is to be moved to a goal and stopped there.
 
@@ -94,6 +100,7 @@ def point_to_point(
       of the angle's range.
     * ``reward``, ``cutoff``, ``noise``: as in :class:`pneumarm.task.TaskSettings`; noise in a simulation only.
     * ``seed``: of a virtual arm's noise.
+    * ``render_mode``: ``"rgb_array"``, or ``"human"`` for a window (``pip install 'pneumarm[window]'``).
 
     ## Version History
     * v0: the definitions of pneumarm 0.1
@@ -107,21 +114,154 @@ def point_to_point(
         if like is not None:
             raise UnusableInput("like= is for arms; a simulation has a state window of its own")
         settings = TaskSettings(reward, cutoff, noise)
-        return SimulatedPointToPoint(_with_goals(simulation, goals), _begin(simulation, transitions), settings)
+        within = SimulatedPointToPoint(_with_goals(simulation, goals), _begin(simulation, transitions), settings)
+        return drawn(within, _pose_with_goal(simulation.scaling), simulation.spec, render_mode)
     if transitions is not None:
         raise UnusableInput("transitions= is for simulations; an arm is brought to its begin states")
-    opened = arm if isinstance(arm, Arm) else open_arm(str(arm), seed)
-    window, scaling, range_ = Window(opened.spec.joints), nominal_scaling(opened.spec), nominal_goals(opened.spec)
-    if like is not None:
-        model = like if isinstance(like, Simulation) else Simulation.load(Path(like))
-        if model.window.joints != opened.spec.joints:
-            opened.close()
-            raise UnusableInput(f"like= has {model.window.joints} joint(s), the arm has {opened.spec.joints}")
-        model.window.require(opened.spec.further, opened.spec.name)
-        window, scaling, range_ = model.window, model.scaling, model.goal_range
+    opened, window, scaling, range_ = _opened(arm, seed, like)
     if goals is not None:
         range_ = _goals(goals, window.joints)
-    return ArmPointToPoint(opened, window, scaling, range_, TaskSettings(reward, cutoff))
+    on_arm = ArmPointToPoint(opened, window, scaling, range_, TaskSettings(reward, cutoff))
+    return drawn(on_arm, _pose_with_goal(scaling), opened.spec, render_mode)
+
+
+def follow(
+    arm: str | Arm = "virtual",
+    reference: str | Reference | None = None,
+    like: str | Path | Simulation | None = None,
+    seconds: float = 5.0,
+    tolerance: float = 1.0,
+    change: float = 0.05,
+    preview: tuple[float, ...] = ServoSettings().preview,
+    seed: int = 0,
+    render_mode: str | None = None,
+) -> gymnasium.Env[Any, Any]:
+    """Return an environment in which an arm of pneumatic muscles is to follow a reference, or to hold a goal.
+
+    ``gymnasium.make("pneumarm/Follow-v0", arm="virtual:seed=7")``
+
+    ## Description
+    From rest at a random angle the arm is to be where a reference is, at every moment. A goal to settle at and to
+    hold is a reference that stays. The arm is a virtual one, a learned simulation, or a real one.
+
+    ## Action Space
+    ``Box(-1, 1, (2 * joints,))``: for each muscle the share of the control period for which its inlet (above 0) or
+    its exhaust (below 0) is open. On an arm, inlets stay closed while their muscle reads over the pressure limit, and
+    pulses are rounded to what the valves can do.
+
+    ## Observation Space
+    ``Box`` of float32: the scaled state window, as in ``pneumarm/PointToPoint-v0`` without its goal, and then how far
+    the reference is from the angle of each joint, scaled as an angle: now, and at each of the times ahead that
+    ``preview`` says. Nothing of it is hidden from an agent that may not look ahead but by ``preview=()``.
+
+    ## Rewards
+    Minus the error in tolerances (the mean over the joints), minus ``change`` for each time that a muscle's valves
+    change: -1 a step is a degree off. What is held within a tenth of a degree with closed valves costs 0.1 a step.
+
+    ## Starting State
+    At rest with closed valves: all muscles are vented for 2 s, inflated for up to 1.5 s each, and closed for 1 s. The
+    reference is ``reference``, or ``reset(options={"reference": "sine:0.5Hz,20deg"})`` or
+    ``reset(options={"goal_deg": 20})``; otherwise one is drawn: goals near and far, steps, sinusoids, smooth moves.
+
+    ## Episode End
+    Truncation after ``seconds``; nothing terminates an episode. ``info`` holds ``angle_deg``, ``wanted_deg``,
+    ``error_deg`` (joints,) and ``valve_changes``.
+
+    ## Arguments
+    * ``arm``: ``"virtual"``, ``"virtual:seed=N"``, ``"simulation:FILE"``, ``"python:module:callable"`` or an ``Arm``.
+    * ``reference``: a name as of :mod:`pneumarm.task.reference` or a ``Reference``, to be followed in every episode.
+    * ``like``: the simulation whose state window, scaling and range of goals are used; that of ``simulation:FILE`` by
+      itself.
+    * ``seconds``: length of an episode.
+    * ``tolerance``: what an error is measured in [degrees].
+    * ``change``: price of a valve change.
+    * ``preview``: how far ahead the reference is seen [s].
+    * ``seed``: of a virtual arm's noise.
+    * ``render_mode``: ``"rgb_array"``, or ``"human"`` for a window (``pip install 'pneumarm[window]'``).
+
+    ## Version History
+    * v0: the definitions of pneumarm 0.1
+
+    Raises:
+        UnusableInput: no such arm or file, a reference that leaves the range of goals, or a number out of its range.
+
+    """
+    numbers = {"seconds": 0 < seconds <= 3600, "tolerance": 0 < tolerance < 360, "change": 0 <= change < math.inf}
+    numbers["preview"] = all(0 < ahead <= 10 for ahead in preview)
+    if wrong := [name for name, is_valid in numbers.items() if not is_valid]:
+        raise UnusableInput(
+            f"{wrong[0]}= is out of its range; seconds and tolerance are above 0, previews up to 10 s"
+        )
+    if like is None and isinstance(arm, str) and arm.startswith(_SIMULATION):
+        like = arm.removeprefix(_SIMULATION)
+    opened, window, scaling, range_ = _opened(arm, seed, like)
+    try:
+        env = ArmFollow(
+            opened,
+            window,
+            scaling,
+            range_,
+            reference,
+            seconds=seconds,
+            tolerance=tolerance,
+            change=change,
+            preview=tuple(preview),
+        )
+    except UnusableInput:
+        opened.close()
+        raise
+    return drawn(env, _pose_with_distance(window, scaling), opened.spec, render_mode)
+
+
+def _opened(
+    arm: str | Arm | Simulation, seed: int, like: str | Path | Simulation | None
+) -> tuple[Arm, Window, Scaling, NDArray[np.float64]]:
+    """Return an arm, and the window, the scaling and the goals (joints, 2) [counts] for it: those of ``like``."""
+    opened = arm if isinstance(arm, Arm) else open_arm(str(arm), seed)
+    if like is None:
+        return opened, Window(opened.spec.joints), nominal_scaling(opened.spec), nominal_goals(opened.spec)
+    try:
+        model = like if isinstance(like, Simulation) else Simulation.load(Path(like))
+        if model.window.joints != opened.spec.joints:
+            raise UnusableInput(f"like= has {model.window.joints} joint(s), the arm has {opened.spec.joints}")
+        model.window.require(opened.spec.further, opened.spec.name)
+    except UnusableInput:
+        opened.close()
+        raise
+    return opened, model.window, model.scaling, model.goal_range
+
+
+def _pose_with_goal(scaling: Scaling) -> Pose:
+    """Return where the arm is and its goal, from an observation that ends with the goal."""
+    joints = len(scaling.command_scale) // 2
+
+    def pose(observation: NDArray[np.float32]) -> tuple[Angles, Angles]:
+        return _angle(observation[: joints * len(QUANTITIES) : len(QUANTITIES)], scaling), _angle(
+            observation[-joints:], scaling
+        )
+
+    return pose
+
+
+def _pose_with_distance(window: Window, scaling: Scaling) -> Pose:
+    """Return where the arm is and is wanted, from an observation with the distances after the state."""
+    joints, first = window.joints, window.state_size
+
+    def pose(observation: NDArray[np.float32]) -> tuple[Angles, Angles]:
+        at = observation[: joints * len(QUANTITIES) : len(QUANTITIES)]
+        return _angle(at, scaling), _angle(at + observation[first : first + joints], scaling)
+
+    return pose
+
+
+def _angle(scaled: NDArray[np.float32], scaling: Scaling) -> Angles:
+    places = slice(0, len(scaled) * len(QUANTITIES), len(QUANTITIES))
+    found: Angles = scaled * scaling.observation_scale[places] + scaling.observation_offset[places]
+    return found
+
+
+for _maker in (point_to_point, follow):
+    setattr(_maker, "metadata", Drawing.metadata)  # noqa: B010 - by this Gymnasium makes windows and lists
 
 
 def point_to_point_vector(

@@ -8,7 +8,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.task.tracker import scaled_goal
-from pneumarm.transitions.window import Window
+from pneumarm.transitions.window import QUANTITIES, Window
 
 Array = NDArray[np.float64]
 
@@ -65,10 +65,28 @@ def observation_space(window: Window, scaling: Scaling, ranges: ArrayLike, goals
         goals: lowest and highest, shape (joints, 2) [counts].
 
     """
+    wanted = scaled_goal(np.asarray(goals, np.float64).T, scaling).T
+    return _box(np.concatenate([_state_bounds(window, scaling, ranges), wanted]))
+
+
+def following_space(window: Window, scaling: Scaling, ranges: ArrayLike, looks: int) -> Box:
+    """Return the space of scaled states with how far the reference is from every joint at so many times (``looks``).
+
+    The rest is as in :func:`observation_space`. A reference and an angle are at most the sensor's range apart.
+    """
+    angles = np.asarray(ranges, np.float64)[: window.joint_size : len(QUANTITIES)]
+    apart = (angles[:, 1] - angles[:, 0]) / scaling.observation_scale[: window.joint_size : len(QUANTITIES)]
+    away = np.tile(np.stack([-apart, apart], axis=1), (looks, 1))
+    return _box(np.concatenate([_state_bounds(window, scaling, ranges), away]))
+
+
+def _state_bounds(window: Window, scaling: Scaling, ranges: ArrayLike) -> Array:
+    """Return the lowest and highest of scaled states, shape (state_size, 2)."""
     offset, scale = scaling.observation_offset[:, None], scaling.observation_scale[:, None]
     observed = (np.asarray(ranges, np.float64) - offset) / scale
     commanded = np.array([[-1.0, 1.0]]) / scaling.command_scale[:, None]
-    wanted = scaled_goal(np.asarray(goals, np.float64).T, scaling).T
-    parts = [observed] * window.history + [commanded] * (window.history - 1) + [wanted]
-    bounds = np.concatenate(parts)
+    return np.concatenate([observed] * window.history + [commanded] * (window.history - 1))
+
+
+def _box(bounds: Array) -> Box:
     return Box((bounds[:, 0] - _ROUNDING).astype(np.float32), (bounds[:, 1] + _ROUNDING).astype(np.float32))

@@ -1,0 +1,103 @@
+"""Pictures of an environment: the arm as it hangs, and in grey where it is wanted."""
+
+from collections.abc import Callable
+from typing import Any, SupportsFloat
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.seam import ArmSpec
+from pneumarm.errors import UnusableInput
+
+Angles = NDArray[np.float64]
+Pose = Callable[[NDArray[np.float32]], tuple[Angles, Angles]]
+"""Returns from an observation where the joints are and where they are wanted, each (joints,) [counts]."""
+MODES = ["rgb_array"]
+"""What can be rendered; Gymnasium makes a window ("human") and lists of pictures of it by itself."""
+_INCHES, _DOTS = 4.0, 100
+
+
+class Drawing(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """An environment with ``render_mode="rgb_array"``.
+
+    Args:
+        env: what is shown; it is not changed.
+        pose: where its arm is and is to be.
+        spec: of its arm.
+
+    """
+
+    metadata = {"render_modes": MODES, "render_fps": 30}  # noqa: RUF012 - as Gymnasium wants it
+
+    def __init__(self, env: gymnasium.Env[Any, Any], pose: Pose, spec: ArmSpec) -> None:
+        super().__init__(env)
+        env.unwrapped.render_mode = MODES[0]
+        self._pose, self._spec = pose, spec
+        self._seen: NDArray[np.float32] | None = None
+        self._figure: _Figure | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        self._seen, info = self.env.reset(seed=seed, options=options)
+        return self._seen, info
+
+    def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Take a step."""
+        self._seen, reward, terminated, truncated, info = self.env.step(action)
+        return self._seen, reward, terminated, truncated, info
+
+    def render(self) -> NDArray[np.uint8]:
+        """Return a picture, shape (height, width, 3)."""
+        if self._seen is None:
+            raise UnusableInput("call reset() before render()")
+        self._figure = self._figure or _Figure(self._spec.joints)
+        return self._figure.draw(*(self._spec.degrees(angles) for angles in self._pose(self._seen)))
+
+
+def drawn(env: gymnasium.Env[Any, Any], pose: Pose, spec: ArmSpec, mode: str | None) -> gymnasium.Env[Any, Any]:
+    """Return ``env``, which can be rendered if a ``mode`` is asked for.
+
+    Raises:
+        UnusableInput: there is no such mode.
+
+    """
+    if mode is None:
+        return env
+    if mode not in MODES:
+        raise UnusableInput(f"render_mode={mode!r}: expected one of human, {', '.join(MODES)}")
+    return Drawing(env, pose, spec)
+
+
+class _Figure:
+    """The picture, of which only what moves is drawn anew."""
+
+    def __init__(self, joints: int) -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        from pneumarm.report.style import DARK, INK, LIGHT
+
+        self._joints = joints
+        figure = Figure(figsize=(_INCHES, _INCHES), dpi=_DOTS)
+        self._canvas = FigureCanvasAgg(figure)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set(xlim=(-1.2, 1.2), ylim=(-1.2, 1.2), aspect="equal")
+        axes.axis("off")
+        axes.plot([-0.3, 0.3], [0.0, 0.0], color=INK, linewidth=3)
+        (self._wanted,) = axes.plot([], [], color=LIGHT, linewidth=14, solid_capstyle="round")
+        (self._arm,) = axes.plot([], [], color=DARK, linewidth=7, solid_capstyle="round", marker="o")
+        self._words = axes.text(0.0, 1.1, "", ha="center", va="top", color=INK, fontsize=12)
+
+    def draw(self, degrees: Angles, wanted: Angles) -> NDArray[np.uint8]:
+        for line, angles in ((self._arm, degrees), (self._wanted, wanted)):
+            turned = np.radians(np.cumsum(angles))
+            x, y = np.cumsum(np.sin(turned)), -np.cumsum(np.cos(turned))
+            line.set_data([0.0, *(x / self._joints)], [0.0, *(y / self._joints)])
+        self._words.set_text(f"{_listed(degrees)}°, wanted {_listed(wanted)}°")
+        self._canvas.draw()
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+
+def _listed(values: Angles) -> str:
+    return ", ".join(f"{value:.1f}" for value in values)

@@ -1,0 +1,75 @@
+"""An arm moved turn by turn, as the control cycle does it, by an agent that is asked from outside."""
+
+import math
+from time import monotonic
+
+import numpy as np
+
+from pneumarm.arm import Arm, BeginState, Reading, guarded
+from pneumarm.arm.cycle import missed_turns
+from pneumarm.arm.valves import Command
+
+
+class Turns:
+    """Brings an arm to rest somewhere and then makes turns of one control period.
+
+    Where the arm's clock goes on while an agent thinks, and longer than a control period, its command is replaced as
+    the control cycle does it, by holding and then venting; an agent that does not come back at all is waited for with
+    the arm vented.
+    """
+
+    def __init__(self, arm: Arm, begin: BeginState) -> None:
+        """Move ``arm``, which is guarded here where it is not yet, from where ``begin`` brings it."""
+        self.arm = guarded(arm)
+        self._fresh = self.arm.get_state()
+        self._begin = begin
+        self._closed = np.zeros((arm.spec.joints, 2), np.int8)
+        self._reading: Reading
+        self._asked = 0.0  # when the agent was last asked for a command [s]
+        self._due = 0.0
+
+    def begin(self, random: np.random.Generator, *, fresh: bool) -> Reading:
+        """Bring the arm to a begin state and return the reading there.
+
+        A ``fresh`` beginning puts an arm that can be put into a saved state back to how it was at first.
+        """
+        self.arm.watchdog.end()
+        if fresh and self._fresh is not None:
+            self.arm.set_state(self._fresh)
+        self._begin.reach(self.arm, random)
+        self._reading = self.arm.read()
+        self._due = self._reading.time
+        return self._reading
+
+    def ask(self) -> None:
+        """Have the arm looked after until the agent comes with a command: for as long as it takes."""
+        self._asked = monotonic()
+        self.arm.watchdog.begin(self._reading, math.inf)
+
+    def turn(self, command: Command) -> tuple[Reading, Command]:
+        """Let a control period pass with ``command`` (joints, 2); return the next reading and what was applied."""
+        spec = self.arm.spec
+        self.arm.watchdog.end()
+        late = self.arm.lateness(self._reading) if monotonic() - self._asked > spec.period else 0.0
+        self._due += spec.period
+        if spec.latency:
+            self.arm.wait(spec.latency)
+        if late > 1:
+            self.arm.replace("late", f"{late:.1f} periods after its reading", late)
+        else:
+            self.arm.decide(command)
+        applied = self.arm.applied
+        self.arm.end_pulses(self._due)
+        self.arm.wait_until(self._due)
+        self._reading = reading = self.arm.read()
+        self._due += missed_turns(reading.time - self._due, spec.period) * spec.period
+        return reading, applied
+
+    def rest(self) -> None:
+        """Close all valves: the movement is over."""
+        self.arm.set_valves(self._closed)
+
+    def close(self) -> None:
+        """Close the arm."""
+        self.arm.watchdog.end()
+        self.arm.close()

@@ -143,7 +143,7 @@ def test_pictures_show_where_the_arm_is_and_is_wanted() -> None:
         first = env.render()
         assert isinstance(first, np.ndarray)
         assert (first.shape, first.dtype) == ((400, 400, 3), np.uint8)
-        for _ in range(3):
+        for _ in range(10 if name == FOLLOW else 1):
             env.step(np.array([1.0, -1.0], np.float32) if name == FOLLOW else 6)
         assert (env.render() != first).any()
         env.close()

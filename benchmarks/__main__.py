@@ -12,6 +12,7 @@ LONG = (
     "bound",
     "faults",
     "held_out",
+    "live",
     "minutes",
     "moving",
     "baselines",

@@ -142,7 +142,7 @@ def figures_of(stage: str, results: dict[str, Any]) -> str:
     if stage == "simulation":
         error = found.get("relative_error", {}).get("angle")
         error = float(np.mean(error)) if error is not None else None
-        return "" if error is None else f"its error of the angle is {error:.0%} of a step"
+        return "" if error is None else f"it predicts the angle with an error of {error:.0%} of its change"
     if stage == "training":
         return f"{found['episodes']:,} movements in {found['seconds']:.0f} s"
     if stage == "test":

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import Any
@@ -186,7 +186,7 @@ class Rig:
 
     def _settings(self) -> RunSettings:
         assert self.folder is not None
-        return settings_in(self.folder) or replace(self.settings, joints=self._session.arm.spec.joints)
+        return settings_in(self.folder) or self.settings
 
     # ---- choosing
 

@@ -52,16 +52,16 @@ class Server:
         self.rig, self.token = rig, token
         self._host = host
         self._socket = _bound(host, port)
+        self._port = int(self._socket.getsockname()[1])
         self._files = dict(_page_files())
         self._serving: _Uvicorn | None = None
 
     @property
     def url(self) -> str:
         """Where the page is."""
-        port = self._socket.getsockname()[1]
         host = _own_address() if self._host in ("0.0.0.0", "::") else self._host
         host = f"[{host}]" if ":" in host else host
-        return f"http://{host}:{port}/" + (f"?token={self.token}" if self.token else "")
+        return f"http://{host}:{self._port}/" + (f"?token={self.token}" if self.token else "")
 
     def run(self, opened: Callable[[], None] = lambda: None) -> None:
         """Serve until the program, or :meth:`end`, asks for the end; ``opened`` is called once it can be reached."""

@@ -67,6 +67,7 @@ export class ArmDrawing {
     this.svg = svg;
     this.moved = moved;
     this.dragging = null;
+    new ResizeObserver(() => this.fit()).observe(svg);
     for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) svg.addEventListener(name, (event) => this[name](event));
   }
 
@@ -79,10 +80,15 @@ export class ArmDrawing {
     this.goal = measures.map(() => 0);
     this.angle = measures.map(() => 0);
     const reach = this.links.reduce((a, b) => a + b, 0);
-    const swing = Math.min(90, measures.length * Math.max(...range.map(Math.abs)));
     const top = Math.min(measures[0].muscle * 1000, 230) + TENDON + PLATE + 40;
-    const half = Math.max(reach * Math.sin(swing * Math.PI / 180) + 46, 150);
+    let turned = 0, aside = 0; // as far as all links reach to a side together
+    this.links.forEach((length, j) => {
+      turned = Math.min(turned + Math.max(...this.goals[j].map(Math.abs)), 90);
+      aside += length * Math.sin(turned * Math.PI / 180);
+    });
+    const half = Math.max(aside + 46, 150);
     this.svg.setAttribute("viewBox", `${-half} ${-top} ${2 * half} ${top + reach + 44}`);
+    this.fit();
     if (measures.length === 1) this.scale(reach + 24);
     this.ghosts = this.chain((parent, j) => {
       make("line", { class: "ghost", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, parent);
@@ -94,6 +100,12 @@ export class ArmDrawing {
     this.handleLayer.append(...this.handles);
     make("line", { class: "plate", x1: -70, x2: 70, y1: -top + 34, y2: -top + 34 }, this.svg);
     make("line", { class: "plate", x1: 0, x2: 0, y1: -top + 34, y2: 0, opacity: 0.14 }, this.svg);
+  }
+
+  // Text is as large on a phone as elsewhere.
+  fit() {
+    const scale = this.svg.getScreenCTM()?.a;
+    if (scale) this.svg.style.setProperty("--millimetre", 1 / scale);
   }
 
   // Nested groups, one a joint, each turning about its hinge; `draw(turning group, j, group that does not turn)`.
@@ -116,6 +128,7 @@ export class ArmDrawing {
     const radius = measures.pulley * 1000, top = rest + TENDON + radius * 0.8;
     const own = { radius, rest, diameter: measures.diameter * 1000, top };
     this.muscles.push([new Muscle(still, 1, own), new Muscle(still, -1, own)]);
+    if (this.links.length > 1) this.muscles[j].forEach((muscle) => muscle.label.remove());
     make("line", { class: "link", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, turn);
     make("line", { class: "bone", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, turn);
     make("circle", { class: "pulley", r: radius }, turn);

@@ -133,6 +133,7 @@ function showState(now) {
   $("stop").textContent = !stopped ? "Stop" : now.mode === "failed" ? "Try again" : "Release";
   $("stop").disabled = stopped && !writes();
   for (const id of ["hold", "relax"]) $(id).disabled = stopped || !writes() || now.mode === "learning" || (id === "hold" && !now.controller);
+  $("draw").hidden = !now.controller;
   showRole(now);
   showLearning(now);
   showHealth(now);
@@ -202,16 +203,16 @@ function showChoices(now) {
   $("choices").replaceChildren(...choices.map(([name, version]) => {
     const row = document.createElement("tr"), figures = now.figures?.[name];
     const number = (value, digits, unit) => (value == null ? "–" : `${value.toFixed(digits)}${unit}`);
+    const acts = document.createElement("td");
+    acts.append(now.controller === name ? "acts" : button("Use", () => send({ do: "choose", controller: name })));
+    row.append(acts);
     const cells = [
-      now.controller === name ? "●" : "", name + (version !== null && version === now.in_use ? " (in use)" : ""),
+      name + (version !== null && version === now.in_use ? " (in use)" : ""),
       figures?.goals ? `${figures.settled} of ${figures.goals}` : "–",
       number(figures?.time, 2, " s"), number(figures?.rest, 2, "°"), number(figures?.curve, 2, "°"),
     ];
     for (const text of cells) row.append(Object.assign(document.createElement("td"), { textContent: text }));
-    const last = document.createElement("td");
-    if (now.controller !== name) last.append(button("Use", () => send({ do: "choose", controller: name })));
-    if (version !== null && version !== now.in_use) last.append(" ", button("Put back", () => send({ do: "put-back", version })));
-    row.append(last);
+    if (version !== null && version !== now.in_use) row.children[1].append(" ", button("Put back", () => send({ do: "put-back", version })));
     return row;
   }));
 }
@@ -223,8 +224,8 @@ function button(words, press) {
 }
 
 function showFaults(now) {
-  $("faults").hidden = !now?.faults;
-  if (!now?.faults) return;
+  $("faults").hidden = !now?.faults || now.mode === "learning";
+  if ($("faults").hidden) return;
   $("offered").replaceChildren(...Object.entries(now.offered).map(([kind, [words, place]]) => {
     const at = [kind, place === "arm" ? 0 : joint + 1, place === "muscle" ? muscle : 0];
     const on = now.faults.some((one) => one.every((value, i) => value === at[i]));

@@ -1,0 +1,164 @@
+"""The live page on an emulated board in real time: how long a stop takes, and whether anything grows.
+
+Board, page and browser are processes of their own, as they are where a real board moves an arm. A stop takes from the
+press of the mouse on a page to the command at the board that vents all muscles; each is pressed while the arm is on
+its way. PNEUMARM_LIVE_STOPS sets their number; PNEUMARM_LIVE_MINUTES sets for how long the arm is then moved about,
+with ten pages open, after which the memory of the program and of a page is told at the beginning, after a quarter of
+the time, and in the end.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from time import monotonic, sleep
+
+import numpy as np
+
+from pneumarm.arm import open_arm
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.classical import TuneSettings, tune
+
+ROOT = Path(__file__).parents[1]
+STOPS = int(os.environ.get("PNEUMARM_LIVE_STOPS", "30"))
+MINUTES = float(os.environ.get("PNEUMARM_LIVE_MINUTES", "2"))
+WATCHERS = 9
+_LOG = "PNEUMARM_LIVE_LOG"
+
+
+class Noted(VirtualArm):
+    """A virtual arm that writes down when its valves are set, and whether all vent; all processes have one clock."""
+
+    def set_valves(self, valves):
+        """Set the valves."""
+        super().set_valves(valves)
+        with open(os.environ[_LOG], "a") as log:
+            log.write(f"{monotonic()} {int((np.asarray(valves) == -1).all())}\n")
+
+
+def noted() -> Noted:
+    """Return the arm on the board."""
+    return Noted(draw_parameters(3), seed=3, name="noted")
+
+
+@contextmanager
+def started(*command: object, expect: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Start ``pneumarm`` with ``command``; give it and the line in which it said what to ``expect``."""
+    both = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen([sys.executable, "-m", "pneumarm", *map(str, command)], cwd=ROOT, **both) as process:
+        try:
+            lines = []
+            for line in process.stdout:
+                lines.append(line)
+                if expect in line:
+                    break
+            else:
+                raise RuntimeError("".join(lines))
+            yield process, line.strip()
+        finally:
+            process.terminate()
+            process.communicate(timeout=60)
+
+
+def measure() -> Iterator[str]:
+    """Yield what was measured."""
+    sys.path.insert(0, str(ROOT / "tests"))
+    from live.browser import opened_browser
+    from live.chromium import missing
+
+    if missing():
+        yield f"not measured: {missing()}"
+        return
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        place = Path(folder)
+        pid, link = place / "arm.pid", place / "arm.port"
+        os.environ[_LOG] = str(place / "log")
+        with open_arm("virtual:seed=3") as arm:
+            tune("pid", arm, TuneSettings(seconds=120)).save(pid)
+        (place / "log").touch()
+        board = started("arm", "emulate", "python:benchmarks.live:noted", "--link", link, "--json", expect='{"port"')
+        _, told = stack.enter_context(board)
+        assert json.loads(told)["port"] == str(link)
+        live = started("live", pid, "--arm", f"serial:{link}", "--port", 0, "--no-browser", expect="open ")
+        process, told = stack.enter_context(live)
+        browser = stack.enter_context(opened_browser())
+        page = browser.new_page(viewport={"width": 800, "height": 1000})
+        page.goto(told.split()[-1])
+        page.locator("body[data-role=writer]").wait_for()
+        yield from _stops(page, place / "log")
+        watchers = [browser.new_page(viewport={"width": 400, "height": 860}) for _ in range(WATCHERS)]
+        for watcher in watchers:
+            watcher.goto(told.split()[-1])
+        yield from _memory(page, process.pid)
+
+
+def _press(page, degrees: float) -> None:
+    """Set the goal on the page."""
+    place = page.evaluate(
+        """(degrees) => {
+          const turned = degrees * Math.PI / 180, arm = document.getElementById("arm");
+          const point = new DOMPoint(180 * Math.sin(turned), 180 * Math.cos(turned));
+          const at = point.matrixTransform(arm.getScreenCTM());
+          return [at.x, at.y];
+        }""",
+        degrees,
+    )
+    page.mouse.click(*place)
+
+
+def _stops(page, log: Path) -> Iterator[str]:
+    took = []
+    box = page.locator("#stop").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    random = np.random.default_rng(0)
+    while len(took) < STOPS:
+        _press(page, 25.0 if len(took) % 2 else -25.0)
+        sleep(random.uniform(0.15, 0.35))
+        if page.locator("body").get_attribute("data-mode") != "moving":
+            sleep(0.5)
+            continue  # the board has vented it by itself: this machine had too much to do
+        page.mouse.move(x, y)
+        begun = monotonic()
+        page.mouse.down()
+        page.mouse.up()
+        page.locator("body[data-mode=stopped]").wait_for()
+        sleep(0.1)
+        rows = [line.split() for line in log.read_text().splitlines()]
+        took.append(next(float(time) for time, vented in rows if vented == "1" and float(time) >= begun) - begun)
+        page.locator("#stop").click()
+        page.locator("body[data-mode=relaxed]").wait_for()
+    ms = 1e3 * np.array(took)
+    within = (ms <= 100).mean()
+    yield (
+        f"a stop vents after {np.median(ms):.0f} ms (median), {np.quantile(ms, 0.95):.0f} ms (95 %), "
+        f"{ms.max():.0f} ms at most of {len(ms)}; {within:.0%} within 100 ms"
+    )
+
+
+def _memory(page, process: int) -> Iterator[str]:
+    begin = monotonic()
+    end, quarter, goal = begin + 60 * MINUTES, begin + 15 * MINUTES, 20.0
+    yield f"at the beginning {_used(page, process)}"
+    while monotonic() < end:
+        _press(page, goal)
+        goal = -goal
+        page.wait_for_timeout(2500)
+        if quarter is not None and monotonic() > quarter:
+            yield f"after {15 * MINUTES / 60:.1f} min {_used(page, process)}"
+            quarter = None
+    yield f"after {MINUTES:.0f} min with {WATCHERS + 1} pages {_used(page, process)}"
+
+
+def _used(page, process: int) -> str:
+    status = Path(f"/proc/{process}/status").read_text()
+    resident = int(re.findall(r"VmRSS:\s+(\d+)", status)[0]) / 1e3
+    session = page.context.new_cdp_session(page)
+    session.send("HeapProfiler.collectGarbage")
+    heap = session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
+    session.detach()
+    return f"the program holds {resident:.0f} MB, a page {heap:.1f} MB"

@@ -90,3 +90,22 @@ def test_unusable_input_is_one_line_and_2(
     code, out, err = called(capsys, *[str(controller) if one == "FILE" else one for one in arguments])
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
+
+
+def test_what_was_done_is_recorded_and_can_be_shown(
+    controller: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    store, film = tmp_path / "moves.db", tmp_path / "moves.gif"
+    for command in (
+        ("move", controller, *ARM, "10deg", "-5deg", "--hold", 1, "--tries", 1),
+        ("track", controller, *ARM, "--reference", "sine:1Hz,5deg", "--seconds", 1),
+    ):
+        called(capsys, *command, "--record", store, "--json")
+    code, out, _ = called(capsys, "view", store, "--sequence", 2, "--out", film, "--json")
+    assert (code, json.loads(out)["joints"]) == (0, 1)
+    assert film.read_bytes()[:3] == b"GIF"
+    code, _, err = called(
+        capsys, "move", controller, "--arm", "virtual:seed=3,sensors=velocity", "5deg", "--record", store
+    )
+    assert code == 2
+    assert "another arm" in err

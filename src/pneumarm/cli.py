@@ -62,6 +62,10 @@ COMMANDS = {
         "Show an arm in the browser, moving; drag its goal, draw a movement, stop it.",
         "pneumarm live arm.agent --arm virtual:seed=7",
     ),
+    "view": (
+        "Make a picture or a film of how an arm moved.",
+        "pneumarm view moves.db --out moves.gif",
+    ),
     "tune": (
         "Tune a classical controller on an arm: pid, scheduled, pwm or sliding.",
         "pneumarm tune pid --arm virtual:seed=7 --out arm.pid",

@@ -1,5 +1,6 @@
 """``pneumarm move``."""
 
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -7,6 +8,7 @@ from cyclopts import Parameter
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, OwnMethod, Settings
 from pneumarm.commands.goals import read_goals
+from pneumarm.commands.recorder import recorder
 from pneumarm.console import live, say, show, table
 from pneumarm.control.named import open_tracking
 from pneumarm.errors import MovementFailed
@@ -19,6 +21,7 @@ def move_(
     *goals: Annotated[str, Parameter(allow_leading_hyphen=True)],
     arm: str,
     seed: int = 0,
+    record: Path | None = None,
     method: OwnMethod = None,
     settings: Annotated[MoveSettings, Settings] = MoveSettings(),
     json: Json = False,
@@ -38,6 +41,8 @@ def move_(
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
         Of a virtual arm's noise.
+    record
+        Store to add what was read and done to, for ``pneumarm view`` or to learn from; made if there is none.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
@@ -45,9 +50,10 @@ def move_(
         mover, spec, goal_range = open_tracking(controller, opened, settings.tolerance, method=method)
         wanted = read_goals(goals, spec, goal_range)
         made: list[Moved] = []
-        with live(spec) as seen:
+        with live(spec) as seen, recorder(record, spec) as keep:
             for one in move(opened, mover, wanted, settings, seen=seen):
                 made.append(one)
+                keep(one.recorded, {"goal": one.goal.tolist()})
                 say(_told(one))
     # What is printed is printed even where one failed: it says which.
     result = {"movements": [one.results() for one in made]}

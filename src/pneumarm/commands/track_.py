@@ -1,7 +1,10 @@
 """``pneumarm track``."""
 
+from pathlib import Path
+
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import Json, OwnMethod
+from pneumarm.commands.recorder import recorder
 from pneumarm.console import live, show, table
 from pneumarm.control.named import open_tracking
 from pneumarm.moving import SECONDS, check_seconds, track
@@ -17,6 +20,7 @@ def track_(
     seconds: float | None = None,
     unforeseen: bool = False,
     seed: int = 0,
+    record: Path | None = None,
     method: OwnMethod = None,
     json: Json = False,
 ) -> None:
@@ -37,6 +41,8 @@ def track_(
         The controller must not look at the reference's future, as if a person gave it by hand.
     seed
         Of a virtual arm's noise.
+    record
+        Store to add what was read and done to, for ``pneumarm view`` or to learn from; made if there is none.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
@@ -46,7 +52,8 @@ def track_(
         lasting = seconds if seconds is not None else wanted.duration or SECONDS
         check_seconds(lasting)
         check_reachable(wanted, lasting, goal_range, spec)
-        with live(spec) as seen:
+        with live(spec) as seen, recorder(record, spec) as keep:
             followed = track(opened, mover, wanted, lasting, seen=seen)
+            keep(followed.recorded, {"reference": reference})
     result = followed.results()
     show(result, json, lambda: [table((reference, ""), [(name, str(value)) for name, value in result.items()], arm)])

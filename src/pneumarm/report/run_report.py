@@ -88,7 +88,7 @@ def read_run(folder: Path) -> RunData:
     """
     results = _read_json(folder / RESULTS)
     return RunData(
-        spec=_read_spec(folder / SPEC),
+        spec=read_spec(folder / SPEC),
         results=results,
         coverage=_read(CoverageData, folder),
         quality=_read(QualityData, folder),
@@ -120,7 +120,8 @@ def _read_transfer(path: Path, results: dict[str, Any]) -> TransferData | None:
 _KNOWN = {field.name for field in fields(ArmSpec)}  # of an arm
 
 
-def _read_spec(path: Path) -> ArmSpec:
+def read_spec(path: Path) -> ArmSpec:
+    """Return what :func:`save_spec` wrote to ``path``; raises UnusableInput where it is something else."""
     stored = _read_json(path)
     try:
         if not isinstance(stored, dict) or "angle_range" not in stored or set(stored) - _KNOWN:

@@ -228,12 +228,7 @@ def _check(arm: Arm, store: Store, transitions: int, seed: int) -> None:
     require_enough(transitions)
     if seed < 0:
         raise UnusableInput(f"a seed must be 0 or more, got {seed}")
-    if not store.valves:
-        raise UnusableInput(f"{store.path}: holds continuous commands; collect into a store of its own")
-    mine, kept = asdict(arm.spec), asdict(store.spec)
-    different = [f"{name} was {kept[name]!r}, is {mine[name]!r}" for name in kept if mine[name] != kept[name]]
-    if different:
-        raise UnusableInput(f"{store.path}: was made for another arm ({'; '.join(different)}); give another file")
+    store.check_arm(arm.spec)
 
 
 class _Collection:

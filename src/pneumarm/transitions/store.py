@@ -269,6 +269,15 @@ class Store:
 
     # ---- writing
 
+    def check_arm(self, spec: ArmSpec) -> None:
+        """Raise UnusableInput where what an arm of ``spec`` does cannot be added: the store is of another one."""
+        if not self.valves:
+            raise UnusableInput(f"{self.path}: holds continuous commands; collect into a store of its own")
+        mine, kept = asdict(spec), asdict(self.spec)
+        different = [f"{name} was {kept[name]!r}, is {mine[name]!r}" for name in kept if mine[name] != kept[name]]
+        if different:
+            raise UnusableInput(f"{self.path}: was made for another arm ({'; '.join(different)}); give another file")
+
     def begin_run(self, purpose: str, settings: Mapping[str, Any]) -> int:
         """Begin a run, to which what is appended from now on belongs, and return its number."""
         metadata = {

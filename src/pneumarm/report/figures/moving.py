@@ -14,21 +14,23 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 320, 700, 30, 250  # of the curve
 _FRAMES_A_SECOND = 15
 
 
-def moving_arm(time: Array, angle: Array, wanted: Array, spec: ArmSpec) -> str:
+def moving_arm(time: Array, angle: Array, wanted: Array | None, spec: ArmSpec) -> str:
     """Return an SVG that plays the record for ever.
 
     Args:
         time: of the readings, shape (n,) [s].
         angle: shape (n, joints) [counts].
-        wanted: what was asked for, shape (n, joints) [counts].
+        wanted: what was asked for, shape (n, joints) [counts]; None where nothing was.
         spec: the arm, for units.
 
     """
+    known = wanted is not None and bool(np.isfinite(wanted).all())
+    asked = wanted if wanted is not None and known else angle
     seconds = float(time[-1] - time[0])
     grid = np.linspace(0.0, seconds, max(round(seconds * _FRAMES_A_SECOND), 2))
     degrees, goals = (
         np.stack([np.interp(grid, time - time[0], column) for column in spec.degrees(values).T], axis=1)
-        for values in (angle, wanted)
+        for values in (angle, asked)
     )
     low, high = min(degrees.min(), goals.min()) - 3, max(degrees.max(), goals.max()) + 3
     x = _LEFT + (_RIGHT - _LEFT) * grid / seconds
@@ -40,7 +42,7 @@ def moving_arm(time: Array, angle: Array, wanted: Array, spec: ArmSpec) -> str:
 
     joints = degrees.shape[1]
     curves = "".join(
-        line(goals[:, j], f'stroke="{MIDDLE}" stroke-width="2" stroke-dasharray="6 4"')
+        (line(goals[:, j], f'stroke="{MIDDLE}" stroke-width="2" stroke-dasharray="6 4"') if known else "")
         + line(degrees[:, j], f'stroke="{DARK}" stroke-width="2"')
         for j in range(joints)
     )
@@ -60,7 +62,7 @@ def moving_arm(time: Array, angle: Array, wanted: Array, spec: ArmSpec) -> str:
         f'<path d="M{_LEFT} {_TOP}V{_BOTTOM}H{_RIGHT}" fill="none" stroke="{INK}"/>{ticks}{curves}'
         f'<line y1="{_TOP}" y2="{_BOTTOM}" stroke="{INK}">{cursor}</line>'
         f'<text x="{_RIGHT}" y="{_BOTTOM + 18}" text-anchor="end">{seconds:.0f} s</text>'
-        f'<text x="{_LEFT}" y="{_BOTTOM + 36}">dashed: asked for; solid: the arm</text></svg>'
+        f'<text x="{_LEFT}" y="{_BOTTOM + 36}">{"dashed: asked for; solid: the arm" if known else ""}</text></svg>'
     )
 
 

@@ -7,7 +7,6 @@ with ten pages open, after which the memory of the program and of a page is told
 the time, and in the end.
 """
 
-import json
 import os
 import re
 import subprocess
@@ -21,29 +20,12 @@ from time import monotonic, sleep
 import numpy as np
 
 from pneumarm.arm import open_arm
-from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.classical import TuneSettings, tune
 
 ROOT = Path(__file__).parents[1]
 STOPS = int(os.environ.get("PNEUMARM_LIVE_STOPS", "30"))
 MINUTES = float(os.environ.get("PNEUMARM_LIVE_MINUTES", "2"))
 WATCHERS = 9
-_LOG = "PNEUMARM_LIVE_LOG"
-
-
-class Noted(VirtualArm):
-    """A virtual arm that writes down when its valves are set, and whether all vent; all processes have one clock."""
-
-    def set_valves(self, valves):
-        """Set the valves."""
-        super().set_valves(valves)
-        with open(os.environ[_LOG], "a") as log:
-            log.write(f"{monotonic()} {int((np.asarray(valves) == -1).all())}\n")
-
-
-def noted() -> Noted:
-    """Return the arm on the board."""
-    return Noted(draw_parameters(3), seed=3, name="noted")
 
 
 @contextmanager
@@ -70,27 +52,24 @@ def measure() -> Iterator[str]:
     sys.path.insert(0, str(ROOT / "tests"))
     from live.browser import opened_browser
     from live.chromium import missing
+    from live.noted_arm import board
 
     if missing():
         yield f"not measured: {missing()}"
         return
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         place = Path(folder)
-        pid, link = place / "arm.pid", place / "arm.port"
-        os.environ[_LOG] = str(place / "log")
+        pid = place / "arm.pid"
         with open_arm("virtual:seed=3") as arm:
             tune("pid", arm, TuneSettings(seconds=120)).save(pid)
-        (place / "log").touch()
-        board = started("arm", "emulate", "python:benchmarks.live:noted", "--link", link, "--json", expect='{"port"')
-        _, told = stack.enter_context(board)
-        assert json.loads(told)["port"] == str(link)
+        link, notes = stack.enter_context(board(place))
         live = started("live", pid, "--arm", f"serial:{link}", "--port", 0, "--no-browser", expect="open ")
         process, told = stack.enter_context(live)
         browser = stack.enter_context(opened_browser())
         page = browser.new_page(viewport={"width": 800, "height": 1000})
         page.goto(told.split()[-1])
         page.locator("body[data-role=writer]").wait_for()
-        yield from _stops(page, place / "log")
+        yield from _stops(page, notes)
         watchers = [browser.new_page(viewport={"width": 400, "height": 860}) for _ in range(WATCHERS)]
         for watcher in watchers:
             watcher.goto(told.split()[-1])
@@ -111,7 +90,9 @@ def _press(page, degrees: float) -> None:
     page.mouse.click(*place)
 
 
-def _stops(page, log: Path) -> Iterator[str]:
+def _stops(page, notes: Path) -> Iterator[str]:
+    from live.noted_arm import vented_after
+
     took = []
     box = page.locator("#stop").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -128,8 +109,9 @@ def _stops(page, log: Path) -> Iterator[str]:
         page.mouse.up()
         page.locator("body[data-mode=stopped]").wait_for()
         sleep(0.1)
-        rows = [line.split() for line in log.read_text().splitlines()]
-        took.append(next(float(time) for time, vented in rows if vented == "1" and float(time) >= begun) - begun)
+        after = vented_after(notes, begun)
+        assert after is not None
+        took.append(after)
         page.locator("#stop").click()
         page.locator("body[data-mode=relaxed]").wait_for()
     ms = 1e3 * np.array(took)

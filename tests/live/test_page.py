@@ -75,8 +75,9 @@ def arrive(page: Page, degrees: float, within: float = 2.0) -> None:
 
     def looked() -> bool:
         mode = page.locator("body").get_attribute("data-mode")
-        if mode == "failed":  # the same, and not even the board was heard
+        if mode in ("failed", "stopped"):  # the same, and not even the board was heard
             page.locator("#stop").click()
+            page.wait_for_timeout(500)
         elif mode != "moving":
             drag_to(page, degrees)
         return abs(angle(page) - degrees) < within
@@ -93,7 +94,7 @@ def comes(page: Page, what: str, is_so: Callable[[], bool]) -> None:
     """Wait until something is so, while the page lives."""
     deadline = monotonic() + LIMIT
     while not is_so():
-        assert monotonic() < deadline, f"{what}: not within {LIMIT:.0f} s, {page.locator('#mode').inner_text()}"
+        assert monotonic() < deadline, f"{what}: not within {LIMIT:.0f} s, {page.locator('#stage').inner_text()}"
         page.wait_for_timeout(20)
 
 

@@ -1,6 +1,7 @@
 """The example scripts run, and the front door of the package is quick, typed, and refuses what cannot be done."""
 
 import inspect
+import json
 import re
 import shutil
 from pathlib import Path
@@ -95,6 +96,17 @@ def test_a_movement_is_shown_in_a_notebook(workshop: Path) -> None:
     assert re.fullmatch(r"<Moved to 10.0 deg: settled after \d\.\d\d s, rest error \d\.\d\d deg>", repr(moved))
     assert moved._repr_html_().startswith("<svg")
     assert moved.degrees.shape == (len(moved.time), 1)
+
+
+def test_its_agent_and_its_recording_are_exported(workshop: Path, tmp_path: Path) -> None:
+    for file, out in (("arm.agent", "agent.c"), ("arm.db", "arm.csv")):
+        done = python("-m", "pneumarm", "export", workshop / file, "--out", tmp_path / out, "--json")
+        assert done.returncode == 0, done.stderr
+    assert "void servo_act(" in (tmp_path / "agent.c").read_text()
+    assert json.loads(done.stdout)["mapping"] == str(tmp_path / "arm.toml")
+    for file, out, words in (("arm.sim", "sim.c", "method servo"), ("arm.db", "arm.xls", ".csv, .parquet")):
+        done = python("-m", "pneumarm", "export", workshop / file, "--out", tmp_path / out)
+        assert (done.returncode, words in done.stderr) == (2, True), done.stderr
 
 
 def test_examples_need_nothing_but_the_package(workshop: Path, tmp_path: Path) -> None:

@@ -26,6 +26,10 @@ COMMANDS = {
         "Import a recording made elsewhere.",
         "pneumarm import recording.csv arm.db --mapping examples/recordings/mpi_pam.toml",
     ),
+    "export": (
+        "Export a recording as CSV or Parquet, or an agent as C.",
+        "pneumarm export arm.agent --out agent.c",
+    ),
     "coverage": (
         "Say how much of the state space a store covers, and whether that is enough.",
         "pneumarm coverage arm.db",

@@ -1,0 +1,138 @@
+"""Export a store for other programs: CSV, which can be imported again, or Parquet.
+
+A row is a reading and the command that followed it, all in sensor units as they are stored: counts, counts/ms,
+m/s2, Celsius. Marked rows are left out, which leaves a gap in the times. Beside a CSV file lies the mapping with
+which ``pneumarm import`` reads it; whether a sequence began at rest is not in it.
+"""
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.errors import UnusableInput
+from pneumarm.files import as_toml, require_folder, write_text, written_whole
+from pneumarm.transitions.rows import Rows
+from pneumarm.transitions.store import Store
+
+FORMATS = (".csv", ".parquet")
+"""What can be written, by the end of the file's name."""
+_ANYTHING = (-1e9, 1e9)
+"""Range in the mapping: what was recorded has been checked."""
+
+
+class Exported(NamedTuple):
+    """What was exported."""
+
+    rows: int
+    sequences: int
+    mapping: str | None
+    """The file by which ``pneumarm import`` reads it again; None where it cannot."""
+
+
+def export_recording(store: Store, path: Path) -> Exported:
+    """Write the rows of ``store`` to ``path``, whole or not at all, in bounded memory.
+
+    Raises:
+        UnusableInput: the format is unknown or needs what is not installed, or ``path`` cannot be written.
+
+    """
+    require_folder(path)
+    if path.suffix not in FORMATS:
+        raise UnusableInput(f"{path}: a store is exported to a file whose name ends in {' or '.join(FORMATS)}")
+    sequences = set[int]()
+
+    def tables() -> Iterator[NDArray[np.float64]]:
+        for rows in store.blocks():
+            sequences.update(np.unique(rows.sequence).tolist())
+            yield _table(rows, store.further)
+
+    names = _names(store)
+    if path.suffix == ".parquet":
+        return Exported(_write_parquet(path, names, tables()), len(sequences), None)
+    written = _write_csv(path, names, tables())
+    mapping = path.with_suffix(".toml")
+    write_text(mapping, _mapping(store))
+    return Exported(written, len(sequences), str(mapping))
+
+
+def _names(store: Store) -> list[str]:
+    joints = [
+        f"joint_{joint}_{what}"
+        for joint in range(1, store.joints + 1)
+        for what in ("angle", "pressure_1", "pressure_2", "command_1", "command_2")
+    ]
+    return ["sequence", "time", *joints, *store.further]
+
+
+def _table(rows: Rows, further: Sequence[str]) -> NDArray[np.float64]:
+    """Return ``rows`` as a table with the columns of :func:`_names`; the last command of a sequence is 0."""
+    joints = np.concatenate([rows.angle[..., None], rows.pressure, np.nan_to_num(rows.command)], axis=2)
+    measured = [rows.measured[name] for name in further]
+    return np.column_stack([rows.sequence, rows.time, joints.reshape(len(rows), -1), *measured])
+
+
+def _write_csv(path: Path, names: list[str], tables: Iterator[NDArray[np.float64]]) -> int:
+    count = 0
+    with written_whole(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(names)
+        for table in tables:
+            writer.writerows([int(row[0]), *map(_number, row[1:])] for row in table.tolist())
+            count += len(table)
+    return count
+
+
+def _number(value: float) -> str:
+    """Return the shortest text of ``value`` that gives all of it back."""
+    return repr(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+
+
+def _write_parquet(path: Path, names: list[str], tables: Iterator[NDArray[np.float64]]) -> int:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError as error:
+        raise UnusableInput(f"{path}: Parquet needs pyarrow: pip install 'pneumarm[parquet]'") from error
+    types = [pyarrow.int64() if name == "sequence" else pyarrow.float64() for name in names]
+    schema = pyarrow.schema(list(zip(names, types, strict=True)))
+    count = 0
+    with written_whole(path) as temporary, parquet.ParquetWriter(temporary, schema) as writer:
+        for table in tables:
+            columns = [pyarrow.array(column, kind) for column, kind in zip(_typed(table), types, strict=True)]
+            writer.write_table(pyarrow.Table.from_arrays(columns, schema=schema))
+            count += len(table)
+    return count
+
+
+def _typed(table: NDArray[np.float64]) -> list[NDArray[Any]]:
+    return [table[:, 0].astype(np.int64), *np.ascontiguousarray(table[:, 1:].T)]
+
+
+def _mapping(store: Store) -> str:
+    """Return the mapping file by which ``pneumarm import`` reads the CSV file of ``store``."""
+    spec = asdict(store.spec)
+    arm = {name: value for name, value in spec.items() if name not in ("joints", "velocity_sensor", "sensors")}
+    lines = ["# How pneumarm import reads the CSV file of the same name.", 'sequence = "sequence"', 'time = "time"']
+    lines += [f'commands = "{"pulses" if store.valves else "continuous"}"', "", "[arm]"]
+    lines += [f"{name} = {as_toml(value)}" for name, value in arm.items() if value is not None]
+    for joint in range(1, store.joints + 1):
+        lines += ["", "[[joint]]"]
+        for what, unit in (("angle", "counts"), ("pressure_1", "counts"), ("pressure_2", "counts")):
+            lines.append(_column(what, {"column": f"joint_{joint}_{what}", "unit": unit, "range": _ANYTHING}))
+        for what in ("command_1", "command_2"):
+            lines.append(_column(what, {"column": f"joint_{joint}_{what}"}))
+        for name in store.further:
+            what = name.removeprefix(f"joint_{joint}_")
+            if what != name:
+                told = {"column": name} | ({"unit": "counts/ms"} if what == "velocity" else {})
+                lines.append(_column(what, told))
+    return "\n".join(lines) + "\n"
+
+
+def _column(what: str, told: dict[str, Any]) -> str:
+    return f"{what} = {as_toml(told)}"

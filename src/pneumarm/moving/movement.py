@@ -218,17 +218,20 @@ def track(
     watch: Watch | None = None,
     seen: Seen | None = None,
 ) -> Tracked:
-    """Move ``arm`` to where ``reference`` begins, then follow it for ``seconds``; see :func:`move` for the rest."""
+    """Move ``arm`` to where ``reference`` begins, then follow it for ``seconds``; see :func:`move` for the rest.
+
+    Where it is known ahead, it is known while the arm moves to its beginning, too.
+    """
     check_seconds(seconds)
     cycle = ControlCycle(guarded(arm))
     cycle.arm.make_ready()
     closed = np.zeros_like(cycle.arm.applied)
+    coming = replace(reference, at=lambda time: reference.at(max(time - lead_in, 0.0)))
+    controller.reset(reference.at(0.0))
+    controller.track(coming)
     if lead_in > 0:
-        begin = reference.at(0.0)
-        controller.reset(begin)
-        played(cycle, controller, lead_in, lambda time: begin, watch, seen)
+        played(cycle, controller, lead_in, coming.at, watch, seen)
     air = cycle.arm.air_used()
-    controller.track(reference)
     recorded = played(cycle, controller, seconds, reference.at, watch, seen)
     passed = recorded.time - recorded.time[0]
     wanted = np.array([reference.at(float(time)) for time in passed])

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 _ORDER = 3
 _MEMORY = 24  # differences that the weights are found from
 _FORGETTING = 0.8  # of a forecaster's error, in a step
-_JUDGED = 5  # steps ahead at which forecasters are judged
+_JUDGED = np.array([1, 5])  # steps ahead at which forecasters are judged: soon, and for longer
+_SURPRISE = 0.5  # error of all forecasters, in parts of the largest difference seen: a jump or a bend
 _RIDGE = 1e-6  # in parts of the largest difference squared
 _FASTEST = 1.5  # largest forecast difference, in parts of the largest one seen
 
@@ -28,23 +29,32 @@ class Forecast:
 
     def __init__(self) -> None:
         self._seen: deque[Array] = deque(maxlen=_MEMORY + _ORDER + 1)
-        self._ahead: deque[Array] = deque(maxlen=_JUDGED)
+        self._ahead: deque[Array] = deque(maxlen=int(_JUDGED.max()))
         self._errors = np.zeros(0)
 
     def see(self, value: ArrayLike) -> None:
         """Take in what is asked for now, shape (joints,)."""
         value = np.atleast_1d(np.asarray(value, np.float64))
+        if self._ahead and self._is_surprise(np.abs(self._ahead[-1][:, 0] - value).min(axis=0)):
+            self._seen = deque([self._seen[-1]], self._seen.maxlen)
         self._seen.append(value)
         if self._errors.size == 0:
             self._errors = np.array([[0.0], [1e-3], [2e-3]]) + np.zeros(value.size)  # the plainer, the rather
-        if len(self._ahead) == _JUDGED:
-            self._errors = _FORGETTING * self._errors + np.abs(self._ahead[0] - value)
-        self._ahead.append(self._all(np.array([_JUDGED]))[:, 0])
+        self._errors *= _FORGETTING
+        for place, steps in enumerate(_JUDGED):
+            if len(self._ahead) >= steps:
+                self._errors += np.abs(self._ahead[-steps][:, place] - value)
+        self._ahead.append(self._all(_JUDGED))
 
     def ahead(self, steps: NDArray[np.int64]) -> Array:
         """Return what will be asked for so many ``steps`` (previews,) from now, shape (previews, joints)."""
         best = self._errors.argmin(axis=0)
         return np.take_along_axis(self._all(steps), best[None, None], axis=0)[0]
+
+    def _is_surprise(self, error: Array) -> bool:
+        """Return whether a forecast's ``error`` (joints,) is one after which what was before says nothing."""
+        change = np.abs(np.diff(self._seen, axis=0))
+        return bool((error > _SURPRISE * change.max(axis=0, initial=0.0)).any())
 
     def _all(self, steps: NDArray[np.int64]) -> Array:
         """Return all forecasts, shape (forecasters, previews, joints)."""

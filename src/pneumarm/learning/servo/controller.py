@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.errors import UnusableInput
+from pneumarm.learning.servo.correction import Correction, features_of
 from pneumarm.task.forecast import Forecast
 from pneumarm.task.tracker import StateTracker
 
@@ -25,6 +26,7 @@ _FORGOTTEN = 0.8  # share of what is due that is left after a period with closed
 _LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest end it
 _BIASED = 4.0  # most tolerances that the integral adds to what is asked for
 _NEAR = 4.0  # tolerances within which an arm can be nearly at rest
+_TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving reference are learned from
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
@@ -41,9 +43,11 @@ class ServoController:
     def __init__(self, agent: ServoAgent) -> None:
         spec, wanted = agent.spec, agent.settings
         self.spec, self.goal_range = spec, agent.goal_range
+        self._middle = agent.goal_range.mean(axis=1)
         self._actor = agent.actor()
         self._tracker = StateTracker(agent.window, agent.scaling)
         tolerance = wanted.tolerance * spec.counts_per_degree * (1.0 if spec.pulses else _COARSE)
+        self._tolerance = tolerance
         self._quiet_below, self._alert_above = wanted.quiet * tolerance, wanted.alert * tolerance
         self._near, self._still, self._most = _NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
         self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(4, round(_LOOK / spec.period)))
@@ -65,6 +69,8 @@ class ServoController:
         """Follow ``reference``, which begins at the time of the next reading, from whatever the arm is doing."""
         self._reference, self._begin = reference, None
         self._forecast = Forecast()
+        self._before: NDArray[np.float64] | None = None
+        self._correction = Correction(self.spec.joints, _TAUGHT_BY * self._tolerance)
         for rest in self._rest:
             rest.leave()
 
@@ -81,9 +87,14 @@ class ServoController:
             self._begin = reading.time
         state = self._tracker.reading(reading)
         self._angles.append(np.asarray(reading.angle, np.float64))
-        now, preview = self._preview(reading.time - self._begin)
-        acts = self._which_act(now, preview)
-        bias = np.array([rest.bias for rest in self._rest])
+        path = self._path(reading.time - self._begin)
+        moves = np.ptp(path, axis=0) > 0
+        steps = self._actor.task.inputs.steps
+        preview = path[1 + steps]
+        acts = self._which_act(path[1], ~moves)
+        features = features_of(path, self._middle)
+        self._correction.learn(np.where(moves, path[1] - reading.angle, 0.0), features[0])
+        bias = np.where(moves, self._correction.of(features[steps]), [rest.bias for rest in self._rest])
         command = self._actor.pulses(state, preview + bias)
         command[~acts] = 0.0
         if self._spread is not None:
@@ -91,21 +102,28 @@ class ServoController:
         self._tracker.commanded(command)
         return command
 
-    def _preview(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what is asked for now (joints,) and ahead (previews, joints) [counts]."""
+    def _path(self, time: float) -> NDArray[np.float64]:
+        """Return what was asked for a period ago, is now, and will be in each to come that matters, (n, joints)."""
         assert self._reference is not None
-        now, steps = self._reference.at(time), self._actor.task.inputs.steps
+        ahead = np.arange(1, 2 + int(self._actor.task.inputs.steps.max()))
+        now = self._reference.at(time)
         if self._reference.known_ahead:
-            return now, np.array([self._reference.at(time + k * self.spec.period) for k in steps])
-        self._forecast.see(now)
-        return now, self._forecast.ahead(steps)
+            coming = np.array([self._reference.at(time + k * self.spec.period) for k in ahead])
+        else:
+            self._forecast.see(now)
+            coming = self._forecast.ahead(ahead)
+        before, self._before = now if self._before is None else self._before, now
+        return np.concatenate([[before, now], coming])
 
-    def _which_act(self, now: NDArray[np.float64], preview: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which joints (joints,) may open valves now, and note which are nearly at rest."""
+    def _which_act(self, now: NDArray[np.float64], stays: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which joints (joints,) may open valves now, and note which are nearly at rest.
+
+        ``now`` is what is asked for, ``stays`` whether that will stay as it is, both (joints,).
+        """
         read = np.array(self._angles)
         error, half = now - read.mean(axis=0), len(read) // 2
         drift = np.abs(read[:half].mean(axis=0) - read[half:].mean(axis=0)) if half else np.full(now.size, np.inf)
-        known = (len(read) == self._angles.maxlen) & (np.ptp(preview, axis=0) == 0) & (preview[0] == now)
+        known = (len(read) == self._angles.maxlen) & stays
         acts = np.ones(now.size, bool)
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)

@@ -3,9 +3,12 @@
 Three forecasters run side by side, and that one is believed which has lately been nearest to what came:
 
     hold:            r_{k+p} = r_k
-    line:            r_{k+p} = r_k + p (r_k - r_{k-1})
+    swing:           differences d_{k+1} = w d_k - d_{k-1}, which continues a sinusoid about any middle, or a line
+                     (w = 2); w by ridge regression, towards that of a sinusoid of 1 Hz
     autoregression:  differences d_{k+1} = w_1 d_k + ... + w_m d_{k-m+1}, the weights by ridge regression over the
-                     last second or so, towards d_{k+1} = d_k; it continues sinusoids and smooth moves
+                     last second or so, towards d_{k+1} = d_k; it continues sums of sinusoids and smooth moves
+
+What was before a jump or a bend says nothing of what comes after it, and is forgotten.
 """
 
 from collections import deque
@@ -20,14 +23,17 @@ _MEMORY = 24  # differences that the weights are found from
 _FORGETTING = 0.8  # of a forecaster's error, in a step
 _JUDGED = np.array([1, 5])  # steps ahead at which forecasters are judged: soon, and for longer
 _SURPRISE = 0.5  # error of all forecasters, in parts of the largest difference seen: a jump or a bend
+_SWING = 0.7  # Hz, of which a reference is expected that has just begun to move
+_DOUBT = 0.02  # in the swing that is expected, in parts of the largest difference squared
 _RIDGE = 1e-6  # in parts of the largest difference squared
 _FASTEST = 1.5  # largest forecast difference, in parts of the largest one seen
 
 
 class Forecast:
-    """The forecast of one reference; ``see`` it once every control period."""
+    """The forecast of one reference; ``see`` it once every control ``period`` [s]."""
 
-    def __init__(self) -> None:
+    def __init__(self, period: float) -> None:
+        self._swing = 2 * np.cos(2 * np.pi * _SWING * period)
         self._seen: deque[Array] = deque(maxlen=_MEMORY + _ORDER + 1)
         self._ahead: deque[Array] = deque(maxlen=int(_JUDGED.max()))
         self._errors = np.zeros(0)
@@ -43,7 +49,7 @@ class Forecast:
         self._errors *= _FORGETTING
         for place, steps in enumerate(_JUDGED):
             if len(self._ahead) >= steps:
-                self._errors += np.abs(self._ahead[-steps][:, place] - value)
+                self._errors += np.abs(self._ahead[-steps][:, place] - value) / steps
         self._ahead.append(self._all(_JUDGED))
 
     def ahead(self, steps: NDArray[np.int64]) -> Array:
@@ -60,11 +66,23 @@ class Forecast:
         """Return all forecasts, shape (forecasters, previews, joints)."""
         seen = np.stack(self._seen)
         now = seen[-1]
-        slope = now - seen[-2] if len(seen) > 1 else np.zeros_like(now)
         hold = np.broadcast_to(now, (len(steps), now.size))
-        line = now + steps[:, None] * slope
+        swung = np.stack([self._swung(seen[:, j], steps) for j in range(now.size)], axis=1)
         continued = np.stack([_continued(seen[:, j], steps) for j in range(now.size)], axis=1)
-        return np.stack([hold, line, continued])
+        return np.stack([hold, swung, continued])
+
+    def _swung(self, seen: Array, steps: NDArray[np.int64]) -> Array:
+        """Return the forecast (previews,) of a swing from the numbers ``seen`` (n,)."""
+        change = np.diff(seen)
+        largest = np.abs(change).max(initial=0.0)
+        if largest == 0.0:
+            return np.full(len(steps), seen[-1])
+        change = change / largest
+        middle = change[1:-1]
+        weight = _DOUBT * self._swing + (middle * (change[2:] + change[:-2])).sum()
+        weight = float(np.clip(weight / (_DOUBT + (middle**2).sum()), -2.0, 2.0))
+        latest = change[[-1, max(-2, -len(change))]]
+        return _stepped(seen[-1], latest, np.array([weight, -1.0]), largest, steps)
 
 
 def _continued(seen: Array, steps: NDArray[np.int64]) -> Array:
@@ -79,10 +97,15 @@ def _continued(seen: Array, steps: NDArray[np.int64]) -> Array:
     prior = np.eye(_ORDER)[0]
     normal = before.T @ before + _RIDGE * np.eye(_ORDER)
     weights = prior + np.linalg.solve(normal, before.T @ (change[_ORDER:] - before @ prior))
-    state, value, values = change[::-1][:_ORDER].copy(), seen[-1], []
+    return _stepped(seen[-1], change[::-1][:_ORDER], weights, largest, steps)
+
+
+def _stepped(now: float, latest: Array, weights: Array, unit: float, steps: NDArray[np.int64]) -> Array:
+    """Return what comes (previews,) after ``now`` where differences, the ``latest`` first, go on by ``weights``."""
+    state, value, values = latest.copy(), now, []
     for _ in range(int(steps.max())):
         following = float(np.clip(weights @ state, -_FASTEST, _FASTEST))
         state = np.concatenate([[following], state[:-1]])
-        value += following * largest
+        value += following * unit
         values.append(value)
     return np.array(values)[steps - 1]

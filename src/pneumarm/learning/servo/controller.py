@@ -18,14 +18,15 @@ from pneumarm.task.tracker import StateTracker
 if TYPE_CHECKING:
     from pneumarm.learning.servo.agent import ServoAgent
 
-_LOOK = 0.2  # s over which readings are averaged where the arm is nearly at rest
+_LOOK = 0.134  # s over which readings are averaged where the arm is nearly at rest
+_EASY = 0.3  # of the error that it may differ by besides
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
 _MOST = 0.8  # of a period for which a valve is due, for it to open for one
 _FORGOTTEN = 0.8  # share of what is due that is left after a period with closed valves
 _LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest end it
-_BIASED = 4.0  # most tolerances that the integral adds to what is asked for
-_NEAR = 4.0  # tolerances within which an arm can be nearly at rest
+_BIASED = 8.0  # most tolerances that the integral adds to what is asked for
+_NEAR = 8.0  # tolerances within which an arm can be nearly at rest
 _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving reference are learned from
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
@@ -68,7 +69,7 @@ class ServoController:
     def track(self, reference: Reference) -> None:
         """Follow ``reference``, which begins at the time of the next reading, from whatever the arm is doing."""
         self._reference, self._begin = reference, None
-        self._forecast = Forecast()
+        self._forecast = Forecast(self.spec.period)
         self._before: NDArray[np.float64] | None = None
         self._correction = Correction(self.spec.joints, _TAUGHT_BY * self._tolerance)
         for rest in self._rest:
@@ -127,7 +128,7 @@ class ServoController:
         acts = np.ones(now.size, bool)
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
-            if not known[j] or abs(error[j]) > far * self._near or drift[j] > fast * self._still:
+            if not known[j] or abs(error[j]) > far * self._near or drift[j] > fast * (self._still + _EASY * abs(error[j])):
                 rest.leave()
                 continue
             rest.calm = True

@@ -48,7 +48,7 @@ class ServoSettings(TaskSettings):
     """Noise of a reading in standard deviations of the one-step error, most of which is such noise."""
     quiet: float = 0.15
     """Mean error, in tolerances, below which a still arm with a constant goal is left alone with closed valves."""
-    alert: float = 0.4
+    alert: float = 0.25
     """Mean error, in tolerances, from which on it no longer is."""
     validation_movements: int = 400
     """Movements in simulation on which the best agent is chosen."""

@@ -72,6 +72,7 @@ class ServoController:
         self._forecast = Forecast(self.spec.period)
         self._before: NDArray[np.float64] | None = None
         self._correction = Correction(self.spec.joints, _TAUGHT_BY * self._tolerance)
+        self._pulse = np.zeros((self.spec.joints, 2))  # the last of each joint
         for rest in self._rest:
             rest.leave()
 
@@ -97,6 +98,7 @@ class ServoController:
         self._correction.learn(np.where(moves, path[1] - reading.angle, 0.0), features[0])
         bias = np.where(moves, self._correction.of(features[steps]), [rest.bias for rest in self._rest])
         command = self._actor.pulses(state, preview + bias)
+        self._pulse[acts] = command[acts]
         command[~acts] = 0.0
         if self._spread is not None:
             command = self._spread(command)
@@ -123,12 +125,13 @@ class ServoController:
         """
         read = np.array(self._angles)
         error, half = now - read.mean(axis=0), len(read) // 2
-        drift = np.abs(read[:half].mean(axis=0) - read[half:].mean(axis=0)) if half else np.full(now.size, np.inf)
+        drift = read[half:].mean(axis=0) - read[:half].mean(axis=0) if half else np.full(now.size, np.inf)
         known = (len(read) == self._angles.maxlen) & stays
-        acts = np.ones(now.size, bool)
+        acts, saturated = np.ones(now.size, bool), (np.abs(self._pulse) >= 1).any(axis=1)
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
-            if not known[j] or abs(error[j]) > far * self._near or drift[j] > fast * (self._still + _EASY * abs(error[j])):
+            easy = _EASY * abs(error[j])
+            if not known[j] or abs(error[j]) > far * self._near or abs(drift[j]) > fast * (self._still + easy):
                 rest.leave()
                 continue
             rest.calm = True
@@ -137,7 +140,8 @@ class ServoController:
             acts[j] = not rest.quiet and rest.look == 0
             if acts[j]:
                 rest.look = len(read)
-                rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._most, self._most))
+                if not saturated[j]:
+                    rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._most, self._most))
         return acts
 
 

@@ -39,10 +39,10 @@ def draw_references(
     references = np.broadcast_to(np.where(kind == _KINDS.index("near"), near, first), (steps, joints, n)).copy()
 
     frequency = np.exp(random.uniform(np.log(_FREQUENCIES[0]), np.log(_FREQUENCIES[1]), (joints, n)))
-    room = np.minimum(first - low, high - first)
-    amplitude = np.minimum(room * random.random((joints, n)), fastest[:, None] / (2 * np.pi * frequency))
+    amplitude = np.minimum(span / 2 * random.random((joints, n)), fastest[:, None] / (2 * np.pi * frequency))
+    middle = low + amplitude + (span - 2 * amplitude) * random.random((joints, n))
     phase = 2 * np.pi * random.random((joints, n))
-    swinging = first + amplitude * np.sin(2 * np.pi * frequency * time + phase)
+    swinging = middle + amplitude * np.sin(2 * np.pi * frequency * time + phase)
 
     begin, takes = random.uniform(0, 0.5, (joints, n)), random.uniform(*_MOVES, (joints, n))
     s = np.clip((time - begin) / takes, 0.0, 1.0)

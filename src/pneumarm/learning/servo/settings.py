@@ -16,7 +16,7 @@ class ServoSettings(TaskSettings):
 
     agents: int = 2
     """Agents trained at once from different weights, of which the best is kept; one a core takes no longer."""
-    updates: int = 800
+    updates: int = 1000
     """How often movements are made and learned from."""
     arms: int = 96
     """Simulated arms that move at once."""

@@ -10,7 +10,7 @@ STEPS = np.array([1, 3, 6, 10])
 
 def worst(reference, first: int, last: int) -> float:
     """Return the largest error of forecasts made from step ``first`` to ``last``."""
-    forecast, errors = Forecast(), []
+    forecast, errors = Forecast(1 / 30), []
     for k in range(last):
         forecast.see(reference(k))
         if k >= first:
@@ -37,12 +37,20 @@ def test_a_ramp_goes_on():
     assert worst(lambda k: np.array([3.0 * k]), 10, 60) < 1e-6
 
 
+@pytest.mark.parametrize("frequency", [0.25, 0.5, 1.0, 2.0])
+def test_a_sinusoid_that_has_just_begun_is_known_after_four_readings(frequency: float):
+    def begins(k: int) -> np.ndarray:
+        return np.array([512 + 200 * np.sin(2 * np.pi * frequency / 30 * max(k - 40, 0))])
+
+    assert worst(begins, 44, 120) < 0.15 * 200
+
+
 def test_after_a_jump_it_is_right_again_soon():
     assert worst(lambda k: np.array([100.0 if k < 50 else 400.0]), 60, 100) < 1.0
 
 
 def test_it_stays_finite_whatever_is_asked_for():
-    random, forecast = np.random.default_rng(0), Forecast()
+    random, forecast = np.random.default_rng(0), Forecast(1 / 30)
     for _ in range(300):
         forecast.see(random.choice([0.0, 1000.0, 512.0], size=2) + random.normal(0, 5, 2))
         assert np.abs(forecast.ahead(STEPS)).max() < 2e4

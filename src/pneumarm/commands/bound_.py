@@ -8,16 +8,29 @@ from pneumarm.arm.virtual import VirtualArm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, show, table
 from pneumarm.errors import UnusableInput
+from pneumarm.learning import load_agent
+from pneumarm.learning.servo import ServoAgent
 from pneumarm.planning.bound import BoundSettings, bound_results, measure_bound, measured_goal_range
+from pneumarm.planning.moving_bound import WAYS, MovingBoundSettings, Way, measure_moving_bound
 from pneumarm.simulation import Simulation
+
+_MEANINGS: dict[Way, str] = {
+    "arm": "agent on the arm",
+    "quiet": "on the arm without noise",
+    "physics": "the best there",
+    "simulation": "network in its simulation",
+    "simulated": "the best there",
+}
 
 
 def bound_(
     *,
     arm: str,
     sim: Path | None = None,
+    agent: Path | None = None,
     seed: int = 0,
     settings: Annotated[BoundSettings, Settings] = BoundSettings(),
+    moving: MovingBoundSettings = MovingBoundSettings(),
     json: Json = False,
 ) -> None:
     """Say what is possible on a virtual arm, by planning with its true physics.
@@ -29,6 +42,9 @@ def bound_(
     sim
         A simulation of this arm: goals are drawn from its range, and a third planner uses it. Without one, a short
         collection measures the range of goals.
+    agent
+        The file of an agent that settles, holds and tracks: then it is said what that could do at best, and whether
+        noise, the learner or the simulation's error keeps it from there.
     seed
         Of the begin states, the goals and the noise; those of ``pneumarm transfer`` with the same seed.
     """
@@ -36,6 +52,9 @@ def bound_(
     if not isinstance(opened, VirtualArm):
         opened.close()
         raise UnusableInput(f"arm {arm!r}: the bound needs a virtual arm, whose true physics are known")
+    if agent is not None:
+        _moving(opened, _servo(agent), moving, seed, json)
+        return
     simulation = None if sim is None else Simulation.load(sim)
     goal_range = measured_goal_range(opened, seed) if simulation is None else simulation.goal_range
     with progress("planning") as report:
@@ -55,3 +74,30 @@ def bound_(
 
     header = ("planner", *columns, "decision, median [ms]", "p99 [ms]")
     show(result, json, lambda: [table(header, rows(), f"{arm}, {settings.episodes} movements, 95 % intervals")])
+
+
+def _servo(file: Path) -> ServoAgent:
+    agent = load_agent(file)
+    if not isinstance(agent, ServoAgent):
+        raise UnusableInput(f"{file}: reaches goals only; give an agent that settles, holds and tracks")
+    return agent
+
+
+def _moving(arm: VirtualArm, agent: ServoAgent, settings: MovingBoundSettings, seed: int, json: bool) -> None:
+    with progress("making movements better") as report:
+        found = measure_moving_bound(arm, agent, settings, seed=seed, progress=report)
+    frequencies = [f"{frequency:g}" for frequency in settings.frequencies]
+
+    def rows() -> list[tuple[object, ...]]:
+        return [
+            (
+                _MEANINGS[way],
+                *(found["settle"][way][name] for name in ("settled", "median_seconds", "rest_error_deg")),
+                *(found["track"][way][frequency] for frequency in frequencies),
+            )
+            for way in WAYS
+        ]
+
+    header = ("", "settled", "median [s]", "at rest [deg]", *(f"{one} Hz, rms [deg]" for one in frequencies))
+    title = f"{arm.spec.name}: {settings.goals} goals, sinusoids of {settings.amplitude:g} degrees"
+    show({"arm": arm.spec.name, "moving": found}, json, lambda: [table(header, rows(), title)])

@@ -118,7 +118,7 @@ def measure_moving_bound(
 
 
 def _settling(errors: list[Array], period: float, last: int, tolerance: float) -> dict[str, float | None]:
-    """Return the figures of movements with ``errors`` (steps, joints) in tolerances, their readings a period apart."""
+    """Return the figures of movements with ``errors`` (steps, joints) in tolerances, one a period."""
     sizes = [np.abs(error).max(axis=1) for error in errors]
     outside = [np.flatnonzero(size > 1) for size in sizes]
     steps = [int(one[-1]) + 1 if len(one) else 0 for one in outside]
@@ -139,7 +139,9 @@ def _movements(goals: list[Reference], wave: Any, settings: MovingBoundSettings)
         yield wave(frequency), settings.seconds, settings.hold
 
 
-def _on_arm(arm: VirtualArm, agent: ServoAgent, goals: list[Reference], wave: Any, settings: MovingBoundSettings) -> Any:
+def _on_arm(
+    arm: VirtualArm, agent: ServoAgent, goals: list[Reference], wave: Any, settings: MovingBoundSettings
+) -> Any:
     """Yield the errors (steps, joints) [counts] of the agent on ``arm``."""
     cycle, controller = ControlCycle(guarded(arm)), agent.controller()
     for reference, seconds, before in _movements(goals, wave, settings):

@@ -39,7 +39,7 @@ class Wanted(NamedTuple):
 
 @kernel
 def cost_of_reading(wanted, angle, step):  # type: ignore[no-untyped-def]
-    """Return what the ``angle`` (joints,) after the command ``step`` costs, see :mod:`pneumarm.learning.servo.price`."""
+    """Return what the ``angle`` (joints,) after the command ``step`` costs, in the prices that a servo learns by."""
     total = 0.0
     for j in range(angle.shape[0]):
         size = abs(angle[j] - wanted.reference[step, j]) / wanted.tolerance[j]
@@ -50,9 +50,9 @@ def cost_of_reading(wanted, angle, step):  # type: ignore[no-untyped-def]
 
 @kernel
 def play(world, states, wanted, plan, first, last, place, limit, command):  # type: ignore[no-untyped-def]
-    """Play ``plan`` (steps, joints, 2) from ``first`` to before ``last`` in the state ``place``; return what it costs.
+    """Play ``plan`` (steps, joints, 2) from ``first`` to before ``last`` in the state ``place``; return the cost.
 
-    Stops where it costs ``limit`` or more. ``command`` (joints, 2) is workspace.
+    Stops where that is ``limit`` or more. ``command`` (joints, 2) is workspace.
     """
     total = 0.0
     for step in range(first, last):
@@ -79,7 +79,7 @@ def keep_states(world, states, wanted, plan, first, command):  # type: ignore[no
 
 @kernel
 def best_change(world, states, wanted, plan, first, changes, command):  # type: ignore[no-untyped-def]
-    """Put the best of the ``changes`` (n, width, joints, 2) of ``plan`` from ``first`` on into it; return what it gains.
+    """Put the best of ``changes`` (n, width, joints, 2) into ``plan`` from ``first`` on; return what it gains.
 
     The last place of ``states`` is workspace.
     """

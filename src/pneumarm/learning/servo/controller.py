@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from pneumarm.learning.servo.agent import ServoAgent
 
 _LOOK = 0.134  # s over which readings are averaged where the arm is nearly at rest
-_EASY = 0.3  # of the error that it may differ by besides
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
+_SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
 _MOST = 0.8  # of a period for which a valve is due, for it to open for one
 _FORGOTTEN = 0.8  # share of what is due that is left after a period with closed valves
@@ -51,7 +51,8 @@ class ServoController:
         self._tolerance = tolerance
         self._quiet_below, self._alert_above = wanted.quiet * tolerance, wanted.alert * tolerance
         self._near, self._still, self._most = _NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
-        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(4, round(_LOOK / spec.period)))
+        self._look = max(4, round(_LOOK / spec.period))
+        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(4, round(_SLOWLY / spec.period)))
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
@@ -123,15 +124,17 @@ class ServoController:
 
         ``now`` is what is asked for, ``stays`` whether that will stay as it is, both (joints,).
         """
-        read = np.array(self._angles)
-        error, half = now - read.mean(axis=0), len(read) // 2
-        drift = read[half:].mean(axis=0) - read[:half].mean(axis=0) if half else np.full(now.size, np.inf)
-        known = (len(read) == self._angles.maxlen) & stays
-        acts, saturated = np.ones(now.size, bool), (np.abs(self._pulse) >= 1).any(axis=1)
+        longer = np.array(self._angles)
+        read = longer[-self._look :]
+        error, half = now - read.mean(axis=0), self._look // 2
+        drift = np.abs(read[-half:].mean(axis=0) - read[:half].mean(axis=0))
+        known = (len(read) == self._look) & stays
+        slow = (len(longer) == self._angles.maxlen) & (np.ptp(longer, axis=0) < self._still + _EASY * np.abs(error))
+        acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
-            easy = _EASY * abs(error[j])
-            if not known[j] or abs(error[j]) > far * self._near or abs(drift[j]) > fast * (self._still + easy):
+            still = drift[j] <= fast * self._still or slow[j]
+            if not known[j] or abs(error[j]) > far * self._near or not still:
                 rest.leave()
                 continue
             rest.calm = True
@@ -139,7 +142,7 @@ class ServoController:
             rest.look = max(rest.look - 1, 0)
             acts[j] = not rest.quiet and rest.look == 0
             if acts[j]:
-                rest.look = len(read)
+                rest.look = self._look
                 if not saturated[j]:
                     rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._most, self._most))
         return acts

@@ -4,10 +4,10 @@ The correction of a reference r is linear in what r does at that time,
 
     w(t) = c . phi(t),   phi = (1, r - m, r'),   c_i <- c_i + mu e phi_i / max over the last while of phi_i^2
 
-with e = r - theta the error now and m the middle of the goals (least mean squares with a step for each feature; B. Widrow and S. D. Stearns, Adaptive
-Signal Processing, 1985). Since w is a function of r it is known as far ahead as r is: what the joint lags behind, falls
-short or goes beyond is put right in time, in amplitude and in phase, whether it is friction, hysteresis or a bias
-of the simulation. For a constant r it is integral action.
+with e = r - theta the error now and m the middle of the goals (least mean squares with a step for each feature;
+B. Widrow and S. D. Stearns, Adaptive Signal Processing, 1985). Since w is a function of r it is known as far ahead as
+r is: what the joint lags behind, falls short or goes beyond is put right in time, in amplitude and in phase, whether
+it is friction, hysteresis or a bias of the simulation. For a constant r it is integral action.
 """
 
 import numpy as np
@@ -48,6 +48,6 @@ class Correction:
 
 
 def features_of(path: Array, middle: Array) -> Array:
-    """Return the features (n, joints, 3) of a reference whose ``path`` (n + 2, joints) begins and ends a step away."""
+    """Return the features (n, joints, 3) of a reference with a ``path`` (n + 2, joints) from a step earlier."""
     slope = (path[2:] - path[:-2]) / 2
     return np.stack([np.ones_like(slope), path[1:-1] - middle, slope], axis=-1)

@@ -1,0 +1,62 @@
+"""Corrections of a moving reference: what is missed again and again is learned, what is missed by far is not."""
+
+import numpy as np
+import pytest
+
+from pneumarm.learning.servo.correction import Correction, features_of
+
+MIDDLE = np.array([500.0])
+PERIOD = 1 / 30
+
+
+def followed(plant, reference, steps: int = 600) -> np.ndarray:
+    """Return the errors (steps,) of a joint that ``plant`` moves from what it is asked for and the step."""
+    correction, errors = Correction(1, 25.0), []
+    for k in range(steps):
+        path = np.array([[reference(k + ahead)] for ahead in (-1, 0, 1)])
+        features = features_of(path, MIDDLE)
+        asked = reference(k) + correction.of(features)[0, 0]
+        errors.append(reference(k) - plant(asked, k))
+        correction.learn(np.array([errors[-1]]), features[0])
+    return np.abs(errors)
+
+
+def wave(frequency: float, amplitude: float = 100.0):
+    return lambda k: 500 + amplitude * np.sin(2 * np.pi * frequency * PERIOD * k)
+
+
+@pytest.mark.parametrize("frequency", [0.1, 0.5, 1.0, 2.0])
+def test_a_bias_a_gain_and_a_lag_are_learned(frequency: float) -> None:
+    reference = wave(frequency)
+
+    def plant(asked: float, k: int) -> float:
+        slope = reference(k) - reference(k - 1)
+        return asked - 8.0 - 0.05 * (reference(k) - 500) - 0.4 * slope
+
+    errors = followed(plant, reference)
+    assert errors[-100:].max() < 0.2 * errors[:30].max()
+
+
+def test_a_constant_reference_gets_integral_action() -> None:
+    errors = followed(lambda asked, k: asked - 10.0, lambda k: 620.0, 200)
+    assert errors[0] == pytest.approx(10.0)
+    assert errors[-1] < 0.1
+
+
+def test_errors_of_a_joint_on_its_way_teach_nothing() -> None:
+    correction = Correction(1, 25.0)
+    features = features_of(np.array([[500.0], [510.0], [520.0]]), MIDDLE)
+    for _ in range(50):
+        correction.learn(np.array([300.0]), features[0])
+    assert correction.of(features)[0, 0] == 0
+
+
+def test_what_was_learned_is_forgotten_where_it_may_be_what_is_wrong() -> None:
+    correction = Correction(1, 25.0)
+    features = features_of(np.array([[500.0], [510.0], [520.0]]), MIDDLE)
+    for _ in range(50):
+        correction.learn(np.array([20.0]), features[0])
+    assert correction.of(features)[0, 0] == pytest.approx(50.0)  # no more than twice the largest error that teaches
+    for _ in range(30):
+        correction.learn(np.array([300.0]), features[0])
+    assert correction.of(features)[0, 0] < 5

@@ -12,6 +12,7 @@ LONG = (
     "bound",
     "faults",
     "held_out",
+    "holding",
     "live",
     "minutes",
     "moving",

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 
@@ -40,9 +40,10 @@ from pneumarm.records import demonstrate, marked_record, moving_record, training
 from pneumarm.report import save_demonstration, save_spec, write_report
 from pneumarm.report.run_report import TEST
 from pneumarm.settings import Valid
-from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
+from pneumarm.simulation.enough import Enough, EnoughSettings, collect_enough
 from pneumarm.task import BeginStates, begin_states, read_episodes, write_episodes
-from pneumarm.transitions import KINDS, CollectSettings, Store, collect, enough
+from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, Store, collect, enough
 
 SETTINGS = "settings.json"
 Progress = Callable[[str], AbstractContextManager[Report]]
@@ -64,20 +65,28 @@ class RunSettings(LearnSettings):
     """Of everything that is drawn at random."""
     joints: int | None = None
     """Joints that the arm has, for an arm that is to be refused with others; the arm knows."""
-    transitions: int = 200_000
-    """How many to collect (thesis section 3.2.2: 200,000, two hours)."""
+    transitions: int | None = None
+    """How many to collect (thesis section 3.2.2: 200,000, two hours); by default until more would not help."""
+    enough: EnoughSettings = field(default_factory=EnoughSettings)
+    """When more would not help."""
     test_episodes: int = 10_000
     """Movements of the test in simulation (thesis section 5.2)."""
     bound_episodes: int = 150
     """Movements planned with the true physics, which say what can be achieved; 0 for none. Virtual arms only."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
-    transfer: TransferSettings = field(default_factory=TransferSettings)
+    transfer: TransferSettings = field(default_factory=lambda: TransferSettings(episodes=30, test_episodes=15))
     moving: MoveTrialSettings = field(default_factory=MoveTrialSettings)
+
+    def of_the_thesis(self) -> Self:
+        """Return the settings with the thesis' sizes in place of those that are left as they are by default."""
+        usual = type(self)()
+        transfer = TransferSettings() if self.transfer == usual.transfer else self.transfer
+        return replace(self, transitions=self.transitions or 200_000, transfer=transfer)
 
     def _valid(self) -> Valid:
         return {
-            "transitions": enough(self.transitions),
+            "transitions": self.transitions is None or enough(self.transitions),
             "test_episodes": self.test_episodes >= 1 or "1 or more",
             "bound_episodes": self.bound_episodes >= 0 or "0 or more",
         }
@@ -106,6 +115,7 @@ class Run:
         self.agent = folder / "agent.safetensors"
         self.adapted = folder / "adapted.safetensors"
         self.episodes = folder / "episodes.csv"
+        self._fitted: StoreFit | None = None  # where collecting has fitted all that there is
         self._claim()
 
     def _claim(self) -> None:
@@ -169,16 +179,28 @@ class Run:
             Store.for_arm(self.store, arm.spec) as store,
         ):
             watch = Monitor(arm.spec)
-            collected = collect(
-                arm, store, wanted.transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
-            )
+
+            def record(transitions: int) -> CollectResult:
+                return collect(
+                    arm, store, transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
+                )
+
+            found: Enough | None = None
+            if wanted.transitions is None:
+                found, self._fitted = collect_enough(record, store, self._fit_settings, wanted.enough)
+            collected = record(wanted.transitions or FEWEST_TRANSITIONS)
             save_spec(self.folder, arm.spec)
             marked_record(store).save(self.folder)
-        return {"collect": collected_results(collected, watch)}
+        decided = {} if found is None else {"enough": found.results()}
+        return {"collect": collected_results(collected, watch) | decided}
+
+    @property
+    def _fit_settings(self) -> FitSettings:
+        return replace(self.settings.fit, seed=self.settings.seed)
 
     def _fit(self) -> dict[str, Any]:
         with self.progress("fitting the simulation") as report, Store.open(self.store) as store:
-            fitted = fit_store(store, replace(self.settings.fit, seed=self.settings.seed), progress=report)
+            fitted = self._fitted or fit_store(store, self._fit_settings, progress=report)
             analysis = analyse(store, fitted.simulation, fitted.filtered)
         fitted.simulation.save(self.simulation)
         analysis.save(self.folder)

@@ -12,6 +12,7 @@ from pneumarm.arm.virtual import (
     Leak,
     LogarithmicPotentiometer,
     Payload,
+    Push,
     ReducerLeak,
     SensorNoise,
     StuckValve,
@@ -44,6 +45,7 @@ EACH = [
     ValveSideSensor(begin=1),
     Cold(begin=1),
     Payload(begin=1, mass=0.3),
+    Push(begin=1, end=1.2, torque=-0.3),
 ]
 
 
@@ -156,6 +158,20 @@ def test_a_sensor_at_the_valves_side_leaps_while_air_flows_and_settles_in_10_ms(
         arm.set_valves([[0, 0]])
         arm.wait(0.012 + 0.015)
     assert abs(leaping.read().pressure[0, 0] - sound.read().pressure[0, 0]) <= 4
+
+
+def test_a_push_moves_a_joint_for_as_long_as_it_lasts():
+    arm = VirtualArm(seed=1, faults=[Push(begin=5.0, end=5.2, torque=0.3)])
+    arm.set_valves([[1, 1]])
+    arm.wait(0.2)
+    arm.set_valves([[0, 0]])
+    arm.wait_until(4.9)
+    before = arm.read().angle[0]
+    arm.wait_until(5.2)
+    pushed = arm.read().angle[0]
+    arm.wait_until(8.0)
+    assert pushed - before > 3 * arm.spec.counts_per_degree
+    assert abs(arm.read().angle[0] - before) < 0.5 * (pushed - before)
 
 
 def test_faults_can_be_taken_away_and_leave_nothing_behind():

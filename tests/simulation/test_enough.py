@@ -1,11 +1,13 @@
 """Whether a recording is enough is judged by what its second half was good for."""
 
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.simulation.enough import Enough, enough_data
+from pneumarm.simulation.enough import Enough, EnoughSettings, collect_enough, enough_data
 from pneumarm.transitions import Store, collect
 
 
@@ -34,3 +36,24 @@ def test_the_verdict_says_what_was_gained() -> None:
     assert Enough(0.3).verdict == "collect as much again: the second half lowers the simulation's error by 30%"
     assert Enough(0.04).verdict.endswith("lowers the simulation's error by 4%, less than 10%")
     assert Enough(-0.01).verdict.endswith("lowers the simulation's error not at all")
+
+
+def test_an_interrupted_collecting_ends_at_the_same_place(tmp_path: Path) -> None:
+    def ended(name: str, *limits: int) -> dict[str, Any]:
+        for limit in (*limits, 10**9):
+            with VirtualArm(seed=3) as arm, Store.for_arm(tmp_path / name, arm.spec) as store:
+
+                def record(wanted: int, arm: VirtualArm = arm, store: Store = store, limit: int = limit) -> None:
+                    if wanted > limit:
+                        raise InterruptedError
+                    collect(arm, store, wanted, 1)
+
+                with suppress(InterruptedError):
+                    found = collect_enough(record, store, EnoughSettings(growth=1.1, most=4500))
+                    assert store.transitions >= found["transitions"][-1]
+        return found
+
+    at_once = ended("at once.db")
+    assert at_once["transitions"][0] == 4000
+    assert ended("interrupted.db", 4000, 4100) == at_once
+    assert ended("interrupted.db") == at_once

@@ -8,7 +8,9 @@ from pneumarm.commands.common import Json, OwnMethod, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import Monitor, open_controller
 from pneumarm.control.condition import LINK, collected_results, complaints
-from pneumarm.transitions import CollectResult, CollectSettings, Store, collect, require_enough
+from pneumarm.simulation import FitSettings
+from pneumarm.simulation.enough import EnoughSettings, collect_enough
+from pneumarm.transitions import FEWEST_TRANSITIONS, CollectResult, CollectSettings, Store, collect, require_enough
 
 
 def collect_(
@@ -16,11 +18,12 @@ def collect_(
     db: Path,
     /,
     *,
-    transitions: int = 200_000,
+    transitions: int | None = None,
     seed: int = 0,
     controller: str = "random",
     method: OwnMethod = None,
     settings: Annotated[CollectSettings, Settings] = CollectSettings(),
+    enough: EnoughSettings = EnoughSettings(),
     json: Json = False,
 ) -> None:
     """Make an arm move about and record it, sequence after sequence; a second call goes on.
@@ -32,7 +35,8 @@ def collect_(
     db
         The store; created if it does not exist.
     transitions
-        How many to record in all (thesis section 3.2.2: 200,000, two hours).
+        How many to record in all (thesis section 3.2.2: 200,000, two hours); by default it goes on until more would
+        not make a simulation better.
     seed
         Seed of the random begin states and actions, and of a virtual arm's noise.
     controller
@@ -40,7 +44,8 @@ def collect_(
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
-    require_enough(transitions)
+    if transitions is not None:
+        require_enough(transitions)
     with (
         open_arm(arm, seed) as opened,
         open_controller(controller, opened, method) as player,
@@ -48,10 +53,18 @@ def collect_(
         progress("collecting") as report,
     ):
         watch = Monitor(opened.spec)
-        result = collect(
-            opened, store, transitions, seed, progress=report, settings=settings, controller=player, watch=watch
-        )
+
+        def record(wanted: int) -> CollectResult:
+            return collect(
+                opened, store, wanted, seed, progress=report, settings=settings, controller=player, watch=watch
+            )
+
+        found = None if transitions is not None else collect_enough(record, store, FitSettings(), enough)[0]
+        result = record(transitions or FEWEST_TRANSITIONS)
     results = collected_results(result, watch)
+    if found is not None:
+        results["enough"] = found.results()
+        say(found.words)
     for line in complaints(results, "collecting"):
         say(line)
     show(results, json, lambda: [table(("collected", ""), _rows(result, opened.spec))])

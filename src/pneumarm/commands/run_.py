@@ -1,7 +1,7 @@
 """``pneumarm run``."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -17,6 +17,7 @@ from pneumarm.run import Run, RunSettings
 def run_(
     *,
     out: Path = Path("pneumarm-run"),
+    preset: Literal["minutes", "thesis"] = "minutes",
     settings: Annotated[RunSettings, Settings] = RunSettings(),
     write_config: Path | None = None,
     json: Json = False,
@@ -29,14 +30,21 @@ def run_(
     ----------
     out
         Folder of the run; created if it does not exist.
+    preset
+        minutes needs some minutes of the arm's time; thesis takes the thesis' sizes, hours of it, for what no other
+        option says.
     write_config
         Write all settings, as they are given, with what each means into this TOML file and do nothing else; change
         there what you like and call `pneumarm run --config FILE`.
     """
+    if preset == "thesis":
+        settings = settings.of_the_thesis()
     if write_config is not None:
         _write_config(write_config, {"out": str(out), **msgspec.to_builtins(settings)})
         return
     results = Run(out, settings, progress).do()
+    if "enough" in results["collect"]:
+        say(results["collect"]["enough"]["verdict"])
     phases = {
         "in the simulation": results["test"],
         "on arrival": results["transfer"]["before"],

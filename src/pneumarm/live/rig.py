@@ -20,6 +20,7 @@ from pneumarm.live.picture import measures_of
 from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
 from pneumarm.run import RunSettings, settings_in
+from pneumarm.simulation.enough import EnoughSettings
 from pneumarm.transitions.watch import warm_up
 
 
@@ -144,7 +145,7 @@ class Rig:
             choices=[[one.name, one.version] for one in choices],
             in_use=self._in_use(),
             can_learn=self._can_learn(),
-            minutes=round(self.settings.transitions * spec.period / 60),
+            minutes=round((self.settings.transitions or EnoughSettings().most) * spec.period / 60),
             learning=None,
         )
         return Session(guarded(paced), mover, watch, self.screen, lambda: self.desk.silence)

@@ -6,12 +6,15 @@ Where all of a recording does hardly better than half of it, as much again will 
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.fit import FitResult, FitSettings, fit
 from pneumarm.transitions.choice import share_held_out
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
@@ -26,6 +29,8 @@ _HELD_OUT = 0.25
 _SETTINGS = FitSettings(epochs=15)
 """Of both fits: further epochs change both alike."""
 _FEWEST_SEQUENCES = 8
+_PURPOSE = "enough"
+"""The purpose of the runs that note a judgement in a store; no sequence belongs to them."""
 TOO_LITTLE = f"collect more: {2 * FEWEST_TRANSITIONS:,} transitions in {_FEWEST_SEQUENCES} sequences can be judged"
 """What to tell a person where there is too little to compare."""
 
@@ -49,6 +54,55 @@ class Enough:
             little = f"by {self.gain:.0%}, less than {_MUCH:.0%}" if self.gain > 0 else "not at all"
             return f"enough: the second half of the recording lowers the simulation's error {little}"
         return f"collect as much again: the second half lowers the simulation's error by {self.gain:.0%}"
+
+
+@dataclass(frozen=True)
+class EnoughSettings(Settings):
+    """When collecting ends by itself."""
+
+    first: int = 2 * FEWEST_TRANSITIONS
+    """Transitions after which it is first judged whether they are enough."""
+    growth: float = 1.5
+    """Factor by which the record grows from then on until it is judged again."""
+    most: int = 60_000
+    """Transitions at which collecting ends all the same."""
+
+    def _valid(self) -> Valid:
+        return {
+            "first": 2 * FEWEST_TRANSITIONS <= self.first <= self.most or f"{2 * FEWEST_TRANSITIONS:,} or more",
+            "growth": 1.1 <= self.growth <= 10 or "1.1 to 10",
+        }
+
+
+def collect_enough(
+    record: Callable[[int], object], store: Store, settings: EnoughSettings = EnoughSettings()
+) -> dict[str, Any]:
+    """Have ``record`` fill ``store`` up to a number of transitions, again and again, until they are enough.
+
+    Each judgement is noted in the store, so that a call that was interrupted goes on and ends as if it had not been.
+
+    Returns:
+        The numbers of ``transitions`` at which it was judged, by which part the second half had lowered the error
+        each time (``gain``), and the last ``verdict``, for ``results.json``.
+
+    """
+    note = asdict(settings)
+    runs = [run["settings"] for run in store.runs().values() if run["purpose"] == _PURPOSE]
+    noted = {run["transitions"]: run["gain"] for run in runs if all(run[name] == note[name] for name in note)}
+    sizes, gains, wanted = list[int](), list[float | None](), settings.first
+    while True:
+        record(wanted)
+        if wanted not in noted:
+            judged = enough_data(store)
+            noted[wanted] = None if judged is None else judged.gain
+            store.begin_run(_PURPOSE, {**note, "transitions": wanted, "gain": noted[wanted]})
+        sizes.append(wanted)
+        gains.append(noted[wanted])
+        found = None if gains[-1] is None else Enough(gains[-1])
+        if wanted >= settings.most or (found is not None and found.enough):
+            verdict = TOO_LITTLE if found is None else found.verdict
+            return {"transitions": sizes, "gain": gains, "verdict": verdict}
+        wanted = min(round(settings.growth * wanted), settings.most)
 
 
 def enough_data(store: Store) -> Enough | None:

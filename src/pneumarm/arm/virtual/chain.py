@@ -59,8 +59,8 @@ def about_joints(joints):  # type: ignore[no-untyped-def]
 
 @part
 def own_torque(c, angle):  # type: ignore[no-untyped-def]
-    """Return the torque [N m] of weight that a joint at ``angle`` [rad] carries as if alone."""
-    return -c.own_weight * math.sin(angle + c.tilt) if c.own_weight > 0.0 else 0.0
+    """Return the torque [N m] of weight on a joint at ``angle`` [rad]: of what pushes it, and of weight as if alone."""
+    return c.push - (c.own_weight * math.sin(angle + c.tilt) if c.own_weight > 0.0 else 0.0)
 
 
 @part

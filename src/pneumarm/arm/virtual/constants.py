@@ -48,6 +48,7 @@ JOINT_CONSTANTS = np.dtype(
             "weight",  # g h [N m]
             "own_inertia",  # what the mass matrix has besides where coupling is turned down [kg m2]
             "own_weight",  # and gravity [N m]
+            "push",  # torque of what pushes the joint [N m]
             "tilt",
             "stop_angle",
             "stop_stiffness",

@@ -303,6 +303,21 @@ class Payload(_JointFault, frozen=True, kw_only=True, tag="payload"):
         return frozenset([("weight", str(self.joint))])
 
 
+class Push(_JointFault, frozen=True, kw_only=True, tag="push"):
+    """Something that pushes a joint: a hand, an obstacle that gives way."""
+
+    torque: float = 0.3
+    """[N m], positive in the direction of growing angles."""
+
+    def _valid(self) -> Valid:
+        return {"torque": -1000 <= self.torque <= 1000}
+
+    @property
+    def parts(self) -> frozenset[Part]:
+        """What is pushed."""
+        return frozenset([("push", str(self.joint))])
+
+
 VIRTUAL_FAULTS = (
     StuckValve,
     SwappedValves,
@@ -318,6 +333,7 @@ VIRTUAL_FAULTS = (
     ValveSideSensor,
     Cold,
     Payload,
+    Push,
 )
 """What a virtual arm can play."""
 _BY_KIND: dict[str, type[Fault]] = {str(one.__struct_config__.tag): one for one in VIRTUAL_FAULTS}

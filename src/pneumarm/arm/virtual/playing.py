@@ -23,6 +23,7 @@ from pneumarm.arm.virtual.faults import (
     LogarithmicPotentiometer,
     Payload,
     Plan,
+    Push,
     ReducerLeak,
     SensorNoise,
     StuckValve,
@@ -182,6 +183,8 @@ class FaultPlayer:
                 case Payload():
                     distance = self._parameters.joints[fault.place].distance
                     hang(fixed, fault.place, distance, fault.mass, self._parameters.coupling)
+                case Push():
+                    fixed.joints["push"][fault.place] += fault.torque
                 case SupplyLoss():
                     left = max(0.0, 1 - (time - fault.begin) / fault.over) if fault.over else 0.0
                     low = min(fault.to * BAR + ATMOSPHERE, self._sound_supply)

@@ -59,7 +59,7 @@ def about_joints(joints):  # type: ignore[no-untyped-def]
 
 @part
 def own_torque(c, angle):  # type: ignore[no-untyped-def]
-    """Return the torque [N m] of weight on a joint at ``angle`` [rad]: of what pushes it, and of weight as if alone."""
+    """Return the torque [N m] of weight on a joint at ``angle`` [rad] of what pushes it, and its own weight."""
     return c.push - (c.own_weight * math.sin(angle + c.tilt) if c.own_weight > 0.0 else 0.0)
 
 

@@ -40,8 +40,8 @@ from pneumarm.records import demonstrate, marked_record, moving_record, training
 from pneumarm.report import save_demonstration, save_spec, write_report
 from pneumarm.report.run_report import TEST
 from pneumarm.settings import Valid
-from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
-from pneumarm.simulation.enough import Enough, EnoughSettings, collect_enough
+from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.simulation.enough import EnoughSettings, collect_enough
 from pneumarm.task import BeginStates, begin_states, read_episodes, write_episodes
 from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, Store, collect, enough
 
@@ -115,7 +115,6 @@ class Run:
         self.agent = folder / "agent.safetensors"
         self.adapted = folder / "adapted.safetensors"
         self.episodes = folder / "episodes.csv"
-        self._fitted: StoreFit | None = None  # where collecting has fitted all that there is
         self._claim()
 
     def _claim(self) -> None:
@@ -185,22 +184,17 @@ class Run:
                     arm, store, transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
                 )
 
-            found: Enough | None = None
+            decided = {}
             if wanted.transitions is None:
-                found, self._fitted = collect_enough(record, store, self._fit_settings, wanted.enough)
+                decided = {"enough": collect_enough(record, store, wanted.enough)}
             collected = record(wanted.transitions or FEWEST_TRANSITIONS)
             save_spec(self.folder, arm.spec)
             marked_record(store).save(self.folder)
-        decided = {} if found is None else {"enough": found.results()}
         return {"collect": collected_results(collected, watch) | decided}
-
-    @property
-    def _fit_settings(self) -> FitSettings:
-        return replace(self.settings.fit, seed=self.settings.seed)
 
     def _fit(self) -> dict[str, Any]:
         with self.progress("fitting the simulation") as report, Store.open(self.store) as store:
-            fitted = self._fitted or fit_store(store, self._fit_settings, progress=report)
+            fitted = fit_store(store, replace(self.settings.fit, seed=self.settings.seed), progress=report)
             analysis = analyse(store, fitted.simulation, fitted.filtered)
         fitted.simulation.save(self.simulation)
         analysis.save(self.folder)

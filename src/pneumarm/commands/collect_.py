@@ -8,7 +8,6 @@ from pneumarm.commands.common import Json, OwnMethod, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import Monitor, open_controller
 from pneumarm.control.condition import LINK, collected_results, complaints
-from pneumarm.simulation import FitSettings
 from pneumarm.simulation.enough import EnoughSettings, collect_enough
 from pneumarm.transitions import FEWEST_TRANSITIONS, CollectResult, CollectSettings, Store, collect, require_enough
 
@@ -59,12 +58,12 @@ def collect_(
                 opened, store, wanted, seed, progress=report, settings=settings, controller=player, watch=watch
             )
 
-        found = None if transitions is not None else collect_enough(record, store, FitSettings(), enough)[0]
+        judged = None if transitions is not None else collect_enough(record, store, enough)
         result = record(transitions or FEWEST_TRANSITIONS)
     results = collected_results(result, watch)
-    if found is not None:
-        results["enough"] = found.results()
-        say(found.words)
+    if judged is not None:
+        results["enough"] = judged
+        say(judged["verdict"])
     for line in complaints(results, "collecting"):
         say(line)
     show(results, json, lambda: [table(("collected", ""), _rows(result, opened.spec))])

@@ -29,7 +29,7 @@ GUARDED = {
     "arm/cycle.py": "takes a GuardedArm",
     "arm/serial/emulate.py": "warms up the arm of an emulated board, before anybody can reach it",
     "experiments/valves_closed/inflation.py": "guards its arm",
-    "gym/on_arm.py": "guards its arm",
+    "gym/turns.py": "guards its arm",
     "live/learning.py": "an arm, behind the guard like any other",
     "live/session.py": "guards its arm",
     "checkup/leaks.py": "takes a GuardedArm",

@@ -91,7 +91,7 @@ def test_all_alternatives_hold_computed_numbers_and_captions_name_the_thesis(htm
     for attrs in (attrs for tag, attrs in page.elements if tag == "img"):
         assert re.search(r"\d", attrs["alt"]), attrs["alt"]
         assert "nan" not in attrs["alt"]
-    captions = re.findall(r"<img[^>]*>\s*<figcaption[^>]*>(.*?)</figcaption>", html, re.DOTALL)
+    captions = re.findall(r"<img[^>]*>\s*</div>\s*<figcaption[^>]*>(.*?)</figcaption>", html, re.DOTALL)
     assert len(captions) == 19
     assert all("thesis" in caption for caption in captions)
 

@@ -237,6 +237,9 @@ class Stage:
     def spoiled_since(self) -> None:
         return None
 
+    def reasons(self) -> str:
+        return ""
+
     def get_state(self) -> bytes:
         return b""
 

@@ -21,6 +21,8 @@ from pneumarm.arm import Arm, open_arm
 from pneumarm.console import Report, jsonable, peak_memory
 from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper
 from pneumarm.control.condition import collected_results
+from pneumarm.control.monitor import Mode
+from pneumarm.control.transfer import monitor_of
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
 from pneumarm.learning import (
@@ -177,7 +179,7 @@ class Run:
             self._seen_by(open_arm_checked(wanted)) as arm,
             Store.for_arm(self.store, arm.spec) as store,
         ):
-            watch = Monitor(arm.spec)
+            watch = Monitor(arm.spec, mode=self.monitor)
 
             def record(transitions: int) -> CollectResult:
                 return collect(
@@ -231,14 +233,16 @@ class Run:
             self._seen_by(open_arm_checked(wanted)) as arm,
             Store.append_to(self.store) as store,
         ):
+            agent = load_agent(self.agent)
             moved = transfer(
-                load_agent(self.agent),
+                agent,
                 arm,
                 store,
                 wanted.transfer,
                 seed=wanted.seed,
                 progress=report,
                 keep_version=version_keeper(self.folder),
+                watch=monitor_of(agent, arm, self.monitor),
             )
             demonstrations = demonstrate(moved.agent, arm, wanted.seed)
             marked_record(store).save(self.folder)

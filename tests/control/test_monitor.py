@@ -156,13 +156,13 @@ def test_cries_wolf_at_most_once_in_ten_hours(tmp_path):
 
 
 def test_a_fault_that_ends_is_over():
-    arm = VirtualArm(draw_parameters(3), seed=2, faults=[SupplyLoss(begin=20.0, end=60.0)])
+    arm = VirtualArm(draw_parameters(3), seed=2, faults=[SupplyLoss(begin=60.0, end=100.0)])
     monitor = Monitor(arm.spec)
     for _ in watched_steps(arm, monitor, 2):
-        if arm.time > 120:
+        if arm.time > 160:
             break
     assert {one.kind for one in monitor.findings} == {"low-supply"}
-    assert all(20.0 < one.since < 70.0 for one in monitor.findings)
+    assert all(50.0 < one.since < 110.0 for one in monitor.findings)
     assert monitor.now == []
 
 

@@ -45,7 +45,7 @@ class Resettable(VirtualArm):
 
 
 def test_collecting_goes_on_after_the_clock_began_anew_and_marks_nothing_sound(tmp_path):
-    arm = Resettable(draw_parameters(3), seed=3, faults=[SupplyLoss(begin=20.0, end=30.0)])
+    arm = Resettable(draw_parameters(3), seed=3, faults=[SupplyLoss(begin=60.0, end=70.0)])
     arm.left = 2_000
     with Store.for_arm(tmp_path / "arm.db", arm.spec) as store:
         with pytest.raises(ArmFailure, match="its clock went back"):
@@ -60,7 +60,7 @@ def test_collecting_goes_on_after_the_clock_began_anew_and_marks_nothing_sound(t
 
 
 def test_what_is_wrong_when_the_clock_begins_anew_stays_wrong_and_is_told_on_both_clocks():
-    arm = VirtualArm(draw_parameters(3), seed=2, faults=[SupplyLoss(begin=20.0, end=70.0)])
+    arm = VirtualArm(draw_parameters(3), seed=2, faults=[SupplyLoss(begin=40.0, end=90.0)])
     turns, draw = iter(range(3_000)), np.random.default_rng(2)
 
     def decide(reading):
@@ -78,16 +78,16 @@ def test_what_is_wrong_when_the_clock_begins_anew_stays_wrong_and_is_told_on_bot
             monitor.see(reading, step.valves)
         return Recorded.from_steps([Step(r, s.valves) for r, s in zip(shifted, part, strict=True)], arm.spec)
 
-    seen(1.0, 45.0, 500.0)
+    seen(1.0, 65.0, 500.0)
     (old,) = monitor.now
     assert old.spoils
-    assert 519.0 - period < old.since < 530.0
+    assert 530.0 < old.since < 550.0
     state, monitor = monitor.get_state(), Monitor(arm.spec)
     monitor.set_state(state)
 
-    still = seen(45.0, 55.0, 2.0)
+    still = seen(65.0, 75.0, 2.0)
     ended, lasting = monitor.findings[-2:]
-    assert (ended.since, ended.until) == (old.since, pytest.approx(544.0, abs=2 * period))
+    assert (ended.since, ended.until) == (old.since, pytest.approx(564.0, abs=2 * period))
     assert (lasting.kind, lasting.until) == (old.kind, None)
     assert lasting.since == pytest.approx(2.0, abs=2 * period)
     assert monitor.now == [lasting]

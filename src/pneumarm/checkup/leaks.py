@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.guard import GuardedArm, guarded
 from pneumarm.arm.seam import Arm, Reading
-from pneumarm.control.monitor.expectation import ATMOSPHERE
 from pneumarm.errors import UnusableInput
 from pneumarm.settings import Settings, Valid
+
+ATMOSPHERE = 1.013
+"""Pressure of the surroundings [bar]."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import ArmSpec, open_arm
-from pneumarm.commands.common import Json, OwnMethod, Settings
+from pneumarm.commands.common import Json, Monitoring, OwnMethod, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import Monitor, open_controller
 from pneumarm.control.condition import LINK, collected_results, complaints
@@ -21,6 +21,7 @@ def collect_(
     seed: int = 0,
     controller: str = "random",
     method: OwnMethod = None,
+    monitor: Monitoring = "stop",
     settings: Annotated[CollectSettings, Settings] = CollectSettings(),
     enough: EnoughSettings = EnoughSettings(),
     json: Json = False,
@@ -51,7 +52,7 @@ def collect_(
         Store.for_arm(db, opened.spec) as store,
         progress("collecting") as report,
     ):
-        watch = Monitor(opened.spec)
+        watch = Monitor(opened.spec, mode=monitor)
 
         def record(wanted: int) -> CollectResult:
             return collect(

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from pneumarm.commands.common import COLUMNS, Json, Settings
+from pneumarm.commands.common import COLUMNS, Json, Monitoring, Settings
 from pneumarm.commands.config_file import as_config
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
@@ -18,6 +18,7 @@ def run_(
     *,
     out: Path = Path("pneumarm-run"),
     preset: Literal["minutes", "thesis"] = "minutes",
+    monitor: Monitoring = "stop",
     settings: Annotated[RunSettings, Settings] = RunSettings(),
     write_config: Path | None = None,
     json: Json = False,
@@ -42,7 +43,7 @@ def run_(
     if write_config is not None:
         _write_config(write_config, {"out": str(out), **msgspec.to_builtins(settings)})
         return
-    results = Run(out, settings, progress).do()
+    results = Run(out, settings, progress, monitor=monitor).do()
     if "enough" in results["collect"]:
         say(results["collect"]["enough"]["verdict"])
     phases = {

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import COLUMNS, Json, OwnMethod, Settings
+from pneumarm.commands.common import COLUMNS, Json, Monitoring, OwnMethod, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import progress, say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
@@ -19,6 +19,7 @@ def transfer_(
     seed: int = 0,
     out: Path = Path("pneumarm-transfer"),
     method: OwnMethod = None,
+    monitor: Monitoring = "stop",
     settings: Annotated[TransferSettings, Settings] = TransferSettings(),
     json: Json = False,
 ) -> None:
@@ -39,7 +40,7 @@ def transfer_(
     """
     trained = open_agent(agent, method)
     with open_arm(arm, seed) as opened, progress("moving on the arm") as report:
-        result = transfer_into(out, trained, opened, settings, seed=seed, progress=report)
+        result = transfer_into(out, trained, opened, settings, seed=seed, progress=report, monitor=monitor)
     say_history(out)
     for line in complaints(result, "moving"):
         say(line)

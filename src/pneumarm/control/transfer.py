@@ -14,7 +14,7 @@ from pneumarm.arm import Arm, ControlCycle, Controller, guarded
 from pneumarm.arm.counts import Counts
 from pneumarm.control.agent import AgentController, controller_of, warm_up
 from pneumarm.control.condition import Condition
-from pneumarm.control.monitor import Monitor
+from pneumarm.control.monitor import Mode, Monitor
 from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -138,6 +138,11 @@ def transfer(
     return Transfer(agent, arm, store, settings, seed, keep_version, watch).run(progress)
 
 
+def monitor_of(agent: AnyAgent, arm: Arm, mode: Mode = "stop") -> Monitor:
+    """Return the monitor of ``arm`` while ``agent`` moves it, judging by its simulation if it has one."""
+    return Monitor(arm.spec, agent.simulation if isinstance(agent, SimulationAgent) else None, mode=mode)
+
+
 class Transfer:
     """A transfer, see :func:`transfer`; where the store holds the begin of it, it goes on from there."""
 
@@ -161,7 +166,7 @@ class Transfer:
         self._learning: _Learning | None = None
         if isinstance(agent, Learns) and self._adapting is None:
             self._learning = _Learning(agent, settings.learning_rate, seed)
-        self._watch = watch or Monitor(arm.spec, agent.simulation if isinstance(agent, SimulationAgent) else None)
+        self._watch = watch or monitor_of(agent, arm)
         self._waiting: list[Recorded] = []
         self._broken: list[Recorded] = []
         self._resume()
@@ -394,11 +399,12 @@ def transfer_into(
     *,
     seed: int = 0,
     progress: Callable[[float, float], None] | None = None,
+    monitor: Mode = "stop",
 ) -> dict[str, Any]:
     """Transfer ``agent`` and leave ``episodes.csv``, ``transitions.db`` and the adapted agent in ``folder``.
 
     Of an agent that adapts between movements its versions and their history stay too, see
-    :mod:`~pneumarm.control.versions`.
+    :mod:`~pneumarm.control.versions`. ``monitor`` says what is done about faults that are found meanwhile.
 
     Raises:
         UnusableInput: the folder's parent is missing, or it holds another transfer.
@@ -409,7 +415,14 @@ def transfer_into(
     folder.mkdir(exist_ok=True)
     with Store.for_arm(folder / "transitions.db", arm.spec) as store:
         moved = transfer(
-            agent, arm, store, settings, seed=seed, progress=progress, keep_version=version_keeper(folder)
+            agent,
+            arm,
+            store,
+            settings,
+            seed=seed,
+            progress=progress,
+            keep_version=version_keeper(folder),
+            watch=monitor_of(agent, arm, monitor),
         )
     moved.agent.save(folder / "adapted.safetensors")
     save_history(folder, moved.adapted)

@@ -322,8 +322,9 @@ class _Collection:
         self._wrong = 0 if found is None else self._wrong + 1
         if found is not None and self._wrong >= MOST_SPOILED:
             raise ArmFailure(
-                f"{self._arm.spec.name}: {found[1]}, for {MOST_SPOILED} sequences now; nothing can be learned from "
-                "that: see to the arm and run the same command again"
+                f"{self._arm.spec.name}: {found[1]}, for {MOST_SPOILED} sequences now; nothing is learned of these: "
+                f"{watch.reasons()}. See to the arm and run the same command again; where nothing is wrong with it, "
+                "add --monitor warn, which tells of such things, marks no rows and does not stop (or off)"
             )
 
     def result(self, wall_seconds: float) -> CollectResult:

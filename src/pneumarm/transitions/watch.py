@@ -29,6 +29,9 @@ class Watch(Protocol):
     def spoiled_since(self) -> tuple[float, str] | None:
         """Return since when [s] something is wrong now, and what; None where nothing is."""
 
+    def reasons(self) -> str:
+        """Return what was seen of what is wrong now, and what it is judged against, in a sentence for people."""
+
     def get_state(self) -> bytes:
         """Return all that its future depends on."""
 

@@ -23,7 +23,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.velocity import derived_velocity
-from pneumarm.control.monitor.expectation import expect_by_rules, expect_by_simulation
+from pneumarm.control.monitor.expectation import expect_by_simulation
+from pneumarm.control.monitor.identification import (
+    EXPERIENCE,
+    expect_by_identification,
+    learn,
+    note_answers,
+    note_valves,
+    remember_look,
+    shift_slots,
+)
 from pneumarm.kernels import kernel, part
 
 _velocity = part(derived_velocity)
@@ -32,6 +41,7 @@ FREEDOM = 4.0
 """Degrees of freedom of the Student distribution of residuals."""
 ZONES = 32
 """Parts of the range of an angle by which residuals are kept."""
+_FAR = 2.5  # standard deviations of a pressure that is worth telling of
 _VISITS = 30.0  # residuals that the mean square of a zone is over, at most
 _LARGEST = 5.0  # a residual that counts in these figures
 
@@ -48,7 +58,7 @@ class Thresholds(NamedTuple):
     inflation: float
     """Standard deviations of the simulation's error on held-out sequences that count as one here."""
     full: float
-    """In a muscle over this pressure an open inlet tells nothing: the supply is not much higher [counts]."""
+    """In a muscle that is so full an open inlet tells nothing, as a part of ``Memory.full``."""
     empty: float
     """A muscle below this is empty; how much air it takes until its pressure rises is uncertain [counts]."""
     clear: float
@@ -68,9 +78,15 @@ class Thresholds(NamedTuple):
     high: float
     """Highest reading of an angle [counts]."""
     jump: float
-    """An angle that goes farther than this, and than twice the last movement, onto a rail has jumped [counts]."""
+    """An angle that goes farther than this, and than its usual movement, onto a rail has jumped [counts]."""
     acted: float
     """Change of a pressure that shows that valves act [counts]."""
+    frozen: float
+    """Equal angles in a row that may show a frozen potentiometer."""
+    edge: float
+    """An angle nearer than this to the farthest that was seen may be at an end stop [counts]."""
+    experience: float
+    """Readings after which it is known how an angle usually moves."""
 
 
 class Memory(NamedTuple):
@@ -82,7 +98,8 @@ class Memory(NamedTuple):
     """Valves chosen after them, shape (history, muscles)."""
     clock: NDArray[np.float64]
     """Time of the newest reading [s]; readings in a row; rows that a window needs; by how much larger residuals are
-    than usual: 1, or ``apart`` of an arm that has changed, of which a simulation proves less."""
+    than usual: 1, or ``apart`` of an arm that has changed, of which a simulation proves less; 1 while something is
+    wrong from which nothing may be learned; shape (5,)."""
     score: NDArray[np.float64]
     """S_h, shape (hypotheses,)."""
     since: NDArray[np.float64]
@@ -100,10 +117,27 @@ class Memory(NamedTuple):
     """By joint: readings of the same angle in a row; since when [s]; least and most pressures meanwhile; (j, 6)."""
     rail: NDArray[np.float64]
     """By joint: readings on a rail in a row; since when [s]; whether it jumped there, its last movement; (j, 4)."""
+    moved: NDArray[np.float64]
+    """By joint: readings; the largest change of a movement from one reading to the next, lowest and highest angle
+    [counts]; (j, 4)."""
+    stayed: NDArray[np.float64]
+    """By joint, away from the farthest angles and at them: readings there; the largest change of a pressure [counts]
+    during which the angle stayed equal for so long that it might have been frozen, and was not; (j, 2, 2)."""
     expected: NDArray[np.float64]
     """Pressures expected at the newest reading, shape (hypotheses, muscles) [counts]."""
     std: NDArray[np.float64]
-    """Their standard deviations, shape (muscles,) [counts]."""
+    """Standard deviations of those of a healthy arm, shape (muscles,) [counts]."""
+    doubt: NDArray[np.float64]
+    """Standard deviations of what is known of the others, shape (hypotheses, muscles) [counts]."""
+    base: NDArray[np.float64]
+    """The pressures that those expected follow on, shape (muscles,) [counts]."""
+    full: NDArray[np.float64]
+    """Pressures at which muscles are full, shape (muscles,) [counts]."""
+    surprise: NDArray[np.float64]
+    """The last pressure of each muscle that was far off: when [s], read, expected, its standard deviation [counts];
+    shape (muscles, 4)."""
+    trust: NDArray[np.float64]
+    """Part of the evidence of a reading that is new, shape (muscles,): an error that lasts proves little."""
     angle: NDArray[np.float64]
     """Angles expected of a healthy arm, shape (joints,) [counts]."""
 
@@ -113,7 +147,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
     return Memory(
         observed=np.zeros((history, joints, 4)),
         command=np.zeros((history, 2 * joints)),
-        clock=np.array([0.0, 0.0, 0.0, 1.0]),
+        clock=np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
         score=np.zeros(hypotheses),
         since=np.zeros(hypotheses),
         disagreement=np.zeros((joints, 3)),
@@ -122,18 +156,38 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
         zone=np.zeros((joints, ZONES, 2)),
         same=np.zeros((joints, 6)),
         rail=np.zeros((joints, 4)),
+        moved=np.tile([0.0, 0.0, np.inf, -np.inf], (joints, 1)),
+        stayed=np.zeros((joints, 2, 2)),
         expected=np.zeros((hypotheses, 2 * joints)),
         std=np.zeros(2 * joints),
+        doubt=np.zeros((hypotheses, 2 * joints)),
+        base=np.zeros(2 * joints),
+        full=np.zeros(2 * joints),
+        surprise=np.zeros((2 * joints, 4)),
+        trust=np.ones(2 * joints),
         angle=np.zeros(joints),
     )
 
 
 @kernel
-def see_by_rules(rules, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
-    """Weigh a reading without a simulation; the valves chosen after it go into ``memory.command[0]``."""
-    if memory.clock[1] >= 1.0:
-        expect_by_rules(rules, readings, memory, angle, memory.expected, memory.std)
-        weigh_hypotheses(thresholds, readings, memory, time, pressure)
+def see_by_identification(known, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
+    """Weigh a reading by what is known of the arm; the valves chosen after it go into ``memory.command[0]``."""
+    if memory.clock[1] < 1.0:
+        remember_look(known, angle, pressure, True)
+    else:
+        note_valves(known, memory.command[0])
+        known.clock[0] += 1.0
+    if known.clock[0] >= known.look[0]:
+        if known.clock[1] >= 0.0:
+            expect_by_identification(known, readings, memory, angle, pressure)
+            if known.clock[2] * known.look[1] >= EXPERIENCE:
+                weigh_hypotheses(thresholds, readings, memory, time, pressure)
+            if memory.clock[4] == 0.0:
+                for m in range(memory.std.shape[0]):
+                    learn(known, m, angle, pressure[m // 2, m % 2])
+            note_answers(known, pressure)
+        remember_look(known, angle, pressure, False)
+        shift_slots(known)
     look_at_potentiometers(thresholds, memory, time, angle, pressure)
     observe(memory, time, angle, pressure)
 
@@ -145,6 +199,7 @@ def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pres
         expect_by_simulation(predictor, readings, memory, memory.expected, memory.angle)
         for m in range(memory.std.shape[0]):
             memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2] * memory.clock[3]
+            memory.base[m], memory.full[m] = memory.observed[0, m // 2, 2 + m % 2], predictor.highest
         weigh_hypotheses(thresholds, readings, memory, time, pressure)
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
@@ -175,21 +230,28 @@ def surprise(error):  # type: ignore[no-untyped-def]
 def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ignore[no-untyped-def]
     """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis."""
     most = 0.0
+    for m in range(memory.std.shape[0]):
+        read = pressure[m // 2, m % 2]
+        if abs(read - memory.expected[0, m]) > _FAR * memory.std[m]:
+            last = memory.surprise[m]
+            last[0], last[1], last[2], last[3] = time, read, memory.expected[0, m], memory.std[m]
     for h in range(1, memory.score.shape[0]):
         evidence = 0.0
         for m in range(memory.std.shape[0]):
             difference = memory.expected[h, m] - memory.expected[0, m]
-            before, read = memory.observed[0, m // 2, 2 + m % 2], pressure[m // 2, m % 2]
+            before, read = memory.base[m], pressure[m // 2, m % 2]
             least = thresholds.telling * memory.std[m]
             if before < thresholds.empty and read < thresholds.empty:
                 least = max(least, thresholds.clear)
-            telling = abs(difference) > least and not (before > thresholds.full and memory.command[0, m] > 0.0)
+            full = before > thresholds.full * memory.full[m] and memory.command[0, m] > 0.0
+            telling = abs(difference) > least and not full
             if readings.leak[h, m] > 0.0:
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
             if telling:
-                std = math.sqrt(memory.std[m] ** 2 + (thresholds.unsure * difference) ** 2)
-                evidence += surprise((read - memory.expected[0, m]) / std)
-                evidence -= surprise((read - memory.expected[h, m]) / std)
+                unsure = thresholds.unsure * difference
+                std = math.sqrt(memory.std[m] ** 2 + unsure * unsure + memory.doubt[h, m] ** 2)
+                said = surprise((read - memory.expected[0, m]) / std) - surprise((read - memory.expected[h, m]) / std)
+                evidence += memory.trust[m] * said
         evidence = min(max(evidence, -thresholds.most), thresholds.most)
         if memory.score[h] <= 0.0 and evidence < 0.0:
             memory.since[h] = time
@@ -238,20 +300,22 @@ def place_residual(thresholds, memory, j, angle, error):  # type: ignore[no-unty
 def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
     """Count readings on a rail, and equal readings in a row, with what the pressures did meanwhile."""
     for j in range(angle.shape[0]):
-        before, rail, same = memory.observed[0, j, 0], memory.rail[j], memory.same[j]
+        before, rail, same, moved = memory.observed[0, j, 0], memory.rail[j], memory.same[j], memory.moved[j]
         fresh = memory.clock[1] < 1.0
         if not (angle[j] <= thresholds.low or angle[j] >= thresholds.high):
-            rail[0] = 0.0
-            rail[3] = 0.0 if fresh else angle[j] - before
+            movement = 0.0 if fresh else angle[j] - before
+            if not fresh and rail[0] == 0.0:
+                moved[1] = max(moved[1], abs(movement - rail[3]))
+            rail[0], rail[3] = 0.0, movement
         elif rail[0] == 0.0:
-            far = abs(angle[j] - before)
-            onward = (angle[j] - before) * rail[3] > 0.0
-            limit = thresholds.jump + (2.0 * abs(rail[3]) if onward else 0.0)
             rail[0], rail[1] = 1.0, time
-            rail[2] = 1.0 if not fresh and far > limit else 0.0
+            rail[2] = 1.0 if not fresh and has_jumped(thresholds, rail, moved, angle[j] - before) else 0.0
         else:
             rail[0] += 1.0
         if same[0] == 0.0 or angle[j] != before or rail[0] > 0.0:
+            if same[0] >= 0.5 * thresholds.frozen and rail[0] == 0.0:
+                stayed = memory.stayed[j, at_edge(thresholds, moved, before)]
+                stayed[1] = max(stayed[1], same[4] - same[2], same[5] - same[3])
             same[0], same[1] = 1.0, time
             same[2], same[4] = pressure[j, 0], pressure[j, 0]
             same[3], same[5] = pressure[j, 1], pressure[j, 1]
@@ -260,6 +324,26 @@ def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: 
             for side in range(2):
                 same[2 + side] = min(same[2 + side], pressure[j, side])
                 same[4 + side] = max(same[4 + side], pressure[j, side])
+        moved[0] += 1.0
+        if rail[0] == 0.0:
+            moved[2], moved[3] = min(moved[2], angle[j]), max(moved[3], angle[j])
+            memory.stayed[j, at_edge(thresholds, moved, angle[j]), 0] += 1.0
+
+
+@part
+def has_jumped(thresholds, rail, moved, movement):  # type: ignore[no-untyped-def]
+    """Return whether an angle went so far onto a rail by this ``movement`` [counts] as no joint of this arm turns."""
+    usual = 1.5 * moved[1] if moved[0] >= thresholds.experience else 3.0 * thresholds.jump
+    limit = max(thresholds.jump, usual)
+    if movement * rail[3] > 0.0:
+        limit += 2.0 * abs(rail[3])
+    return abs(movement) > limit
+
+
+@part
+def at_edge(thresholds, moved, angle):  # type: ignore[no-untyped-def]
+    """Return 1 for an ``angle`` that is among the farthest that were seen, as at an end stop, else 0."""
+    return 1 if angle - moved[2] < thresholds.edge or moved[3] - angle < thresholds.edge else 0
 
 
 @part

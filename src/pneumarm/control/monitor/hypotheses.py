@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from pneumarm.kernels import part
 
-LEAKING = 0.015
-"""Part of its pressure that a muscle with a large leak loses in a control period."""
+LEAKING = 0.45
+"""Rate at which a muscle with a large leak loses its pressure [1/s]."""
 HALF_SUPPLY = 0.5
-"""Pressure of a low supply [bar gauge]; the other one is gone."""
+"""A low supply as a part of the usual one; the other one is gone."""
 _WHOLE = math.inf  # the supply of a healthy arm
-_NEAR, _BACK = 0.35, 0.35  # bar below the supply in which the flow ceases; part of it that runs back above
+_NEAR, _BACK = 0.35, 0.35  # of the usual supply, over which the flow ceases; part of it that runs back above
 _TOLD = (-1.0, 0.0, 1.0)
 
 
@@ -46,9 +46,11 @@ class Readings(NamedTuple):
     table: NDArray[np.float64]
     """What is carried out for out, closed, in; shape (n, m, 3)."""
     leak: NDArray[np.float64]
-    """Part of its pressure that a muscle loses in a period besides, shape (n, m)."""
+    """Rate at which a muscle loses its pressure besides, shape (n, m) [1/s]."""
     supply: NDArray[np.float64]
-    """Pressure of the supply [bar gauge]; inf where it is what it should be, shape (n,)."""
+    """Pressure of the supply as a part of the usual; inf where it is what it should be, shape (n,)."""
+    as_told: NDArray[np.bool_]
+    """Whether a muscle takes and gives air as it is told, shape (n, m)."""
 
 
 def hypotheses(joints: int) -> tuple[list[Hypothesis], Readings]:
@@ -95,26 +97,57 @@ def hypotheses(joints: int) -> tuple[list[Hypothesis], Readings]:
     for first, second in combinations(range(muscles), 2):
         other = f"the valves are those of joint {second // 2 + 1}, muscle {second % 2 + 1}"
         add(Hypothesis("swapped-muscles", other, first // 2 + 1, first % 2 + 1), swap=(first, second))
-    return found, Readings(np.array(sources), np.array(tables), np.array(leaks), np.array(supplies))
+    source, table, leak, low = map(np.array, (sources, tables, leaks, supplies))
+    as_told = (source == np.arange(muscles)) & (table == _TOLD).all(axis=2) & np.isinf(low)[:, None]
+    return found, Readings(source, table, leak, low, as_told)
 
 
 @part
-def carried_out(readings, h, m, told, bar):  # type: ignore[no-untyped-def]
-    """Return what muscle ``m``, at a pressure of ``bar``, does under hypothesis ``h`` when ``told`` a command.
+def carried_out(readings, h, m, told, level):  # type: ignore[no-untyped-def]
+    """Return what muscle ``m`` at a ``level`` of the usual supply does under hypothesis ``h`` if ``told`` a command.
 
     During a pulse it does what it does when told to open, in the rest of the period what it does when told to close.
     """
     share = abs(told)
     done = share * readings.table[h, m, 2 if told > 0.0 else 0] + (1.0 - share) * readings.table[h, m, 1]
     if done > 0.0 and readings.supply[h] < math.inf:
-        done *= supplied(readings.supply[h], bar)
+        done *= supplied(readings.supply[h], level)
     return done
 
 
 @part
-def supplied(supply, bar):  # type: ignore[no-untyped-def]
+def supplied(supply, level):  # type: ignore[no-untyped-def]
     """Return what an open inlet lets in from a low ``supply``, as a part of the usual; negative where air runs back.
 
-    Choked flow falls with the absolute pressure before the valve; a straight line stands for the rest of ISO 6358.
+    Supply and the ``level`` of the muscle's pressure are parts of the usual supply, which is taken to be about 1 bar:
+    choked flow falls with the absolute pressure before the valve; a straight line stands for the rest of ISO 6358.
     """
-    return 0.5 * (1.0 + supply) * min(max((supply + 0.05 - bar) / _NEAR, -_BACK), 1.0)
+    return 0.5 * (1.0 + supply) * reached(supply, level)
+
+
+@part
+def reduced(supply, level):  # type: ignore[no-untyped-def]
+    """Return the same of a supply that has its ups and downs, of which a low one is to differ clearly."""
+    return max(supply, 0.15) * reached(supply, level)
+
+
+@part
+def reached(supply, level):  # type: ignore[no-untyped-def]
+    """Return how much of the choked flow from ``supply`` is left at a ``level``; negative where air runs back."""
+    return min(max((supply + 0.05 - level) / _NEAR, -_BACK), 1.0)
+
+
+@part
+def inflow(readings, h, m, told_in, told_out):  # type: ignore[no-untyped-def]
+    """Return for which part of a time muscle ``m`` takes air under hypothesis ``h``, told to for ``told_in``."""
+    table = readings.table[h, m]
+    closed = max(0.0, 1.0 - told_in - told_out)
+    return told_in * max(table[2], 0.0) + told_out * max(table[0], 0.0) + closed * max(table[1], 0.0)
+
+
+@part
+def outflow(readings, h, m, told_in, told_out):  # type: ignore[no-untyped-def]
+    """Return for which part of a time muscle ``m`` gives air under hypothesis ``h``; as :func:`inflow`."""
+    table = readings.table[h, m]
+    closed = max(0.0, 1.0 - told_in - told_out)
+    return -(told_in * min(table[2], 0.0) + told_out * min(table[0], 0.0) + closed * min(table[1], 0.0))

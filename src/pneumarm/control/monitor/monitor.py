@@ -2,8 +2,9 @@
 
 import json
 import math
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,160 +16,45 @@ from pneumarm.control.monitor.evidence import (
     Memory,
     Thresholds,
     new_memory,
-    see_by_rules,
+    see_by_identification,
     see_by_simulation,
 )
-from pneumarm.control.monitor.expectation import RuleParameters, RuleSettings, predictor, rule_parameters
+from pneumarm.control.monitor.expectation import Predictor, predictor
+from pneumarm.control.monitor.findings import CHANGES, DISAGREEMENTS, Finding, Key, marks_of
 from pneumarm.control.monitor.hypotheses import hypotheses
+from pneumarm.control.monitor.identification import (
+    EXPERIENCE,
+    LOOKS,
+    Identified,
+    forget_answers,
+    identified,
+    wrong_from_the_start,
+)
+from pneumarm.control.monitor.settings import Mode, MonitorSettings
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
-_DISAGREEMENTS = ("changed", "sensor-noise", "worn-potentiometer")
-"""Kinds of findings with which readings no longer agree with the simulation, so that it proves less of valves; from
-the least to the most special."""
-_CHANGES = (*_DISAGREEMENTS, "leak")
-"""Kinds of findings with which valves do as they are told: what is read is what arm and sensors are like now."""
-
-
-@dataclass(frozen=True)
-class MonitorSettings(Settings):
-    """How much evidence a monitor wants."""
-
-    alarm: float = 11.0
-    """Log-likelihood ratio from which on a fault of the valves or the air counts as found by a simulation."""
-    alarm_by_rules: float = 9.0
-    """... by the rules, which take more for possible and so give less evidence for the same."""
-    supply: float = 4.0
-    """Evidence that a low supply needs less: every inlet speaks for or against it, so by chance it has little.
-    Of a simulation only: what the rules do not know looks like a low supply."""
-    lead: float = 4.0
-    """By how much that of another fault must exceed it for what was found to be called by the name of the other."""
-    most: float = 5.0
-    """Evidence that a single reading gives at most."""
-    telling: float = 1.5
-    """Pressures expected with and without a fault that differ by fewer standard deviations tell nothing."""
-    inflation: float = 1.5
-    """Standard deviations of the simulation's error on held-out sequences that count as one."""
-    full: float = 0.75
-    """Part of the highest pressure over which an open inlet tells nothing: the supply is not much higher."""
-    empty: float = 0.04
-    """A muscle below this is empty, and how much air it takes until its pressure rises is uncertain [bar] ..."""
-    clear: float = 0.04
-    """... so that expected pressures which differ by less tell nothing [bar]."""
-    unsure: float = 0.2
-    """Standard deviation of a filling or emptying as a part of it."""
-    unsure_by_rules: float = 0.5
-    """... as the rules know it."""
-    calm: float = 20.0
-    """A joint slower than this hardly moves [degrees/s]; large leaks are looked for then."""
-    fast: float = 150.0
-    """Speed at which the simulation's errors are larger by the root of two than at rest [degrees/s]."""
-    apart: float = 2.5
-    """An arm has changed whose errors are so many times as large as usual."""
-    changed: float = 40.0
-    """Log-likelihood ratio from which on the arm counts as changed."""
-    alternating: float = 0.3
-    """Correlation of residuals with those before them under minus which they are noise of a sensor."""
-    worn: float = 6.0
-    """Mean square of the residuals from which on a part of a potentiometer's range counts as worn ..."""
-    sound: float = 1.0
-    """... while a quarter of all parts are below this; both in squares of the residuals that are usual."""
-    rail: int = 3
-    """Readings on a rail, after a jump there, that show a broken potentiometer."""
-    jump: float = 10.0
-    """Least angle that counts as a jump onto a rail [degrees]; more where the arm was moving there."""
-    frozen: int = 10
-    """Equal angles in a row, while the pressures change, that show a potentiometer which is frozen."""
-    acted: float = 0.10
-    """Change of a pressure that shows that valves act [bar]."""
-    rules: RuleSettings = field(default_factory=RuleSettings)
-    """What is taken for granted before there is a simulation."""
-
-    def _valid(self) -> Valid:
-        return {
-            "alarm": 0 < self.alarm < math.inf,
-            "alarm_by_rules": 0 < self.alarm_by_rules < math.inf,
-            "supply": 0 <= self.supply < self.alarm,
-            "lead": 0 <= self.lead < math.inf,
-            "most": 0 < self.most < math.inf,
-            "telling": 0 <= self.telling < math.inf,
-            "inflation": 0 < self.inflation < math.inf,
-            "full": 0 < self.full < math.inf,
-            "empty": 0 <= self.empty < math.inf,
-            "clear": 0 <= self.clear < math.inf,
-            "unsure": 0 <= self.unsure < math.inf,
-            "unsure_by_rules": 0 <= self.unsure_by_rules < math.inf,
-            "calm": 0 < self.calm < math.inf,
-            "fast": 0 < self.fast < math.inf,
-            "apart": 1 < self.apart < math.inf,
-            "changed": 0 < self.changed < math.inf,
-            "alternating": 0 < self.alternating < 1,
-            "worn": self.sound < self.worn < math.inf,
-            "sound": 0 < self.sound < math.inf,
-            "rail": self.rail >= 1,
-            "jump": 0 < self.jump < math.inf,
-            "frozen": self.frozen >= 2,
-            "acted": 0 < self.acted < math.inf,
-        }
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something that is wrong with an arm."""
-
-    kind: str
-    """As the faults of a virtual arm are called; ``low-supply``; ``changed`` where readings no longer agree with the
-    simulation, and neither noise of a sensor nor a worn potentiometer is the reason."""
-    detail: str
-    """What it is in words."""
-    joint: int | None
-    """Joint from 1; None where it is about the whole arm."""
-    muscle: int | None
-    """Muscle 1 or 2; None where it is about the joint or the whole arm."""
-    since: float
-    """When it began, as far as can be told [s]."""
-    noticed: float
-    """When it was found [s]."""
-    until: float | None = None
-    """When it was over [s]; None while it is not."""
-
-    @property
-    def spoils(self) -> bool:
-        """Whether nothing may be learned from what was read meanwhile.
-
-        An arm that has changed, or leaks, is still an arm: what it does then is what there is to learn.
-        """
-        return self.kind not in _CHANGES
-
-    def __str__(self) -> str:
-        place = "" if self.joint is None else f"joint {self.joint}"
-        place += "" if self.muscle is None else f", muscle {self.muscle}"
-        ended = "" if self.until is None else f" until {self.until:.1f} s"
-        return f"{self.kind}{': ' + place if place else ''} ({self.detail}) since {self.since:.1f} s{ended}"
-
-    def overlaps(self, begin: float, end: float) -> bool:
-        """Whether it was there at some time from ``begin`` to ``end`` [s]."""
-        return self.since <= end and (self.until is None or self.until >= begin)
-
-
+_LONG = 1 / 3  # s; equal angles for less show nothing
+_BEYOND = 2.5  # times the largest change at an equal angle; a larger one shows something
 _FEWEST = 10  # residuals of which a mean square is taken seriously
-_Key = tuple[str, str, int | None, int | None]
 
 
 class Monitor:
     """Watches an arm; a :class:`~pneumarm.transitions.Watch`.
 
     With a ``simulation`` of the arm valves, supply and large leaks are judged by what it expects, and an arm that
-    has changed is noticed. Without one, rules of thumb do the first three with less certainty (valves and supply
-    take longer, large leaks may not be found). Potentiometers on a rail or frozen are found by rules in both cases.
+    has changed is noticed. Without one the first three are judged by what the monitor itself learns of the arm while
+    it watches (:mod:`pneumarm.control.monitor.identification`), from twenty seconds on and the better the longer; and
+    it is noticed if pressures do what no sound arm's do. Potentiometers on a rail or frozen are found in both cases.
 
     Args:
         spec: the arm.
         simulation: of the arm; None before there is one.
         settings: how much evidence is wanted.
+        mode: ``stop`` marks what is spoiled, so that nothing is learned from it and collecting gives up on an arm
+            that stays broken; ``warn`` only finds; ``off`` sees nothing.
 
     Raises:
         UnusableInput: the simulation is one of another arm, or of continuous commands.
@@ -176,7 +62,11 @@ class Monitor:
     """
 
     def __init__(
-        self, spec: ArmSpec, simulation: Simulation | None = None, settings: MonitorSettings | None = None
+        self,
+        spec: ArmSpec,
+        simulation: Simulation | None = None,
+        settings: MonitorSettings | None = None,
+        mode: Mode = "stop",
     ) -> None:
         self.spec, self.settings = spec, settings or MonitorSettings()
         if simulation is not None and (simulation.window.joints != spec.joints or not simulation.valves):
@@ -184,20 +74,21 @@ class Monitor:
                 f"the simulation is of {simulation.window.joints} joint(s), the arm {spec.name} has {spec.joints} "
                 "and on/off valves; give the one that was fitted to this arm"
             )
+        self.mode = mode
         self.findings: list[Finding] = []
         """All that was found, in the order of being found."""
         self._earlier = 0  # so many findings are told on a clock of the arm that has ended
-        self._open: dict[_Key, int] = {}  # places in findings of what is not over
+        self._open: dict[Key, int] = {}  # places in findings of what is not over
         self._hypotheses, self._readings = hypotheses(spec.joints)
-        self._prior = np.array(
-            [self.settings.supply if one.kind == "low-supply" else 0.0 for one in self._hypotheses]
-        )
+        self._weighing = self.settings.by_identification if simulation is None else self.settings.by_simulation
+        self._prior = np.array([self._weighing.supply * (one.kind == "low-supply") for one in self._hypotheses])
         history = 2 if simulation is None else max(2, simulation.window.history)
         self._memory = new_memory(spec.joints, history, len(self._hypotheses))
         self._simulation = simulation
         self._thresholds = self._packed()
-        self._expects = rule_parameters(self.settings.rules, spec) if simulation is None else predictor(simulation)
-        self._see = see_by_rules if simulation is None else see_by_simulation
+        self._expects: Identified | Predictor = identified(spec) if simulation is None else predictor(simulation)
+        self._see = see_by_identification if simulation is None else see_by_simulation
+        self._from_the_start: dict[Key, float] = {}  # what no sound arm does
         self.begin(at_rest=True)
 
     def judge_by(self, simulation: Simulation) -> None:
@@ -219,22 +110,22 @@ class Monitor:
         self._measured[...] = measured_before
         memory = self._memory
         memory.disagreement[...] = memory.zone[...] = 0.0
-        memory.score[[one.kind in _CHANGES for one in self._hypotheses]] = 0.0
-        for key in [key for key in self._open if key[0] in _CHANGES]:
+        memory.score[[one.kind in CHANGES for one in self._hypotheses]] = 0.0
+        for key in [key for key in self._open if key[0] in CHANGES]:
             self._close(key, float(memory.clock[0]))
         memory.clock[3] = self._width()
 
     def _packed(self) -> Thresholds:
-        settings, spec = self.settings, self.spec
+        settings, spec, weighing = self.settings, self.spec, self._weighing
         return Thresholds(
             most=settings.most,
-            alarm=settings.alarm if self._simulation is not None else settings.alarm_by_rules,
-            telling=settings.telling,
+            alarm=weighing.alarm,
+            telling=weighing.telling,
             inflation=settings.inflation,
-            full=settings.full * spec.max_pressure_counts,
-            empty=settings.empty * spec.counts_per_bar,
-            clear=settings.clear * spec.counts_per_bar,
-            unsure=settings.unsure if self._simulation is not None else settings.unsure_by_rules,
+            full=weighing.full,
+            empty=weighing.empty * spec.max_pressure_counts,
+            clear=weighing.clear * spec.max_pressure_counts,
+            unsure=weighing.unsure,
             calm=1e-3 * settings.calm * spec.counts_per_degree,
             fast=1e-3 * settings.fast * spec.counts_per_degree,
             apart=settings.apart,
@@ -242,7 +133,10 @@ class Monitor:
             low=spec.angle_range[0],
             high=spec.angle_range[1],
             jump=settings.jump * spec.counts_per_degree,
-            acted=settings.acted * spec.counts_per_bar,
+            acted=settings.acted * spec.max_pressure_counts,
+            frozen=max(settings.frozen, math.ceil(_LONG / spec.period)),
+            edge=settings.edge * (spec.angle_range[1] - spec.angle_range[0]),
+            experience=EXPERIENCE / spec.period,
         )
 
     # ---- watching
@@ -254,6 +148,8 @@ class Monitor:
         memory.clock[2] = 1.0 if at_rest else memory.observed.shape[0] + 1.0
         memory.command[...] = 0.0
         memory.scatter[..., 2] = 0.0
+        if isinstance(self._expects, Identified):
+            self._begin_identifying(self._expects, at_rest)
         broken = {(key[0], key[2]) for key in self._open}
         for j in range(self.spec.joints):  # what is broken stays so
             if ("frozen-potentiometer", j + 1) not in broken:
@@ -261,8 +157,19 @@ class Monitor:
             if ("dead-potentiometer", j + 1) not in broken:
                 memory.rail[j] = 0.0
 
+    def _begin_identifying(self, known: Identified, at_rest: bool) -> None:
+        """Begin a sequence with what has been learned of the arm so far, and look for what no sound arm does."""
+        known.open[...] = 0.0
+        known.clock[:2] = 0.0, 0.0 if at_rest else -LOOKS
+        since = float(self._memory.clock[0])
+        found = wrong_from_the_start(known)
+        self._from_the_start = {key: self._from_the_start.get(key, since) for key in found}
+        forget_answers(known)
+
     def see(self, reading: Reading, valves: Command | None) -> None:
         """Weigh a reading and remember the ``valves`` (joints, 2) as applied after it."""
+        if self.mode == "off":
+            return
         memory = self._memory
         if reading.time < memory.clock[0]:
             self._go_on_from(reading.time)
@@ -280,7 +187,7 @@ class Monitor:
     @property
     def _measured(self) -> NDArray[np.float64]:
         """What further sensors said, shape (history, needs); (0, 0) where none is needed."""
-        return np.zeros((0, 0)) if isinstance(self._expects, RuleParameters) else self._expects.measured
+        return np.zeros((0, 0)) if isinstance(self._expects, Identified) else self._expects.measured
 
     def _note_further(self, reading: Reading) -> None:
         """Remember what the further sensors say that the simulation needs."""
@@ -313,7 +220,8 @@ class Monitor:
         return bool(
             self._open
             or (memory.score + self._prior).max() >= self._thresholds.alarm
-            or memory.same[:, 0].max() >= settings.frozen
+            or self._from_the_start
+            or memory.same[:, 0].max() >= self._thresholds.frozen
             or memory.rail[:, 0].max() >= settings.rail
             or memory.disagreement.max() >= settings.changed
         )
@@ -325,8 +233,9 @@ class Monitor:
         if holding:  # what follows from a wrong angle proves nothing
             memory.score[...] = 0.0
         holding |= self._judge_valves()
-        if any(key[0] not in _CHANGES for key in holding):  # what a fault explains says nothing of the arm
+        if any(key[0] not in CHANGES for key in holding):  # what a fault explains says nothing of the arm
             memory.disagreement[...] = 0.0
+        holding |= self._from_the_start
         holding |= self._judge_agreement(any(key[0] == "leak" for key in holding))
         for key, since in holding.items():
             if key not in self._open:
@@ -336,36 +245,52 @@ class Monitor:
         for key in [key for key in self._open if key not in holding]:
             self._close(key, now)
         self._memory.clock[3] = self._width()
+        self._memory.clock[4] = float(any(key[0] not in CHANGES for key in self._open))
 
     def _width(self) -> float:
         """Return how large residuals are, in usual ones: a simulation of another arm is no proof of a stuck valve."""
-        return self.settings.apart if any(key[0] in _DISAGREEMENTS for key in self._open) else 1.0
+        return self.settings.apart if any(key[0] in DISAGREEMENTS for key in self._open) else 1.0
 
-    def _close(self, key: _Key, now: float) -> None:
+    def _close(self, key: Key, now: float) -> None:
         place = self._open.pop(key)
         self.findings[place] = replace(self.findings[place], until=now)
 
-    def _rename(self, key: _Key, to: _Key) -> None:
+    def _rename(self, key: Key, to: Key) -> None:
         """Call what is open another name: with few readings several faults look alike."""
         place = self._open.pop(key)
         kind, detail, joint, muscle = to
         self._open[to] = place
         self.findings[place] = replace(self.findings[place], kind=kind, detail=detail, joint=joint, muscle=muscle)
 
-    def _judge_potentiometers(self) -> dict[_Key, float]:
+    def _judge_potentiometers(self) -> dict[Key, float]:
         memory, settings = self._memory, self.settings
-        found: dict[_Key, float] = {}
+        found: dict[Key, float] = {}
         for j in range(self.spec.joints):
             count, since, jumped, _ = memory.rail[j]
             if jumped and count >= settings.rail:
                 found["dead-potentiometer", "its reading jumped onto a rail and stays there", j + 1, None] = since
             count, since, *pressures = memory.same[j]
             change = max(pressures[2] - pressures[0], pressures[3] - pressures[1])
-            if count >= settings.frozen and change >= self._thresholds.acted:
+            if count >= self._thresholds.frozen and change >= self._acted(j, count):
                 found["frozen-potentiometer", "its reading stays the same while valves act", j + 1, None] = since
         return found
 
-    def _judge_valves(self) -> dict[_Key, float]:
+    def _acted(self, j: int, count: float) -> float:
+        """Return the change of a pressure [counts] during which the angle of joint ``j`` never stays the same.
+
+        ``count`` equal readings are not asked: before them this arm may have shown the same angle during large
+        changes, with a sensor of few bits, dry friction, or at an end stop.
+        """
+        memory, limits = self._memory, self._thresholds
+        readings, _, low, high = memory.moved[j]
+        angle = memory.observed[0, j, 0]
+        edge = min(angle - low, high - angle) < limits.edge
+        there, most = memory.stayed[j, int(edge)]
+        if readings < limits.experience or there - count < limits.experience / 4:
+            return math.inf
+        return max(limits.acted, _BEYOND * float(most))
+
+    def _judge_valves(self) -> dict[Key, float]:
         """What was found stays until nothing speaks for it, or is renamed where another fault explains more."""
         memory = self._memory
         weighed = np.where(memory.score > 0, memory.score + self._prior, 0.0)
@@ -383,19 +308,19 @@ class Monitor:
             found[keys[best]] = float(memory.since[best])
         return found
 
-    def _judge_agreement(self, explained: bool) -> dict[_Key, float]:
+    def _judge_agreement(self, explained: bool) -> dict[Key, float]:
         """Readings that do not agree with the simulation mean nothing more where a fault explains them."""
         memory, settings = self._memory, self.settings
-        found: dict[_Key, float] = {}
+        found: dict[Key, float] = {}
         for j, q in np.argwhere(memory.disagreement > 0).tolist():
             place = (j + 1, q or None)
-            known = next((key for key in self._open if key[0] in _DISAGREEMENTS and key[2:] == place), None)
+            known = next((key for key in self._open if key[0] in DISAGREEMENTS and key[2:] == place), None)
             enough = memory.disagreement[j, q] >= settings.changed and not explained
             if known is None and not enough:
                 continue
-            key: _Key = (*self._why(j, q), *place)
+            key: Key = (*self._why(j, q), *place)
             if known is not None:
-                if _DISAGREEMENTS.index(key[0]) > _DISAGREEMENTS.index(known[0]):
+                if DISAGREEMENTS.index(key[0]) > DISAGREEMENTS.index(known[0]):
                     self._rename(known, key)
                 else:
                     key = known
@@ -434,13 +359,34 @@ class Monitor:
 
     def spoiled_since(self) -> tuple[float, str] | None:
         """Return since when [s] something is wrong now that spoils what is read, and what; None if nothing is."""
-        wrong = [one for one in self.now if one.spoils]
+        wrong = [one for one in self.now if one.spoils and self.mode == "stop"]
         first = min(wrong, key=lambda one: one.since, default=None)
         return None if first is None else (first.since, str(first))
 
     def marks(self, recorded: Recorded) -> tuple[Mark, ...]:
         """Return the marks of a sequence that it has seen."""
+        if self.mode != "stop":
+            return ()
         return marks_of(self.findings[self._earlier :], recorded.time, recorded.step)
+
+    def reasons(self) -> str:
+        """Return what was seen that is wrong now, and what it is judged against, in a sentence for people."""
+        seen = []
+        for m, (when, *counts) in enumerate(self._memory.surprise):
+            concerned = any(one.muscle in (None, m % 2 + 1) and one.joint in (None, m // 2 + 1) for one in self.now)
+            if when > 0 and concerned:
+                read, expected, std = self.spec.bar(counts)
+                seen.append(
+                    f"at {when:.1f} s pressure {m % 2 + 1} of joint {m // 2 + 1} read {read:.2f} bar where "
+                    f"{expected:.2f} ± {std:.2f} was expected"
+                )
+        if isinstance(self._expects, Identified):
+            known = float(self._expects.clock[2] * self._expects.look[1])
+            against = f"what this arm itself did in the {known:.0f} s that it was watched"
+        else:
+            against = "what the simulation of this arm expects"
+        shown = "; ".join(seen) or "no single reading is far off, together they are"
+        return f"{shown}. It is judged against {against}"
 
     # ---- saved states
 
@@ -454,6 +400,8 @@ class Monitor:
         }
         if self._measured.size:
             state["measured"] = self._measured.tolist()
+        if isinstance(self._expects, Identified):
+            state["identified"] = {name: values.tolist() for name, values in self._expects._asdict().items()}
         return json.dumps(state).encode()
 
     def set_state(self, state: bytes) -> None:
@@ -473,10 +421,14 @@ class Monitor:
             further = np.array(saved.get("measured", []), np.float64).reshape(self._measured.shape)
             if not all(same) or saved["simulation"] is not (self._simulation is not None):
                 raise ValueError("it has other sizes")
+            known = _identified_of(saved["identified"], self._expects) if "identified" in saved else None
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise UnusableInput(f"the state of the monitor is damaged or of another arm ({error})") from error
         for mine, values in zip(self._memory, memory, strict=True):
             mine[...] = values
+        if known is not None:
+            for name, values in known._asdict().items():
+                getattr(self._expects, name)[...] = values
         self._measured[...] = further
         self.findings, self._earlier = findings, earlier
         self._open = {
@@ -486,12 +438,9 @@ class Monitor:
         }
 
 
-def marks_of(findings: Iterable[Finding], time: NDArray[np.float64], step: NDArray[np.int64]) -> tuple[Mark, ...]:
-    """Return the marks that ``findings`` make on a sequence with readings at ``time`` (n,) [s] and ``step`` (n,)."""
-    marks = []
-    for one in findings:
-        if one.spoils and one.overlaps(float(time[0]), float(time[-1])):
-            inside = np.flatnonzero((time >= one.since) & (time <= (math.inf if one.until is None else one.until)))
-            if len(inside):
-                marks.append(Mark(int(step[inside[0]]), int(step[inside[-1]]), str(replace(one, until=None))))
-    return tuple(marks)
+def _identified_of(saved: Mapping[str, Any], mine: Identified | Predictor) -> Identified:
+    """Return what was saved of what is known of an arm; ValueError where it is not of one like ``mine``."""
+    known = Identified(**{name: np.array(values, np.float64) for name, values in saved.items()})
+    if any(values.shape != getattr(mine, name).shape for name, values in known._asdict().items()):
+        raise ValueError("it has other sizes")
+    return known

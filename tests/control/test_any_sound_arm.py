@@ -1,0 +1,97 @@
+"""No sound arm is refused, whatever its physics: not while collecting, and no row of it is marked."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pneumarm.arm import Arm, guarded, open_arm
+from pneumarm.arm.virtual import SwappedMuscles, SwappedValves, VirtualArm, draw_wide
+from pneumarm.control import Monitor
+from pneumarm.errors import ArmFailure
+from pneumarm.transitions import Store, collect
+
+PLAIN = [f"python:tests.plain_arms:{name}" for name in ("linear", "throttled", "hose")]
+
+
+class Broken(Arm):
+    """A sound arm whose readings or commands are spoiled from a time on."""
+
+    def __init__(self, arm, begin, pressures=lambda p: p, valves=lambda v: v):
+        self.arm, self.spec, self.begin = arm, arm.spec, begin
+        self.pressures, self.valves, self.now = pressures, valves, 0.0
+
+    def read(self):
+        reading = self.arm.read()
+        self.now = reading.time
+        if self.now >= self.begin:
+            return replace(reading, pressure=self.pressures(reading.pressure.copy()))
+        return reading
+
+    def set_valves(self, valves):
+        self.arm.set_valves(self.valves(np.array(valves)) if self.now >= self.begin else valves)
+
+    def wait(self, seconds):
+        self.arm.wait(seconds)
+
+    def close(self):
+        self.arm.close()
+
+
+def stuck(valves):
+    valves[0, 0] = min(valves[0, 0], 0)
+    return valves
+
+
+def dead(pressure):
+    pressure[0, 1] = 7.0
+    return pressure
+
+
+@pytest.mark.parametrize("name", [*PLAIN, *(f"virtual:wide,seed={seed}" for seed in (2, 6, 9))])
+def test_a_sound_arm_is_collected_from_without_a_mark(name, tmp_path):
+    arm = open_arm(name)
+    watch = Monitor(arm.spec)
+    with Store.for_arm(tmp_path / "db", arm.spec) as store:
+        result = collect(arm, store, 6_000, 1, watch=watch)
+    assert watch.findings == []
+    assert result.marked == {}
+    assert result.transitions >= 6_000
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_a_fault_of_any_arm_is_what_differs_from_this_arm(name, tmp_path):
+    arm = Broken(open_arm(name), 60.0, valves=stuck)
+    watch = Monitor(arm.spec)
+    with Store.for_arm(tmp_path / "db", arm.spec) as store, pytest.raises(ArmFailure) as stopped:
+        collect(arm, store, 6_000, 1, watch=watch)
+    first = watch.findings[0]
+    assert (first.kind, first.joint, first.muscle) == ("stuck-valve", 1, 1)
+    assert 50.0 <= first.since <= 75.0
+    for said in ("judged against what this arm itself did", "--monitor warn"):
+        assert said in str(stopped.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Broken(open_arm(PLAIN[0]), 0.0, pressures=dead), "stays the same"),
+        (lambda: VirtualArm(draw_wide(2), seed=3, faults=[SwappedValves()]), "outlet are swapped"),
+        (lambda: VirtualArm(draw_wide(2), seed=3, faults=[SwappedMuscles()]), "valves are those of"),
+    ],
+)
+def test_what_no_sound_arm_does_is_wrong_from_the_start(make, said, tmp_path):
+    arm = make()
+    with Store.for_arm(tmp_path / "db", arm.spec) as store, pytest.raises(ArmFailure, match=said):
+        collect(arm, store, 10_000, 1, watch=Monitor(arm.spec))
+
+
+@pytest.mark.parametrize("mode", ["warn", "off"])
+def test_a_monitor_that_only_warns_or_is_off_stops_nothing_and_marks_nothing(mode, tmp_path):
+    arm = Broken(open_arm(PLAIN[0]), 60.0, valves=stuck)
+    watch = Monitor(arm.spec, mode=mode)
+    with Store.for_arm(tmp_path / "db", arm.spec) as store:
+        result = collect(guarded(arm), store, 4_000, 1, watch=watch)
+    assert result.transitions >= 4_000
+    assert result.marked == {}
+    assert bool(watch.findings) == (mode == "warn")

@@ -103,6 +103,7 @@ class Run:
         settings: RunSettings,
         progress: Progress = silent,
         seen_by: Callable[[Arm], Arm] = lambda arm: arm,
+        monitor: Mode = "stop",
     ) -> None:
         """Take up the run in ``folder``, or begin it; ``seen_by`` may put something around the arm that shows it.
 
@@ -111,6 +112,7 @@ class Run:
 
         """
         self.folder, self.settings, self.progress, self._seen_by = folder, settings, progress, seen_by
+        self._monitor = monitor
         self.results: dict[str, Any] = {}
         self.store = folder / "transitions.db"
         self.simulation = folder / "simulation.safetensors"
@@ -179,7 +181,7 @@ class Run:
             self._seen_by(open_arm_checked(wanted)) as arm,
             Store.for_arm(self.store, arm.spec) as store,
         ):
-            watch = Monitor(arm.spec, mode=self.monitor)
+            watch = Monitor(arm.spec, mode=self._monitor)
 
             def record(transitions: int) -> CollectResult:
                 return collect(
@@ -242,7 +244,7 @@ class Run:
                 seed=wanted.seed,
                 progress=report,
                 keep_version=version_keeper(self.folder),
-                watch=monitor_of(agent, arm, self.monitor),
+                watch=monitor_of(agent, arm, self._monitor),
             )
             demonstrations = demonstrate(moved.agent, arm, wanted.seed)
             marked_record(store).save(self.folder)

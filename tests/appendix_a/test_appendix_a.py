@@ -75,12 +75,12 @@ def test_claims_that_are_believed_repeat_readings_and_headers_do_not():
 
 
 def test_a_recording_is_judged_as_the_arm_was(tmp_path):
-    faulty = VirtualArm(draw_parameters(3), seed=3, faults=[StuckValve(begin=30.0, end=50.0)])
+    faulty = VirtualArm(draw_parameters(3), seed=3, faults=[StuckValve(begin=60.0, end=90.0)])
     with Store.for_arm(tmp_path / "db", faulty.spec) as store:
         collect(faulty, store, 2_000, 3, settings=WHOLE_PERIODS)
         watched = Monitor(faulty.spec)
         later = findings(store.blocks(), watched)
-    again = VirtualArm(draw_parameters(3), seed=3, faults=[StuckValve(begin=30.0, end=50.0)])
+    again = VirtualArm(draw_parameters(3), seed=3, faults=[StuckValve(begin=60.0, end=90.0)])
     live = Monitor(again.spec)
     with Store.for_arm(tmp_path / "again", again.spec) as store:
         collect(again, store, 2_000, 3, watch=live, settings=WHOLE_PERIODS)

@@ -19,6 +19,7 @@ LONG = (
     "baselines",
     "sensors",
     "serial",
+    "sound_arms",
     "success",
 )
 """What takes many minutes runs only when it is named."""

@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, Reading, Step, guarded
 from pneumarm.arm.virtual import (
+    ArmParameters,
     DeadPotentiometer,
     Fault,
     FrozenPotentiometer,
@@ -263,11 +264,17 @@ def watched_steps(arm: Arm, monitor: Watch, seed: int, settings: CollectSettings
             yield step
 
 
-def play(kind: Kind, arm_seed: int, seed: int, agent: AnyAgent | None = None) -> Played:
-    """Let a fault happen to a healthy arm that collects, or that ``agent`` moves."""
+def play(
+    kind: Kind,
+    arm_seed: int,
+    seed: int,
+    agent: AnyAgent | None = None,
+    draw: Callable[[int], ArmParameters] = draw_parameters,
+) -> Played:
+    """Let a fault happen to a healthy arm, one of those of ``draw``, that collects or that ``agent`` moves."""
     random = np.random.default_rng([seed, arm_seed])
     muscle = int(random.integers(1, 3))
-    twins = Twins(VirtualArm(draw_parameters(arm_seed), seed=seed), seed)
+    twins = Twins(VirtualArm(draw(arm_seed), seed=seed), seed)
     stage = Stage(twins, lambda time: kind.make(muscle, time), random, max(AFTERWARDS, kind.within))
     if agent is None:
         for _ in watched_steps(twins, stage, seed):
@@ -276,9 +283,9 @@ def play(kind: Kind, arm_seed: int, seed: int, agent: AnyAgent | None = None) ->
     else:
         cycle, controller, number = ControlCycle(guarded(twins)), AgentController(agent), 0
         while not stage.over:
-            draw = draw_movement(agent.goal_range, seed, True, number)
-            BEGIN.reach(cycle.arm, draw.random)
-            move(cycle, controller, draw.goal, agent.settings, stage)
+            drawn = draw_movement(agent.goal_range, seed, True, number)
+            BEGIN.reach(cycle.arm, drawn.random)
+            move(cycle, controller, drawn.goal, agent.settings, stage)
             number += 1
     assert stage.broke is not None
     return Played(twins.spec, stage.turns, stage.broke, stage.contradiction)

@@ -11,6 +11,8 @@ from pneumarm.errors import UnusableInput
 from pneumarm.transitions.rows import Recorded, Rows
 from pneumarm.transitions.schema import LONGEST_SEQUENCE
 
+_BEYOND = 10  # highest pressures of a muscle that no supply has
+
 
 def are_possible(rows: Rows, first: NDArray[np.int64], spec: ArmSpec, valves: bool) -> bool:
     """Return whether the rows of whole sequences that begin at the rows ``first`` are possible."""
@@ -42,17 +44,17 @@ def _wrong_commands(command: NDArray[np.float64], spec: ArmSpec, valves: bool) -
 def far_outside(angle: NDArray[np.float64], pressure: NDArray[np.float64], spec: ArmSpec) -> str | None:
     """Return what is wrong with angles and pressures [counts] that no sensor of this arm can have given.
 
-    Generous, because sensors do go past their nominal ranges: half a range of the angle, and three times the
-    largest pressure. What it catches is a wrong unit.
+    Generous, because sensors do go past their nominal ranges, by half a range of the angle, and because a pressure
+    sensor towards the valve reads the supply while the inlet is open. What it catches is a wrong unit.
     """
     low, high = spec.angle_range
     margin = (high - low) / 2
-    limit = 3 * spec.max_pressure_counts
+    limit = _BEYOND * spec.max_pressure_counts
     # Written so that NaN counts as outside.
     if not ((angle >= low - margin) & (angle <= high + margin)).all():
         return f"an angle is far outside {low:g}..{high:g} counts or no number"
     if not ((pressure >= -limit) & (pressure <= limit)).all():
-        return f"a pressure is over three times the limit of {spec.max_pressure_counts:g} counts or no number"
+        return f"a pressure is over ten times the limit of {spec.max_pressure_counts:g} counts or no number"
     return None
 
 

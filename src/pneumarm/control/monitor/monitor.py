@@ -2,9 +2,9 @@
 
 import json
 import math
+from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from dataclasses import asdict, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -401,7 +401,8 @@ class Monitor:
         if self._measured.size:
             state["measured"] = self._measured.tolist()
         if isinstance(self._expects, Identified):
-            state["identified"] = {name: values.tolist() for name, values in self._expects._asdict().items()}
+            known = self._expects._asdict().items()
+            state["identified"] = {name: b64encode(values.tobytes()).decode() for name, values in known}
         return json.dumps(state).encode()
 
     def set_state(self, state: bytes) -> None:
@@ -438,9 +439,8 @@ class Monitor:
         }
 
 
-def _identified_of(saved: Mapping[str, Any], mine: Identified | Predictor) -> Identified:
+def _identified_of(saved: Mapping[str, str], mine: Identified | Predictor) -> Identified:
     """Return what was saved of what is known of an arm; ValueError where it is not of one like ``mine``."""
-    known = Identified(**{name: np.array(values, np.float64) for name, values in saved.items()})
-    if any(values.shape != getattr(mine, name).shape for name, values in known._asdict().items()):
-        raise ValueError("it has other sizes")
-    return known
+    return Identified(
+        **{name: np.frombuffer(b64decode(text)).reshape(getattr(mine, name).shape) for name, text in saved.items()}
+    )

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup run test lint bench held-out baselines soak clean
+.PHONY: setup run test lint bench held-out baselines soak site clean
 
 setup: $(READY)
 
@@ -38,5 +38,9 @@ baselines: setup  ## the table of baselines on the held-out arms, into runs/base
 soak: setup  ## fault injection that takes minutes: kills, power cuts, full disks
 	$(BIN)/python -m pytest -m soak -s
 
+site: setup  ## the documentation as pages to be read in a browser, into site/
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(BIN)/python -m mkdocs build
+
 clean:
-	rm -rf $(VENV) runs .pytest_cache .ruff_cache .mypy_cache
+	rm -rf $(VENV) runs site .pytest_cache .ruff_cache .mypy_cache

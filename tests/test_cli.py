@@ -296,6 +296,13 @@ def test_help_has_two_levels(capsys: pytest.CaptureFixture[str]) -> None:
     assert "(thesis" in everything
 
 
+def test_help_says_what_reached_means(capsys: pytest.CaptureFixture[str]) -> None:
+    said = " ".join(Outcome(capsys, "test", "--help").out.split())
+    assert "A goal counts as reached, a success, at a reading" in said
+    assert "within 25 counts" in said
+    assert "Test an agent in a simulation." in Outcome(capsys, "--help").out
+
+
 def test_options_come_from_a_file_and_the_command_line_goes_before_it(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, store: Path
 ) -> None:

@@ -164,6 +164,8 @@ def _run(arguments: list[str]) -> int:
         app.config = () if config is None else (config,)
         app.help_formatter = AllOptions() if HELP_ALL in arguments else FewOptions()
         arguments = [HELP if one == HELP_ALL else one for one in arguments]
+        if HELP in arguments:
+            _tell_all(arguments)
         app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         complain(f"{error} See {' '.join(['pneumarm', *(error.command_chain or ())])} --help.")
@@ -186,6 +188,13 @@ def _run(arguments: list[str]) -> int:
         complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
         return 1
     return 0
+
+
+def _tell_all(arguments: list[str]) -> None:
+    """Have the help of a command tell what its function tells; its one line is for the list of commands."""
+    command, apps, _ = app.parse_commands([one for one in arguments if one != HELP])
+    if " ".join(command) in COMMANDS:
+        apps[-1].help = None
 
 
 if __name__ == "__main__":

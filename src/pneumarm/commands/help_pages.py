@@ -30,11 +30,11 @@ class AllOptions(DefaultFormatter):
 
 
 class FewOptions(AllOptions):
-    """Leaves out the settings of parts, such as ``--servo.agents``, and what cites the thesis."""
+    """Leaves out the settings of parts, such as ``--servo.agents``, and of words all but what an option does."""
 
     def shown(self, entries: list[HelpEntry]) -> list[HelpEntry]:
         """Return what is shown of the options of a command, and how to see the others."""
-        kept = [_without_citations(one) for one in entries if not any("." in name for name in one.names)]
+        kept = [_in_short(one) for one in entries if not any("." in name for name in one.names)]
         left_out = len(entries) - len(kept)
         more = [_entry(HELP_ALL, f"Show {left_out} more options: the settings of all parts.")] if left_out else []
         return [*super().shown(kept), *more]
@@ -45,10 +45,11 @@ def _entry(name: str, words: str, metavar: str | None = None) -> HelpEntry:
     return HelpEntry(positive_names=(name,), metavar=metavar, description=description)
 
 
-def _without_citations(entry: HelpEntry) -> HelpEntry:
+def _in_short(entry: HelpEntry) -> HelpEntry:
+    """Return ``entry`` with the first paragraph of its words, without what cites the thesis."""
     from rich.markdown import Markdown
 
     words = getattr(entry.description, "primary_renderable", None)
     if isinstance(words, Markdown):
-        entry.description.primary_renderable = Markdown(_CITED.sub("", words.markup))
+        entry.description.primary_renderable = Markdown(_CITED.sub("", words.markup.partition("\n\n")[0]))
     return entry

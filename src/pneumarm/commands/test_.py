@@ -25,6 +25,9 @@ def test_(
 ) -> None:
     """Test an agent in a simulation: greedy, not learning, from all begin states to all goals.
 
+    A goal counts as reached, a success, at a reading after at least one action where every joint is within 25 counts
+    of it and not faster than 1 count/ms, unless the agent was trained with other tolerances.
+
     An agent that looks ahead on an arm is tested without lookahead, and then with it on the first 500 movements
     ("lookahead"). The latter is what would move the arm, but it takes a hundred times as long.
 

@@ -25,6 +25,9 @@ def transfer_(
 ) -> None:
     """Move an agent onto an arm: test it there, let it learn there, test it again. A second call goes on.
 
+    A goal counts as reached, a success, at a reading after at least one action where every joint is within 25 counts
+    of it and not faster than 1 count/ms, unless the agent was trained with other tolerances.
+
     Parameters
     ----------
     agent

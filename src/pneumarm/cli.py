@@ -3,6 +3,8 @@
 import os
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 
 from cyclopts import App, CycloptsError
 
@@ -164,9 +166,8 @@ def _run(arguments: list[str]) -> int:
         app.config = () if config is None else (config,)
         app.help_formatter = AllOptions() if HELP_ALL in arguments else FewOptions()
         arguments = [HELP if one == HELP_ALL else one for one in arguments]
-        if HELP in arguments:
-            _tell_all(arguments)
-        app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        with _told_in_full(arguments) if HELP in arguments else nullcontext():
+            app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         complain(f"{error} See {' '.join(['pneumarm', *(error.command_chain or ())])} --help.")
         return 2
@@ -190,11 +191,16 @@ def _run(arguments: list[str]) -> int:
     return 0
 
 
-def _tell_all(arguments: list[str]) -> None:
+@contextmanager
+def _told_in_full(arguments: list[str]) -> Iterator[None]:
     """Have the help of a command tell what its function tells; its one line is for the list of commands."""
     command, apps, _ = app.parse_commands([one for one in arguments if one != HELP])
-    if " ".join(command) in COMMANDS:
-        apps[-1].help = None
+    found, short = apps[-1], apps[-1].help
+    found.help = None if " ".join(command) in COMMANDS else short
+    try:
+        yield
+    finally:
+        found.help = short
 
 
 if __name__ == "__main__":

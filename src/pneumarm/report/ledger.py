@@ -50,7 +50,8 @@ def ledger(
         "The ledger: means over the episodes with 95% confidence intervals in brackets (normal approximation, for "
         "the success Wilson's; episodes taken as independent; none below 30 episodes). Greedy and without learning, "
         "except while learning. A success reached its goal: at a reading every joint was within 25 counts of it and "
-        "not faster than 1 count/ms, unless other tolerances were asked for. Arm time holds everything, the way to the begin states too.",
+        "not faster than 1 count/ms, unless other tolerances were asked for. Arm time holds everything, the way to "
+        "the begin states too.",
     )
 
 

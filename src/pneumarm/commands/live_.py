@@ -4,6 +4,7 @@ import os
 import secrets
 import sys
 import webbrowser
+from contextlib import suppress
 from pathlib import Path
 
 from pneumarm.commands.common import Json, OwnMethod
@@ -71,6 +72,7 @@ def live_(
     )
     if token is None and host not in _LOCAL:
         token = secrets.token_urlsafe(12)
+    say(f"opening {settings.arm}")
     rig = Rig(settings, named, folder, method)
     server = Server(rig, host, port, token)
 
@@ -79,9 +81,9 @@ def live_(
         if browser or (browser is None and _has_screen()):
             webbrowser.open(server.url)
 
-    with rig:
+    with rig, suppress(KeyboardInterrupt):  # that is how it is meant to end
         server.run(opened)
-    result = {"url": server.url, "figures": rig.screen.state["figures"]}
+    result = {"url": server.url, "figures": rig.screen.state.get("figures", {})}
     rows = [(name, *found.values()) for name, found in result["figures"].items()]
     header = ("controller", "goals", "settled", "median time [s]", "rest error [deg]", "last curve [deg]")
     show(result, json, lambda: [table(header, rows, settings.arm)] if rows else [])

@@ -131,7 +131,10 @@ def _coverage(store: Store, filtered: Filtered) -> CoverageData:
         counts.add(grid.cells(transitions(block, grid.window).inputs))
         held = counts.arrays()[1]
         growth.append((int(held.sum()), len(held)))
-    sample = filtered.sample("generalisation", _POINTS) or filtered.transitions
+    apart = filtered.sample("generalisation", _POINTS)
+    kept = filtered.transitions
+    # Where nearly every transition has a cell of its own, nearly all of them are kept.
+    sample = kept if apart is None or len(apart.sequence) < min(len(kept.sequence), _POINTS) else apart
     return CoverageData(
         observation=grid.window.of_joints(sample.observation).astype(np.float64),
         cells_holding=np.bincount(np.minimum(filtered.filter.counts.arrays()[1], _MOST_IN_CELL)),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, ControlCycle, Reading, Step, guarded
 from pneumarm.arm.valves import Command
 from pneumarm.control import BEGIN, controller_of, move
-from pneumarm.learning import AnyAgent, Training
+from pneumarm.learning import AnyAgent, Training, goals_of
 from pneumarm.moving.trial import MoveTrial
 from pneumarm.report.data import Demonstration, MarkedData, MovingData, TrainingData
 from pneumarm.task import Movement
@@ -90,16 +90,17 @@ def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Demonstration]:
     """
     cycle = ControlCycle(guarded(arm))
     random = np.random.default_rng([seed, 2])
-    low, high = agent.goal_range.T
+    goals = goals_of(agent)
+    low, high = goals.range.T
     shown = []
     for name, degrees in DISPLACEMENTS.items():
         half = degrees * arm.spec.counts_per_degree / 2
         middle = (low + high) / 2
         if (half < (high - low) / 2).all():
             BEGIN.reach(cycle.arm, random)
-            _move(agent, cycle, middle - half)
+            _move(agent, cycle, goals.within(middle - half))
             cycle.arm.wait(_TAIL)
-            shown.append(_recorded(agent, cycle, middle + half, name))
+            shown.append(_recorded(agent, cycle, goals.within(middle + half), name))
     return shown
 
 

@@ -29,6 +29,7 @@ from pneumarm.learning import (
     LOOKING_AHEAD,
     LearnSettings,
     Tracks,
+    goals_of,
     load_agent,
     results_with_lookahead,
     test_ahead,
@@ -44,6 +45,7 @@ from pneumarm.report.run_report import TEST
 from pneumarm.settings import Valid
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.simulation.enough import EnoughSettings, collect_enough
+from pneumarm.statistics import FEWEST
 from pneumarm.task import BeginStates, begin_states, read_episodes, write_episodes
 from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, Store, collect, enough
 
@@ -74,7 +76,8 @@ class RunSettings(LearnSettings):
     test_episodes: int = 10_000
     """Movements of the test in simulation (thesis section 5.2)."""
     bound_episodes: int = 150
-    """Movements planned with the true physics, which say what can be achieved; 0 for none. Virtual arms only."""
+    """Movements planned with the true physics, which say what can be achieved; 0 for none. Virtual arms only; for
+    each joint more an eighth of them, because a plan for two takes ten times as long."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     transfer: TransferSettings = field(default_factory=lambda: TransferSettings(episodes=30, test_episodes=15))
@@ -263,7 +266,7 @@ class Run:
             return found
         with self.progress("moving to goals") as report, self._seen_by(open_arm_checked(wanted)) as arm:
             tried = try_moving(
-                arm, agent.controller(), agent.goal_range, wanted.moving, seed=wanted.seed, progress=report
+                arm, agent.controller(), goals_of(agent), wanted.moving, seed=wanted.seed, progress=report
             )
         if tried.moved:
             moving_record(tried).save(self.folder)
@@ -276,11 +279,12 @@ class Run:
             return {"bound": {"missing": "it was not asked for"}}
         agent, made = load_agent(self.agent), read_episodes(self.episodes)
         rewards = {phase: made[phase].reward for phase in ("before", "after")}
-        settings = BoundSettings(wanted.bound_episodes, PlanSettings(cutoff=agent.settings.cutoff))
+        episodes = max(min(wanted.bound_episodes, FEWEST), wanted.bound_episodes // 8 ** (agent.spec.joints - 1))
+        settings = BoundSettings(episodes, PlanSettings(cutoff=agent.settings.cutoff))
         with self.progress("planning with the true physics") as report, open_arm_checked(wanted) as arm:
             return {
                 "bound": known_bound(
-                    arm, agent.goal_range, rewards, settings,
+                    arm, goals_of(agent), rewards, settings,
                     seed=wanted.seed, reward=agent.settings.reward, progress=report,
                 )
             }  # fmt: skip

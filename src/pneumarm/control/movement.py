@@ -15,6 +15,7 @@ from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.task import Movement, Movements, TaskSettings
 from pneumarm.task.movements import of_rows
 from pneumarm.task.tally import Tally
+from pneumarm.transitions.goals import Goals
 from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.watch import Watch, watched
 
@@ -132,20 +133,21 @@ class Draw(NamedTuple):
     """Of the way to its begin state, and whatever else is drawn on the way."""
 
 
-def draw_movement(goal_range: NDArray[np.float64], seed: int, test: bool, number: int) -> Draw:
-    """Return movement ``number``, its goal within ``goal_range`` (joints, 2) [counts].
+def draw_movement(goals: Goals | NDArray[np.float64], seed: int, test: bool, number: int) -> Draw:
+    """Return movement ``number``, its goal one of ``goals``, or within a range of them (joints, 2) [counts].
 
     The movements of a ``test`` are others than those while learning. Both tests of a transfer use the same begin
     states and goals, and so does every baseline with the same seed.
     """
     random = np.random.default_rng([seed, 0 if test else 1, number])
-    low, high = goal_range.T
-    return Draw(random.uniform(low, high), random)
+    return Draw(Goals.of(goals).draw(random, 1)[0], random)
 
 
-def drawn(goal_range: NDArray[np.float64], seed: int, numbers: Iterable[int], *, test: bool = True) -> Iterator[Draw]:
+def drawn(
+    goals: Goals | NDArray[np.float64], seed: int, numbers: Iterable[int], *, test: bool = True
+) -> Iterator[Draw]:
     """Yield the movements of these ``numbers``, see :func:`draw_movement`."""
-    return (draw_movement(goal_range, seed, test, number) for number in numbers)
+    return (draw_movement(goals, seed, test, number) for number in numbers)
 
 
 def make_movements(

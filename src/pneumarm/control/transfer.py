@@ -19,7 +19,7 @@ from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
-from pneumarm.learning import AnyAgent, LearningActor, Learns, SimulationAgent, fingerprint
+from pneumarm.learning import AnyAgent, LearningActor, Learns, SimulationAgent, fingerprint, goals_of
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import Store
@@ -275,7 +275,7 @@ class Transfer:
     def _move(self, controller: Controller, test: bool, number: int) -> Movement:
         """Bring the arm to a begin state and make movement ``number`` of a test or of learning."""
         agent = self._arrived
-        draw = draw_movement(agent.goal_range, self._seed, test, number)
+        draw = draw_movement(goals_of(agent), self._seed, test, number)
         BEGIN.reach(self._cycle.arm, draw.random)
         velocity = agent.window.velocity
         return move(self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity)

@@ -1,7 +1,6 @@
 """Make environments by the name of an arm."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -333,4 +332,4 @@ def _goals(goals: ArrayLike, joints: int) -> Any:
 def _with_goals(simulation: Simulation, goals: ArrayLike | None) -> Simulation:
     if goals is None:
         return simulation
-    return replace(simulation, goal_range=_goals(goals, simulation.window.joints))
+    return simulation.with_goals(_goals(goals, simulation.window.joints))

@@ -12,6 +12,7 @@ from pneumarm.learning.agents import (
     SimulationAgent,
     Tracks,
     fingerprint,
+    goals_of,
 )
 from pneumarm.learning.batched.settings import BatchedSettings
 from pneumarm.learning.methods import (
@@ -65,6 +66,7 @@ __all__ = [
     "Training",
     "find_method",
     "fingerprint",
+    "goals_of",
     "load_agent",
     "results_with_lookahead",
     "test",

@@ -22,6 +22,7 @@ from pneumarm.task.acting import Acting
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.movements import Movements
 from pneumarm.task.settings import TaskSettings
+from pneumarm.transitions.goals import Goals
 from pneumarm.transitions.window import Window
 
 
@@ -181,6 +182,17 @@ class SimulationAgent:
     def goal_range(self) -> NDArray[np.float64]:
         """Goals that it reaches, shape (joints, 2) [counts]."""
         return self.simulation.goal_range
+
+    @property
+    def goals(self) -> Goals:
+        """Goals that its arm was seen to hold."""
+        return self.simulation.goals
+
+
+def goals_of(agent: AnyAgent) -> Goals:
+    """Return the goals that ``agent`` is to reach: those that it knows, or all within its range."""
+    known: Goals | NDArray[np.float64] = getattr(agent, "goals", agent.goal_range)
+    return Goals.of(known)
 
 
 def fingerprint(agent: AnyAgent) -> str:

@@ -13,6 +13,7 @@ from pneumarm.arm.reference import Reference
 from pneumarm.moving.movement import Moved, MoveSettings, Tracked, move, track
 from pneumarm.settings import Settings, Valid
 from pneumarm.statistics import wilson
+from pneumarm.transitions.goals import Goals
 
 
 @dataclass(frozen=True)
@@ -81,23 +82,24 @@ class MoveTrial:
 def try_moving(
     arm: Arm,
     controller: TrackingController,
-    goal_range: NDArray[np.float64],
+    goals: Goals | NDArray[np.float64],
     settings: MoveTrialSettings = MoveTrialSettings(),
     *,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> MoveTrial:
-    """Move ``arm`` to goals in ``goal_range`` (joints, 2) [counts] and along sinusoids; each is tried once."""
-    spec, random = arm.spec, np.random.default_rng([seed, 5])
-    goals = random.uniform(goal_range[:, 0], goal_range[:, 1], (settings.goals, spec.joints))
+    """Move ``arm`` to ``goals``, or within a range (joints, 2) [counts], and along sinusoids; each is tried once."""
+    spec, random, possible = arm.spec, np.random.default_rng([seed, 5]), Goals.of(goals)
+    drawn = possible.draw(random, settings.goals)
     total, moved = settings.goals + len(settings.frequencies), []
     guard = guarded(arm)
-    for one in move(guard, controller, goals, MoveSettings(settings.hold, 1, settings.tolerance)):
+    for one in move(guard, controller, drawn, MoveSettings(settings.hold, 1, settings.tolerance)):
         moved.append(one)
         if progress is not None:
             progress(len(moved), total)
-    middle, half = goal_range.mean(axis=1), np.ptp(goal_range, axis=1) / 2
+    middle, half = possible.middle, np.ptp(possible.range, axis=1) / 2
     counts = np.minimum(settings.amplitude * spec.counts_per_degree, 0.9 * half)
+    counts = np.minimum(*(np.abs(possible.within(middle + side * counts) - middle) for side in (-1, 1)))
     tracked = {}
     for number, frequency in enumerate(settings.frequencies, 1):
         wave = Reference(lambda t, f=frequency: middle + counts * np.sin(2 * np.pi * f * t))  # type: ignore[misc]

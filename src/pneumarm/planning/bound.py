@@ -25,6 +25,7 @@ from pneumarm.statistics import FEWEST, mean_estimate
 from pneumarm.task import Reward, TaskSettings
 from pneumarm.task.movements import Movements, of_rows
 from pneumarm.transitions import WHOLE_PERIODS, Store, collect
+from pneumarm.transitions.goals import Goals
 
 Baseline = Literal["open_loop", "closed_loop", "simulated"]
 """True physics planned once without noise, true physics planned every turn, learned simulation planned every turn."""
@@ -93,7 +94,7 @@ def measured_goal_range(arm: Arm, seed: int = 0) -> NDArray[np.float64]:
 
 def measure_bound(
     parameters_of: VirtualArm,
-    goal_range: NDArray[np.float64],
+    goals: Goals | NDArray[np.float64],
     settings: BoundSettings = BoundSettings(),
     *,
     seed: int = 0,
@@ -105,7 +106,7 @@ def measure_bound(
 
     Args:
         parameters_of: the arm whose parameters are taken; it is not moved.
-        goal_range: goals are drawn from it, shape (joints, 2) [counts].
+        goals: what is drawn from, or their range (joints, 2) [counts].
         settings: how many movements, and which plans.
         seed: of begin states, goals and noise; begin states and goals are those of a transfer with the same seed.
         reward: what is paid.
@@ -131,21 +132,21 @@ def measure_bound(
                 if progress is not None:
                     progress(before + done, total)
 
-            results[baseline] = _movements(arm, planner, goal_range, settings, seed, report)
+            results[baseline] = _movements(arm, planner, goals, settings, seed, report)
     return results
 
 
 def _movements(
     arm: Arm,
     planner: Planner,
-    goal_range: NDArray[np.float64],
+    goals: Goals | NDArray[np.float64],
     settings: BoundSettings,
     seed: int,
     report: Callable[[int], None],
 ) -> Planned:
     task = TaskSettings(reward=planner.reward, cutoff=settings.plan.cutoff)
     rows = []
-    for made in make_movements(arm, planner, task, drawn(goal_range, seed, range(settings.episodes))):
+    for made in make_movements(arm, planner, task, drawn(goals, seed, range(settings.episodes))):
         rows.append(made.row())
         report(len(rows))
     return Planned(of_rows(rows), np.array(planner.seconds), planner.unproven)
@@ -153,7 +154,7 @@ def _movements(
 
 def known_bound(
     arm: Arm,
-    goal_range: NDArray[np.float64],
+    goals: Goals | NDArray[np.float64],
     rewards: Mapping[str, NDArray[np.float64]],
     settings: BoundSettings,
     *,
@@ -165,7 +166,7 @@ def known_bound(
 
     Args:
         arm: any; the true physics is known of a virtual one only. It is not moved.
-        goal_range: goals are drawn from it, shape (joints, 2) [counts].
+        goals: what is drawn from, or their range (joints, 2) [counts].
         rewards: of the controller's tests on the arm by their names, each shape (n,), in the order of the movements.
         settings: how many movements, and which plans.
         seed: of the transfer in which the tests were made.
@@ -179,7 +180,7 @@ def known_bound(
     """
     if not isinstance(arm, VirtualArm):
         return {"missing": f"{arm.spec.name} is no virtual arm: its true physics is not known"}
-    planned = measure_bound(arm, goal_range, settings, seed=seed, reward=reward, progress=progress)
+    planned = measure_bound(arm, goals, settings, seed=seed, reward=reward, progress=progress)
     figures: dict[str, Any] = {baseline: movements.results() for baseline, movements in planned.items()}
     for found in figures.values():
         del found["decision_ms"]  # of the machine, not of the arm

@@ -33,10 +33,16 @@ from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Veloci
 from pneumarm.transitions.choice import share_held_out
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
+from pneumarm.transitions.goals import seen_goals
 from pneumarm.transitions.grid import GridSettings
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
 
+_LARGEST_EPOCH = 3e10
+"""Rows times weights squared; more than 500,000 rows of one joint, and 48,000 of two."""
+_ROWS_A_WEIGHT = 20
+"""Rows that a network is fitted to at least, for each of its weights, where there are so many."""
+_ROWS = 7  # stream of random numbers
 _MARGIN = 0.05
 """Predicted pressures may exceed the recorded ones by this part of their range."""
 
@@ -50,7 +56,7 @@ class FitSettings(Settings):
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
     hidden: int = 10
-    """Hidden units of each network (thesis: 10)."""
+    """Hidden units of each network for each joint of the arm (thesis: 10, one joint)."""
     epochs: int = 60
     """Epochs of Levenberg-Marquardt at most (thesis: 15)."""
     tolerance: float = 1e-5
@@ -182,7 +188,8 @@ def fit(
     fitted = [linear]
     if settings.approximator == "network":
         targets = [y] if settings.one_network else [y[:, [i]] for i in range(len(places))]
-        fits = _fit_networks(x, targets, settings, progress)
+        chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * spec.joints, settings.seed)
+        fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, spec.joints, progress)
         fitted = [one.network for one in fits]
     # The targets were in units of the change's spread, the simulation's are in those of the observation.
     factors = np.split(spread / scaling.observation_scale[places], len(fitted))
@@ -236,6 +243,7 @@ def _fit_networks(
     x: NDArray[np.float32],
     targets: list[NDArray[np.float64]],
     settings: FitSettings,
+    joints: int,
     progress: Callable[[int, int], None] | None,
 ) -> list[Fit]:
     """Fit a network to each of ``targets``, on as many threads as there are cores: the work is in NumPy."""
@@ -250,11 +258,22 @@ def _fit_networks(
                 progress(sum(done), settings.epochs * len(targets))
 
         y = targets[number]
-        start = nguyen_widrow(x.shape[1], settings.hidden, y.shape[1], int(seeds[number]))
+        start = nguyen_widrow(x.shape[1], settings.hidden * joints, y.shape[1], int(seeds[number]))
         return levenberg_marquardt(x, y, start, solver, report)
 
     with ThreadPoolExecutor(min(len(targets), os.cpu_count() or 1)) as threads:
         return list(threads.map(one, range(len(targets))))
+
+
+def _rows_to_fit(rows: int, weights: int, seed: int) -> slice | NDArray[np.int64]:
+    """Return which rows networks of so many ``weights`` are fitted to: all, unless an epoch would take too long.
+
+    An epoch takes time in proportion to rows times weights squared.
+    """
+    most = max(_ROWS_A_WEIGHT * weights, int(_LARGEST_EPOCH / weights**2))
+    if rows <= most:
+        return slice(None)
+    return np.sort(np.random.default_rng([seed, _ROWS]).choice(rows, most, replace=False))
 
 
 def _rescaled(network: Network, factor: NDArray[np.float64]) -> Network:
@@ -362,7 +381,8 @@ def fit_store(
         settings=settings,
         progress=progress,
     )
-    return StoreFit(result, filtered)
+    goals = seen_goals(store.blocks, result.simulation.goal_range)
+    return StoreFit(result._replace(simulation=result.simulation.with_goals(goals)), filtered)
 
 
 def refiltered(store: Store, simulation: Simulation, grid: GridSettings | None = None) -> Filtered:

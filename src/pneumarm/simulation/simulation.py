@@ -22,6 +22,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.networks.network import Network
+from pneumarm.transitions.goals import Goals
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
 
 Velocity = Literal["derived", "network"]
@@ -105,6 +106,20 @@ class Simulation:
     """As ``error_std``, of the further sensors in the window, shape (further,) [sensor units]."""
     further_range: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     """Lowest and highest readings that it predicts of further sensors, shape (further, 2) [sensor units]."""
+    goal_ways: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    """Of :class:`~pneumarm.transitions.goals.Goals`, shape (k, joints) [1/counts]; empty where nothing is limited."""
+    goal_limits: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    """Of the same, shape (k, 2)."""
+
+    @property
+    def goals(self) -> Goals:
+        """Goals that the arm was seen to hold."""
+        return Goals(self.goal_range, self.goal_ways.reshape(-1, self.window.joints), self.goal_limits)
+
+    def with_goals(self, goals: Goals | ArrayLike) -> Self:
+        """Return it with other goals, or with all within a range (joints, 2) [counts]."""
+        found = Goals.of(goals)
+        return replace(self, goal_range=found.range, goal_ways=found.ways, goal_limits=found.limits)
 
     def __repr__(self) -> str:
         ranges = ", ".join(f"{low:.0f} to {high:.0f} deg" for low, high in self.spec.degrees(self.goal_range))
@@ -184,7 +199,7 @@ class Simulation:
         """Return what a file has to hold: settings for its header, and arrays."""
         direct = [network.direct is not None for network in self.networks]
         header = _Header(self.spec, self.window, self.velocity, self.commands, self.held_out, self.seed, direct)
-        names = (*_ARRAYS, *(_FURTHER if self.window.further else ()))
+        names = (*_ARRAYS, *(_FURTHER if self.window.further else ()), *(_LIMITS if len(self.goal_ways) else ()))
         arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in names}
         arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
         for number, network in enumerate(self.networks):
@@ -214,7 +229,9 @@ class Simulation:
 
         networks = tuple(network(number) for number in range(len(header.direct)))
         scaling = Scaling(**{name: arrays.pop(name) for name in _SCALINGS})
-        rest = {name: arrays.pop(name) for name in (*_ARRAYS, *(_FURTHER if header.window.further else ()))}
+        further = _FURTHER if header.window.further else ()
+        limits = _LIMITS if _LIMITS[0] in arrays else ()
+        rest = {name: arrays.pop(name) for name in (*_ARRAYS, *further, *limits)}
         if arrays:
             raise ValueError(f"it also holds {', '.join(sorted(arrays))}")
         return cls(
@@ -232,6 +249,7 @@ class Simulation:
 
 _ARRAYS = ("error_std", "goal_range", "pressure_range")
 _FURTHER = ("further_std", "further_range")
+_LIMITS = ("goal_ways", "goal_limits")
 _SCALINGS = ("observation_offset", "observation_scale", "command_scale")
 _LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias", "direct")
 
@@ -272,7 +290,10 @@ def _check(simulation: Simulation) -> None:
     _expect("command_scale", scaling.command_scale, (2 * joints,), scaling.command_scale > 0)
     _expect("error_std", simulation.error_std, (joints, 4), simulation.error_std >= 0)
     _expect("further_std", simulation.further_std, (further,), simulation.further_std >= 0)
+    ways = len(simulation.goal_limits)
+    _expect("goal_ways", simulation.goal_ways, (ways, joints if ways else simulation.goal_ways.shape[1]))
     for name, array, shape in (
+        ("goal_limits", simulation.goal_limits, (ways, 2)),
         ("goal_range", simulation.goal_range, (joints, 2)),
         ("pressure_range", simulation.pressure_range, (joints, 2, 2)),
         ("further_range", simulation.further_range, (further, 2)),

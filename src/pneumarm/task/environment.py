@@ -28,6 +28,7 @@ from pneumarm.task.begin import BeginParameters, BeginStates, begin_parameters, 
 from pneumarm.task.reward import RewardParameters, is_near, is_slow, is_switch, paid
 from pneumarm.task.settings import TaskSettings
 
+_TRIES = 100  # draws until a goal is taken whatever it is
 GOES_ON, REACHED, CUT_OFF = 0, 1, 2
 """How an episode is after an action."""
 
@@ -36,7 +37,11 @@ class Task(NamedTuple):
     """What is asked of the arm, in sensor units unless it says scaled."""
 
     goal_range: NDArray[np.float64]
-    """Goals are uniform between these, shape (joints, 2) [counts]."""
+    """Goals are uniform between these, shape (joints, 2) [counts] ..."""
+    goal_ways: NDArray[np.float64]
+    """... and keep the limits of these sums, see :class:`~pneumarm.transitions.goals.Goals`, shape (k, joints)."""
+    goal_limits: NDArray[np.float64]
+    """Shape (k, 2)."""
     unit: NDArray[np.float64]
     """Offset and scale of angle and velocity, shape (joints, 4): angle, angle, velocity, velocity."""
     commands: NDArray[np.float32]
@@ -87,7 +92,9 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     commands = VALVES[None] / scaling.command_scale.reshape(window.joints, 1, 2)
     task = Task(
-        goal_range=np.ascontiguousarray(simulation.goal_range, np.float64),
+        goal_range=np.ascontiguousarray(simulation.goals.range, np.float64),
+        goal_ways=np.ascontiguousarray(simulation.goals.ways, np.float64),
+        goal_limits=np.ascontiguousarray(simulation.goals.limits, np.float64),
         unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
         commands=np.ascontiguousarray(commands, np.float32),
         goal_place=places(simulation.window).goal,
@@ -118,15 +125,30 @@ def episode(environment: Environment, random: RandomState) -> Episode:
 def begin_episode(environment, episode, deviation, random):  # type: ignore[no-untyped-def]
     """Draw goals and a begin state within ``deviation`` [counts] of them from ``random``, and put the arm there."""
     task = environment.task
+    for _ in range(_TRIES):
+        for joint in range(episode.goal.shape[0]):
+            low, high = task.goal_range[joint, 0], task.goal_range[joint, 1]
+            episode.goal[joint] = low + (high - low) * uniform(random)
+        if is_goal(task.goal_ways, task.goal_limits, episode.goal):
+            break
     for joint in range(episode.goal.shape[0]):
-        low, high = task.goal_range[joint, 0], task.goal_range[joint, 1]
-        goal = low + (high - low) * uniform(random)
-        episode.goal[joint] = goal
         episode.actions[joint] = -1
-        scaled = (goal - task.unit[joint, 0]) / task.unit[joint, 1]
+        scaled = (episode.goal[joint] - task.unit[joint, 0]) / task.unit[joint, 1]
         episode.state.x[task.goal_place + joint] = np.float32(scaled)
     index = draw_begin(environment.begin, episode.goal, deviation, random)
     begin(environment.simulation, environment.noise, episode.state, environment.begin.states[index])
+
+
+@part
+def is_goal(ways, limits, goal):  # type: ignore[no-untyped-def]
+    """Return whether ``goal`` (joints,) keeps all ``limits`` (k, 2) of sums by ``ways`` (k, joints)."""
+    for k in range(ways.shape[0]):
+        total = 0.0
+        for joint in range(goal.shape[0]):
+            total += ways[k, joint] * goal[joint]
+        if total < limits[k, 0] or total > limits[k, 1]:
+            return False
+    return True
 
 
 @part

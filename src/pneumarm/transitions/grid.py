@@ -29,6 +29,8 @@ class GridSettings(Settings):
     """Divisions of the velocity (thesis: 8)."""
     pressure_bins: int = 8
     """Divisions of each pressure (thesis: 8)."""
+    chain_bins: int = 5
+    """Divisions of angle, velocity and pressures where an arm has several joints (thesis section 6.1.4: 5)."""
     command_bins: int = 3
     """Divisions of each muscle's command where commands are continuous or pulses (not in the thesis); valves are
     divided into the 9 actions of a joint. Three keeps a grid of as many cells: 3 x 3 = 9."""
@@ -43,7 +45,7 @@ class GridSettings(Settings):
     bounds memory where there are so many dimensions that nearly every transition has a cell of its own."""
 
     def _valid(self) -> Valid:
-        whole = ("angle_bins", "velocity_bins", "pressure_bins", "command_bins", "per_cell", "most")
+        whole = ("angle_bins", "velocity_bins", "pressure_bins", "chain_bins", "command_bins", "per_cell", "most")
         enough = {name: getattr(self, name) >= 1 or "1 or more" for name in whole}
         return {**enough, "inside": 0.5 <= self.inside <= 1 or "0.5 to 1"}
 
@@ -107,6 +109,8 @@ def span_grid(blocks: Iterable[Transitions], window: Window, settings: GridSetti
     outside = (1 - settings.inside) / 2
     low, high = counted([outside, 1 - outside])
     per_joint = [settings.angle_bins, settings.velocity_bins, settings.pressure_bins, settings.pressure_bins]
+    if window.joints > 1:
+        per_joint = [settings.chain_bins] * len(per_joint)
     # What further sensors say is not divided: each would multiply the cells, and with them what there is to collect.
     bins = per_joint * window.joints + [1] * len(window.further)
     if valves:

@@ -126,7 +126,8 @@ _Ranges = dict[str, tuple[float, float]]
 def _link_ranges(j: int, joints: int) -> _Ranges:
     """Return the ranges of the parameters of joint ``j`` of a chain that are not those of a single joint.
 
-    Outer pulleys are smaller, so that the light links on them swing at a few hertz too.
+    Outer pulleys are smaller, so that the light links on them swing at a few hertz too. With those the stops are what
+    ends the stroke, and they end it where the sensor still sees the joint, pressed against them or not.
     """
     share = 2 / joints  # of what a link of two is
     mass, distance = ((0.20, 0.30), (0.09, 0.13)) if j < joints - 1 else ((0.12, 0.20), (0.16, 0.20))
@@ -135,6 +136,7 @@ def _link_ranges(j: int, joints: int) -> _Ranges:
         **{name: (low * share, high * share) for name, (low, high) in scaled.items()},
         "link_inertia": (0.003, 0.005) if j == 0 else (0.006, 0.009),
         "radius": (0.031, 0.037) if j == 0 else (0.024, 0.029),
+        "stop_angle": (math.radians(42.5), math.radians(42.5)),
     }
 
 

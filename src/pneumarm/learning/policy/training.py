@@ -15,11 +15,15 @@ from pneumarm.networks.layers import initial_weights, trainable
 from pneumarm.random import random_state, random_states
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
+from pneumarm.task.environment import Environment
 from pneumarm.task.fleet import begin_all, fleet
 from pneumarm.task.movements import Movements
 
 _WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
 _FIRST_OUTPUT = 0.01  # the first policy chooses by its bonus for holding alone
+_WIDER = 4.0  # times as wide the tolerances of several joints are when training begins ...
+_CHEAPER = 0.2  # ... and this share of its price is what a switch costs,
+_EASING = 0.6  # until both are what they are, at this share of the training
 _VALUE_RATE = 4e-3  # of a policy's training, whose values begin at random, too
 
 
@@ -31,9 +35,15 @@ def train_policy(
 
 
 class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):
-    """A policy and the value of states under it, with the arms in which they are learned."""
+    """A policy and the value of states under it, with the arms in which they are learned.
+
+    With several joints all have to be near their goals and slow at once, which a policy that knows nothing hardly
+    ever is. So its training begins with wider tolerances and cheap switches.
+    """
 
     networks = ("policy", "value")
+    easing = _EASING
+    """Share of the training in which goals are easier; 0 for none."""
 
     def __init__(
         self, simulation: Simulation, begin_states: BeginStates, settings: PolicySettings, seed: int, number: int
@@ -54,10 +64,25 @@ class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):
 
     def update(self) -> tuple[int, int, float]:
         """Act for a batch of steps and learn from them."""
-        now, counts, (environment, limits, inputs) = self._rule, self.counts, self.mind[:3]
-        seen: tuple[int, int, float] = collect(environment, limits, inputs, now, self.policy, self.fleet, self._batch)
+        now, counts, (_, limits, inputs) = self._rule, self.counts, self.mind[:3]
+        world = self._eased()
+        seen: tuple[int, int, float] = collect(world, limits, inputs, now, self.policy, self.fleet, self._batch)
         counts[1] = improve(now, self.policy, self.value, self._batch, self.rates(), counts[1], self.random)
         return seen
+
+    def _eased(self) -> Environment:
+        """Return the environment with goals as easy to reach as they are now."""
+        left = 1 - self.share / self.easing if self.easing and self._simulation.window.joints > 1 else 0.0
+        if left <= 0:
+            return self.environment
+        task = self.environment.task
+        wider, cheaper = 1 + (_WIDER - 1) * left, 1 - (1 - _CHEAPER) * left
+        reward = task.reward._replace(
+            switch=task.reward.switch * cheaper,
+            angle_tolerance=task.reward.angle_tolerance * wider,
+            velocity_tolerance=task.reward.velocity_tolerance * wider,
+        )
+        return self.environment._replace(task=task._replace(reward=reward))
 
     def rates(self) -> tuple[float, float]:
         """Return the learning rates of policy and values."""
@@ -89,6 +114,8 @@ def rule(settings: PolicySettings) -> Rule:
 
 class _Tuner(PolicyLearner):
     """A policy that is kept as it is until the values of states are known."""
+
+    easing = 0.0
 
     def __init__(
         self, simulation: Simulation, begin: BeginStates, settings: PolicySettings, seed: int, warm_up: int

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.transitions.goals import Goals
 
 Array = NDArray[np.float64]
 
@@ -16,13 +17,13 @@ _MOVES = 0.3, 2.0  # s that a move takes
 
 
 def draw_references(
-    random: np.random.Generator, goal_range: Array, angle: Array, steps: int, spec: ArmSpec, fastest: Array
+    random: np.random.Generator, goals: Goals | Array, angle: Array, steps: int, spec: ArmSpec, fastest: Array
 ) -> Array:
     """Return references (steps, joints, n) in [counts], at every control period.
 
     Args:
         random: what is drawn from.
-        goal_range: shape (joints, 2) [counts].
+        goals: that the arm can hold, or their range (joints, 2) [counts]; references keep within them.
         angle: where the joints are now, shape (joints, n) [counts].
         steps: how many periods.
         spec: of the arm.
@@ -30,7 +31,8 @@ def draw_references(
 
     """
     joints, n = angle.shape
-    low, high = goal_range[:, :1], goal_range[:, 1:]
+    possible = Goals.of(goals)
+    low, high = possible.range[:, :1], possible.range[:, 1:]
     span = high - low
     time = np.arange(steps)[:, None, None] * spec.period
     kind = random.choice(len(_KINDS), size=(joints, n), p=_SHARES)
@@ -55,4 +57,6 @@ def draw_references(
 
     for name, values in (("sinusoid", swinging), ("move", moving), ("steps", stepping)):
         references = np.where(kind == _KINDS.index(name), values, references)
-    return references
+    if not len(possible.ways):
+        return references
+    return np.ascontiguousarray(possible.within(references.swapaxes(1, 2)).swapaxes(1, 2))

@@ -197,7 +197,7 @@ class ServoLearner(Learner[ServoAgent]):
         ahead = self.task.inputs.steps
         drawn = draw_references(
             random,
-            simulation.goal_range,
+            simulation.goals,
             self._counts(self._angles(0)),
             steps + 1 + int(ahead.max()),
             simulation.spec,

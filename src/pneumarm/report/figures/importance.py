@@ -11,6 +11,7 @@ from pneumarm.report.style import DARK, INK, MIDDLE, panels, styled
 Array = NDArray[np.float64]
 
 _SHOWN = 24  # inputs; the most important ones where there are more
+_IN_A_ROW = 4  # outputs; of several joints each has a row of its own
 
 
 @styled
@@ -26,17 +27,20 @@ def input_importance(weights: Array, inputs: Sequence[str], outputs: Sequence[st
     """
     order = _largest_first(weights)[:_SHOWN]
     order = np.sort(order)[::-1]
-    figure, axes = panels(1, len(outputs), 0.9 + 0.19 * len(order), sharey=True)
+    columns = len(outputs) if len(outputs) <= _IN_A_ROW else next(n for n in (3, 4, 1) if len(outputs) % n == 0)
+    rows = -(-len(outputs) // columns)
+    figure, axes = panels(rows, columns, rows * (0.9 + 0.19 * len(order)), sharey=True)
     limit = 1.08 * float(np.abs(weights).max(initial=0)) or 1.0
     place = np.arange(len(order))
-    for axis, name, w in zip(axes[0], outputs, weights[order].T, strict=True):
+    for axis, name, w in zip(axes.flat, outputs, weights[order].T, strict=True):
         axis.barh(place, w, color=np.where(w >= 0, DARK, MIDDLE), height=0.7)
         axis.axvline(0, color=INK, lw=0.7)
         axis.set_title(f"change of {name}")
         axis.set_xlabel("standardised weight [-]")
         axis.set_xlim(-limit, limit)
-    axes[0, 0].set_yticks(place, [readable(inputs[i]) for i in order])
-    axes[0, 0].set_ylabel("input")
+    for axis in axes[:, 0]:
+        axis.set_yticks(place, [readable(inputs[i]) for i in order])
+        axis.set_ylabel("input")
     return figure
 
 

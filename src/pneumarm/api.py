@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # what these need is imported when they are called
     from pneumarm.arm.reference import Reference
     from pneumarm.classical import Tuned, TuneSettings
     from pneumarm.control.loaded import LoadedController
+    from pneumarm.control.monitor import Mode
     from pneumarm.learning import AnyAgent, LearnSettings, Training
     from pneumarm.moving import Moved, MoveSettings, Tracked
     from pneumarm.simulation import FitSettings, Simulation, StoreFit
@@ -43,13 +44,16 @@ def open_arm(name: str, seed: int = 0) -> "Arm":
 def collect(
     arm: "Arm | str",
     db: str | Path,
-    transitions: int = 200_000,
+    transitions: int | None = None,
     seed: int = 0,
     settings: "CollectSettings | None" = None,
+    *,
+    monitor: "Mode" = "stop",
 ) -> "CollectResult":
     """Make ``arm`` move about and record it in the store ``db`` until that holds so many ``transitions``.
 
-    A second call goes on. What was wrong meanwhile is said on stderr, and nothing is learned from it.
+    Without a number it goes on until more would not make a simulation better. A second call goes on. What was wrong
+    meanwhile is said on stderr, and nothing is learned from it unless ``monitor`` is ``warn`` or ``off``.
 
     Raises:
         UnusableInput: fewer than 2,000 transitions, or ``db`` is the store of another arm or another collection.
@@ -59,16 +63,24 @@ def collect(
     from pneumarm.console import progress, say
     from pneumarm.control import Monitor
     from pneumarm.control.condition import collected_results, complaints
-    from pneumarm.transitions import Store, collect, require_enough
+    from pneumarm.simulation.enough import collect_enough
+    from pneumarm.transitions import FEWEST_TRANSITIONS, Store, collect, require_enough
 
-    require_enough(transitions)
+    if transitions is not None:
+        require_enough(transitions)
     with (
         _opened(arm, seed) as opened,
         Store.for_arm(Path(db), opened.spec) as store,
         progress("collecting") as report,
     ):
-        watch = Monitor(opened.spec)
-        result = collect(opened, store, transitions, seed, progress=report, settings=settings, watch=watch)
+        watch = Monitor(opened.spec, mode=monitor)
+
+        def record(wanted: int) -> "CollectResult":
+            return collect(opened, store, wanted, seed, progress=report, settings=settings, watch=watch)
+
+        if transitions is None:
+            say(collect_enough(record, store)["verdict"])
+        result = record(transitions or FEWEST_TRANSITIONS)
     for line in complaints(collected_results(result, watch), "collecting"):
         say(line)
     return result

@@ -25,6 +25,7 @@ from pneumarm.learning import (
     train,
 )
 from pneumarm.learning.policy.agent import KIND
+from pneumarm.learning.policy.training import PolicyLearner
 from pneumarm.learning.training import CHECKPOINT
 from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.simulation import Simulation
@@ -251,3 +252,23 @@ def test_looking_ahead_is_tested_on_the_first_of_the_same_movements(
     scaling = replace(simulation.scaling, observation_scale=2 * simulation.scaling.observation_scale)
     with pytest.raises(UnusableInput, match="another simulation"):
         test_ahead(agent, replace(simulation, scaling=scaling), begin, 10)
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_several_joints_begin_with_easier_goals_and_end_with_those_asked_for(joints):
+    simulation = synthetic_simulation(joints=joints, hidden=4)
+    learner = PolicyLearner(simulation, synthetic_begin_states(simulation), replace(POLICY, updates=10), 0, 0)
+    asked, found = learner.environment.task.reward, []
+    for done in range(11):
+        learner.counts[0] = done
+        found.append(learner._eased().task.reward)
+    assert found[6:] == [asked] * 5
+    if joints == 1:
+        assert found[0] == asked
+    else:
+        tolerances = [reward.angle_tolerance for reward in found[:7]]
+        assert tolerances == sorted(tolerances, reverse=True)
+        assert tolerances[0] == 4 * asked.angle_tolerance
+        assert [reward.switch for reward in found[:7]] == sorted(
+            (reward.switch for reward in found[:7]), reverse=True
+        )

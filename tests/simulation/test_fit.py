@@ -12,6 +12,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import UnusableInput
 from pneumarm.simulation import FitResult, FitSettings, Simulation, by_quantity, fit, fit_store, refiltered
+from pneumarm.simulation.fit import _rows_to_fit
 from pneumarm.transitions import CollectSettings, GridSettings, Store, collect, filter_transitions, held_out
 from pneumarm.transitions.rows import Recorded, Rows
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
@@ -241,3 +242,25 @@ def test_what_commands_were_fitted_is_known_and_kept(fitted: Fitted, tmp_path: P
     assert simulation.commands == "valves"
     replace(simulation, commands="pulses").save(tmp_path / "sim")
     assert Simulation.load(tmp_path / "sim").commands == "pulses"
+
+
+def test_two_coupled_joints_are_fitted_with_goals_that_they_were_seen_to_hold(tmp_path: Path) -> None:
+    arm = VirtualArm(draw_parameters(1, 2))
+    with Store.for_arm(tmp_path / "two.db", arm.spec) as store:
+        collect(arm, store, 2_000)
+        simulation = fit_store(store, FitSettings(epochs=2, hidden=2))[0].simulation
+    assert [network.hidden_bias.size for network in simulation.networks] == [4] * 6
+    assert simulation.goals.ways.shape == (6, 2)
+    drawn = simulation.goals.draw(np.random.default_rng(0), 500)
+    assert simulation.goals.contain(drawn).all()
+    assert np.ptp(drawn, axis=0).min() > 0.5 * np.ptp(simulation.goal_range, axis=1).min()
+    simulation.save(tmp_path / "two.sim")
+    np.testing.assert_array_equal(Simulation.load(tmp_path / "two.sim").goal_limits, simulation.goal_limits)
+
+
+def test_a_part_of_the_rows_is_enough_for_large_networks() -> None:
+    assert _rows_to_fit(500_000, 200, 0) == slice(None)  # a single joint has all that the filter keeps
+    chosen = _rows_to_fit(500_000, 760, 0)
+    assert isinstance(chosen, np.ndarray)
+    assert 40_000 < len(chosen) < 60_000
+    assert len(np.unique(chosen)) == len(chosen)

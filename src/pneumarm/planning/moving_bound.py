@@ -23,6 +23,7 @@ from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.arm.virtual import VirtualArm, without_noise
 from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
+from pneumarm.learning.agents import goals_of
 from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.commands import shortest_share
 from pneumarm.moving.movement import played
@@ -86,7 +87,7 @@ def measure_moving_bound(
     """
     random, spec = np.random.default_rng([seed, 6]), agent.spec
     low, high = agent.goal_range.T
-    goals = [constant(random.uniform(low, high)) for _ in range(settings.goals)]
+    goals = [constant(goal) for goal in goals_of(agent).draw(random, settings.goals)]
     middle, half = (low + high) / 2, (high - low) / 2
     counts = np.minimum(settings.amplitude * spec.counts_per_degree, 0.9 * half)
 

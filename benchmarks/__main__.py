@@ -16,6 +16,7 @@ LONG = (
     "live",
     "minutes",
     "moving",
+    "moving_pictures",
     "baselines",
     "sensors",
     "serial",

@@ -47,12 +47,19 @@ def measure() -> Iterator[str]:
     )
     names = [name for name in environment.get("controllers", CONTROLLERS).split(",") if name != "plan"][: len(INKS)]
     arms = [int(arm) for arm in environment.get("arms", HELD_OUT).split(",")]
+    seeds = [int(seed) for seed in environment.get("seeds", "0,1,2").split(",")]
     yield str(save(movements({name: made(plan, name, arms[0]) for name in names}), "moving.svg"))
     rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds")
     errors = {
         name: [np.mean([row["tracking"][key(AMPLITUDES[0], f, True)] for row in found]) for f in FREQUENCIES]
         for name in names
-        if (found := [row for row in rows if row["controller"] == name and row["arm"] in arms])
+        if (
+            found := [
+                row
+                for row in rows
+                if (row["controller"], row["arm"] in arms, row["seed"] in seeds) == (name, True, True)
+            ]
+        )
     }
     bound = [bound_of(plan, arm) for arm in arms[:BOUNDED]]
     yield str(save(following(errors, [float(np.mean(one)) for one in zip(*bound, strict=True)]), "following.svg"))

@@ -3,13 +3,14 @@
 python -m benchmarks moving_pictures
 
 Draws ``docs/moving.svg`` and ``docs/following.svg``. Controllers and rows are those of ``python -m benchmarks
-moving``, and so are the settings from the environment; movements are made on the first of its arms, the bound is that of the
-first three (:mod:`pneumarm.planning.moving_bound`).
+moving``, and so are the settings from the environment; movements are made on the first of its arms, the bound is that
+of the first three (:mod:`pneumarm.planning.moving_bound`).
 """
 
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -63,6 +64,11 @@ def measure() -> Iterator[str]:
     }
     bound = [bound_of(plan, arm) for arm in arms[:BOUNDED]]
     yield str(save(following(errors, [float(np.mean(one)) for one in zip(*bound, strict=True)]), "following.svg"))
+
+
+def rows_of(rows: Rows, name: str, arm: int) -> list[dict[str, Any]]:
+    """Return the rows of a controller on an arm."""
+    return [row for row in rows if (row["controller"], row["arm"]) == (name, arm)]
 
 
 def made(plan: Plan, name: str, arm: int) -> tuple[Course, Course]:

@@ -145,7 +145,13 @@ def _summary(run: RunData) -> list[str]:
     spec = run.spec
     joints = f"{spec.joints} joint{'s' if spec.joints > 1 else ''}"
     text = [f"{spec.name}: {joints}, {1 / spec.period:.3g} Hz, pressures up to {spec.max_pressure:g} bar."]
-    text = [*moving_words(run.results), *text]
+    moves = moving_words(run.results)
+    text = [*moves, *text]
+    if moves:
+        text.append(
+            "What follows is the thesis' measure: a goal counts as reached once it is touched slowly enough, and every "
+            "change of valves costs 8 of the reward. This agent stays at goals instead, and does not save changes."
+        )
     if run.test is not None and run.test.n:
         text.append(
             f"In the simulation the controller reaches {run.test.success.mean():.2%} of its goals "

@@ -149,7 +149,7 @@ def _summary(run: RunData) -> list[str]:
     text = [*moves, *text]
     if moves:
         text.append(
-            "What follows is the thesis' measure: a goal counts as reached once it is touched slowly enough, and every "
+            "What follows is the thesis' measure: a goal is reached once it is touched slowly enough, and each "
             "change of valves costs 8 of the reward. This agent stays at goals instead, and does not save changes."
         )
     if run.test is not None and run.test.n:

@@ -1,8 +1,7 @@
 """The settings of a small run of the whole job."""
 
-from pneumarm.control import TransferSettings
 from pneumarm.learning import Shaping, TrainSettings
-from pneumarm.run import RunSettings
+from pneumarm.run import RunSettings, RunTransferSettings
 from pneumarm.simulation import FitSettings
 
 SMALL = RunSettings(
@@ -14,5 +13,5 @@ SMALL = RunSettings(
     fit=FitSettings(epochs=10),
     method="sarsa",
     thesis=TrainSettings(agents=2, max_episodes=3_000, validation_episodes=100, shaping=Shaping(episodes=100)),
-    transfer=TransferSettings(episodes=30, test_episodes=20),
+    transfer=RunTransferSettings(episodes=30, test_episodes=20),
 )

@@ -13,9 +13,8 @@ import pneumarm.errors
 import pneumarm.gym
 from pneumarm.arm import open_arm
 from pneumarm.cli import main
-from pneumarm.control import TransferSettings
 from pneumarm.learning import PolicySettings, load_agent
-from pneumarm.run import Run, RunSettings
+from pneumarm.run import Run, RunSettings, RunTransferSettings
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import joined
@@ -30,7 +29,7 @@ SETTINGS = RunSettings(
     bound_episodes=3,
     fit=FitSettings(epochs=6, sensors=("velocity", "temperature")),
     policy=PolicySettings(agents=1, updates=12, arms=64, validation_episodes=50, lookahead=16),
-    transfer=TransferSettings(episodes=12, test_episodes=5),
+    transfer=RunTransferSettings(episodes=12, test_episodes=5),
 )
 
 

@@ -60,6 +60,16 @@ def silent(title: str) -> Iterator[Report]:
 
 
 @dataclass(frozen=True)
+class RunTransferSettings(TransferSettings):
+    """As of a transfer, in minutes of the arm's time instead of hours."""
+
+    episodes: int = 30
+    """Movements while learning (thesis section 5.5.1: progress is seen after some 750)."""
+    test_episodes: int = 15
+    """Greedy movements before and again after learning; at least 500 for figures to be compared."""
+
+
+@dataclass(frozen=True)
 class RunSettings(LearnSettings):
     """What a run is asked for. A folder is resumed with the same settings only."""
 
@@ -80,13 +90,14 @@ class RunSettings(LearnSettings):
     each joint more an eighth of them, because a plan for two takes ten times as long."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
-    transfer: TransferSettings = field(default_factory=lambda: TransferSettings(episodes=30, test_episodes=15))
+    transfer: RunTransferSettings = field(default_factory=RunTransferSettings)
     moving: MoveTrialSettings = field(default_factory=MoveTrialSettings)
 
     def of_the_thesis(self) -> Self:
         """Return the settings with the thesis' sizes in place of those that are left as they are by default."""
-        usual = type(self)()
-        transfer = TransferSettings() if self.transfer == usual.transfer else self.transfer
+        usual, thesis, transfer = RunTransferSettings(), TransferSettings(), self.transfer
+        if transfer == usual:
+            transfer = replace(transfer, episodes=thesis.episodes, test_episodes=thesis.test_episodes)
         return replace(self, transitions=self.transitions or 200_000, transfer=transfer)
 
     def _valid(self) -> Valid:

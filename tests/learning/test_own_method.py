@@ -18,14 +18,14 @@ import numpy as np
 import pytest
 
 import pneumarm as pneumarm_itself
-from pneumarm.control import TransferSettings, open_agent
+from pneumarm.control import open_agent
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings
 from pneumarm.experiments.there_and_back import BEFORE, Prepared, Recipe, train_and_move
 from pneumarm.files import kind_of, read_arrays, write_arrays
 from pneumarm.learning import Method, SimulationAgent, Training, find_method, fingerprint, load_agent, test
 from pneumarm.learning.methods import GROUP
-from pneumarm.run import Run, RunSettings
+from pneumarm.run import Run, RunSettings, RunTransferSettings
 from pneumarm.settings import Valid
 from pneumarm.simulation import FitSettings, Simulation
 from pneumarm.task import BeginStates, TaskSettings, begin_states
@@ -117,7 +117,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
         fit=FitSettings(epochs=3),
         method=NAME,
         own={"trials": 3},
-        transfer=TransferSettings(episodes=2, test_episodes=3),
+        transfer=RunTransferSettings(episodes=2, test_episodes=3),
     )
     Run(folder, settings).do()
     return folder

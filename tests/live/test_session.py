@@ -142,10 +142,10 @@ def test_an_arm_whose_page_is_silent_holds_then_is_vented(played: Played) -> Non
 
 
 def test_a_fault_is_switched_on_found_and_switched_off(played: Played) -> None:
-    goals = [(1.0 + k, Goal([15.0 if k % 2 else -15.0])) for k in range(30)]
+    goals = [(1.0 + k, Goal([15.0 if k % 2 else -15.0])) for k in range(50)]
     on, off = Faults("inlet-closed", 1, 1, True), Faults("inlet-closed", 1, 1, False)
-    played.run(*goals, (5.05, on), (28.0, off), until=31.0)
-    kinds = {one.kind for one in played.session._watch.findings if one.since > 4}
+    played.run(*goals, (25.05, on), (48.0, off), until=51.0)  # after 20 s it knows the arm
+    kinds = {one.kind for one in played.session._watch.findings if one.since > 24}
     assert "stuck-valve" in kinds
     assert played.virtual.faults == ()
 

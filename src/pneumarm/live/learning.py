@@ -13,14 +13,13 @@ from pneumarm.arm import Arm
 from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Reading
 from pneumarm.console import Report
-from pneumarm.control import TransferSettings
 from pneumarm.errors import PneumarmError
 from pneumarm.live.screen import Screen
-from pneumarm.run import Run, RunSettings, settings_in
+from pneumarm.run import Run, RunSettings, RunTransferSettings, settings_in
 
 TRANSITIONS = 36_000
 """How much is recorded: 20 minutes of an arm that is controlled at 30 Hz."""
-TRANSFER = TransferSettings(episodes=100, test_episodes=50)
+TRANSFER = RunTransferSettings(episodes=100, test_episodes=50)
 """Few movements: people are looking on."""
 STAGES = {
     "collect": "move about and record",

@@ -40,7 +40,7 @@ def test_each_boot_loader_is_tried(avrdude: Path, tmp_path: Path, capsys: pytest
     with pytest.raises(SystemExit) as ended:
         main(["arm", "flash", f"serial:{tmp_path / 'port'}"])
     assert ended.value.code == 0
-    assert "is flashed" in capsys.readouterr().out
+    assert "is flashed" in " ".join(capsys.readouterr().out.split())  # a long name of a port is wrapped
     calls = avrdude.read_text().splitlines()
     assert [f"-b {baud} " in call for baud, call in zip(BAUDS, calls, strict=True)] == [True, True]
     assert all(f"-P {tmp_path / 'port'} " in call and call.endswith(f"flash:w:{FIRMWARE}:i") for call in calls)

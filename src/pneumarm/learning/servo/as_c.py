@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pneumarm.learning.servo.agent import ServoAgent
+from pneumarm.learning.servo.commands import WHOLE
 from pneumarm.learning.servo.inputs import input_size
 
 _PLACE = "/* PARAMETERS */"
@@ -26,7 +27,7 @@ def as_c(agent: ServoAgent) -> str:
         "LAYERS": len(sizes) - 1,
         "WIDEST": max(input_size(seen), *sizes),
     }
-    shares = {"DEAD": made.dead, "SHORTEST": made.shortest}
+    shares = {"DEAD": made.dead, "SHORTEST": made.shortest, "WHOLE": min(float(WHOLE), 1 - made.shortest / 2)}
     lines = [
         f"/* For {_safe(agent.spec.name)}, {1 / agent.spec.period:g} Hz, {agent.spec.counts_per_degree:g} counts per "
         f"degree, {agent.spec.counts_per_bar:g} counts per bar. */",

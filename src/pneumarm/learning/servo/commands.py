@@ -22,7 +22,8 @@ from pneumarm.simulation.simulation import Simulation
 _GAIN = np.float32(1.25)
 _LEAK = 0.05
 _AS_IF = 0.1
-_WHOLE = np.float32(0.8)
+WHOLE = np.float32(0.8)
+"""Longer pulses last the whole period: that saves changes of valves and costs next to no precision."""
 _ONE, _ZERO = np.float32(1.0), np.float32(0.0)
 
 
@@ -60,7 +61,7 @@ def rounded(size, shortest):  # type: ignore[no-untyped-def]
     """Return a pulse of ``size`` periods as the valve can make it: none, or between ``shortest`` and the period."""
     if size < np.float32(0.5) * shortest:
         return _ZERO
-    if size > min(_WHOLE, _ONE - np.float32(0.5) * shortest):
+    if size > min(WHOLE, _ONE - np.float32(0.5) * shortest):
         return _ONE
     return max(size, shortest)
 

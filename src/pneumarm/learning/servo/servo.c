@@ -91,7 +91,7 @@ static float servo_pulse(float said, float pressure, float limit)
     size = size < 0 ? 0 : size > 1 ? 1 : size;
     if (size < 0.5f * SERVO_SHORTEST)
         size = 0;
-    else if (size > 1.0f - 0.5f * SERVO_SHORTEST)
+    else if (size > SERVO_WHOLE)
         size = 1;
     else if (size < SERVO_SHORTEST)
         size = SERVO_SHORTEST;

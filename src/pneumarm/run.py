@@ -85,7 +85,7 @@ class RunSettings(LearnSettings):
     """When more would not help."""
     test_episodes: int = 10_000
     """Movements of the test in simulation (thesis section 5.2)."""
-    bound_episodes: int = 150
+    bound_episodes: int = 40
     """Movements planned with the true physics, which say what can be achieved; 0 for none. Virtual arms only; for
     each joint more an eighth of them, because a plan for two takes ten times as long."""
     collect: CollectSettings = field(default_factory=CollectSettings)
@@ -175,18 +175,22 @@ class Run:
         ):
             if name not in self.results:
                 began = time.perf_counter()
-                figures = stage()
-                wall = {name: round(time.perf_counter() - began, 3)}
-                self.results |= figures
-                self.results["wall_seconds"] = self.results.get("wall_seconds", {}) | wall
-                self.results["peak_memory_mb"] = max(peak_memory(), self.results.get("peak_memory_mb", 0.0))
-                write_json(self._results_file, jsonable(self.results))
+                self.results |= stage()
+                self._note(name, time.perf_counter() - began)
         if not (self.folder / "report.html").exists():
+            began = time.perf_counter()
             with self.progress("report") as report:
                 report(0, 1)
                 write_report(self.folder)
                 report(1, 1)
+            self._note("report", time.perf_counter() - began)
         return self.results
+
+    def _note(self, stage: str, seconds: float) -> None:
+        """Write the results with how long a ``stage`` took; once they are there it is not done again."""
+        self.results["wall_seconds"] = self.results.get("wall_seconds", {}) | {stage: round(seconds, 3)}
+        self.results["peak_memory_mb"] = max(peak_memory(), self.results.get("peak_memory_mb", 0.0))
+        write_json(self._results_file, jsonable(self.results))
 
     def _collect(self) -> dict[str, Any]:
         wanted = self.settings

@@ -250,12 +250,13 @@ class Stage:
 
 def watched_steps(arm: Arm, monitor: Watch, seed: int, settings: CollectSettings = WHOLE_PERIODS) -> Iterator[Step]:
     """Collect for ever, as :func:`pneumarm.transitions.collect` does, and yield the turns that ``monitor`` saw."""
+    settings = settings.for_period(arm.spec.period)
     random, guard = np.random.default_rng([seed, 7]), guarded(arm)
     while True:
         settings.begin.reach(guard, random)
         _, actor = random_actions(arm.spec, settings, random)
         actor.reset(np.zeros(arm.spec.joints))
-        left = iter(range(settings.actions))
+        left = iter(range(settings.actions or 0))
         monitor.begin(at_rest=True)
         for step in ControlCycle(guard).run(
             lambda reading, left=left, actor=actor: None if next(left, None) is None else actor.act(reading)  # type: ignore[misc]

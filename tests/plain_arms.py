@@ -193,3 +193,28 @@ def hose() -> PlainArm:
         sag=0.15,
     )
     return PlainArm(spec, physics)
+
+
+def noisy() -> PlainArm:
+    """Slow valves, and sensors whose noise of 0.3 degrees is most of what changes in a period; 25 Hz, 12 bits."""
+    spec = ArmSpec(
+        period=0.04,
+        counts_per_degree=20.0,
+        counts_per_bar=900.0,
+        angle_range=(0.0, 4095.0),
+        max_pressure=1.5,
+        name="noisy",
+    )
+    physics = Physics(
+        lambda p: 0.9 * max(2.0 - p, 0.0),
+        lambda p: 0.9 * p,
+        45.0,
+        55.0,
+        2.2,
+        0.2,
+        0.004,
+        hose=0.03,
+        lag=0.015,
+        noise=(6.0, 10.0),
+    )
+    return PlainArm(spec, physics)

@@ -7,6 +7,7 @@ import pytest
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.simulation import FitResult, FitSettings, fit
+from pneumarm.simulation.history import USUAL
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import Transitions, Window, transitions
 
@@ -55,7 +56,7 @@ def make_fit() -> Callable[..., tuple[FitResult, Transitions]]:
 
     def make(joints: int = 1, **settings: object) -> tuple[FitResult, Transitions]:
         chosen = FitSettings(**{"epochs": 15, "hidden": 6, **settings})  # type: ignore[arg-type]
-        window = Window(joints, chosen.history)
+        window = Window(joints, chosen.history or USUAL)
         training = transitions(recorded(joints, seed=1), window)
         held_out = transitions(recorded(joints, sequences=6, seed=2), window)
         spec = ArmSpec(joints=joints, period=PERIOD)

@@ -4,6 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pneumarm.arm.virtual import VirtualArm
@@ -33,9 +34,20 @@ def test_five_minutes_are_enough_and_two_cannot_be_judged(grown: Path) -> None:
 
 
 def test_the_verdict_says_what_was_gained() -> None:
-    assert Enough(0.3).verdict == "collect as much again: the second half lowers the simulation's error by 30%"
-    assert Enough(0.04).verdict.endswith("lowers the simulation's error by 4%, less than 10%")
-    assert Enough(-0.01).verdict.endswith("lowers the simulation's error not at all")
+    assert Enough(0.3, 0.1).verdict == "collect as much again: the second half lowers the simulation's error by 30%"
+    assert Enough(0.04, 0.1).verdict.endswith("lowers the simulation's error by 4%, less than 10%")
+    assert Enough(-0.01, 0.1).verdict.endswith("lowers the simulation's error not at all")
+
+
+def test_little_gain_is_not_enough_where_most_of_the_error_is_noise() -> None:
+    """A fit to n transitions errs by s^2 (1 + c / n); half of them and all of them tell how much c / n is."""
+    noise, networks = 0.6, 0.2
+    whole, half = np.hypot(noise, networks), np.hypot(noise, networks * np.sqrt(2))
+    judged = Enough(1 - whole / half, whole)
+    assert judged.unknown == pytest.approx(networks)
+    assert judged.gain < 0.1
+    assert not judged.enough
+    assert "20%" in judged.verdict
 
 
 def test_an_interrupted_collecting_ends_at_the_same_place(tmp_path: Path) -> None:
@@ -49,7 +61,7 @@ def test_an_interrupted_collecting_ends_at_the_same_place(tmp_path: Path) -> Non
                     collect(arm, store, wanted, 1)
 
                 with suppress(InterruptedError):
-                    found = collect_enough(record, store, EnoughSettings(growth=1.1, most=4500))
+                    found = collect_enough(record, store, EnoughSettings(growth=1.1, most=150))
                     assert store.transitions >= found["transitions"][-1]
         return found
 

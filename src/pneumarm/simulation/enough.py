@@ -24,6 +24,8 @@ from pneumarm.transitions.window import Window
 
 _MUCH = 0.1
 """An error that is lower by this part is worth collecting as much again."""
+_LEFT = 0.1
+"""So is an error of the networks alone, without the sensors' noise, of this part of how the arm changes in a step."""
 _HELD_OUT = 0.25
 """Share of the sequences that the errors are measured on."""
 _SETTINGS = FitSettings(epochs=15)
@@ -41,11 +43,22 @@ class Enough:
 
     gain: float
     """By which part its second half lowered the one-step error, the geometric mean over what networks predict."""
+    error: float
+    """The one-step error that is left, as a part of how the arm changes in a step; the noise of readings included."""
+
+    @property
+    def unknown(self) -> float:
+        """How much of the error is the networks', not the noise's.
+
+        The variance of theirs falls with the number of transitions, that of the noise does not: the second half took
+        away as much of it as is left.
+        """
+        return self.error * math.sqrt(max((1 - self.gain) ** -2 - 1, 0.0)) if self.gain < 1 else 0.0
 
     @property
     def enough(self) -> bool:
-        """Whether that is little."""
-        return self.gain < _MUCH
+        """Whether both are little."""
+        return self.gain < _MUCH and self.unknown < _LEFT
 
     @property
     def verdict(self) -> str:
@@ -53,25 +66,36 @@ class Enough:
         if self.enough:
             little = f"by {self.gain:.0%}, less than {_MUCH:.0%}" if self.gain > 0 else "not at all"
             return f"enough: the second half of the recording lowers the simulation's error {little}"
-        return f"collect as much again: the second half lowers the simulation's error by {self.gain:.0%}"
+        if self.gain >= _MUCH:
+            return f"collect as much again: the second half lowers the simulation's error by {self.gain:.0%}"
+        return (
+            "collect as much again: the sensors are noisy, and behind the noise the simulation's error still is "
+            f"{self.unknown:.0%} of how the arm changes in a step"
+        )
 
 
 @dataclass(frozen=True)
 class EnoughSettings(Settings):
-    """When collecting ends by itself."""
+    """When collecting ends by itself; in seconds of sequences, because an arm that is read oftener moves no more."""
 
-    first: int = 2 * FEWEST_TRANSITIONS
-    """Transitions after which it is first judged whether they are enough."""
+    first: float = 2 * FEWEST_TRANSITIONS / 30
+    """After which it is first judged whether they are enough [s]; no fewer transitions than can be judged."""
     growth: float = 1.5
     """Factor by which the record grows from then on until it is judged again."""
-    most: int = 60_000
-    """Transitions at which collecting ends all the same."""
+    most: float = 2000.0
+    """At which collecting ends all the same [s]."""
 
     def _valid(self) -> Valid:
         return {
-            "first": 2 * FEWEST_TRANSITIONS <= self.first <= self.most or f"{2 * FEWEST_TRANSITIONS:,} or more",
+            "first": 0 < self.first <= self.most or "above 0, and no more than most",
             "growth": 1.1 <= self.growth <= 10 or "1.1 to 10",
+            "most": self.most < math.inf or "a number of seconds",
         }
+
+    def sizes(self, period: float) -> tuple[int, int]:
+        """Return after how many transitions it is judged first, and at how many it ends, for a control period [s]."""
+        first, most = (max(round(one / period), 2 * FEWEST_TRANSITIONS) for one in (self.first, self.most))
+        return first, most
 
 
 def collect_enough(
@@ -88,21 +112,22 @@ def collect_enough(
     """
     note = asdict(settings)
     runs = [run["settings"] for run in store.runs().values() if run["purpose"] == _PURPOSE]
-    noted = {run["transitions"]: run["gain"] for run in runs if all(run[name] == note[name] for name in note)}
-    sizes, gains, wanted = list[int](), list[float | None](), settings.first
+    noted = {run["transitions"]: run["judged"] for run in runs if all(run.get(name) == note[name] for name in note)}
+    wanted, most = settings.sizes(store.spec.period)
+    sizes, gains = list[int](), list[float | None]()
     while True:
         record(wanted)
         if wanted not in noted:
             judged = enough_data(store)
-            noted[wanted] = None if judged is None else judged.gain
-            store.begin_run(_PURPOSE, {**note, "transitions": wanted, "gain": noted[wanted]})
+            noted[wanted] = None if judged is None else asdict(judged)
+            store.begin_run(_PURPOSE, {**note, "transitions": wanted, "judged": noted[wanted]})
+        found = None if noted[wanted] is None else Enough(**noted[wanted])
         sizes.append(wanted)
-        gains.append(noted[wanted])
-        found = None if gains[-1] is None else Enough(gains[-1])
-        if wanted >= settings.most or (found is not None and found.enough):
+        gains.append(None if found is None else found.gain)
+        if wanted >= most or (found is not None and found.enough):
             verdict = TOO_LITTLE if found is None else found.verdict
             return {"transitions": sizes, "gain": gains, "verdict": verdict}
-        wanted = min(round(settings.growth * wanted), settings.most)
+        wanted = min(round(settings.growth * wanted), most)
 
 
 def enough_data(store: Store) -> Enough | None:
@@ -114,7 +139,9 @@ def enough_data(store: Store) -> Enough | None:
     sequences = [entry.number for entry in store.catalogue()]
     if store.transitions < 2 * FEWEST_TRANSITIONS or len(sequences) < _FEWEST_SEQUENCES:
         return None
-    window = Window.of(store.spec, _SETTINGS.history, ())
+    settings = _SETTINGS.of_arm(store)
+    assert settings.history is not None
+    window = Window.of(store.spec, settings.history)
     first = sequences[: len(sequences) // 2]
     share = share_held_out(first, _HELD_OUT)
     half, whole = (
@@ -128,15 +155,15 @@ def enough_data(store: Store) -> Enough | None:
             spec=store.spec,
             goal_range=store.percentiles(),
             valves=store.valves,
-            settings=_SETTINGS,
+            settings=settings,
         )
         for filtered in (half, whole)
     ]
     before, after = map(_error, results)
-    return Enough(1 - after / before)
+    return Enough(1 - after / before, after)
 
 
 def _error(result: FitResult) -> float:
-    """Return the geometric mean of the one-step errors of all that networks predict [sensor units]."""
-    errors: NDArray[np.float64] = result.held_out.std[result.simulation.outputs]
+    """Return the geometric mean of the relative one-step errors of all that networks predict."""
+    errors: NDArray[np.float64] = result.held_out.relative[result.simulation.outputs]
     return math.exp(np.log(errors).mean())

@@ -28,6 +28,7 @@ from pneumarm.networks import (
 )
 from pneumarm.networks import importance as importance_of
 from pneumarm.settings import Settings, Valid
+from pneumarm.simulation.history import USUAL, chosen_history
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
 from pneumarm.transitions.choice import share_held_out
@@ -51,8 +52,8 @@ _MARGIN = 0.05
 class FitSettings(Settings):
     """What a person may choose of a fit."""
 
-    history: int = 3
-    """Observations in the state (thesis eq. 3.5: 3)."""
+    history: int | None = None
+    """Observations in the state (thesis eq. 3.5: 3); by default 3, or more where more say more of this arm."""
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
     hidden: int = 10
@@ -78,7 +79,7 @@ class FitSettings(Settings):
 
     def _valid(self) -> Valid:
         return {
-            "history": self.history >= 1,
+            "history": self.history is None or self.history >= 1 or "1 or more",
             "approximator": self.approximator in ("network", "least-squares"),
             "hidden": 1 <= self.hidden <= 1000,
             "epochs": self.epochs >= 1,
@@ -89,6 +90,12 @@ class FitSettings(Settings):
             "held_out": 0 < self.held_out < 1,
             "seed": self.seed >= 0,
         }
+
+    def of_arm(self, store: Store) -> "FitSettings":
+        """Return the settings with the history that suits the arm of ``store`` where none is asked for."""
+        if self.history is not None:
+            return self
+        return replace(self, history=chosen_history(store, store.spec, self.sensors))
 
 
 class FitResult(NamedTuple):
@@ -166,10 +173,10 @@ def fit(
 
     """
     settings = settings or FitSettings()
-    window = Window.of(spec, settings.history, settings.sensors)
+    window = _window(spec, settings)
     if training.inputs.shape[1] != window.input_size or training.target.shape[1] != window.observation_size:
         raise UnusableInput(
-            f"expected transitions of {spec.joints} joint(s) with a history of {settings.history}, that is "
+            f"expected transitions of {spec.joints} joint(s) with a history of {window.history}, that is "
             f"{window.input_size} inputs, got {training.inputs.shape[1]}; make them with the same window"
         )
     if len(training.inputs) <= window.input_size:
@@ -215,7 +222,7 @@ def _unfitted(
     training: Transitions, spec: ArmSpec, goal_range: NDArray[np.float64], valves: bool, settings: FitSettings
 ) -> Simulation:
     """Return the simulation without its networks."""
-    window = Window.of(spec, settings.history, settings.sensors)
+    window = _window(spec, settings)
     return Simulation(
         spec=_widened(window.spec(spec), window, training),
         window=window,
@@ -231,6 +238,10 @@ def _unfitted(
         further_std=np.zeros(len(window.further)),
         further_range=_further_range(training, window),
     )
+
+
+def _window(spec: ArmSpec, settings: FitSettings) -> Window:
+    return Window.of(spec, settings.history or USUAL, settings.sensors)
 
 
 def _commands(training: Transitions, window: Window) -> Commands:
@@ -300,10 +311,12 @@ def _widened(spec: ArmSpec, window: Window, transitions: Transitions) -> ArmSpec
 def _pressure_range(transitions: Transitions, window: Window) -> NDArray[np.float64]:
     """Return the range that predicted pressures are clipped to, (joints, 2 muscles, 2) [counts].
 
-    No gauge pressure lies below 0, unless the sensors said so; above, the recorded range gets a margin.
+    The recorded range gets a margin; but no gauge pressure lies below 0, unless the sensors said so.
     """
     pressure = window.of_joints(transitions.target)[..., -2:].astype(np.float64)
-    lowest, highest = np.minimum(pressure.min(axis=0), 0.0), pressure.max(axis=0)
+    least, highest = pressure.min(axis=0), pressure.max(axis=0)
+    margin = _MARGIN * (highest - least)
+    lowest = np.maximum(least - margin, np.minimum(least, 0.0))
     return np.stack([lowest, highest + _MARGIN * (highest - lowest)], axis=-1)
 
 
@@ -365,8 +378,10 @@ def fit_store(
         raise UnusableInput(
             f"{store.transitions} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}"
         )
-    window = Window.of(store.spec, settings.history, settings.sensors)
+    window = Window.of(store.spec, 1, settings.sensors)
     window.require(store.further, str(store.path))
+    settings = settings.of_arm(store)
+    window = _window(store.spec, settings)
     sequences = [entry.number for entry in store.catalogue()]
     settings = replace(settings, held_out=share_held_out(sequences, settings.held_out, settings.seed))
     filtered = filter_transitions(store, window, grid, seed=settings.seed, hold_out=settings.held_out)

@@ -21,6 +21,7 @@ import time as wall_clock
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,7 +60,8 @@ class CollectBegin(BeginState):
     """Longest time that a muscle is inflated again [s] (thesis section 3.2.2: 1.2)."""
 
 
-_LONGEST_PULSES = 4  # most periods in a row in which a muscle gets the same pulse
+_LONGEST_PULSES = 0.134  # s for which a muscle gets the same pulse in every period, at most
+_SEQUENCE, _HELD = 200 / 30, 10 / 30  # s that a sequence lasts, and for which an action is held at most
 _SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse sequence
 
 
@@ -67,12 +69,13 @@ _SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse seq
 class CollectSettings(Settings):
     """How transitions are collected."""
 
-    actions: int = 200
-    """Actions of a sequence (thesis section 3.2.2: 200)."""
+    actions: int | None = None
+    """Actions of a sequence (thesis section 3.2.2: 200); by default those of as many seconds as there, 6.7."""
     velocity_share: float = 0.5
     """Share of sequences whose actions are held (the thesis decides "randomly")."""
-    longest_hold: int = 10
-    """Most control periods that an action is held, the least is 1 (the thesis does not say)."""
+    longest_hold: int | None = None
+    """Most control periods that an action is held, the least is 1 (the thesis does not say); by default those of a
+    third of a second."""
     pulses: float = 0.55
     """Share of the sequences in which valves open for pulses of random length, where the arm can do them; in the
     others they are open for whole periods, as in the thesis. A record of both serves controllers of both kinds."""
@@ -85,12 +88,17 @@ class CollectSettings(Settings):
 
     def _valid(self) -> Valid:
         return {
-            "actions": 1 <= self.actions <= 50_000,
+            "actions": self.actions is None or 1 <= self.actions <= 50_000 or "1 to 50,000",
             "velocity_share": 0 <= self.velocity_share <= 1,
-            "longest_hold": self.longest_hold >= 1,
+            "longest_hold": self.longest_hold is None or self.longest_hold >= 1 or "1 or more",
             "pulses": 0 <= self.pulses <= 1,
             "sparse": 0 <= self.sparse <= 1,
         }
+
+    def for_period(self, period: float) -> Self:
+        """Return the settings with the numbers of control periods [s] that they stand for where none are given."""
+        actions, held = (max(round(seconds / period), 1) for seconds in (_SEQUENCE, _HELD))
+        return replace(self, actions=self.actions or actions, longest_hold=self.longest_hold or held)
 
 
 WHOLE_PERIODS = CollectSettings(pulses=0.0)
@@ -244,6 +252,7 @@ class _Collection:
         goals: ArrayLike | None,
         watch: Watch | None,
     ) -> None:
+        settings = settings.for_period(arm.spec.period)
         self._store, self._seed, self._settings = store, seed, settings
         self._controller, self._goals, self._watch = controller, goals, watch
         name = None if controller is None else type(controller).__name__
@@ -269,7 +278,7 @@ class _Collection:
         before, start = Counts.now(cycle), arm.read().time
         self._settings.begin.reach(arm, random)
         kind, actor, info = self._actor(random)
-        remaining = iter(range(self._settings.actions))
+        remaining = iter(range(self._settings.actions or 0))
 
         def decide(reading: Reading) -> Command | None:
             return None if next(remaining, None) is None else actor.act(reading)
@@ -345,6 +354,9 @@ class _Collection:
 
 def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
     """Return one of the kinds of random sequences: its name and its commands."""
+    settings = settings.for_period(spec.period)
+    assert settings.actions is not None
+    assert settings.longest_hold is not None
     actions = random.integers(ACTIONS, size=(settings.actions, spec.joints))
     drawn = np.tile(np.arange(settings.actions)[:, None], spec.joints)  # which action each step and joint does
     kind = "zero-velocity"
@@ -354,20 +366,21 @@ def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.G
             lengths = random.integers(1, settings.longest_hold, size=settings.actions, endpoint=True)
             drawn[:, joint] = np.repeat(drawn[:, joint], lengths)[: settings.actions]
     if settings.pulses and spec.pulses and random.random() < settings.pulses:
-        return _random_pulses(spec, settings, random)
+        return _random_pulses(spec, settings.sparse, settings.actions, random)
     return kind, Trajectory(to_valves(actions)[drawn, np.arange(spec.joints)].astype(np.float64))
 
 
-def _random_pulses(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
+def _random_pulses(spec: ArmSpec, sparse: float, actions: int, random: np.random.Generator) -> tuple[str, Trajectory]:
     """Return a sequence of pulses, every muscle for itself: some repeated over a few periods, or few short ones."""
     shortest = min(spec.shortest_pulse / spec.period, 1.0)
-    shape = (settings.actions, spec.joints, 2)
+    shape = (actions, spec.joints, 2)
     valves, shares = random.integers(-1, 2, shape), random.uniform(shortest, 1.0, shape)
-    if random.random() < settings.sparse:
+    if random.random() < sparse:
         opened = random.random(shape) < _SPARSE
         return "sparse", Trajectory(valves * opened * np.maximum(shares**2, shortest))
-    commands = (valves * shares).reshape(settings.actions, -1)
+    commands = (valves * shares).reshape(actions, -1)
+    longest = max(round(_LONGEST_PULSES / spec.period), 1)
     for muscle in range(commands.shape[1]):
-        lengths = random.integers(1, _LONGEST_PULSES, size=settings.actions, endpoint=True)
-        commands[:, muscle] = np.repeat(commands[:, muscle], lengths)[: settings.actions]
+        lengths = random.integers(1, longest, size=actions, endpoint=True)
+        commands[:, muscle] = np.repeat(commands[:, muscle], lengths)[:actions]
     return "pulses", Trajectory(commands.reshape(shape))

@@ -17,6 +17,7 @@ from pneumarm.task.begin import BeginStates
 from pneumarm.transitions.watch import made_up_readings
 
 KIND = "pneumarm servo"
+_USUAL_PERIOD = 1 / 30  # s, for which prices are given
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,12 +63,22 @@ class ServoAgent(NetworkAgent):
 
 def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:
     """Return what does not change while a servo learns or acts."""
+    change = price_of_a_change(simulation, settings)
     return ServoTask(
         simulation=simulation_parameters(simulation),
         inputs=seen_parameters(simulation, settings.preview, settings.tolerance),
         commands=command_parameters(simulation, settings.dead, shortest_share(simulation.spec)),
-        prices=PriceParameters(settings.precision, settings.far, settings.flat, settings.change),
+        prices=PriceParameters(settings.precision, settings.far, settings.flat, change),
+        steepest=1e9,
     )
+
+
+def price_of_a_change(simulation: Simulation, settings: ServoSettings) -> float:
+    """Return what opening or closing a valve costs, in errors of a control period.
+
+    Errors cost by the step: at a higher rate there are more of them in a second, and a change must cost as much more.
+    """
+    return settings.change * _USUAL_PERIOD / simulation.spec.period
 
 
 def servo_sizes(simulation: Simulation, settings: ServoSettings) -> tuple[int, ...]:

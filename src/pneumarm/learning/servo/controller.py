@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,10 @@ from pneumarm.task.tracker import StateTracker
 if TYPE_CHECKING:
     from pneumarm.learning.servo.agent import ServoAgent
 
-_LOOK = 0.134  # s over which readings are averaged where the arm is nearly at rest
+_LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
+_SURE = 0.065  # tolerances of noise that may be left in that average
+_ANSWERED = 3.0  # as many times the noise that is left is an error
+_EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
@@ -49,10 +53,17 @@ class ServoController:
         self._tracker = StateTracker(agent.window, agent.scaling)
         tolerance = wanted.tolerance * spec.counts_per_degree * (1.0 if spec.pulses else _COARSE)
         self._tolerance = tolerance
-        self._quiet_below, self._alert_above = wanted.quiet * tolerance, wanted.alert * tolerance
         self._near, self._still, self._most = _NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
-        self._look = max(4, round(_LOOK / spec.period))
-        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(4, round(_SLOWLY / spec.period)))
+        noise = float((wanted.reading_noise * agent.simulation.error_std[:, 0]).max())
+        least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)
+        self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
+        left = _ANSWERED * noise / math.sqrt(self._look)
+        self._quiet_below = max(wanted.quiet * tolerance, left / 2)
+        self._alert_above = max(wanted.alert * tolerance, left)
+        lowest, highest = np.moveaxis(agent.simulation.pressure_range, -1, 0)
+        self._empty = lowest + _EMPTY * (highest - lowest)
+        longest = max(self._look, round(_SLOWLY / spec.period))
+        self._angles: deque[NDArray[np.float64]] = deque(maxlen=longest)
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
@@ -99,6 +110,8 @@ class ServoController:
         self._correction.learn(np.where(moves, path[1] - reading.angle, 0.0), features[0])
         bias = np.where(moves, self._correction.of(features[steps]), [rest.bias for rest in self._rest])
         command = self._actor.pulses(state, preview + bias)
+        calm = np.array([rest.calm for rest in self._rest])
+        command[calm[:, None] & (command < 0) & (reading.pressure < self._empty)] = 0.0
         self._pulse[acts] = command[acts]
         command[~acts] = 0.0
         if self._spread is not None:

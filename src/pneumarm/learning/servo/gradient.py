@@ -33,6 +33,13 @@ class ServoTask(NamedTuple):
     inputs: SeenParameters
     commands: CommandParameters
     prices: PriceParameters
+    steepest: float
+    """Most that the cost to come changes with the state of an arm, in prices of a step for an error of a tolerance.
+
+    Where a policy does well it changes by 10 to 40. Where one makes an arm swing, the change grows with every step
+    that it is traced back through, to 1e10 and beyond, and a single arm decides the direction of an update; where it
+    is cut off, all arms have a say.
+    """
 
 
 class Tape(NamedTuple):
@@ -123,6 +130,7 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
     steps, n = tape.slope.shape[0], tape.slope.shape[2]
     share = np.float32(1.0 / (steps * n))
+    steepest = np.float32(task.steepest) * share * task.inputs.tolerances.max()
     later, sooner, row = tape.later, tape.sooner, tape.row
     later[:] = _ZERO
     total = 0.0
@@ -157,7 +165,22 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
         through_weights(net.layers[0], net.errors[0], tape.seen)
         inputs_back(task.inputs, tape.inputs[t], tape.seen, sooner)
         later[:] = sooner
+        cut_off(later, steepest, row[0])
     return total * share
+
+
+@kernel(fastmath=FASTMATH)
+def cut_off(vectors, longest, square):  # type: ignore[no-untyped-def]
+    """Shorten the ``vectors`` (size, n) that are longer than ``longest`` to that; ``square`` (n,) is workspace."""
+    square[:] = _ZERO
+    for i in range(vectors.shape[0]):
+        for e in range(vectors.shape[1]):
+            square[e] += vectors[i, e] * vectors[i, e]
+    for e in range(square.shape[0]):
+        square[e] = min(np.float32(1.0), longest / np.sqrt(max(square[e], longest * longest)))
+    for i in range(vectors.shape[0]):
+        for e in range(vectors.shape[1]):
+            vectors[i, e] *= square[e]
 
 
 @kernel

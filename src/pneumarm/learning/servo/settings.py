@@ -39,7 +39,7 @@ class ServoSettings(TaskSettings):
     far: float = 0.06
     """Price of an error for each tolerance, besides the logarithmic one of being out of precision."""
     change: float = 0.15
-    """Price of opening or closing a valve."""
+    """Price of opening or closing a valve, at 30 Hz; at other rates as much in errors times seconds."""
     dead: float = 0.15
     """Share of the policy's output around 0 that keeps a valve closed."""
     known: float = 0.6

@@ -22,6 +22,7 @@ _ROW = 25  # updates between two rows of the curves
 _FIRST_OUTPUT = 1.0  # the first policy opens valves now and then
 _RENEWED = 0.5  # share of arms that begin anew at rest; the others go on from where they are
 _FREE = 0.6  # share of the updates in which the price of changes rises to what it is
+_STEEPEST = 10.0, 40.0  # where derivatives are cut off in the first update and in the last
 _FASTEST = 4.0  # highest speed of a reference, in scaled velocities
 
 
@@ -56,7 +57,7 @@ class ServoLearner(Learner[ServoAgent]):
     columns = ("episodes", "price", "settled")
     """Mean price of a step, and share of the last third of movements within tolerance, since the row before."""
     price_all_along = False
-    """Whether changes of valves have their whole price from the first update on."""
+    """Whether changes of valves have their whole price from the first update on, as for a policy that does well."""
 
     def __init__(
         self,
@@ -157,9 +158,17 @@ class ServoLearner(Learner[ServoAgent]):
         return price
 
     def _task_now(self) -> ServoTask:
-        """Return the task with the price of changes of this update: who pays for them first never learns to move."""
-        paid = 1.0 if self.price_all_along else min(self.share / _FREE, 1.0)
-        return self.task._replace(prices=self.task.prices._replace(change=paid * self.settings.change))
+        """Return the task of this update.
+
+        The price of changes rises, because who pays for them first never learns to move. Derivatives are cut off
+        later and later: a policy that makes arms swing has none that are of use from far away.
+        """
+        paid, share = (1.0, 1.0) if self.price_all_along else (min(self.share / _FREE, 1.0), self.share)
+        first, last = _STEEPEST
+        return self.task._replace(
+            prices=self.task.prices._replace(change=paid * self.task.prices.change),
+            steepest=first * (last / first) ** share,
+        )
 
     def _angles(self, step: int) -> NDArray[np.float32]:
         """Return the angles at a step on the tape, shape (joints, n) [scaled]."""

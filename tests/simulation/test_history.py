@@ -1,0 +1,44 @@
+"""How many observations a state holds is judged by a recording of the arm."""
+
+from pathlib import Path
+
+import pytest
+from tests.plain_arms import noisy
+
+from pneumarm.arm import Arm
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.simulation import FitSettings, fit_store
+from pneumarm.simulation.history import USUAL, chosen_history
+from pneumarm.transitions import Store, collect
+
+TRANSITIONS = 4000
+
+
+def recorded(arm: Arm, path: Path) -> Path:
+    with arm, Store.for_arm(path, arm.spec) as store:
+        collect(arm, store, TRANSITIONS, 1)
+    return path
+
+
+@pytest.fixture(scope="module")
+def of_noisy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return recorded(noisy(), tmp_path_factory.mktemp("noisy") / "arm.db")
+
+
+def test_the_usual_arm_needs_no_more_than_usual(tmp_path: Path) -> None:
+    with Store.open(recorded(VirtualArm(seed=3), tmp_path / "arm.db")) as store:
+        assert chosen_history(store, store.spec) == USUAL
+
+
+def test_an_arm_with_noisy_sensors_needs_more_and_is_predicted_better_with_them(of_noisy: Path) -> None:
+    with Store.open(of_noisy) as store:
+        by_itself, usual = (fit_store(store, FitSettings(history=history)) for history in (None, USUAL))
+        chosen = by_itself.simulation.window.history
+        assert chosen == chosen_history(store, store.spec) > USUAL
+        assert by_itself.result.held_out.std[0] < usual.result.held_out.std[0]
+
+
+def test_it_is_what_was_asked_for_where_something_was(of_noisy: Path) -> None:
+    with Store.open(of_noisy) as store:
+        assert FitSettings(history=4).of_arm(store).history == 4
+        assert FitSettings().of_arm(store).history == chosen_history(store, store.spec)

@@ -137,6 +137,7 @@ def enough_data(store: Store) -> Enough | None:
 
 
 def _error(result: FitResult) -> float:
-    """Return the geometric mean of the one-step errors of all that networks predict [sensor units]."""
-    errors: NDArray[np.float64] = result.held_out.std[result.simulation.outputs]
+    """Return the geometric mean of the one-step errors of all that is measured and predicted [sensor units]."""
+    simulation = result.simulation
+    errors: NDArray[np.float64] = result.held_out.std[simulation.outputs[simulation.measured]]
     return math.exp(np.log(errors).mean())

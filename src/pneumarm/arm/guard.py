@@ -123,8 +123,8 @@ class GuardedArm(Arm):
             if not arm.spec.safe_supply:
                 arm.close()
                 raise UnusableInput(
-                    f"{arm.spec.name}: without pressure sensors only the supply keeps muscles from bursting; set it to "
-                    "what every muscle bears and say so, by safe_supply = true in the arm's spec or arm.toml"
+                    f"{arm.spec.name}: without pressure sensors only the supply keeps muscles from bursting; set "
+                    "it to what every muscle bears and say so, by safe_supply = true in the arm's spec or arm.toml"
                 )
             arm = EstimatedArm(arm)
         self.arm = arm

@@ -40,7 +40,7 @@ class Fill:
     def __init__(self, spec: ArmSpec) -> None:
         filling, emptying = spec.fill_times
         self._full = 1.0 + spec.max_pressure / _ATMOSPHERE
-        self._counts = spec.counts_per_bar * _ATMOSPHERE
+        self._counts, self._highest = spec.counts_per_bar * _ATMOSPHERE, spec.max_pressure_counts
         self._period = spec.period
         self._inflow = (math.pi / 2 - math.asin(1.0 / self._full)) / filling
         self._outflow = math.acosh(self._full) / emptying
@@ -54,7 +54,7 @@ class Fill:
     @property
     def pressure(self) -> NDArray[np.float64]:
         """Gauge pressures, shape (joints, 2) [counts]."""
-        return (np.array(self._levels).reshape(-1, 2) - 1.0) * self._counts
+        return np.minimum((np.array(self._levels).reshape(-1, 2) - 1.0) * self._counts, self._highest)
 
     def command(self, command: NDArray[np.int8] | NDArray[np.float64]) -> None:
         """Set valves or pulses (joints, 2)."""
@@ -83,22 +83,18 @@ class Fill:
         time = math.nan if self.time is None else self.time
         return self._format.pack(time, *self._levels, *self._valves, *self._left)
 
-    def set_state(self, state: bytes) -> bytes:
-        """Take up what ``state`` begins with, which :meth:`get_state` returned, and return the rest of it.
-
-        Raises:
-            UnusableInput: it is too short.
-
-        """
-        size = self._format.size
-        if len(state) < size:
-            raise UnusableInput(f"expected a saved state of an arm without pressure sensors, got {len(state)} bytes")
-        time, *kept = self._format.unpack(state[:size])
+    def set_state(self, state: bytes) -> None:
+        """Take up what :meth:`get_state` returned."""
+        time, *kept = self._format.unpack(state)
         muscles = len(self._levels)
         self._levels, self._left = kept[:muscles], kept[2 * muscles :]
         self._valves = [int(valve) for valve in kept[muscles : 2 * muscles]]
         self.time = None if math.isnan(time) else time
-        return state[size:]
+
+    @property
+    def state_size(self) -> int:
+        """Bytes of a state."""
+        return self._format.size
 
     @property
     def _format(self) -> struct.Struct:
@@ -153,8 +149,17 @@ class EstimatedArm(PassedOn):
         return None if state is None else self._fill.get_state() + state
 
     def set_state(self, state: bytes) -> None:
-        """Restore both."""
-        self.arm.set_state(self._fill.set_state(state))
+        """Restore both.
+
+        Raises:
+            UnusableInput: the arm has no state, or this is none of it.
+
+        """
+        size = self._fill.state_size if self.arm.get_state() is not None else 0
+        if len(state) < size:
+            raise UnusableInput(f"{self.spec.name}: expected the saved state of an arm without pressure sensors")
+        self.arm.set_state(state[size:])
+        self._fill.set_state(state[:size])
 
 
 def filled(spec: ArmSpec, time: NDArray[np.float64], command: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -126,7 +126,7 @@ class GuardedArm(Arm):
                     f"{arm.spec.name}: without pressure sensors only the supply keeps muscles from bursting; set "
                     "it to what every muscle bears and say so, by safe_supply = true in the arm's spec or arm.toml"
                 )
-            arm = EstimatedArm(arm)
+            arm = arm if isinstance(arm, EstimatedArm) else EstimatedArm(arm)
         self.arm = arm
         self.spec = arm.spec
         self._valves: NDArray[np.int8] = np.zeros((arm.spec.joints, 2), np.int8)  # as they are now

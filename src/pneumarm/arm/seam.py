@@ -89,7 +89,7 @@ class ArmSpec(Settings):
     safe_supply: bool = False
     """That the supply, at its highest, cannot burst a muscle: the guard asks for your word on this where no pressures
     are measured."""
-    fill_times: tuple[float, float] = (0.8, 0.5)
+    fill_times: tuple[float, float] = (1.5, 0.7)
     """Times in which a muscle is filled and emptied [s], about; asked only where no pressures are measured."""
     max_inflation: float = 10.0
     """An inlet that was open for so long [s] stays closed until its muscle has rested (:mod:`pneumarm.arm.guard`)."""

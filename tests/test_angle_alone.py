@@ -12,7 +12,7 @@ from pneumarm.checkup import measure
 from pneumarm.classical import TuneSettings, tune
 from pneumarm.cli import main as command_line
 from pneumarm.control import Monitor
-from pneumarm.errors import UnusableInput
+from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.gym import point_to_point
 from pneumarm.run import Run
 from pneumarm.transitions import Store, collect, import_recording
@@ -81,8 +81,10 @@ def test_the_monitor_finds_a_frozen_potentiometer_by_the_valves_and_nothing_on_a
         watch = Monitor(arm.spec)
         collect(arm, store, 4000, 1, watch=watch)
         assert watch.findings == []
+    with open_arm(VIRTUAL) as arm, Store.for_arm(tmp_path / "frozen.db", arm.spec) as store:
         arm.faults = [FrozenPotentiometer(joint=1)]
-        collect(arm, store, 4300, 1, watch=watch)
+        with pytest.raises(ArmFailure, match="stays the same while valves act"):
+            collect(arm, store, 4000, 1, watch=watch)
     assert {one.kind for one in watch.findings} == {"frozen-potentiometer"}
 
 

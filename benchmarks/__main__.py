@@ -11,6 +11,7 @@ LONG = (
     "agents",
     "bound",
     "faults",
+    "few_sensors",
     "held_out",
     "holding",
     "live",

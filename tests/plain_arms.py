@@ -7,7 +7,7 @@ and a joint is a mass on a spring whose rest moves with the difference of the pr
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,8 +93,10 @@ class PlainArm(Arm):
         angle = (low + high) / 2 + spec.counts_per_degree * np.array(self._angle)
         pressure = np.array([[muscle.inlet for muscle in pair] for pair in self._muscles])
         counts = physics.zero + spec.counts_per_bar * pressure + physics.noise[1] * random.normal(size=(n, 2))
-        noisy = angle + physics.noise[0] * random.normal(size=n)
-        return Reading(self._time, np.clip(np.round(noisy), low, high), np.maximum(np.round(counts), 0.0))
+        noisy = np.clip(np.round(angle + physics.noise[0] * random.normal(size=n)), low, high)
+        if not spec.pressure_sensors:
+            return Reading(self._time, noisy)
+        return Reading(self._time, noisy, np.maximum(np.round(counts), 0.0))
 
     def set_valves(self, valves: NDArray[np.int8]) -> None:
         self._coming.append((self._time + self._physics.lag, np.array(valves)))
@@ -216,5 +218,37 @@ def noisy() -> PlainArm:
         hose=0.03,
         lag=0.015,
         noise=(6.0, 10.0),
+    )
+    return PlainArm(spec, physics)
+
+
+def with_pressures() -> PlainArm:
+    """As :func:`angle_alone`, with pressure sensors."""
+    arm = angle_alone()
+    arm.spec = replace(arm.spec, pressure_sensors=True)
+    return arm
+
+
+def angle_alone() -> PlainArm:
+    """No pressure sensors, a supply of 0.9 bar that muscles fill up to by a law of their own; 10 bits, 25 Hz."""
+    spec = ArmSpec(
+        period=0.04,
+        counts_per_degree=8.0,
+        angle_range=(0.0, 1023.0),
+        max_pressure=0.9,
+        pressure_sensors=False,
+        safe_supply=True,
+        name="angle alone",
+    )
+    physics = Physics(
+        lambda p: 1.6 * math.sqrt(max(0.9 - p, 0.0)),
+        lambda p: 2.2 * p**0.7,
+        50.0,
+        55.0,
+        2.5,
+        0.4,
+        0.003,
+        lag=0.01,
+        noise=(0.7, 0.0),
     )
     return PlainArm(spec, physics)

@@ -11,7 +11,7 @@ from pneumarm.control import Monitor
 from pneumarm.errors import ArmFailure
 from pneumarm.transitions import Store, collect
 
-PLAIN = [f"python:tests.plain_arms:{name}" for name in ("linear", "throttled", "hose")]
+PLAIN = [f"python:tests.plain_arms:{name}" for name in ("linear", "throttled", "hose", "angle_alone")]
 
 
 class Broken(Arm):

@@ -130,14 +130,14 @@ class ChangeDetector:
 def standardised_squares(simulation: Simulation, rows: Rows) -> NDArray[np.float64]:
     """Return the mean squares of the residues of ``rows`` over those of the fit, shape (outputs,).
 
-    Rows of which no transition can be made tell nothing: ones.
+    What tells nothing is one: of rows of which no transition can be made, and of pressures that are estimated.
     """
     found = transitions(rows, simulation.window)
     if not len(found.inputs):
         return np.ones(len(simulation.outputs))
     error = residue(simulation, found)[:, simulation.outputs]
     squares: NDArray[np.float64] = (error**2).mean(axis=0) / error_squares(simulation)
-    return squares
+    return np.where(simulation.measured, squares, 1.0)
 
 
 def error_squares(simulation: Simulation) -> NDArray[np.float64]:

@@ -123,7 +123,7 @@ def refit(now: Simulation, origin: Simulation, rows: Rows, settings: RefitSettin
         movements=len(numbers),
         before=np.sqrt(old.mean(axis=0)),
         after=np.sqrt(new.mean(axis=0)),
-        better=_is_better(old, new, found.sequence, settings),
+        better=_is_better(old[:, now.measured], new[:, now.measured], found.sequence, settings),
     )
 
 

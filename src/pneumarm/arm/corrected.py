@@ -40,7 +40,8 @@ class CorrectedArm(PassedOn):
         angle, velocity = correction.angle(raw.angle), raw.velocity
         if velocity is not None and correction.angle_raw:
             velocity = correction.angle(raw.angle + velocity / 2) - correction.angle(raw.angle - velocity / 2)
-        return replace(raw, angle=angle, pressure=correction.pressure(raw.pressure), velocity=velocity)
+        pressure = correction.pressure(raw.pressure) if raw.pressure.size else raw.pressure
+        return replace(raw, angle=angle, pressure=pressure, velocity=velocity)
 
     def set_pulses(self, command: NDArray[np.float64]) -> bool:
         """Set pulses, of an arm whose control period is that of the file."""

@@ -5,7 +5,9 @@ What is asked for passes four rules, in this order:
 1. *Sense*: valves are (joints, 2) of -1, 0, +1, pulses of -1 to +1. A controller that gives anything else, that
    raises, or that takes longer than a control period is replaced: what was last applied is held, then everything is
    vented, in the end the controller is stopped (:meth:`GuardedArm.decide`, :meth:`GuardedArm.replace`).
-2. *Pressure*: an inlet stays closed while its muscle reads over ``spec.max_pressure``.
+2. *Pressure*: an inlet stays closed while its muscle reads over ``spec.max_pressure``. An arm that measures no
+   pressures needs a supply that cannot burst a muscle instead, and somebody who says that it is so
+   (``spec.safe_supply``); readings then carry estimates in their place (:mod:`pneumarm.arm.fill`).
 3. *Time of inflation*: an inlet that was open for ``spec.max_inflation`` stays closed until its muscle has rested as
    long, or has been vented for a tenth of it. A muscle that takes air for so long without reaching its limit is
    unplugged, burst, or its pressure sensor does not see it.
@@ -29,10 +31,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.arm.fill import EstimatedArm
 from pneumarm.arm.seam import Arm, Reading, checked
 from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import Watchdog
-from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
+from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError, UnusableInput
 
 _SETTINGS = frozenset((-1, 0, 1))
 HELD = 3
@@ -110,6 +113,20 @@ class GuardedArm(Arm):
     """
 
     def __init__(self, arm: Arm) -> None:
+        """Put the guard before ``arm``.
+
+        Raises:
+            UnusableInput: it measures no pressures, and nobody has said that its supply is safe.
+
+        """
+        if not arm.spec.pressure_sensors:
+            if not arm.spec.safe_supply:
+                arm.close()
+                raise UnusableInput(
+                    f"{arm.spec.name}: without pressure sensors only the supply keeps muscles from bursting; set "
+                    "it to what every muscle bears and say so, by safe_supply = true in the arm's spec or arm.toml"
+                )
+            arm = arm if isinstance(arm, EstimatedArm) else EstimatedArm(arm)
         self.arm = arm
         self.spec = arm.spec
         self._valves: NDArray[np.int8] = np.zeros((arm.spec.joints, 2), np.int8)  # as they are now
@@ -118,9 +135,9 @@ class GuardedArm(Arm):
         self._now = 0.0  # the arm's clock, as of the last reading and the waits since [s]
         self.applied: Command = self._valves
         self.peak_pressure = np.zeros((arm.spec.joints, 2))
-        """Highest pressures read, shape (joints, 2) [counts]."""
+        """Highest pressures read, shape (joints, 2) [counts]; of estimates where none are measured."""
         self._interventions = Interventions()
-        self._limit = arm.spec.max_pressure_counts
+        self._limit = arm.spec.max_pressure_counts if arm.spec.pressure_sensors else math.inf
         self._over: NDArray[np.bool_] | None = None  # which muscles read over the limit; None if none does
         self._outward: NDArray[np.int8] | None = None  # valves that push out of the angle's limits; None if none does
         self._inflation = _Inflation(arm.spec.max_inflation, self.applied.size)

@@ -18,10 +18,13 @@ if TYPE_CHECKING:
 _FORMS = (
     "virtual, virtual:seed=7, virtual:wide,seed=7, virtual:preset=A, virtual:seed=7,rate=200, "
     "virtual:joints=2,seed=7,coupling=0.5, virtual:seed=7,sensors=velocity+temperature, "
+    "virtual:seed=7,pressure_sensors=off, "
     "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
     "emulated:ARM or python:module:callable, each with ,spec=arm.toml if you like"
 )
-_OPTION = re.compile(r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|faults|spec)=|wide(?:,|$))")
+_OPTION = re.compile(
+    r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|faults|spec)=|wide(?:,|$))"
+)
 """Stands before an option; files may have commas in their names."""
 
 
@@ -32,7 +35,8 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     ``virtual:wide,seed=N`` one from a wide distribution (:mod:`pneumarm.arm.virtual.wide`), ``virtual:preset=A``, B
     or C one of three readings of the thesis (:func:`pneumarm.arm.virtual.preset_parameters`),
     ``virtual:seed=N,sensors=velocity+acceleration+temperature`` one with further sensors, any of these
-    (:mod:`pneumarm.arm.virtual.further`), ``virtual:seed=N,faults=PLAN.toml`` one with faults
+    (:mod:`pneumarm.arm.virtual.further`), ``virtual:seed=N,pressure_sensors=off`` one that reads angles alone, its
+    supply turned down to what its muscles bear, ``virtual:seed=N,faults=PLAN.toml`` one with faults
     (:mod:`pneumarm.arm.virtual.faults`), ``virtual:seed=N,rate=200`` or ``period=0.005`` one that is controlled at
     200 Hz, not at the rate that it is made for, ``virtual:joints=2,seed=N`` a chain of several joints, up to 4, and
     with ``coupling=0.5`` one whose joints act on each other half as much;
@@ -123,6 +127,7 @@ def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | N
         period=_period(name, options, None if spec is None else spec.period),
         velocity_sensor=velocity,
         sensors=sensors,
+        pressure_sensors=_on(name, options, "pressure_sensors", spec is None or spec.pressure_sensors),
     )
 
 
@@ -166,6 +171,14 @@ def _period(name: str, options: Mapping[str, str], usual: float | None) -> float
     if len(given) > 1 or not 0 < value < math.inf:
         raise UnusableInput(f"arm {name!r}: expected a period [s] or a rate [Hz] above 0, not both")
     return value if given == ["period"] else 1 / value
+
+
+def _on(name: str, options: Mapping[str, str], option: str, usual: bool) -> bool:
+    """Return whether ``option`` is on, as it ``usual``ly is where it is not given."""
+    given = options.get(option, "on" if usual else "off")
+    if given not in ("on", "off"):
+        raise UnusableInput(f"arm {name!r}: {option} is on or off, not {given!r}")
+    return given == "on"
 
 
 def _from_python(place: str) -> Arm:

@@ -7,7 +7,7 @@ takes an :class:`Arm`; nothing else in pneumarm knows whether it is virtual, sim
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from types import TracebackType
 from typing import Literal, Self
@@ -83,6 +83,14 @@ class ArmSpec(Settings):
     """Lowest and highest count of the angle sensor; its middle is called 0 degrees."""
     max_pressure: float = 1.05
     """Inlets stay closed while their muscle reads over this [bar]."""
+    pressure_sensors: bool = True
+    """Whether pressures are measured. Where not, they are estimated from what the valves were told
+    (:mod:`pneumarm.arm.fill`), ``max_pressure`` is that of the supply, and the guard cannot enforce it."""
+    safe_supply: bool = False
+    """That the supply, at its highest, cannot burst a muscle: the guard asks for your word on this where no pressures
+    are measured."""
+    fill_times: tuple[float, float] = (1.5, 0.7)
+    """Times in which a muscle is filled and emptied [s], about; asked only where no pressures are measured."""
     max_inflation: float = 10.0
     """An inlet that was open for so long [s] stays closed until its muscle has rested (:mod:`pneumarm.arm.guard`)."""
     angle_limits: tuple[float, float] | None = None
@@ -118,12 +126,20 @@ class ArmSpec(Settings):
             "angle_range": math.isfinite(low) and math.isfinite(high) and low < high,
             "max_pressure": _positive(self.max_pressure),
             "max_inflation": _positive(self.max_inflation),
+            "pressure_sensors": isinstance(self.pressure_sensors, bool),
+            "safe_supply": isinstance(self.safe_supply, bool),
+            "fill_times": len(self.fill_times) == 2 and all(map(_positive, self.fill_times)),
             "angle_limits": math.isfinite(lowest) and math.isfinite(highest) and lowest < highest,
             "latency": math.isfinite(self.latency) and 0 <= self.latency < self.period,
             "sensors": all(one.joint <= self.joints for one in self.sensors)
             and _unlike(one.name for one in self.sensors)
             and _unlike(one.channel for one in self.sensors),
         }
+
+    @property
+    def pressure_word(self) -> str:
+        """What people are to call the pressures of its readings."""
+        return "pressure" if self.pressure_sensors else "estimated pressure"
 
     @property
     def max_pressure_counts(self) -> float:
@@ -171,8 +187,9 @@ class Reading:
     """The arm's clock [s]."""
     angle: NDArray[np.float64]
     """Angles, shape (joints,) [counts]."""
-    pressure: NDArray[np.float64]
-    """Pressures, shape (joints, 2) [counts]."""
+    pressure: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """Pressures, shape (joints, 2) [counts]; left out by an arm without pressure sensors, and estimated behind the
+    guard."""
     velocity: NDArray[np.float64] | None = None
     """Angular velocities from a sensor of their own, shape (joints,) [counts/ms]."""
     temperature: NDArray[np.float64] | None = None
@@ -321,12 +338,14 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
 
     Raises:
         ArmFailure: a value is missing, not finite or of the wrong shape; also of the further sensors of ``spec``.
+            An arm without pressure sensors may leave out the pressures.
 
     """
     try:
         time = float(reading.time)
         angle = _array(reading.angle, (spec.joints,))
-        pressure = _array(reading.pressure, (spec.joints, 2))
+        none = not spec.pressure_sensors and np.size(reading.pressure) == 0
+        pressure = reading.pressure if none else _array(reading.pressure, (spec.joints, 2))
     except (TypeError, ValueError, AttributeError) as error:
         raise ArmFailure(
             f"{spec.name}: a reading needs a time, {spec.joints} angle(s) and {spec.joints} x 2 pressures, "
@@ -340,6 +359,21 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
     if angle is reading.angle and pressure is reading.pressure and type(reading.time) is float:
         return reading
     return Reading(time, angle, pressure, reading.velocity, reading.temperature, reading.acceleration)
+
+
+def check_pressures(made_for: ArmSpec, found: ArmSpec, what: str) -> None:
+    """Raise UnusableInput where ``what`` was made for an arm whose pressures come from elsewhere."""
+    if made_for.pressure_sensors != found.pressure_sensors:
+        words = ["without", "with"]
+        raise UnusableInput(
+            f"{what} for an arm {words[made_for.pressure_sensors]} pressure sensors, {found.name} is one "
+            f"{words[found.pressure_sensors]}; record, fit and train on an arm like this"
+        )
+    if not found.pressure_sensors and not np.allclose(made_for.fill_times, found.fill_times, rtol=1e-3):
+        raise UnusableInput(
+            f"{what} for an arm whose fill_times are {made_for.fill_times}, those of {found.name} are "
+            f"{found.fill_times}; give the same arm.toml"
+        )
 
 
 def _array(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -69,6 +69,8 @@ def leak_test(arm: Arm, test: LeakTest | None = None) -> LeakRates:
         UnusableInput: a muscle holds too little air to be watched: its supply or its valves are to be seen to first.
 
     """
+    if not arm.spec.pressure_sensors:
+        raise UnusableInput(f"{arm.spec.name} has no pressure sensors, by which leaks are found")
     test, guard = test or LeakTest(), guarded(arm)
     begin = guard.read().time
     readings = watch_closed(guard, test)

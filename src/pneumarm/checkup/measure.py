@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
 from pneumarm.checkup.leaks import LeakTest, watch_closed
+from pneumarm.errors import UnusableInput
 from pneumarm.settings import Settings, Valid
 
 Array = NDArray[np.float64]
@@ -135,9 +136,11 @@ def measure(
     """Check ``arm``, whose joints must be free to move, for some two minutes; it is left vented and closed.
 
     Raises:
+        UnusableInput: the arm has no pressure sensors.
         ArmFailure: the arm fails.
 
     """
+    _require_pressures(arm)
     guard = guarded(arm)
     bench = _Bench(guard, settings)
     told = progress or (lambda done, total: None)
@@ -159,6 +162,14 @@ def measure(
         return Checkup(guard.spec, settings, timing, tuple(tests))
     finally:
         guard.set_valves(np.zeros_like(guard.applied))
+
+
+def _require_pressures(arm: Arm) -> None:
+    if not arm.spec.pressure_sensors:
+        raise UnusableInput(
+            f"{arm.spec.name} has no pressure sensors, and a check-up judges muscles by their pressures; look at its "
+            "angles and valves with `pneumarm arm sensors` and `pneumarm arm valves`"
+        )
 
 
 def fill_alone(arm: Arm, joint: int, muscle: int, settings: CheckupSettings = CheckupSettings()) -> None:

@@ -264,11 +264,8 @@ def sensors_(arm: str, /, *, seconds: float = 60.0, every: float = 0.2, json: Js
 def _extremes(seen: Sequence[Reading], spec: ArmSpec) -> list[dict[str, Any]]:
     """Return the lowest and the highest that each sensor said in the readings ``seen``, at least one."""
     counts = np.array([np.column_stack([reading.angle, reading.pressure]) for reading in seen])
-    found = [
-        (j + 1, name, "counts", counts[:, j, k])
-        for j in range(spec.joints)
-        for k, name in enumerate(("angle", "pressure 1", "pressure 2"))
-    ]
+    names = ("angle", "pressure 1", "pressure 2") if spec.pressure_sensors else ("angle",)
+    found = [(j + 1, name, "counts", counts[:, j, k]) for j in range(spec.joints) for k, name in enumerate(names)]
     further = np.array([measured(reading, spec.further) for reading in seen])
     for name, values in zip(spec.further, further.T, strict=True):
         _, joint, sensor = name.split("_", 2)
@@ -282,9 +279,10 @@ def _extremes(seen: Sequence[Reading], spec: ArmSpec) -> list[dict[str, Any]]:
 def _sensed(reading: Reading, spec: ArmSpec) -> str:
     """Return what the sensors say in degrees and bar, in counts behind it, then what further sensors say."""
     degrees, bar = spec.degrees(reading.angle), spec.bar(reading.pressure)
+    muscles = range(2 if spec.pressure_sensors else 0)
     joints = [
         f"joint {j + 1}: {degrees[j]:6.1f}° ({reading.angle[j]:4.0f})"
-        + "".join(f"  {bar[j, m]:5.2f} bar ({reading.pressure[j, m]:4.0f})" for m in range(2))
+        + "".join(f"  {bar[j, m]:5.2f} bar ({reading.pressure[j, m]:4.0f})" for m in muscles)
         for j in range(spec.joints)
     ]
     further = zip(spec.further, measured(reading, spec.further), strict=True)

@@ -77,7 +77,7 @@ def _rows(result: CollectResult, spec: ArmSpec) -> list[tuple[str, str]]:
         ("sequences", f"{result.sequences:,}"),
         ("time of the arm [s]", f"{result.seconds:,.1f}"),
         ("time of this call [s]", f"{result.wall_seconds:,.1f}"),
-        ("highest pressures [bar]", ", ".join(f"{peak:.2f}" for peak in peaks)),
+        (f"highest {spec.pressure_word}s [bar]", ", ".join(f"{peak:.2f}" for peak in peaks)),
         ("the guard", str(result.interventions)),
         ("missed deadlines", f"{result.missed_deadlines:,}"),
         *((LINK.get(name, name), f"{count:,}") for name, count in result.link.items()),

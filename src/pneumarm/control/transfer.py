@@ -12,6 +12,7 @@ import numpy as np
 from pneumarm.adaptation import AdaptationSettings, adaptation_of
 from pneumarm.arm import Arm, ControlCycle, Controller, guarded
 from pneumarm.arm.counts import Counts
+from pneumarm.arm.seam import check_pressures
 from pneumarm.control.agent import AgentController, controller_of, warm_up
 from pneumarm.control.condition import Condition
 from pneumarm.control.monitor import Mode, Monitor
@@ -157,7 +158,8 @@ class Transfer:
         watch: Monitor | None = None,
     ) -> None:
         check_fit(agent, arm)
-        self._arrived, self._arm, self._store, self._settings, self._seed = agent, arm, store, settings, seed
+        self._arrived, self._store, self._settings, self._seed = agent, store, settings, seed
+        self._arm = guarded(arm)
         self._keep_version = keep_version or (lambda version, agent: None)
         self._number = store.resume_run("transfer", {**asdict(settings), "seed": seed, "agent": fingerprint(agent)})
         self._done = [dict(entry.info) for entry in self._stored()]
@@ -166,11 +168,11 @@ class Transfer:
         self._learning: _Learning | None = None
         if isinstance(agent, Learns) and self._adapting is None:
             self._learning = _Learning(agent, settings.learning_rate, seed)
-        self._watch = watch or monitor_of(agent, arm)
+        self._watch = watch or monitor_of(agent, self._arm)
         self._waiting: list[Recorded] = []
         self._broken: list[Recorded] = []
         self._resume()
-        self._cycle = ControlCycle(guarded(arm), settings.close_while_computing)
+        self._cycle = ControlCycle(self._arm, settings.close_while_computing)
         self._warm_up()
         self._counted = {
             phase: Counts.of(saved) for phase, saved in json.loads(store.state(_COUNTS) or b"{}").items()
@@ -438,4 +440,5 @@ def check_fit(agent: AnyAgent, arm: Arm) -> None:
             raise UnusableInput(
                 f"this agent was trained for an arm whose {name} is {trained}, that of {arm.spec.name} is {found}"
             )
+    check_pressures(agent.spec, arm.spec, "this agent was trained")
     agent.window.require(arm.spec.further, arm.spec.name)

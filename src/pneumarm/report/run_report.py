@@ -145,6 +145,12 @@ def _summary(run: RunData) -> list[str]:
     spec = run.spec
     joints = f"{spec.joints} joint{'s' if spec.joints > 1 else ''}"
     text = [f"{spec.name}: {joints}, {1 / spec.period:.3g} Hz, pressures up to {spec.max_pressure:g} bar."]
+    if not spec.pressure_sensors:
+        text.append(
+            "Its pressures are not measured: wherever they are shown, they are estimated from what the valves were "
+            "told. The guard could not limit them, and the monitor judged angles alone: neither valves, nor the "
+            "supply, nor leaks."
+        )
     moves = moving_words(run.results)
     text = [*moves, *text]
     if moves:

@@ -156,8 +156,8 @@ def quantities(spec: ArmSpec) -> tuple[Quantity, ...]:
     return (
         Quantity("angle", r"\theta", "counts", "°", angle),
         Quantity("velocity", r"\omega", "counts/ms", "°/s", 1e3 * angle),
-        Quantity("pressure 1", r"p_1", "counts", "bar", pressure),
-        Quantity("pressure 2", r"p_2", "counts", "bar", pressure),
+        Quantity(f"{spec.pressure_word} 1", r"p_1", "counts", "bar", pressure),
+        Quantity(f"{spec.pressure_word} 2", r"p_2", "counts", "bar", pressure),
     )
 
 

@@ -33,9 +33,9 @@ class SimulationArm(Arm):
     for the whole period, as they did when the transitions were recorded. Between these moments readings stay as
     they are.
 
-    It begins at rest in the middle of the range of goals. A simulation is as good as its data: seconds of
-    venting or resting with closed valves are outside of it, and so is what it then says. No heat, no creep,
-    no supply that fluctuates.
+    It begins at rest in the middle of the range of goals; without pressure sensors it begins vented, as the guard
+    presumes. A simulation is as good as its data: seconds of venting or resting with closed valves are outside of it,
+    and so is what it then says. No heat, no creep, no supply that fluctuates.
     """
 
     def __init__(self, simulation: Simulation, *, seed: int = 0, noise: NoiseSettings | None = None) -> None:
@@ -59,6 +59,8 @@ class SimulationArm(Arm):
         observation = simulation.scaling.observation_offset.copy()
         observation[: window.joint_size : 4] = simulation.goal_range.mean(axis=1)
         observation[1 : window.joint_size : 4] = 0.0
+        if not self.spec.pressure_sensors:
+            window.of_joints(observation)[:, 2:] = 0.0
         commands = np.zeros(window.state_size - window.history * window.observation_size)
         sigma = np.concatenate([np.tile(observation, window.history), commands])
         begin(self._parameters, self._noise, self._state, scaled_state(sigma, window, simulation.scaling))
@@ -75,7 +77,9 @@ class SimulationArm(Arm):
         newest = raw_observations(self._state.x[: window.state_size], self._simulation.scaling)
         observation, further = window.of_joints(newest), newest[window.joint_size :]
         time = self._periods * self.spec.period + self._since
-        reading = Reading(time, observation[:, 0].copy(), observation[:, 2:].copy())
+        reading = Reading(time, observation[:, 0].copy())
+        if self.spec.pressure_sensors:
+            reading = replace(reading, pressure=observation[:, 2:].copy())
         velocity = observation[:, 1] if self.spec.velocity_sensor else ()
         return with_measured(reading, self.spec, [*velocity, *further])
 

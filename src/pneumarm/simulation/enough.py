@@ -164,6 +164,7 @@ def enough_data(store: Store) -> Enough | None:
 
 
 def _error(result: FitResult) -> float:
-    """Return the geometric mean of the relative one-step errors of all that networks predict."""
-    errors: NDArray[np.float64] = result.held_out.relative[result.simulation.outputs]
+    """Return the geometric mean of the relative one-step errors of all that is measured and predicted."""
+    simulation = result.simulation
+    errors: NDArray[np.float64] = result.held_out.relative[simulation.outputs[simulation.measured]]
     return math.exp(np.log(errors).mean())

@@ -138,6 +138,13 @@ class Simulation:
         return places if self.velocity == "network" else places[~derived]
 
     @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Which of the outputs a sensor stands behind: all of them, or all but the pressures, which are estimated."""
+        places = self.outputs
+        pressure = (places < self.window.joint_size) & (places % len(QUANTITIES) > _VELOCITY)
+        return self.spec.pressure_sensors | ~pressure
+
+    @property
     def errors(self) -> NDArray[np.float64]:
         """``error_std`` and ``further_std`` in the order of an observation, shape (observation_size,)."""
         return np.concatenate([self.error_std.ravel(), self.further_std])

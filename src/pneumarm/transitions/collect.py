@@ -262,9 +262,9 @@ class _Collection:
         """Transitions and sequences that are stored."""
         kept = {name: store.state(name) if self.number else None for name in ("collect", "arm", "watch")}
         self._tally = _Tally(**json.loads(kept["collect"])) if kept["collect"] is not None else _Tally()
-        if kept["arm"] is not None:
-            arm.set_state(kept["arm"])
         self._arm = guarded(arm)
+        if kept["arm"] is not None:
+            self._arm.set_state(kept["arm"])
         self._wrong = 0  # sequences in a row
         if watch is not None:
             if kept["watch"] is not None:

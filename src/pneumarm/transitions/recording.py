@@ -20,7 +20,9 @@ The mapping, with every setting that is not of an arm's spec::
     temperature_1 = { column = "t1" }                                 # [Celsius]; temperature_2 alike
 
 ``full_scale`` is the pressure [bar] of a normalised 1. ``range`` are the least and the most that a column may hold,
-in its own unit; by default the arm's range of the angle, and -0.2 to 1.2 times its largest pressure.
+in its own unit; by default the arm's range of the angle, and -0.2 to 1.2 times its largest pressure. An arm that
+measures no pressures says so by ``pressure_sensors = false`` in ``[arm]`` and has no columns of them; they are
+estimated from the commands of each sequence, at whose begin all muscles count as vented.
 """
 
 import csv
@@ -36,6 +38,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.fill import filled
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
 from pneumarm.files import written_whole
@@ -98,10 +101,10 @@ class JointColumns(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The columns of one joint; those of further sensors where it has them."""
 
     angle: AngleColumn
-    pressure_1: PressureColumn
-    pressure_2: PressureColumn
     command_1: CommandColumn
     command_2: CommandColumn
+    pressure_1: PressureColumn | None = None
+    pressure_2: PressureColumn | None = None
     velocity: VelocityColumn | None = None
     acceleration: FurtherColumn | None = None
     temperature_1: FurtherColumn | None = None
@@ -198,6 +201,7 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
         if not mapping.joint:
             raise UnusableInput("needs a [[joint]] for each joint of the arm")
         spec = msgspec.convert({**mapping.arm, "joints": len(mapping.joint)}, ArmSpec)
+        _check_pressures(mapping, spec)
         velocity, sensors = _measures_velocity(mapping.joint), _sensors(mapping.joint)
         return mapping, replace(spec, velocity_sensor=velocity, sensors=sensors)
     except OSError as error:
@@ -205,6 +209,22 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
     except (ValueError, RecursionError, UnusableInput) as error:  # TOML, UTF-8 and msgspec's errors are ValueErrors
         message = str(error) if isinstance(error, UnusableInput | ValueError) else "too deeply nested"
         raise UnusableInput(message if message.startswith(str(path)) else f"{path}: {message}") from error
+
+
+def _check_pressures(mapping: Mapping, spec: ArmSpec) -> None:
+    """Raise UnusableInput unless each joint has the columns of both pressures, or the arm has no such sensors."""
+    given = [column is not None for joint in mapping.joint for column in (joint.pressure_1, joint.pressure_2)]
+    if spec.pressure_sensors and not all(given):
+        raise UnusableInput(
+            "needs pressure_1 and pressure_2 of every [[joint]]; of an arm that measures none say in [arm] "
+            "pressure_sensors = false"
+        )
+    if not spec.pressure_sensors and any(given):
+        raise UnusableInput("has a pressure of an arm without pressure sensors; leave out one or the other")
+    if not spec.pressure_sensors and mapping.commands == "continuous":
+        raise UnusableInput(
+            "has continuous commands, from which no pressures can be estimated; expected valves or pulses"
+        )
 
 
 def _measures_velocity(joints: list[JointColumns]) -> bool:
@@ -231,7 +251,8 @@ def _columns(mapping: Mapping, spec: ArmSpec) -> list[_Column]:
     found = []
     for joint in mapping.joint:
         found.append(_angle(joint.angle, spec))
-        found += [_pressure(pressure, spec) for pressure in (joint.pressure_1, joint.pressure_2)]
+        pressures = (joint.pressure_1, joint.pressure_2)
+        found += [_pressure(pressure, spec) for pressure in pressures if pressure is not None]
         for command in (joint.command_1, joint.command_2):
             most = math.inf if mapping.commands == "continuous" else 1.0
             low, high = command.range or (-most, most)
@@ -273,18 +294,19 @@ def _pressure(pressure: PressureColumn, spec: ArmSpec) -> _Column:
 
 
 def _sequences(reader: "_Reader", spec: ArmSpec) -> Iterator[Recorded]:
+    size = 5 if spec.pressure_sensors else 3
     for time, values in reader:
-        per_joint = values[:, : 5 * spec.joints].reshape(len(time), spec.joints, 5)
-        command = per_joint[:, :, 3:].copy()
+        per_joint = values[:, : size * spec.joints].reshape(len(time), spec.joints, size)
+        command = per_joint[:, :, -2:].copy()
         command[-1] = np.nan
         yield Recorded(
             time=time,
             angle=per_joint[:, :, 0],
-            pressure=per_joint[:, :, 1:3],
+            pressure=per_joint[:, :, 1:3] if spec.pressure_sensors else filled(spec, time, command),
             command=command,
             step=steps_of(time, spec.period),
             kind="imported",
-            measured=dict(zip(spec.further, values[:, 5 * spec.joints :].T, strict=True)),
+            measured=dict(zip(spec.further, values[:, size * spec.joints :].T, strict=True)),
         )
 
 

@@ -2,7 +2,7 @@
 
 import secrets
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import NamedTuple, NoReturn
 
 import numpy as np
@@ -143,6 +143,8 @@ class SerialArm(Arm):
         self._fed = line.now()
         self._closed = False
         limit = min(round((cut_off or CUT_OFF * spec.max_pressure) * spec.counts_per_bar), HIGHEST_COUNT)
+        if not spec.pressure_sensors:
+            limit = HIGHEST_COUNT  # what pins read that nothing is wired to means nothing
         self._settings = (conversions, velocity_ms, *[limit] * MUSCLES)
         self._limit = limit / spec.counts_per_bar
         self._session = 0
@@ -310,8 +312,10 @@ class SerialArm(Arm):
         reading = Reading(
             self._clock.map(sensors.time, answer.sent, answer.received),
             np.array(sensors.angle[:joints], np.float64),
-            np.array(sensors.pressure[: 2 * joints], np.float64).reshape(joints, 2),
         )
+        if self.spec.pressure_sensors:
+            pressure = np.array(sensors.pressure[: 2 * joints], np.float64).reshape(joints, 2)
+            reading = replace(reading, pressure=pressure)
         velocity = [value / VELOCITY_SCALE for value in sensors.velocity[:joints] if self.spec.velocity_sensor]
         further = [one.value(sensors.extra[(one.channel or 1) - 1]) for one in self.spec.sensors]
         return with_measured(reading, self.spec, [*velocity, *further])

@@ -299,7 +299,8 @@ class EmulatedBoard:
     def _sensors(self, now: Reading, time: int, flags: Flag, valves: int) -> Sensors:
         missing = JOINTS - len(now.angle)
         angle = [_count(value) for value in now.angle.tolist()] + [0] * missing
-        pressure = [_count(value) for value in now.pressure.ravel().tolist()] + [0, 0] * missing
+        pressure = [_count(value) for value in now.pressure.ravel().tolist()]
+        pressure += [0] * (2 * JOINTS - len(pressure))
         since = 1e3 * (now.time - self._earlier.time)
         velocity = [0] * JOINTS
         if since > 0:

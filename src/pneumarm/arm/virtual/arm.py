@@ -55,6 +55,7 @@ class VirtualArm(Arm):
             the thesis' 30 Hz is so by a faster computer: latency and jitter are shorter in proportion.
         velocity_sensor: whether it also reads the velocity, from faster samples of its angle.
         sensors: accelerometers and thermometers that it has besides; see :mod:`pneumarm.arm.virtual.further`.
+        pressure_sensors: whether it reads pressures; where not, its supply is turned down to what its muscles bear.
 
     Raises:
         UnusableInput: the arm cannot play the faults, or has no joint for a sensor.
@@ -71,8 +72,11 @@ class VirtualArm(Arm):
         period: float | None = None,
         velocity_sensor: bool = False,
         sensors: Sequence[Sensor] = (),
+        pressure_sensors: bool = True,
     ) -> None:
         self.parameters = parameters if parameters is not None else ArmParameters()
+        if not pressure_sensors:
+            self.parameters = _with_safe_supply(self.parameters)
         joints, converter = len(self.parameters.joints), self.parameters.sensors
         period = self.parameters.period if period is None else period
         faster = min(1.0, period / PERIOD)
@@ -87,6 +91,8 @@ class VirtualArm(Arm):
             name=name,
             velocity_sensor=velocity_sensor,
             sensors=tuple(sensors),
+            pressure_sensors=pressure_sensors,
+            safe_supply=not pressure_sensors,
         )
         if seed < 0:
             raise UnusableInput(f"the seed of a virtual arm must be 0 or more, got {seed}")
@@ -126,13 +132,16 @@ class VirtualArm(Arm):
         """The body of an arm that kernels alone can move.
 
         Raises:
-            UnusableInput: the arm plays faults or has further sensors, which only its own methods do.
+            UnusableInput: the arm plays faults or has further sensors, which only its own methods do, or it has no
+                pressure sensors, in place of which only the guard has estimates.
 
         """
         if self._player is not None:
             raise UnusableInput(f"{self.spec.name}: kernels cannot move an arm that plays faults; remove them")
         if self._further is not None:
             raise UnusableInput(f"{self.spec.name}: kernels cannot read further sensors; open the arm without them")
+        if not self.spec.pressure_sensors:
+            raise UnusableInput(f"{self.spec.name}: kernels cannot estimate pressures; open the arm with its sensors")
         return self.body
 
     @property
@@ -165,6 +174,8 @@ class VirtualArm(Arm):
         joints = self.spec.joints
         angle, pressure = np.empty(joints), np.empty((joints, 2))
         reading = Reading(_sense(self.body, angle, pressure), angle, pressure)
+        if not self.spec.pressure_sensors:
+            reading = Reading(reading.time, angle)
         if self._further is None:
             return reading
         values = np.empty(len(self.spec.further))
@@ -334,6 +345,12 @@ class VirtualArm(Arm):
             part[...] = values
         if player is not None and played is not None:
             player.set_state(played)
+
+
+def _with_safe_supply(parameters: ArmParameters) -> ArmParameters:
+    """Return ``parameters`` with the supply at the largest pressure that the muscles bear, if it was over that."""
+    supply = min(parameters.air.supply, parameters.max_pressure)
+    return replace(parameters, air=replace(parameters.air, supply=supply))
 
 
 def _check_state(values: NDArray[Any], name: str) -> None:

@@ -61,7 +61,7 @@ def predictor(simulation: Simulation) -> Predictor:
         offset=np.ascontiguousarray(window.of_joints(scaling.observation_offset)),
         scale=np.ascontiguousarray(window.of_joints(scaling.observation_scale)),
         command_scale=scaling.command_scale,
-        std=np.maximum(simulation.error_std, _LEAST_STD),
+        std=_usual_errors(simulation),
         first_command=places(simulation.window).command,
         highest=simulation.spec.max_pressure_counts,
         period=simulation.spec.period,
@@ -70,6 +70,14 @@ def predictor(simulation: Simulation) -> Predictor:
         further_offset=scaling.observation_offset[window.joint_size :].copy(),
         further_scale=scaling.observation_scale[window.joint_size :].copy(),
     )
+
+
+def _usual_errors(simulation: Simulation) -> NDArray[np.float64]:
+    """Return the standard deviations of errors (joints, 4) [sensor units]; boundless where nothing is measured."""
+    std = np.maximum(simulation.error_std, _LEAST_STD)
+    if not simulation.spec.pressure_sensors:
+        std[:, 2:] = np.inf
+    return std
 
 
 @part

@@ -52,6 +52,10 @@ class Readings(NamedTuple):
     as_told: NDArray[np.bool_]
     """Whether a muscle takes and gives air as it is told, shape (n, m)."""
 
+    def first(self, n: int) -> "Readings":
+        """Return the first ``n``."""
+        return Readings(self.source[:n], self.table[:n], self.leak[:n], self.supply[:n], self.as_told[:n])
+
 
 def hypotheses(joints: int) -> tuple[list[Hypothesis], Readings]:
     """Return what may be wrong with the valves of an arm; the first one is that nothing is."""

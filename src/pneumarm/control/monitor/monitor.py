@@ -48,6 +48,8 @@ class Monitor:
     has changed is noticed. Without one the first three are judged by what the monitor itself learns of the arm while
     it watches (:mod:`pneumarm.control.monitor.identification`), from twenty seconds on and the better the longer; and
     it is noticed if pressures do what no sound arm's do. Potentiometers on a rail or frozen are found in both cases.
+    Of an arm without pressure sensors only the angles are judged: potentiometers, and by a simulation whether the arm
+    has changed, whatever the reason.
 
     Args:
         spec: the arm.
@@ -80,6 +82,8 @@ class Monitor:
         self._earlier = 0  # so many findings are told on a clock of the arm that has ended
         self._open: dict[Key, int] = {}  # places in findings of what is not over
         self._hypotheses, self._readings = hypotheses(spec.joints)
+        if not spec.pressure_sensors:  # estimates follow the commands, whatever valves and air do
+            self._hypotheses, self._readings = self._hypotheses[:1], self._readings.first(1)
         self._weighing = self.settings.by_identification if simulation is None else self.settings.by_simulation
         self._prior = np.array([self._weighing.supply * (one.kind == "low-supply") for one in self._hypotheses])
         history = 2 if simulation is None else max(2, simulation.window.history)
@@ -372,7 +376,7 @@ class Monitor:
     def reasons(self) -> str:
         """Return what was seen that is wrong now, and what it is judged against, in a sentence for people."""
         seen = []
-        for m, (when, *counts) in enumerate(self._memory.surprise):
+        for m, (when, *counts) in enumerate(self._memory.surprise if self.spec.pressure_sensors else ()):
             concerned = any(one.muscle in (None, m % 2 + 1) and one.joint in (None, m // 2 + 1) for one in self.now)
             if when > 0 and concerned:
                 read, expected, std = self.spec.bar(counts)

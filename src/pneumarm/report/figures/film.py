@@ -138,7 +138,7 @@ def _pressures(axes: Any, shown: Shown) -> None:
     for j in range(shown.spec.joints):
         for m, color in enumerate((DARK, LIGHT)):
             axes.plot(shown.time, bar[:, j, m], color=color, linestyle=_STYLES[j % len(_STYLES)], linewidth=1.1)
-    axes.set_ylabel("[bar]")
+    axes.set_ylabel("[bar]" if shown.spec.pressure_sensors else "estimated [bar]")
 
 
 def _valves(axes: Any, shown: Shown) -> None:

@@ -39,7 +39,7 @@ def movement(
         above.plot(t, spec.degrees(angle[:, joint]), color=DARK, marker=".", ms=4, label="angle")
         for muscle, (color, style) in enumerate(((DARK, "-"), (MIDDLE, "--"))):
             middle.plot(t, spec.bar(pressure[:, joint, muscle]), style, color=color, label=f"muscle {muscle + 1}")
-        middle.set_ylabel("pressure [bar]")
+        middle.set_ylabel(f"{spec.pressure_word} [bar]")
         middle.set_ylim(0)
         _valves(below, t, valves[:, joint])
         below.set_xlabel("time [s]")
@@ -84,8 +84,8 @@ def movement_alt(
         peak = spec.bar(pressure[:, joint]).max()
         parts.append(
             f"the angle{of_joint(joint, angle.shape[1])} goes from {seen[0]:.1f}° to a goal of "
-            f"{float(spec.degrees(goal[joint])):.1f}°, at most {overshoot:.1f}° beyond it; the highest pressure is "
-            f"{peak:.2f} bar"
+            f"{float(spec.degrees(goal[joint])):.1f}°, at most {overshoot:.1f}° beyond it; the highest "
+            f"{spec.pressure_word} is {peak:.2f} bar"
         )
     reached = "the goal is not reached" if end is None else f"the goal is reached after {end - time[0]:.2f} s"
     changes = int((np.diff(valves[moving], axis=0) != 0).any(axis=(1, 2)).sum()) if moving.any() else 0

@@ -1,0 +1,108 @@
+"""What it costs to do without pressure sensors: the same arms with them and without.
+
+python -m benchmarks few_sensors
+
+On each arm the job is done as ``pneumarm run`` does it by default, up to the agent's arrival: collecting until more
+would not help, the fit, and a training of the default agent and of the one for reaching. Then the first settles at
+goals and follows sinusoids, and the second reaches goals. What was measured is kept, so an interrupted benchmark goes
+on. Settings come from the environment:
+
+PNEUMARM_FEW_ARMS       seeds of virtual arms, "11,12,13,14,15"
+PNEUMARM_FEW_GOALS      200 to settle at, and as many to reach
+PNEUMARM_FEW_FOLDER     where rows are kept; runs/few_sensors by default
+"""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks._trials import Rows
+from pneumarm.arm import Arm, open_arm
+from pneumarm.experiments import there_and_back
+from pneumarm.learning import Tracks, goals_of, train
+from pneumarm.learning.methods import find_method
+from pneumarm.moving.trial import MoveTrialSettings, try_moving
+from pneumarm.simulation import FitSettings
+from pneumarm.simulation.enough import collect_enough
+from pneumarm.statistics import mean_estimate, rate_estimate
+from pneumarm.transitions import Store, collect
+
+KINDS = {"all sensors": "", "angle alone": ",pressure_sensors=off"}
+"""What is added to the name of an arm."""
+SEED = 0
+HEADER = (
+    f"{'':13}{'arm':>5}{'min':>6}{'settled':>9}{'median':>8}{'rest':>7}"
+    f"{'1/4, 1/2, 1 Hz':>19}{'success':>9}{'reward':>8}"
+)
+
+
+def measure() -> Iterator[str]:
+    arms = [int(arm) for arm in os.environ.get("PNEUMARM_FEW_ARMS", "11,12,13,14,15").split(",")]
+    goals = int(os.environ.get("PNEUMARM_FEW_GOALS", "200"))
+    folder = Path(os.environ.get("PNEUMARM_FEW_FOLDER", "runs/few_sensors"))
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = Rows(folder / "rows.jsonl", "kind", "arm", "goals")
+    wanted = [(arm, goals) for arm in arms]
+    yield HEADER
+    for arm in arms:
+        for kind in KINDS:
+            yield line(kind, str(arm), [rows.get(kind, arm, goals) or rows.add(row_of(kind, arm, goals))])
+    for kind in KINDS:
+        yield line(kind, "all", [row for row in rows if row["kind"] == kind and (row["arm"], row["goals"]) in wanted])
+
+
+def row_of(kind: str, arm: int, goals: int) -> dict[str, Any]:
+    """Return what the two agents of an arm do on it."""
+    name = f"virtual:seed={arm}{KINDS[kind]}"
+    with tempfile.TemporaryDirectory() as folder:
+        db = Path(folder) / "arm.db"
+        with open_arm(name, SEED) as opened, Store.for_arm(db, opened.spec) as store:
+            collect_enough(partial(collected, opened, store), store)
+            minutes = opened.read().time / 60
+        made, begin = there_and_back.fitted(db, FitSettings(seed=SEED))
+    servo, reaching = (
+        train(made.simulation, begin, seed=SEED, method=find_method(method)).agent for method in ("servo", "policy")
+    )
+    assert isinstance(servo, Tracks)
+    with open_arm(name, SEED) as opened:
+        settings = MoveTrialSettings(goals=goals)
+        tried = try_moving(opened, servo.controller(), goals_of(servo), settings, seed=SEED).results()
+    with open_arm(name, SEED) as opened:
+        reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), SEED)
+    return {
+        "kind": kind,
+        "arm": arm,
+        "goals": goals,
+        "minutes": minutes,
+        "settled": tried["settle"]["settled"],
+        "seconds": tried["settle"]["median_seconds"],
+        "rest": tried["settle"]["rest_error_deg"],
+        "track": [float(np.mean(one["rms_error_deg"])) for one in tried["track"]],
+        "success": [int(one.success) for one in reached],
+        "reward": [float(one.reward) for one in reached],
+    }
+
+
+def collected(arm: Arm, store: Store, transitions: int) -> None:
+    """Have so many ``transitions`` in ``store``."""
+    collect(arm, store, transitions, SEED)
+
+
+def line(kind: str, arm: str, rows: list[dict[str, Any]]) -> str:
+    """Return the figures of ``rows`` as a line of the table."""
+
+    def mean(name: str) -> float:
+        return float(np.mean([row[name] for row in rows]))
+
+    success = rate_estimate(np.concatenate([row["success"] for row in rows]).astype(bool))
+    reward = mean_estimate(np.concatenate([row["reward"] for row in rows]))
+    track = ", ".join(f"{error:.2f}" for error in np.mean([row["track"] for row in rows], axis=0))
+    return (
+        f"{kind:13}{arm:>5}{mean('minutes'):6.1f}{mean('settled'):9.4f}{mean('seconds'):8.2f}{mean('rest'):7.2f}"
+        f"{track:>19}{success.mean:9.4f}{reward.mean:8.2f}"
+    )

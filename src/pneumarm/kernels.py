@@ -22,9 +22,13 @@ import llvmlite.binding as llvm
 import numba
 from numba import config as numba_config
 from numba.core.caching import FunctionCache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.dispatcher import Dispatcher
-from numba.core.registry import cpu_target
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.environment import lookup_environment
+from numba.core.dispatcher import Dispatcher, _FunctionCompiler
+from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.sigutils import normalize_signature
+from numba.core.typing.templates import make_concrete_template
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _KEEP = 3  # folders of earlier sources kept, so that switching back and forth does not recompile
@@ -75,22 +79,91 @@ def _forget_old(root: Path) -> None:
 numba_config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
 
-class _OwnCopies(JITCodeLibrary):
-    """A kernel's machine code that calls its own copies of other kernels, whatever the process has loaded before."""
+class _Library(JITCodeLibrary):
+    """The machine code of what is called from Python, or the code of a kernel as other kernels call it.
+
+    The former is linked with its own copies of all kernels that it calls, and optimised as a whole. The latter is
+    neither linked nor optimised nor made machine code.
+    """
+
+    def add_linking_library(self, library: Any) -> None:
+        self._linking_libraries.append(library)
+
+    def _get_module_for_linking(self) -> Any:
+        if self._finalized:
+            return super()._get_module_for_linking()
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.external:
+                function.linkage = "linkonce_odr"
+        return self._final_module
+
+    def get_pointer_to_function(self, name: str) -> Any:
+        if not self._finalized and all(function.name != name for function in self._final_module.functions):
+            return 0  # it is not called from Python
+        return super().get_pointer_to_function(name)
+
+    def finalize(self) -> None:
+        called = dict.fromkeys(self._linking_libraries)
+        for library in (waiting := list(called)):
+            new = [one for one in library._linking_libraries if not library._finalized and one not in called]
+            called |= dict.fromkeys(new)
+            waiting += new
+        self._linking_libraries = list(called)
+        super().finalize()
+        for variable in self._final_module.global_variables:
+            if (environment := lookup_environment(variable.name)) is not None:
+                self._codegen.set_env(variable.name, environment)
 
     def _optimize_final_module(self) -> None:
         super()._optimize_final_module()
-        # What callers link is as it comes from the cache: then their code is the same too.
-        self._shared_module = llvm.parse_bitcode(self._final_module.as_bitcode())
-        for function in self._shared_module.functions:
-            if not function.is_declaration and function.linkage == llvm.Linkage.external:
-                function.linkage = "linkonce_odr"
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
                 function.linkage = "internal"
 
 
-cpu_target.target_context.codegen()._library_class = _OwnCopies
+class _Codegen(JITCPUCodegen):
+    """Numba's, which has nowhere to put the environment of what has no machine code."""
+
+    _library_class = _Library
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        if self._engine.get_global_value_address(env_name):
+            super().set_env(env_name, env)
+
+
+cpu_target.target_context.codegen().__class__ = _Codegen
+
+
+class _InlinedCompiler(_FunctionCompiler):
+    """Compiles a kernel for the calls of other kernels: without what calls from Python need."""
+
+    def _customize_flags(self, flags: Any) -> Any:
+        flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        return flags
+
+
+class _Kernel(CPUDispatcher):
+    """A jitted function that is compiled once more, and otherwise, for the kernels that call it."""
+
+    def __init__(self, function: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
+        super().__init__(function, *args, **kwargs)
+        own = self._compiler
+        self._for_kernels = _InlinedCompiler(
+            function, own.targetdescr, own.targetoptions, own.locals, own.pipeline_class
+        )
+        self._inlined: dict[Any, Any] = {}
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        signature, args = self._compiler.fold_argument_types(args, kws)
+        if args not in self._inlined:
+            with global_compiler_lock, self._compiling_counter:
+                self._inlined[args] = self._for_kernels.compile(args, None)
+        name = f"CallTemplate({self.py_func.__name__})"
+        signatures = [compiled.signature for compiled in self._inlined.values()]
+        return make_concrete_template(name, key=self.py_func.__name__, signatures=signatures), signature, args, {}
+
+    def get_overload(self, sig: Any) -> Any:
+        return self._inlined[normalize_signature(sig)[0]].entry_point
 
 
 class _ForgivingCache(FunctionCache):
@@ -120,10 +193,11 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
     """
 
     def compile_(f: _Function) -> Any:
-        settings = {"nogil": True, "error_model": "numpy", **options}
-        dispatcher = numba.njit(**settings)(f)
-        if not getattr(numba_config, "DISABLE_JIT", 0) and settings.get("inline", "never") == "never":
-            dispatcher._cache = _ForgivingCache(dispatcher.py_func)
+        if getattr(numba_config, "DISABLE_JIT", 0):
+            return f
+        settings = {"nopython": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+        dispatcher = _Kernel(f, targetoptions=settings)
+        dispatcher._cache = _ForgivingCache(f)
         return dispatcher
 
     return compile_ if function is None else compile_(function)

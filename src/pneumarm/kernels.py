@@ -14,7 +14,9 @@ import hashlib
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,8 +26,8 @@ from numba import config as numba_config
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher, _FunctionCompiler  # type: ignore[attr-defined]
 from numba.core.environment import lookup_environment
-from numba.core.dispatcher import Dispatcher, _FunctionCompiler
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
 from numba.core.typing.templates import make_concrete_template
@@ -76,7 +78,19 @@ def _forget_old(root: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-numba_config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
+CACHE_FOLDER = _cache_folder()
+"""Where the kernels of these sources are."""
+numba_config.CACHE_DIR = str(CACHE_FOLDER)  # type: ignore[attr-defined]
+
+
+@dataclass
+class Compiling:
+    """How long this process has compiled kernels, or loaded compiled ones."""
+
+    seconds: float = 0.0
+
+
+compiling = Compiling()
 
 
 class _Library(JITCodeLibrary):
@@ -112,7 +126,7 @@ class _Library(JITCodeLibrary):
         super().finalize()
         for variable in self._final_module.global_variables:
             if (environment := lookup_environment(variable.name)) is not None:
-                self._codegen.set_env(variable.name, environment)
+                self._codegen.set_env(variable.name, environment)  # type: ignore[attr-defined]
 
     def _optimize_final_module(self) -> None:
         super()._optimize_final_module()
@@ -134,7 +148,7 @@ class _Codegen(JITCPUCodegen):
 cpu_target.target_context.codegen().__class__ = _Codegen
 
 
-class _InlinedCompiler(_FunctionCompiler):
+class _InlinedCompiler(_FunctionCompiler):  # type: ignore[misc]
     """Compiles a kernel for the calls of other kernels: without what calls from Python need."""
 
     def _customize_flags(self, flags: Any) -> Any:
@@ -145,6 +159,9 @@ class _InlinedCompiler(_FunctionCompiler):
 class _Kernel(CPUDispatcher):
     """A jitted function that is compiled once more, and otherwise, for the kernels that call it."""
 
+    _compiler: Any
+    _cache: Any
+
     def __init__(self, function: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
         super().__init__(function, *args, **kwargs)
         own = self._compiler
@@ -153,17 +170,33 @@ class _Kernel(CPUDispatcher):
         )
         self._inlined: dict[Any, Any] = {}
 
+    def compile(self, sig: Any) -> Any:
+        began = time.perf_counter()
+        try:
+            return super().compile(sig)
+        finally:
+            compiling.seconds += time.perf_counter() - began
+
     def get_call_template(self, args: Any, kws: Any) -> Any:
         signature, args = self._compiler.fold_argument_types(args, kws)
         if args not in self._inlined:
             with global_compiler_lock, self._compiling_counter:
-                self._inlined[args] = self._for_kernels.compile(args, None)
+                self._inlined[args] = _without_notes(self._for_kernels.compile(args, None))
         name = f"CallTemplate({self.py_func.__name__})"
         signatures = [compiled.signature for compiled in self._inlined.values()]
         return make_concrete_template(name, key=self.py_func.__name__, signatures=signatures), signature, args, {}
 
+    def add_overload(self, cres: Any) -> None:
+        super().add_overload(_without_notes(cres))
+
     def get_overload(self, sig: Any) -> Any:
         return self._inlined[normalize_signature(sig)[0]].entry_point
+
+
+def _without_notes(compiled: Any) -> Any:
+    """Return what was ``compiled`` without what the compiler noted of it on the way, which takes most memory."""
+    compiled.fndesc.typemap = compiled.fndesc.calltypes = None
+    return compiled._replace(type_annotation=None, metadata=None, call_helper=None)
 
 
 class _ForgivingCache(FunctionCache):

@@ -5,9 +5,13 @@ Three traps of Numba are closed here:
 1. It does not see a change in a jitted function of *another* file. So the cache folder's name holds a hash
    of every source file that compiles anything and of Numba's version: any change starts a fresh folder.
 2. A truncated entry makes it crash. Here an entry that cannot be read is dropped and compiled again.
-3. A kernel's machine code holds copies of the kernels that it calls, optimised once more than the originals, so that
-   sums may run in another order. Numba lets a process call whichever it has loaded first, and results would depend
-   on what it has compiled or called before. Here every kernel calls its own copies.
+3. A kernel's machine code holds copies of the kernels that it calls, optimised with it, so that sums may run in
+   another order than in the originals. Numba lets a process call whichever it has loaded first, and results would
+   depend on what it has compiled or called before. Here every kernel calls its own copies.
+
+And one cost: Numba makes machine code, wrappers for Python and a cache entry of every kernel, also of those that only
+other kernels call, and optimises these once more in each caller. Here a kernel is compiled for Python when Python
+calls it; for the kernels that call it there is only its code, which is optimised once, as a part of what Python calls.
 """
 
 import hashlib
@@ -117,11 +121,13 @@ class _Library(JITCodeLibrary):
         return super().get_pointer_to_function(name)
 
     def finalize(self) -> None:
-        called = dict.fromkeys(self._linking_libraries)
-        for library in (waiting := list(called)):
-            new = [one for one in library._linking_libraries if not library._finalized and one not in called]
-            called |= dict.fromkeys(new)
-            waiting += new
+        called: dict[Any, None] = {}
+        waiting = list(self._linking_libraries)
+        while waiting:
+            library = waiting.pop(0)
+            if library not in called:
+                called[library] = None
+                waiting += [] if library._finalized else library._linking_libraries
         self._linking_libraries = list(called)
         super().finalize()
         for variable in self._final_module.global_variables:

@@ -21,13 +21,14 @@ import msgspec
 import numpy as np
 
 from pneumarm.arm import ArmSpec, open_arm
+from pneumarm.arm.virtual import VirtualArm
 from pneumarm.console import peak_memory
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.kernels import CACHE_FOLDER
 from pneumarm.learning import ServoSettings, test, train
 from pneumarm.leaving import leave_by_exceptions
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
-from pneumarm.planning.bound import BoundSettings, known_bound
+from pneumarm.planning.bound import BoundSettings, measure_bound
 from pneumarm.simulation import FitSettings, SimulationArm, fit_store
 from pneumarm.task import begin_states
 from pneumarm.transitions import FEWEST_TRANSITIONS, Store
@@ -107,9 +108,10 @@ def rehearse(piece: Piece, folder: Path) -> Iterator[str]:
             yield "settle"
     if piece.physics is not None:
         with open_arm(piece.physics) as arm:
-            known_bound(arm, simulation.goal_range, {}, BoundSettings(episodes=1))
-    yield "bound"
+            assert isinstance(arm, VirtualArm)
+            measure_bound(arm, simulation.goal_range, BoundSettings(episodes=1))
     _REHEARSED.touch()
+    yield "bound"
 
 
 def _made_up(spec: ArmSpec) -> Iterator[Recorded]:

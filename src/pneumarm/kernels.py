@@ -11,7 +11,7 @@ Three traps of Numba are closed here:
 
 And one cost: Numba makes machine code, wrappers for Python and a cache entry of every kernel, also of those that only
 other kernels call, and optimises these once more in each caller. Here a kernel is compiled for Python when Python
-calls it; for the kernels that call it there is only its code, which is optimised once, as a part of what Python calls.
+calls it; for kernels that call it there is only its code, which is optimised once, as a part of what Python calls.
 """
 
 import hashlib

@@ -15,7 +15,10 @@ from pneumarm.run import Run
 from pneumarm.transitions import Store
 from small import SMALL
 
-TIMES = ("peak_memory_mb", "seconds", "wall_seconds", "steps_per_second", "steps_per_second_per_core")
+TIMES = (
+    "peak_memory_mb", "rehearsal_memory_mb", "seconds", "wall_seconds", "compile_seconds",
+    "steps_per_second", "steps_per_second_per_core",
+)  # fmt: skip
 STAGES = ("collect", "simulation", "training", "test", "transfer", "bound")
 
 

@@ -98,9 +98,9 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Any]], title: str = "")
     return built
 
 
-def peak_memory() -> float:
-    """Return the most memory that this process has held so far [MB]."""
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+def peak_memory(whose: int = resource.RUSAGE_SELF) -> float:
+    """Return the most memory that this process has held, or the largest of its children that have ended [MB]."""
+    most = resource.getrusage(whose).ru_maxrss
     return round(most / (1e6 if sys.platform == "darwin" else 1e3), 1)
 
 

@@ -18,6 +18,7 @@ import msgspec
 
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
+from pneumarm.arm.virtual import VirtualArm
 from pneumarm.console import Report, jsonable, peak_memory
 from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper
 from pneumarm.control.condition import collected_results
@@ -25,9 +26,11 @@ from pneumarm.control.monitor import Mode
 from pneumarm.control.transfer import monitor_of
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
+from pneumarm.kernels import compiling
 from pneumarm.learning import (
     LOOKING_AHEAD,
     LearnSettings,
+    ServoSettings,
     Tracks,
     goals_of,
     load_agent,
@@ -40,6 +43,7 @@ from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning import PlanSettings
 from pneumarm.planning.bound import BoundSettings, known_bound
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
+from pneumarm.rehearsal import Piece, Rehearsal
 from pneumarm.report import save_demonstration, save_spec, write_report
 from pneumarm.report.run_report import TEST
 from pneumarm.settings import Valid
@@ -133,6 +137,7 @@ class Run:
         self.agent = folder / "agent.safetensors"
         self.adapted = folder / "adapted.safetensors"
         self.episodes = folder / "episodes.csv"
+        self._rehearsal = Rehearsal()
         self._claim()
 
     def _claim(self) -> None:
@@ -164,32 +169,43 @@ class Run:
 
     def do(self) -> dict[str, Any]:
         """Do all stages that are not done yet and return the results."""
-        for name, stage in (
-            ("collect", self._collect),
-            ("simulation", self._fit),
-            ("training", self._train),
-            ("test", self._test),
-            ("transfer", self._transfer),
-            ("settle", self._move),
-            ("bound", self._bound),
-        ):
-            if name not in self.results:
-                began = time.perf_counter()
-                self.results |= stage()
-                self._note(name, time.perf_counter() - began)
+        with self._rehearsal:
+            for name, stage in (
+                ("collect", self._collect),
+                ("simulation", self._fit),
+                ("training", self._train),
+                ("test", self._test),
+                ("transfer", self._transfer),
+                ("settle", self._move),
+                ("bound", self._bound),
+            ):
+                if name not in self.results:
+                    with self._noted(name):
+                        if name != "collect":
+                            self._rehearsal.wait_for(name)
+                        self.results |= stage()
         if not (self.folder / "report.html").exists():
-            began = time.perf_counter()
-            with self.progress("report") as report:
+            with self._noted("report"), self.progress("report") as report:
                 report(0, 1)
                 write_report(self.folder)
                 report(1, 1)
-            self._note("report", time.perf_counter() - began)
         return self.results
 
-    def _note(self, stage: str, seconds: float) -> None:
-        """Write the results with how long a ``stage`` took; once they are there it is not done again."""
-        self.results["wall_seconds"] = self.results.get("wall_seconds", {}) | {stage: round(seconds, 3)}
-        self.results["peak_memory_mb"] = max(peak_memory(), self.results.get("peak_memory_mb", 0.0))
+    @contextmanager
+    def _noted(self, stage: str) -> Iterator[None]:
+        """Write the results of a ``stage`` with how long it took; once they are there it is not done again."""
+        began, compiled = time.perf_counter(), compiling.seconds
+        yield
+        for name, seconds in (
+            ("wall_seconds", time.perf_counter() - began),
+            ("compile_seconds", compiling.seconds - compiled),
+        ):
+            self.results[name] = self.results.get(name, {}) | {stage: round(seconds, 3)}
+        for name, megabytes in (
+            ("peak_memory_mb", peak_memory()),
+            ("rehearsal_memory_mb", self._rehearsal.memory),
+        ):
+            self.results[name] = max(megabytes, self.results.get(name, 0.0))
         write_json(self._results_file, jsonable(self.results))
 
     def _collect(self) -> dict[str, Any]:
@@ -199,6 +215,7 @@ class Run:
             self._seen_by(open_arm_checked(wanted)) as arm,
             Store.for_arm(self.store, arm.spec) as store,
         ):
+            self._rehearse(arm)
             watch = Monitor(arm.spec, mode=self._monitor)
 
             def record(transitions: int) -> CollectResult:
@@ -213,6 +230,13 @@ class Run:
             save_spec(self.folder, arm.spec)
             marked_record(store).save(self.folder)
         return {"collect": collected_results(collected, watch) | decided}
+
+    def _rehearse(self, arm: Arm) -> None:
+        """Have the kernels of the later stages compiled while ``arm`` is moved."""
+        wanted = self.settings
+        if isinstance(wanted.chosen, ServoSettings):
+            physics = wanted.arm if isinstance(arm, VirtualArm) and wanted.bound_episodes else None
+            self._rehearsal.begin(Piece(arm.spec, wanted.fit, wanted.chosen, physics))
 
     def _fit(self) -> dict[str, Any]:
         with self.progress("fitting the simulation") as report, Store.open(self.store) as store:

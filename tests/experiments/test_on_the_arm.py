@@ -11,7 +11,7 @@ import pytest
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.arm.virtual.parameters import without_noise
 from pneumarm.control.playing import Player
-from pneumarm.errors import UnusableInput
+from pneumarm.control.turns import TurnPlayer
 from pneumarm.experiments import registry
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.displacement import typical
@@ -24,20 +24,22 @@ from pneumarm.experiments.moving import (
     agent_of,
     draws,
     from_visits,
-    material,
 )
 from pneumarm.experiments.on_the_arm_only import from_scratch
 from pneumarm.experiments.overnight.days import DAYS
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.results import write_page
+from pneumarm.experiments.sweep import sweep
 from pneumarm.experiments.transfer import conditions
 from pneumarm.learning import Shaping
+from pneumarm.learning.online.loop import Schedule
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.kernel import raw_observation
 from pneumarm.task import Reward, begin_states
 from pneumarm.transitions import Store
 from small import SMALL
 
+PLAIN = "python:tests.plain_arms:linear"
 LABORATORY = LaboratorySettings(test_episodes=30, max_episodes=300)
 AGENT = replace(THESIS, agents=2, validation_episodes=20)
 
@@ -209,6 +211,43 @@ def test_draws_go_on(small_material: Material) -> None:
         np.testing.assert_array_equal(all_[4:], part)
 
 
-def test_other_arms_than_virtual_ones_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(UnusableInput, match="expected a virtual arm, such as virtual:seed=1"):
-        material("emulated:virtual", tmp_path, LABORATORY, lambda done, total: None)
+@pytest.fixture(scope="module")
+def plain_laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("plain")
+
+
+@pytest.mark.parametrize("name", ["transfer", "goal-area", "overnight", "on-the-arm-only", "displacement"])
+def test_they_move_any_arm(name: str, plain_laboratory: Path, tmp_path: Path) -> None:
+    small = replace(LABORATORY, transitions=2_000, max_episodes=40)
+    tiny = {
+        "transfer": {"learning": 10, "block": 5, "test": 3, "warming": 2},
+        "goal-area": {"test": 3},
+        "overnight": {"first": 5, "second": 5, "block": 5, "hours": 0.01},
+        "on-the-arm-only": {"looks": 5, "test": 3},
+        "displacement": {"adapting": 3, "shown": 9, "typical": 1},
+    }[name]
+    one = SMALL_ONES[name]
+    experiment = replace(one, sizes=replace(one.sizes, **tiny))
+    done = sweep(experiment, plain_laboratory, [PLAIN], 1, small)
+    assert {row.arm for row in done.rows.rows} == {PLAIN}
+    for row in done.rows.rows:
+        ideal = name == "transfer" and row.trial in conditions.IDEAL
+        assert bool(row.figures) != ideal, row
+    analysis = experiment.analyse(done.rows)
+    told = "Only a virtual arm can" in " ".join(analysis.summary)
+    assert told == (name == "transfer")
+    assert write_page(experiment, tmp_path, analysis, 1, (PLAIN,)).exists()
+
+
+def test_turn_by_turn_it_is_the_compiled_loop(small_material: Material) -> None:
+    agent, seed = agent_of(small_material, AGENT, 1, LABORATORY), 3
+    made = []
+    for kind in (Player, TurnPlayer):
+        with VirtualArm(draw_parameters(3), seed=7) as arm:
+            one = kind(agent, arm, 0.05, AGENT.exploration, seed)
+            near = Schedule(60.0, 0.1, 5.0, 0.1)
+            rows = [*one.play(*draws(agent, seed, 3, MOVEMENTS)).rows()]
+            rows += one.play(*draws(agent, seed, 3, MOVEMENTS, 3), near).rows()
+            seen = one.visit(draws(agent, seed, 2, MOVEMENTS, 6)[1])
+            made.append((rows, one.learned.weights().tolist(), one.performance, [part.tolist() for part in seen]))
+    assert made[0] == made[1]

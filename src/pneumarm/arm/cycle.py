@@ -7,6 +7,7 @@ from time import monotonic
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumarm.arm.guard import GuardedArm
 from pneumarm.arm.seam import Reading
@@ -129,12 +130,15 @@ class BeginState:
 
     def reach(self, arm: GuardedArm, random: np.random.Generator) -> None:
         """Vent, inflate every muscle for a time uniform in 0..``inflate``, and wait."""
+        self.inflated(arm, random.uniform(0.0, self.inflate, arm.applied.shape))
+
+    def inflated(self, arm: GuardedArm, duration: NDArray[np.float64]) -> None:
+        """Vent, inflate every muscle for its ``duration`` (joints, 2) [s], and wait."""
         valves = np.full(arm.applied.shape, -1, np.int8)
         arm.make_ready()
         arm.read()
         arm.set_valves(valves)
         arm.wait(self.deflate)
-        duration = random.uniform(0.0, self.inflate, valves.shape)
         passed = 0.0
         for end in [0.0, *np.sort(duration, axis=None)]:
             if end > passed:

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Annotated
 
+from cyclopts import Parameter
+
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import progress, say, show, table
 from pneumarm.experiments.experiment import LaboratorySettings
@@ -16,7 +18,7 @@ def experiment_(
     /,
     *,
     out: Path = Path("laboratory"),
-    arms: str | None = None,
+    arms: Annotated[str | None, Parameter(name=("--arms", "--arm"))] = None,
     runs: int | None = None,
     workers: int | None = None,
     dask: str | None = None,
@@ -34,7 +36,7 @@ def experiment_(
     out
         Folder of the laboratory, shared by all experiments; created if it does not exist.
     arms
-        Names of the arms, separated by commas; by default those of the experiment.
+        Names of the arms, separated by commas, any that `pneumarm run` takes; by default those of the experiment.
     runs
         How often every trial is done, each time from other weights; by default as often as in the thesis.
     workers

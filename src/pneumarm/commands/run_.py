@@ -1,5 +1,6 @@
 """``pneumarm run``."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,6 +13,8 @@ from pneumarm.console import progress, say, show, table
 from pneumarm.control.condition import complaints
 from pneumarm.files import write_text
 from pneumarm.run import Run, RunSettings
+
+_MENTIONED = 0.5  # s of compiling
 
 
 def run_(
@@ -58,7 +61,17 @@ def run_(
         for line in complaints(results[stage], doing):
             say(line)
     seconds = sum(results["wall_seconds"].values())
-    say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory")
+    say("seconds of " + ", ".join(_spent(results)))
+    beside = results["rehearsal_memory_mb"]
+    also = f", {beside:.0f} MB in the process that compiled beside it" if beside else ""
+    say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory{also}")
+
+
+def _spent(results: dict[str, Any]) -> Iterator[str]:
+    """Say how long each stage took and how much of that was compiling."""
+    for stage, seconds in results["wall_seconds"].items():
+        compiled = results["compile_seconds"][stage]
+        yield f"{stage} {seconds:.1f}" + (f" ({compiled:.1f} compiling)" if compiled >= _MENTIONED else "")
 
 
 def _write_config(file: Path, settings: dict[str, Any]) -> None:

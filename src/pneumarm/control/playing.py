@@ -8,7 +8,8 @@ time (``python -m benchmarks playing``, on two cores that others shared), and th
 agent that learns on the arm alone needs 80,000 s of arm time. A test compares the two, lateness and two joints
 included.
 
-It is for virtual arms without faults or further sensors, and for agents of the thesis' kind.
+It is for virtual arms without faults or further sensors, and for agents of the thesis' kind; on other arms they are
+moved by :mod:`~.turns`.
 """
 
 from typing import NamedTuple
@@ -223,6 +224,11 @@ class Player:
         angle, pressure = np.zeros(durations.shape[:2]), np.zeros(durations.shape)
         _visit(self.arm.plain, self._watched, self._rules, durations, angle, pressure)
         return angle, pressure
+
+    @property
+    def time(self) -> float:
+        """Time on the arm's clock [s]."""
+        return self.arm.time
 
     @property
     def learned(self) -> Agent:

@@ -3,6 +3,7 @@
 import functools
 import threading
 from abc import abstractmethod
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import open_arm
+from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.virtual import ArmParameters, VirtualArm
 from pneumarm.control.movement import BEGIN, drawn
-from pneumarm.control.playing import Player
-from pneumarm.errors import UnusableInput
+from pneumarm.control.turns import player
 from pneumarm.experiments.experiment import ARMS, Experiment, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import Agent, Exploration, TrainSettings
@@ -49,30 +49,12 @@ class Material:
     simulated: Simulated
 
     @property
-    def parameters(self) -> ArmParameters:
-        """What the arm is made of."""
-        return _parameters(self.arm)
-
-
-def _parameters(name: str) -> ArmParameters:
-    with open_arm(name) as arm:
-        if not isinstance(arm, VirtualArm):
-            raise UnusableInput(
-                f"arm {name!r}: this experiment looks into what an arm is made of and moves it for days; "
-                "expected a virtual arm, such as virtual:seed=1"
-            )
-        return arm.parameters
-
-
-def material(arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-    """Return ``arm`` and its simulation, collecting and fitting where that is missing.
-
-    Raises:
-        UnusableInput: the arm is not a virtual one.
-
-    """
-    _parameters(arm)
-    return Material(arm, simulated(arm, folder, settings, progress))
+    def parameters(self) -> ArmParameters | None:
+        """What the arm is made of, if that is known: it is of a virtual arm."""
+        if not self.arm.startswith("virtual"):
+            return None
+        with open_arm(self.arm) as arm:
+            return arm.parameters if isinstance(arm, VirtualArm) else None
 
 
 @dataclass(frozen=True)
@@ -92,7 +74,7 @@ class OnTheArm(Experiment):
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
         """Return the arm and its simulation."""
-        return material(arm, folder, settings, progress)
+        return Material(arm, simulated(arm, folder, settings, progress))
 
 
 @dataclass(frozen=True)
@@ -119,12 +101,18 @@ class AgentsByTrial(OnTheArm):
         return {"agents": agents, "sizes": asdict(self.sizes)}
 
 
-def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Any:
-    """Return the virtual arm as it is in the morning, after a night of rest.
+def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Arm:
+    """Return the arm: a virtual one as it is in the morning, after a night of rest, any other as it is.
 
-    All trials of a run meet the same noise. ``parameters`` are those of the arm, or others.
+    All trials of a run on a virtual arm meet the same noise. ``parameters`` are those of the arm, or others.
     """
-    return VirtualArm(parameters or of.parameters, seed=run_seed(laboratory, run), name=of.arm)
+    seed, made_of = run_seed(laboratory, run), parameters or of.parameters
+    return open_arm(of.arm, seed % 2**31) if made_of is None else VirtualArm(made_of, seed=seed, name=of.arm)
+
+
+def clock(arm: Arm) -> float:
+    """Return the time on the clock of ``arm`` [s]; asking a virtual arm draws no noise."""
+    return arm.time if isinstance(arm, VirtualArm) else arm.read().time
 
 
 _locks: dict[Any, threading.Lock] = {}
@@ -192,11 +180,11 @@ def greedy_test(
     episodes: int,
     run: int,
     laboratory: LaboratorySettings,
-    arm: VirtualArm | None = None,
+    arm: Arm | None = None,
 ) -> Movements:
     """Let ``agent`` move greedily on the arm, by default as it is in the morning; the same goals in all trials."""
-    where = arm or new_arm(of, run, laboratory)
-    return Player(agent, where).play(*draws(agent, run_seed(laboratory, run), episodes, TEST_MOVEMENTS))
+    with nullcontext(arm) if arm else new_arm(of, run, laboratory) as where:
+        return player(agent, where).play(*draws(agent, run_seed(laboratory, run), episodes, TEST_MOVEMENTS))
 
 
 def from_visits(agent: Agent, angle: Array, pressure: Array) -> BeginStates:

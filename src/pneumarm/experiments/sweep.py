@@ -22,6 +22,8 @@ from pneumarm.files import require_folder
 from pneumarm.learning.training import cores
 
 ROWS = "rows.jsonl"
+_OF_MANY = ("virtual", "simulation:", "emulated:virtual")
+"""How the names of arms begin of which there can be several at once."""
 _PATIENCE = 10.0  # s, for a scheduler to answer
 Progress = Callable[[str], AbstractContextManager[Report]]
 
@@ -93,6 +95,8 @@ def sweep(
             with progress(f"preparing {arm}") as report:
                 materials[arm] = experiment.prepare(arm, arm_folder(laboratory, arm), settings, report)
         tasks = [(experiment, materials[key[0]], key, settings) for key in missing]
+        if not all(arm.startswith(_OF_MANY) for arm in materials):
+            workers = 1  # there is only one of it
         began = time.perf_counter()
         with progress(experiment.name) as report:
             report(len(keys) - len(missing), len(keys))

@@ -14,6 +14,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -102,16 +103,18 @@ def svg(figure: Figure) -> str:
     """Return ``figure`` as SVG text; the same figure gives the same text."""
     buffer = io.StringIO()
     with _style():
-        figure.savefig(buffer, format="svg", dpi=RASTER_DPI, metadata={"Date": None, "Creator": None})
+        figure.set_dpi(RASTER_DPI)
+        # Figure.savefig would draw once more for a layout that is fixed already.
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
 
 def _freeze(figure: Figure) -> None:
     """Lay ``figure`` out once and for all.
 
-    The layout makes place for tick labels, and the ticks depend on that: fixed after a first layout, they make
-    the second one final. Positions are rounded, because the solver leaves differences in the last bits from call
-    to call, and ids in the SVG are made of them.
+    The layout makes place for tick labels, and the ticks depend on that: they stay what they were when it was made.
+    Positions are rounded, because the solver leaves differences in the last bits from call to call, and ids in the
+    SVG are made of them.
     """
     engine = figure.get_layout_engine()
     if engine is None:
@@ -121,7 +124,6 @@ def _freeze(figure: Figure) -> None:
         for axis in (a for part in (axes, *axes.child_axes) for a in (part.xaxis, part.yaxis)):
             if axis.get_scale() != "log":
                 axis.set_major_locator(FixedLocator([float(v) for v in axis.get_majorticklocs()]))
-    engine.execute(figure)
     figure.set_layout_engine("none")
     for axes in figure.axes:
         x, y, width, height = (round(float(v), 5) for v in axes.get_position().bounds)

@@ -128,6 +128,11 @@ class VirtualArm(Arm):
         return (sides[..., INLET] - sides[..., OUTLET]).astype(np.int8)
 
     @property
+    def is_plain(self) -> bool:
+        """Whether kernels alone can move it: it plays no faults and has no further sensors."""
+        return self._player is None and self._further is None
+
+    @property
     def plain(self) -> Body:
         """The body of an arm that kernels alone can move.
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import ControlCycle, Reading, guarded
-from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm import Arm, ControlCycle, Reading, guarded
 from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import BEGIN, move
-from pneumarm.control.playing import Player
+from pneumarm.control.turns import player
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.means import (
     series,
@@ -93,10 +92,12 @@ class Displacement(OnTheArm):
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Adapt, move, and make the typical movements."""
         sizes, seed = self.sizes, run_seed(settings, run)
-        agent, arm = agent_of(material, self.agent, run, settings), new_arm(material, run, settings)
-        player = Player(agent, arm, sizes.learning_rate, self.agent.exploration, seed)
-        player.play(*draws(agent, seed, sizes.adapting, MOVEMENTS))
-        made = player.play(*draws(agent, seed, sizes.shown, MOVEMENTS, sizes.adapting))
+        agent = agent_of(material, self.agent, run, settings)
+        with new_arm(material, run, settings) as arm:
+            learner = player(agent, arm, sizes.learning_rate, self.agent.exploration, seed)
+            learner.play(*draws(agent, seed, sizes.adapting, MOVEMENTS))
+            made = learner.play(*draws(agent, seed, sizes.shown, MOVEMENTS, sizes.adapting))
+            typical = [_typical(learner.learned, arm, one, sizes.typical, seed) for one in sizes.degrees]
         distance = made.distance[:, 0]
         won, switches = made.success, made.switches.sum(axis=1)
         found = {
@@ -106,8 +107,8 @@ class Displacement(OnTheArm):
             **series("actions", made.actions[won]),
             **series("switches", switches[won]),
         }
-        for degrees in sizes.degrees:
-            found |= _typical(player.learned, arm, degrees, sizes.typical, seed)
+        for figures in typical:
+            found |= figures
         return found
 
 
@@ -133,9 +134,7 @@ def thirds(distance: Array, actions: Counts, switches: Counts, won: NDArray[np.b
     return found
 
 
-def typical_movement(
-    agent: Agent, arm: VirtualArm, degrees: float, random: np.random.Generator
-) -> TypicalMovement | None:
+def typical_movement(agent: Agent, arm: Arm, degrees: float, random: np.random.Generator) -> TypicalMovement | None:
     """Let ``agent`` move greedily by ``degrees`` from a random begin state; None where none allows that.
 
     The direction is the one in which there is more workspace. All joints move alike.
@@ -169,7 +168,7 @@ def typical_movement(
     )
 
 
-def _typical(agent: Agent, arm: VirtualArm, degrees: float, count: int, seed: int) -> dict[str, float]:
+def _typical(agent: Agent, arm: Arm, degrees: float, count: int, seed: int) -> dict[str, float]:
     """Return what movements by ``degrees`` have in common, and the first of them."""
     random = np.random.default_rng([seed, _TYPICAL, round(degrees)])
     made = [one for _ in range(count) if (one := typical_movement(agent, arm, degrees, random)) is not None]

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm import Arm
 from pneumarm.control.movement import BEGIN
-from pneumarm.control.playing import Player
+from pneumarm.control.turns import player
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.means import (
     series,
@@ -18,6 +18,7 @@ from pneumarm.experiments.moving import (
     Material,
     OnTheArm,
     agent_of,
+    clock,
     draws,
     greedy_test,
     means,
@@ -82,15 +83,16 @@ class OnTheArmOnly(OnTheArm):
         """Learn, and move greedily on the arm in another morning."""
         if trial == IN_SIMULATION:
             agent = agent_of(material, self.agent, run, settings)
-            arm = new_arm(material, run, settings)
-            goals = look(arm, self.agent, self.sizes.looks, run_seed(settings, run)).goal_range
+            with new_arm(material, run, settings) as arm:
+                goals = look(arm, self.agent, self.sizes.looks, run_seed(settings, run)).goal_range
             same = replace(agent, goal_range=goals)  # it has learned goals in a wider range
             made = greedy_test(material, same, self.sizes.test, run, settings)
             return {**means(made), "hours": settings.transitions * agent.spec.period / 3600}
         most = settings.max_episodes or self.agent.max_episodes
-        chosen, arm = replace(self.agent, max_episodes=most), new_arm(material, run, settings)
-        seed = run_seed(settings, run)
-        found = learn_on(arm, look(arm, chosen, self.sizes.looks, seed), seed)
+        chosen, seed = replace(self.agent, max_episodes=most), run_seed(settings, run)
+        with new_arm(material, run, settings) as arm:
+            began = clock(arm)
+            found = learn_on(arm, look(arm, chosen, self.sizes.looks, seed), seed, began)
         tested = greedy_test(material, found.agent, self.sizes.test, run, settings)
         hours, deviation, performance = zip(*found.course, strict=True)
         return {
@@ -106,7 +108,7 @@ class OnTheArmOnly(OnTheArm):
         }
 
 
-def look(arm: VirtualArm, settings: TrainSettings, looks: int, seed: int) -> Agent:
+def look(arm: Arm, settings: TrainSettings, looks: int, seed: int) -> Agent:
     """Return an agent for ``arm`` that has learned nothing, after visiting ``looks`` begin states.
 
     Its goals are the middle of the range between the angles at rest with one muscle inflated and the other vented.
@@ -117,10 +119,10 @@ def look(arm: VirtualArm, settings: TrainSettings, looks: int, seed: int) -> Age
     nothing = Scaling(np.zeros(4 * spec.joints), np.ones(4 * spec.joints), np.ones(2 * spec.joints))
     blank = Agent(spec, window, nothing, np.tile(spec.angle_range, (spec.joints, 1)), networks, settings)
     durations = random.uniform(0.0, BEGIN.inflate, (looks, spec.joints, 2))
-    player = Player(blank, arm)
-    angle, pressure = player.visit(durations)
+    looking = player(blank, arm)
+    angle, pressure = looking.visit(durations)
     one_side = np.tile([[BEGIN.inflate, 0.0], [0.0, BEGIN.inflate]], (spec.joints, 1, 1)).transpose(1, 0, 2)
-    ends, _ = player.visit(one_side)
+    ends, _ = looking.visit(one_side)
     low, high = ends.min(axis=0), ends.max(axis=0)
     margin = (high - low) * (1 - _MIDDLE) / 2
     seen = np.stack([angle, np.zeros_like(angle), pressure[..., 0], pressure[..., 1]], axis=-1)
@@ -130,19 +132,22 @@ def look(arm: VirtualArm, settings: TrainSettings, looks: int, seed: int) -> Age
     return replace(blank, scaling=scaling, goal_range=np.stack([low + margin, high - margin], axis=1))
 
 
-def learn_on(arm: VirtualArm, agent: Agent, seed: int) -> Learned:
-    """Let ``agent`` learn on ``arm`` until it meets the criterion of its settings, or for their ``max_episodes``."""
+def learn_on(arm: Arm, agent: Agent, seed: int, began: float = 0.0) -> Learned:
+    """Let ``agent`` learn on ``arm`` until it meets the criterion of its settings, or for their ``max_episodes``.
+
+    ``began`` is when the arm's clock began to count for it [s].
+    """
     settings, spec = agent.settings, arm.spec
-    player = Player(agent, arm, settings.learning_rate, settings.exploration, seed)
+    learner = player(agent, arm, settings.learning_rate, settings.exploration, seed)
     deviation, made, steps, met = initial_deviation(settings, spec), 0, 0, False
     course: list[tuple[float, float, float]] = []
     while not met and made < settings.max_episodes:
         now = stage(deviation, settings, spec)
         chunk = min(settings.shaping.episodes if settings.shaping else _CHUNK, settings.max_episodes - made)
-        played = player.play(*draws(agent, seed, chunk, MOVEMENTS, made), now.schedule)
+        played = learner.play(*draws(agent, seed, chunk, MOVEMENTS, made), now.schedule)
         made += played.n
         steps += int(played.actions.sum())
-        met = now.whole and player.performance >= now.criterion
-        course.append((arm.time / 3600, deviation, player.performance))
-        deviation = adjusted(deviation, player.performance, settings, spec)
-    return Learned(player.learned, met, made, steps, arm.time, tuple(course))
+        met = now.whole and learner.performance >= now.criterion
+        course.append(((learner.time - began) / 3600, deviation, learner.performance))
+        deviation = adjusted(deviation, learner.performance, settings, spec)
+    return Learned(learner.learned, met, made, steps, learner.time - began, tuple(course))

@@ -4,7 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pneumarm.control.playing import Player
+import numpy as np
+
+from pneumarm.arm import Arm, BeginState, guarded
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.control.turns import player
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, course, draws, new_arm
 from pneumarm.experiments.words import words_of
@@ -63,12 +67,21 @@ class Overnight(OnTheArm):
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Move for two days, exploring as at the end of training on both."""
         sizes, days, seed = self.sizes, DAYS[trial], run_seed(settings, run)
-        agent, arm = agent_of(material, self.agent, run, settings), new_arm(material, run, settings)
+        agent = agent_of(material, self.agent, run, settings)
         explores, rate = self.agent.exploration, sizes.learning_rate
-        first = Player(agent, arm, rate if days.first else 0.0, explores, seed)
-        day = first.play(*draws(agent, seed, sizes.first, MOVEMENTS))
-        if days.night:
-            arm.rest(3600 * sizes.hours)
-        second = Player(first.learned, arm, rate if days.second else 0.0, explores, seed + 1)
-        next_day = second.play(*draws(agent, seed, sizes.second, MOVEMENTS, sizes.first))
+        with new_arm(material, run, settings) as arm:
+            first = player(agent, arm, rate if days.first else 0.0, explores, seed)
+            day = first.play(*draws(agent, seed, sizes.first, MOVEMENTS))
+            if days.night:
+                _rest(arm, 3600 * sizes.hours)
+            second = player(first.learned, arm, rate if days.second else 0.0, explores, seed + 1)
+            next_day = second.play(*draws(agent, seed, sizes.second, MOVEMENTS, sizes.first))
         return course(joined([day, next_day]), sizes.block)
+
+
+def _rest(arm: Arm, seconds: float) -> None:
+    """Leave the arm vented for ``seconds`` [s]; a virtual one in no time."""
+    if isinstance(arm, VirtualArm):
+        arm.rest(seconds)
+    else:
+        BeginState(settle=seconds).inflated(guarded(arm), np.zeros((arm.spec.joints, 2)))

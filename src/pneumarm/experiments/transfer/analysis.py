@@ -18,6 +18,7 @@ from pneumarm.experiments.transfer.conditions import (
     CONDITIONS,
     EXPLORING,
     FROM_ARM,
+    IDEAL,
     NO_NOISE,
     PUNCTUAL,
     RATES,
@@ -40,7 +41,8 @@ _SIMULATIONS = (
 def analysis(experiment: TransferToTheArm, rows: TrialRows) -> Analysis:
     """Return the courses beside the thesis', the causes, and what holds of section 5.5.1."""
     causes = causes_of_the_drop(rows)
-    largest = max((name for name in causes if name != _ALL_THREE), key=lambda name: causes[name].mean)
+    known = [name for name, one in causes.items() if one.samples and name != _ALL_THREE]
+    largest = max(known, key=lambda name: causes[name].mean)
     found = {
         **measured(rows, _PROGRESS // experiment.sizes.block),
         "model": causes[_MODEL],
@@ -50,6 +52,11 @@ def analysis(experiment: TransferToTheArm, rows: TrialRows) -> Analysis:
         "block": experiment.sizes.block,
     }
     words = experiment.words.filled(found)
+    without = [row.arm for row in rows.rows if row.trial in IDEAL and not row.figures]
+    if without:
+        conditions, arms = ", ".join(CONDITIONS[trial] for trial in IDEAL), ", ".join(sorted(set(without)))
+        left_out = f"Only a virtual arm can be put into these conditions, {arms} was not: {conditions}."
+        words = msgspec.structs.replace(words, summary=(*words.summary, left_out))
     last = {experiment.trials[t]: over_arms(blocks(rows, "reward", t)[:, :, -1])._asdict() for t in RATES}
     return words.analysis(
         found,
@@ -124,7 +131,8 @@ def _on_the_arm(words: SectionWords, rows: TrialRows, block: int) -> Section:
 
 
 def _causes(words: SectionWords, rows: TrialRows, causes: Mapping[str, Interval]) -> Section:
-    drawn = dots(list(causes), {"lost reward [-]": list(causes.values())}, words.figure, zero=True)
+    known = {name: one for name, one in causes.items() if one.samples}
+    drawn = dots(list(known), {"lost reward [-]": list(known.values())}, words.figure, zero=True)
     made = section(words, rows, CONDITIONS, figures=[drawn])
     simulated = [
         [name, *(msgspec.structs.replace(c, figure=prefix + c.figure).text(rows, AS_IT_IS) for c in words.columns)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from pneumarm.arm.virtual import ArmParameters
 from pneumarm.arm.virtual.parameters import without_noise
-from pneumarm.control.playing import Player
+from pneumarm.control.turns import player
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.moving import (
     MOVEMENTS,
@@ -14,6 +14,7 @@ from pneumarm.experiments.moving import (
     Material,
     OnTheArm,
     agent_of,
+    clock,
     course,
     draws,
     from_visits,
@@ -35,6 +36,8 @@ CONDITIONS = {
     WARM: "arm that has moved for an hour",
     ALL: "all three",
 }
+IDEAL = (NO_NOISE, PUNCTUAL, ALL)
+"""Conditions that only an arm of known physics can be put into: a virtual one."""
 EXPLORING = "simulation, exploring: "
 FROM_ARM, WITHOUT_NOISE = "simulation from the arm's begin states: ", "the same without noise: "
 """Prefixes of the figures of tests in the simulation."""
@@ -76,26 +79,31 @@ class TransferToTheArm(OnTheArm):
     def _learning(self, of: Material, rate: float, run: int, laboratory: LaboratorySettings) -> Figures:
         agent, seed = agent_of(of, self.agent, run, laboratory), run_seed(laboratory, run)
         explores = self.agent.exploration
-        player = Player(agent, new_arm(of, run, laboratory), rate, explores, seed)
-        played = player.play(*draws(agent, seed, self.sizes.learning, MOVEMENTS))
+        with new_arm(of, run, laboratory) as arm:
+            began, learner = clock(arm), player(agent, arm, rate, explores, seed)
+            played = learner.play(*draws(agent, seed, self.sizes.learning, MOVEMENTS))
         return {
             **simulated_test(of, agent, laboratory.test_episodes, exploration=explores, prefix=EXPLORING),
             **course(played, self.sizes.block),
-            "hours": float(played.time_end[-1] / 3600),
+            "hours": float((played.time_end[-1] - began) / 3600),
         }
 
     def _condition(self, of: Material, trial: int, run: int, laboratory: LaboratorySettings) -> Figures:
+        parameters = of.parameters
+        if trial in IDEAL and parameters is None:
+            return {}
         agent, seed = agent_of(of, self.agent, run, laboratory), run_seed(laboratory, run)
-        arm = new_arm(of, run, laboratory, changed(of.parameters, trial))
-        if trial in (WARM, ALL):
-            Player(agent, arm).play(*draws(agent, seed, self.sizes.warming, MOVEMENTS))
-        found = means(greedy_test(of, agent, self.sizes.test, run, laboratory, arm))
+        with new_arm(of, run, laboratory, parameters and changed(parameters, trial)) as arm:
+            if trial in (WARM, ALL):
+                player(agent, arm).play(*draws(agent, seed, self.sizes.warming, MOVEMENTS))
+            found = means(greedy_test(of, agent, self.sizes.test, run, laboratory, arm))
         if trial != AS_IT_IS:
             return found
         # What is simulated does not depend on the trial.
         count = laboratory.test_episodes
         _, durations = draws(agent, seed, self.sizes.test, TEST_MOVEMENTS)
-        begin = from_visits(agent, *Player(agent, new_arm(of, run, laboratory)).visit(durations))
+        with new_arm(of, run, laboratory) as arm:
+            begin = from_visits(agent, *player(agent, arm).visit(durations))
         there = replace(of, simulated=replace(of.simulated, begin=begin))
         quiet = NoiseSettings(kind="none")
         return {

@@ -46,7 +46,8 @@ class OnlineLearner:
         self._agent = agent
         self.learning_rate = learning_rate
         chosen = exploration or Exploration(0.0, 1.0)
-        self._schedule = Schedule(np.inf, float(chosen.epsilon), float(chosen.temperature), 0.0)
+        self.schedule = Schedule(np.inf, float(chosen.epsilon), float(chosen.temperature), 0.0)
+        """How it explores from now on."""
         self._learner = learner(agent.weights(), agent.settings, learning_rate)
         self._random = random_state(seed)
         joints = agent.window.joints
@@ -61,7 +62,7 @@ class OnlineLearner:
         goal = np.asarray(goal, np.float64).reshape(window.joints)
         self._x[self._places.goal : self._places.one] = scaled_goal(goal, scaling)
         self._x[: self._places.command] = self._checked(state)
-        begin_acting(self._learner, self._schedule, self._x, self._workspace, self._random)
+        begin_acting(self._learner, self.schedule, self._x, self._workspace, self._random)
 
     def act(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of the current state; they stay the same until :meth:`observe`."""
@@ -89,7 +90,7 @@ class OnlineLearner:
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state`` without learning, as if an episode began there."""
         self._x[: self._places.command] = self._checked(next_state)
-        begin_acting(self._learner, self._schedule, self._x, self._workspace, self._random)
+        begin_acting(self._learner, self.schedule, self._x, self._workspace, self._random)
 
     def weights(self) -> NDArray[np.float32]:
         """Return a copy of the weights as they are now."""
@@ -105,7 +106,7 @@ class OnlineLearner:
         paid = np.broadcast_to(np.asarray(reward, np.float64), self._workspace.actions.shape).copy()
         next_state = self._checked(next_state)
         seen = paid, next_state
-        learn_and_act(self._learner, self._schedule, self._x, self._workspace, self._random, seen, bool(terminal))
+        learn_and_act(self._learner, self.schedule, self._x, self._workspace, self._random, seen, bool(terminal))
 
     @property
     def agent(self) -> Agent:

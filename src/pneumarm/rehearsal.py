@@ -1,0 +1,150 @@
+"""The later stages of a run, rehearsed on made-up data in a process beside it, so that their kernels are compiled.
+
+On a fresh machine most of a first run is compiling. The arm's moving compiles kernels of its own meanwhile; what is
+compiled here goes to the same cache on the disk (:mod:`pneumarm.kernels`), and the run takes it from there. Nothing
+else comes of a rehearsal: a run without one gives the same results, later.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Self
+
+import msgspec
+import numpy as np
+
+from pneumarm.arm import ArmSpec, open_arm
+from pneumarm.arm.virtual import VirtualArm
+from pneumarm.console import peak_memory
+from pneumarm.control import Monitor, TransferSettings, transfer
+from pneumarm.kernels import CACHE_FOLDER
+from pneumarm.learning import ServoSettings, test, train
+from pneumarm.leaving import leave_by_exceptions
+from pneumarm.moving.trial import MoveTrialSettings, try_moving
+from pneumarm.planning.bound import BoundSettings, measure_bound
+from pneumarm.simulation import FitSettings, SimulationArm, fit_store
+from pneumarm.task import begin_states
+from pneumarm.transitions import FEWEST_TRANSITIONS, Store
+from pneumarm.transitions.rows import Recorded
+
+_REHEARSED = CACHE_FOLDER / "rehearsed"
+_SEQUENCE = 100  # rows of a made-up sequence
+_PLANNED = 4  # movements
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What is rehearsed."""
+
+    spec: ArmSpec
+    fit: FitSettings
+    servo: ServoSettings
+    physics: str | None
+    """Name of the virtual arm whose physics will be planned with."""
+
+
+class Rehearsal:
+    """A rehearsal in a process of its own, where none has been before; ended with the block it is in."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+        self._done: set[str] = set()
+        self.memory = 0.0
+        """The most that the process has held [MB]; told when it has ended."""
+
+    def begin(self, piece: Piece) -> None:
+        """Begin, unless all of it is in the kernel cache."""
+        if _REHEARSED.exists() or self._process is not None:
+            return
+        command = [sys.executable, "-m", "pneumarm.rehearsal"]
+        errors = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # it is no part of the run
+        with suppress(OSError):
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True
+            )
+            assert self._process.stdin is not None
+            self._process.stdin.write(json.dumps(asdict(piece)))
+            self._process.stdin.close()
+
+    def wait_for(self, stage: str) -> None:
+        """Return when the kernels of ``stage`` are in the cache, or will not be."""
+        if self._process is not None and self._process.stdout is not None:
+            while stage not in self._done and (line := self._process.stdout.readline()):
+                self._done.add(line.strip())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process is not None:
+            with self._process as process:
+                process.kill()
+            self.memory = peak_memory(resource.RUSAGE_CHILDREN)
+
+
+def rehearse(piece: Piece, folder: Path) -> Iterator[str]:
+    """Do each stage with as little as possible in ``folder``, and name those whose kernels are compiled."""
+    with Store.create(folder / "made-up.db", piece.spec) as store:
+        store.append_all(_made_up(piece.spec))
+        simulation = fit_store(store, replace(piece.fit, epochs=1)).simulation
+        begin = begin_states(store, simulation.window, simulation.scaling)
+        yield "simulation"
+        agent = train(simulation, begin, replace(piece.servo, agents=1, updates=1, validation_movements=8)).agent
+        yield "training"
+        test(agent, simulation, begin, 8)
+        yield "test"
+        monitor = Monitor(piece.spec, simulation, mode="warn")
+        with SimulationArm(simulation) as arm:
+            transfer(agent, arm, store, TransferSettings(episodes=1, test_episodes=1), watch=monitor)
+            yield "transfer"
+            moves = MoveTrialSettings(goals=1, hold=0.2, frequencies=(1.0,), seconds=0.5)
+            try_moving(arm, agent.controller(), simulation.goal_range, moves)
+            yield "settle"
+    if piece.physics is not None:
+        with open_arm(piece.physics) as arm:
+            assert isinstance(arm, VirtualArm)
+            low, high = simulation.goal_range.T
+            # To a goal that cannot be reached no plan is sought.
+            middle = np.stack([0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high], axis=1)
+            measure_bound(arm, middle, BoundSettings(episodes=_PLANNED))
+    _REHEARSED.touch()
+    yield "bound"
+
+
+def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
+    """Return a recording, just long enough to be fitted, of an arm that nobody has seen."""
+    random = np.random.default_rng(0)
+    (low, high), n = spec.angle_range, _SEQUENCE
+    for number in range(2 * FEWEST_TRANSITIONS // n):
+        command = random.integers(-1, 2, (n, spec.joints, 2)).astype(np.float64)
+        command[-1] = np.nan
+        yield Recorded(
+            time=(number * 2.0 * n + np.arange(n, dtype=np.float64)) * spec.period,
+            angle=random.uniform(low, high, (n, spec.joints)),
+            pressure=random.uniform(0, spec.max_pressure_counts, (n, spec.joints, 2)),
+            command=command,
+            step=np.arange(n),
+            kind="pulses",
+            at_rest=True,
+            measured={name: random.uniform(-1, 1, n) for name in spec.further},
+        )
+
+
+def main() -> None:
+    """Rehearse the piece on the standard input, and write the stages that are done."""
+    leave_by_exceptions()  # also when the run that it is for has ended
+    piece = msgspec.convert(json.load(sys.stdin), Piece)
+    with TemporaryDirectory() as folder:
+        for stage in rehearse(piece, Path(folder)):
+            print(stage, flush=True)
+
+
+if __name__ == "__main__":
+    main()

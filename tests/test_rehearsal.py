@@ -1,0 +1,54 @@
+"""What is rehearsed beside a run: every stage, on made-up data, of arms of any kind; once for each cache."""
+
+from pathlib import Path
+
+import pytest
+
+from pneumarm import rehearsal
+from pneumarm.arm import open_arm
+from pneumarm.learning import ServoSettings
+from pneumarm.rehearsal import Piece, Rehearsal, rehearse
+from pneumarm.run import Run, RunSettings
+from pneumarm.simulation import FitSettings
+
+SMALL = ServoSettings(arms=4, hidden=(8, 8))
+STAGES = ["simulation", "training", "test", "transfer", "settle"]
+
+
+@pytest.fixture
+def marker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(rehearsal, "_REHEARSED", tmp_path / "rehearsed")
+    return tmp_path / "rehearsed"
+
+
+@pytest.mark.parametrize("name", ["virtual:seed=2", "virtual:wide,seed=3", "virtual:joints=2,seed=1"])
+def test_every_stage_is_rehearsed(name: str, marker: Path, tmp_path: Path) -> None:
+    with open_arm(name) as arm:
+        piece = Piece(arm.spec, FitSettings(), SMALL, None)
+    assert list(rehearse(piece, tmp_path)) == [*STAGES, "bound"]
+    assert marker.exists()
+
+
+def test_a_rehearsal_is_waited_for_and_ended(marker: Path) -> None:
+    with open_arm("virtual:seed=2") as arm:
+        piece = Piece(arm.spec, FitSettings(), SMALL, "virtual:seed=2")
+    with Rehearsal() as beside:
+        beside.begin(piece)
+        beside.wait_for("simulation")
+        beside.wait_for("bound")
+        assert beside._done == {*STAGES, "bound"}
+    assert beside.memory > 100
+
+
+def test_a_second_run_needs_none(marker: Path) -> None:
+    marker.touch()
+    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
+        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        assert beside._process is None
+
+
+def test_a_run_of_another_method_begins_none(marker: Path, tmp_path: Path) -> None:
+    run = Run(tmp_path / "run", RunSettings(arm="virtual:seed=2", method="sarsa"))
+    with open_arm("virtual:seed=2") as arm:
+        run._rehearse(arm)
+    assert run._rehearsal._process is None

@@ -1,4 +1,4 @@
-"""What the command line shows: progress with an estimate, tables, and one JSON object for programs."""
+"""What the command line shows: readings while an arm moves, tables, and one JSON object for programs."""
 
 import json
 import math
@@ -10,7 +10,6 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.status import Status
 from rich.table import Table
 
@@ -20,32 +19,9 @@ if TYPE_CHECKING:  # the command line answers before these are imported
 
     from pneumarm.arm.seam import ArmSpec, Reading
 
-Report = Callable[[float, float], None]
-"""Called with what is done and the total."""
-
 _LOOK = 0.1  # s between two looks of a person
 
 _errors = Console(stderr=True, highlight=False)
-
-
-@contextmanager
-def progress(title: str) -> Iterator[Report]:
-    """Show a bar with the time that remains on stderr while the block runs; nothing where stderr is no terminal."""
-    columns = (
-        TextColumn("{task.description:<28}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=_errors, disable=not _errors.is_terminal) as bar:
-        task = bar.add_task(title, total=None)
-
-        def report(done: float, total: float) -> None:
-            bar.update(task, completed=int(done), total=int(total))
-
-        yield report
 
 
 @contextmanager

@@ -213,8 +213,10 @@ def test_json_is_one_object_on_stdout_and_nothing_else(
 
     fitted = asked("fit", store, "--out", tmp_path / "sim", "--epochs", 3)
     assert set(fitted["std"]) == set(fitted["relative_error"]) == quantities  # type: ignore[call-overload]
-    trained = asked("train", sim, store, "--out", tmp_path / "agent", "--agents", 1, "--policy.updates", 5)
+    logged = ("--tensorboard", tmp_path / "curves")
+    trained = asked("train", sim, store, "--out", tmp_path / "agent", "--agents", 1, "--policy.updates", 5, *logged)
     assert {"episodes", "steps", "seconds", "steps_per_second_per_core"} <= trained.keys()
+    assert list((tmp_path / "curves" / "agent-1").iterdir())
     assert figures | {"lookahead"} <= asked("test", agent, sim, store, "--episodes", 50).keys()
     out = ("--out", tmp_path / "t", "--episodes", 3, "--test-episodes", 4)
     moved = asked("transfer", agent, "--arm", "virtual:seed=3", *out)

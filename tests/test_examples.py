@@ -99,12 +99,12 @@ def test_a_movement_is_shown_in_a_notebook(workshop: Path) -> None:
 
 
 def test_its_agent_and_its_recording_are_exported(workshop: Path, tmp_path: Path) -> None:
-    for file, out in (("arm.agent", "agent.c"), ("arm.db", "arm.csv")):
+    for file, out in (("arm.agent", "agent.c"), ("arm.agent", "agent.onnx"), ("arm.db", "arm.csv")):
         done = python("-m", "pneumarm", "export", workshop / file, "--out", tmp_path / out, "--json")
         assert done.returncode == 0, done.stderr
     assert "void servo_act(" in (tmp_path / "agent.c").read_text()
     assert json.loads(done.stdout)["mapping"] == str(tmp_path / "arm.toml")
-    for file, out, words in (("arm.sim", "sim.c", "method servo"), ("arm.db", "arm.xls", ".csv, .parquet")):
+    for file, out, words in (("arm.sim", "sim.c", "servo and policy"), ("arm.db", "arm.xls", ".csv, .parquet")):
         done = python("-m", "pneumarm", "export", workshop / file, "--out", tmp_path / out)
         assert (done.returncode, words in done.stderr) == (2, True), done.stderr
 

@@ -10,6 +10,7 @@ Three traps of Numba are closed here:
    on what it has compiled or called before. Here every kernel calls its own copies.
 """
 
+import getpass
 import hashlib
 import os
 import shutil
@@ -20,6 +21,7 @@ from typing import Any, TypeVar
 
 import llvmlite.binding as llvm
 import numba
+import platformdirs
 from numba import config as numba_config
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
@@ -47,13 +49,13 @@ def _cache_root() -> Path:
     base = os.environ.get("PNEUMARM_CACHE")
     if base:
         return Path(base)
-    xdg = os.environ.get("XDG_CACHE_HOME")
-    return (Path(xdg) if xdg else Path.home() / ".cache") / "pneumarm"
+    return platformdirs.user_cache_path("pneumarm", appauthor=False)
 
 
 def _cache_folder() -> Path:
     name = sources_hash(Path(__file__).parent)
-    for root in (_cache_root(), Path(tempfile.gettempdir()) / f"pneumarm-{os.getuid()}"):
+    whose = os.getuid() if hasattr(os, "getuid") else getpass.getuser()
+    for root in (_cache_root(), Path(tempfile.gettempdir()) / f"pneumarm-{whose}"):
         folder = root / name
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,5 @@
 import json
 import re
-import shlex
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,8 +10,7 @@ from children import python
 from pneumarm.cli import COMMANDS, main
 from pneumarm.learning.imported import ImportedPolicy
 from pneumarm.simulation import Simulation
-
-README = Path(__file__).parent.parent / "README.md"
+from readme import blocks, commands
 
 
 class Outcome:
@@ -271,15 +268,10 @@ def test_an_agent_of_another_library_is_tested_and_transferred(
     assert (out / "adapted.safetensors").read_bytes() == file.read_bytes()  # it cannot learn here
 
 
-def blocks(language: str) -> Iterator[str]:
-    yield from re.findall(rf"```{language}\n(.*?)```", README.read_text(), re.S)
-
-
 def test_the_commands_and_the_program_of_the_readme_run(tmp_path: Path) -> None:
-    lines = [shlex.split(line, comments=True) for block in blocks("sh") for line in block.splitlines()]
-    commands = [line for line in lines if line and line[0] == "pneumarm"]
-    assert len(commands) >= 7
-    for command in commands:
+    found = commands("sh")
+    assert len(found) >= 7
+    for command in found:
         done = python("-m", "pneumarm", *command[1:], cwd=tmp_path)
         assert done.returncode == 0, (command, done.stderr)
     (program,) = blocks("python")

@@ -2,7 +2,6 @@
 
 import json
 import math
-import resource
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -76,6 +75,13 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Any]], title: str = "")
 
 def peak_memory() -> float:
     """Return the most memory that this process has held so far [MB]."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        from psutil import Process
+
+        now = Process().memory_info()
+        return round(getattr(now, "peak_wset", now.rss) / 1e6, 1)
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return round(most / (1e6 if sys.platform == "darwin" else 1e3), 1)
 

@@ -63,7 +63,7 @@ def leave_by_exceptions() -> None:
     wanted = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
     for number in wanted:
         signal.signal(number, interrupt)
-    if sys.platform == "linux" and signal.SIGHUP in wanted:
+    if sys.platform == "linux" and _HANG_UP in wanted:
         signal.signal(_PARENT_GONE, interrupt)
         try:
             ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(_PARENT_GONE))

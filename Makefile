@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup run test lint bench held-out baselines soak site clean
+.PHONY: setup run test lint bench held-out baselines soak walk site clean
 
 setup: $(READY)
 
@@ -37,6 +37,9 @@ baselines: setup  ## the table of baselines on the held-out arms, into runs/base
 
 soak: setup  ## fault injection that takes minutes: kills, power cuts, full disks
 	$(BIN)/python -m pytest -m soak -s
+
+walk: setup  ## a new user's walk: the wheel in a fresh environment, every command of the README; takes minutes
+	$(BIN)/python -m pytest -m walk -s
 
 site: setup  ## the documentation as pages to be read in a browser, into site/
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -1,7 +1,5 @@
 import json
 import re
-import shlex
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,8 +10,7 @@ from children import python
 from pneumarm.cli import COMMANDS, main
 from pneumarm.learning.imported import ImportedPolicy
 from pneumarm.simulation import Simulation
-
-README = Path(__file__).parent.parent / "README.md"
+from readme import blocks, commands
 
 
 class Outcome:
@@ -213,8 +210,10 @@ def test_json_is_one_object_on_stdout_and_nothing_else(
 
     fitted = asked("fit", store, "--out", tmp_path / "sim", "--epochs", 3)
     assert set(fitted["std"]) == set(fitted["relative_error"]) == quantities  # type: ignore[call-overload]
-    trained = asked("train", sim, store, "--out", tmp_path / "agent", "--agents", 1, "--policy.updates", 5)
+    logged = ("--tensorboard", tmp_path / "curves")
+    trained = asked("train", sim, store, "--out", tmp_path / "agent", "--agents", 1, "--policy.updates", 5, *logged)
     assert {"episodes", "steps", "seconds", "steps_per_second_per_core"} <= trained.keys()
+    assert list((tmp_path / "curves" / "agent-1").iterdir())
     assert figures | {"lookahead"} <= asked("test", agent, sim, store, "--episodes", 50).keys()
     out = ("--out", tmp_path / "t", "--episodes", 3, "--test-episodes", 4)
     moved = asked("transfer", agent, "--arm", "virtual:seed=3", *out)
@@ -269,15 +268,10 @@ def test_an_agent_of_another_library_is_tested_and_transferred(
     assert (out / "adapted.safetensors").read_bytes() == file.read_bytes()  # it cannot learn here
 
 
-def blocks(language: str) -> Iterator[str]:
-    yield from re.findall(rf"```{language}\n(.*?)```", README.read_text(), re.S)
-
-
 def test_the_commands_and_the_program_of_the_readme_run(tmp_path: Path) -> None:
-    lines = [shlex.split(line, comments=True) for block in blocks("sh") for line in block.splitlines()]
-    commands = [line for line in lines if line and line[0] == "pneumarm"]
-    assert len(commands) >= 7
-    for command in commands:
+    found = commands("sh")
+    assert len(found) >= 7
+    for command in found:
         done = python("-m", "pneumarm", *command[1:], cwd=tmp_path)
         assert done.returncode == 0, (command, done.stderr)
     (program,) = blocks("python")

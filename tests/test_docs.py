@@ -45,6 +45,21 @@ def test_what_a_page_names_is_there(page: Path) -> None:
     assert set(re.findall(r"^pneumarm experiment ([a-z][\w-]+)", code, re.M)) <= {*PLACES}
 
 
+def test_every_yes_of_what_may_be_expected_names_a_test() -> None:
+    lines = (ROOT / "docs" / "how-to" / "expectations.md").read_text().splitlines()
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| ")]
+    answers = [row for row in rows if row[0] != "you expect"]
+    assert len(answers) >= 30
+    for expected, answer, shown in answers:
+        if answer.startswith("no"):
+            assert shown == "", expected
+            continue
+        assert answer.startswith("yes"), expected
+        path, _, name = shown.strip("`").partition("::")
+        found = (ROOT / path).read_text()
+        assert re.search(rf"^def {name}\(" if name else r"^def test_", found, re.M), shown
+
+
 def test_names_of_the_glossary_are_in_the_code() -> None:
     words = {word for file in SOURCE.rglob("*.py") for word in re.findall(r"\w+", file.read_text())}
     lines = (ROOT / "docs" / "glossary.md").read_text().splitlines()

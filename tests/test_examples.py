@@ -1,9 +1,12 @@
 """The example scripts run, and the front door of the package is quick, typed, and refuses what cannot be done."""
 
+import importlib.util
 import inspect
 import json
+import math
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +57,38 @@ def test_the_example_with_stable_baselines3_runs(workshop: Path) -> None:
     assert "500 Movements" in done.stdout
 
 
+def test_settings_are_looked_for_by_optuna(workshop: Path) -> None:
+    pytest.importorskip("optuna")
+    done = python(EXAMPLES / "optuna_settings.py", "--quick", cwd=workshop, check=True)
+    assert "settled in" in done.stdout
+    found = tomllib.loads((workshop / "best.toml").read_text())["train"]["servo"]
+    assert found.keys() == {"learning-rate", "precision", "change"}
+    options = ("--config", "best.toml", "--servo.updates", 20, "--servo.agents", 1, "--out", "best.agent")
+    python("-m", "pneumarm", "train", "arm.sim", "arm.db", *options, cwd=workshop, check=True)
+
+
+def test_the_bridge_to_ros_moves_an_arm_and_vents_it(workshop: Path) -> None:
+    """All of the example with ROS 2 that is not ROS."""
+    spec = importlib.util.spec_from_file_location("ros2_node", EXAMPLES / "ros2_node.py")
+    assert spec is not None
+    assert spec.loader is not None
+    node = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(node)
+    with node.Bridge(pneumarm.open_arm("virtual:seed=7"), pneumarm.load_controller(workshop / "arm.agent")) as bridge:
+        assert max(bridge.turn().pressure) < 0.1  # nothing moves before there is a goal
+        for goal in (0.3, -0.1):
+            bridge.go([goal])
+            states = [bridge.turn() for _ in range(60)]
+            assert states[-1].position == pytest.approx([goal], abs=0.05)
+            assert math.copysign(1, max((s.velocity[0] for s in states), key=abs)) == math.copysign(1, goal)
+        for wrong in ([9.0], [0.1, 0.1], [math.nan]):
+            with pytest.raises(UnusableInput):
+                bridge.go(wrong)
+        assert bridge.turn().position == pytest.approx([-0.1], abs=0.05)  # and the goal before stays
+        bridge.stop()
+        assert max([bridge.turn() for _ in range(60)][-1].pressure) < 0.1
+
+
 def test_importing_is_quick_and_imports_nothing_heavy() -> None:
     heavy = "{'numba', 'numpy', 'matplotlib', 'scipy', 'rich'}"
     done = python("-c", f"import pneumarm, sys; print({heavy} & sys.modules.keys())", check=True)
@@ -99,12 +134,12 @@ def test_a_movement_is_shown_in_a_notebook(workshop: Path) -> None:
 
 
 def test_its_agent_and_its_recording_are_exported(workshop: Path, tmp_path: Path) -> None:
-    for file, out in (("arm.agent", "agent.c"), ("arm.db", "arm.csv")):
+    for file, out in (("arm.agent", "agent.c"), ("arm.agent", "agent.onnx"), ("arm.db", "arm.csv")):
         done = python("-m", "pneumarm", "export", workshop / file, "--out", tmp_path / out, "--json")
         assert done.returncode == 0, done.stderr
     assert "void servo_act(" in (tmp_path / "agent.c").read_text()
     assert json.loads(done.stdout)["mapping"] == str(tmp_path / "arm.toml")
-    for file, out, words in (("arm.sim", "sim.c", "method servo"), ("arm.db", "arm.xls", ".csv, .parquet")):
+    for file, out, words in (("arm.sim", "sim.c", "servo and policy"), ("arm.db", "arm.xls", ".csv, .parquet")):
         done = python("-m", "pneumarm", "export", workshop / file, "--out", tmp_path / out)
         assert (done.returncode, words in done.stderr) == (2, True), done.stderr
 

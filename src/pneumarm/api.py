@@ -2,7 +2,8 @@
 
 An arm is its name, as on the command line (``virtual:seed=7``, ``serial:/dev/ttyACM0``), which is opened and closed
 here, or an :class:`~pneumarm.arm.Arm` of yours, which is left open. What one function returns is given to the next as
-it is, or as the file it was saved in. Where stderr is a terminal, a bar shows how far it is.
+it is, or as the file it was saved in. Where stderr is a terminal, a bar shows how far it is; elsewhere the logger
+``pneumarm`` is told.
 """
 
 from collections.abc import Iterator, Sequence
@@ -60,9 +61,10 @@ def collect(
         ArmFailure: the arm failed; what was stored before stays.
 
     """
-    from pneumarm.console import progress, say
+    from pneumarm.console import say
     from pneumarm.control import Monitor
     from pneumarm.control.condition import collected_results, complaints
+    from pneumarm.progress import progress
     from pneumarm.simulation.enough import collect_enough
     from pneumarm.transitions import FEWEST_TRANSITIONS, Store, collect, require_enough
 
@@ -95,8 +97,8 @@ def fit(db: str | Path, out: str | Path | None = None, settings: "FitSettings | 
         UnusableInput: too little is stored, or ``out`` cannot be written.
 
     """
-    from pneumarm.console import progress
     from pneumarm.files import require_folder
+    from pneumarm.progress import progress
     from pneumarm.simulation import fit_store
     from pneumarm.transitions import Store
 
@@ -125,9 +127,9 @@ def train(
         UnusableInput: simulation and store do not fit together, or ``out`` cannot be written.
 
     """
-    from pneumarm.console import progress
     from pneumarm.files import require_folder
     from pneumarm.learning import LearnSettings, train
+    from pneumarm.progress import progress
     from pneumarm.task import begin_states
     from pneumarm.transitions import Store
 
@@ -255,8 +257,8 @@ def tune(
 
     """
     from pneumarm.classical import TuneSettings, tune
-    from pneumarm.console import progress
     from pneumarm.files import require_folder
+    from pneumarm.progress import progress
 
     if out is not None:
         require_folder(Path(out))

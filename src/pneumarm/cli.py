@@ -9,11 +9,12 @@ from contextlib import contextmanager, nullcontext
 from cyclopts import App, CycloptsError
 
 from pneumarm import __version__
-from pneumarm.commands.config_file import take_config
-from pneumarm.commands.help_pages import HELP, HELP_ALL, AllOptions, FewOptions
+from pneumarm.commands.config_file import take_config, take_option
+from pneumarm.commands.help_pages import HELP, HELP_ALL, LOG, AllOptions, FewOptions
 from pneumarm.console import complain
 from pneumarm.errors import PneumarmError
 from pneumarm.leaving import leave_by_exceptions
+from pneumarm.progress import LEVELS, checked_level, print_lines
 
 COMMANDS = {
     "run": (
@@ -29,7 +30,7 @@ COMMANDS = {
         "pneumarm import recording.csv arm.db --mapping examples/recordings/mpi_pam.toml",
     ),
     "export": (
-        "Export a recording as CSV or Parquet, or an agent as C.",
+        "Export a recording (CSV, Parquet, LeRobot, Minari) or an agent (ONNX, C).",
         "pneumarm export arm.agent --out agent.c",
     ),
     "coverage": (
@@ -128,6 +129,10 @@ COMMANDS = {
         "Rewrite the report of a finished run.",
         "pneumarm report runs/first",
     ),
+    "completion": (
+        "Complete commands and options in your shell: bash, zsh or fish.",
+        "pneumarm completion bash --install",
+    ),
 }
 """Every command with its one-line help and an example."""
 
@@ -162,6 +167,8 @@ def main(arguments: list[str] | None = None) -> None:
 def _run(arguments: list[str]) -> int:
     try:
         leave_by_exceptions()
+        arguments, level = take_option(arguments, LOG, "one of " + ", ".join(LEVELS))
+        print_lines(checked_level(level))
         arguments, config = take_config(arguments, app)
         app.config = () if config is None else (config,)
         app.help_formatter = AllOptions() if HELP_ALL in arguments else FewOptions()

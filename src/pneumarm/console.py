@@ -1,8 +1,7 @@
-"""What the command line shows: progress with an estimate, tables, and one JSON object for programs."""
+"""What the command line shows: readings while an arm moves, tables, and one JSON object for programs."""
 
 import json
 import math
-import resource
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -10,7 +9,6 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.status import Status
 from rich.table import Table
 
@@ -20,32 +18,9 @@ if TYPE_CHECKING:  # the command line answers before these are imported
 
     from pneumarm.arm.seam import ArmSpec, Reading
 
-Report = Callable[[float, float], None]
-"""Called with what is done and the total."""
-
 _LOOK = 0.1  # s between two looks of a person
 
 _errors = Console(stderr=True, highlight=False)
-
-
-@contextmanager
-def progress(title: str) -> Iterator[Report]:
-    """Show a bar with the time that remains on stderr while the block runs; nothing where stderr is no terminal."""
-    columns = (
-        TextColumn("{task.description:<28}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=_errors, disable=not _errors.is_terminal) as bar:
-        task = bar.add_task(title, total=None)
-
-        def report(done: float, total: float) -> None:
-            bar.update(task, completed=int(done), total=int(total))
-
-        yield report
 
 
 @contextmanager
@@ -98,9 +73,19 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Any]], title: str = "")
     return built
 
 
-def peak_memory(whose: int = resource.RUSAGE_SELF) -> float:
-    """Return the most memory that this process has held, or the largest of its children that have ended [MB]."""
-    most = resource.getrusage(whose).ru_maxrss
+def peak_memory(children: bool = False) -> float:
+    """Return the most memory that this process has held, or the largest of its ``children`` that have ended [MB].
+
+    Of children Windows does not tell: 0.
+    """
+    try:
+        import resource
+    except ImportError:  # Windows
+        from psutil import Process
+
+        now = Process().memory_info()
+        return 0.0 if children else round(getattr(now, "peak_wset", now.rss) / 1e6, 1)
+    most = resource.getrusage(resource.RUSAGE_CHILDREN if children else resource.RUSAGE_SELF).ru_maxrss
     return round(most / (1e6 if sys.platform == "darwin" else 1e3), 1)
 
 

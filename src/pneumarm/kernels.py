@@ -14,18 +14,18 @@ other kernels call, and optimises these once more in each caller. Here a kernel 
 calls it; for kernels that call it there is only its code, which is optimised once, as a part of what Python calls.
 """
 
+import getpass
 import hashlib
 import os
 import shutil
 import tempfile
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import llvmlite.binding as llvm
 import numba
+import platformdirs
 from numba import config as numba_config
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
@@ -57,13 +57,13 @@ def _cache_root() -> Path:
     base = os.environ.get("PNEUMARM_CACHE")
     if base:
         return Path(base)
-    xdg = os.environ.get("XDG_CACHE_HOME")
-    return (Path(xdg) if xdg else Path.home() / ".cache") / "pneumarm"
+    return platformdirs.user_cache_path("pneumarm", appauthor=False)
 
 
 def _cache_folder() -> Path:
     name = sources_hash(Path(__file__).parent)
-    for root in (_cache_root(), Path(tempfile.gettempdir()) / f"pneumarm-{os.getuid()}"):
+    whose = os.getuid() if hasattr(os, "getuid") else getpass.getuser()
+    for root in (_cache_root(), Path(tempfile.gettempdir()) / f"pneumarm-{whose}"):
         folder = root / name
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -85,16 +85,6 @@ def _forget_old(root: Path) -> None:
 CACHE_FOLDER = _cache_folder()
 """Where the kernels of these sources are."""
 numba_config.CACHE_DIR = str(CACHE_FOLDER)  # type: ignore[attr-defined]
-
-
-@dataclass
-class Compiling:
-    """How long this process has compiled kernels, or loaded compiled ones."""
-
-    seconds: float = 0.0
-
-
-compiling = Compiling()
 
 
 class _Library(JITCodeLibrary):
@@ -175,13 +165,6 @@ class _Kernel(CPUDispatcher):
             function, own.targetdescr, own.targetoptions, own.locals, own.pipeline_class
         )
         self._inlined: dict[Any, Any] = {}
-
-    def compile(self, sig: Any) -> Any:
-        began = time.perf_counter()
-        try:
-            return super().compile(sig)
-        finally:
-            compiling.seconds += time.perf_counter() - began
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         signature, args = self._compiler.fold_argument_types(args, kws)

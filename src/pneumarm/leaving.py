@@ -11,11 +11,15 @@ import signal
 import sys
 from time import monotonic
 from types import FrameType
+from typing import Any
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_HANG_UP = getattr(signal, "SIGHUP", None)  # Windows has none
+SIGNALS = tuple(one for one in (signal.SIGINT, signal.SIGTERM, _HANG_UP) if one is not None)
 _PATIENCE = 2.0
 """For so long [s] after a first signal others are ignored: whoever presses Ctrl-C twice means it once."""
-_PARENT_GONE = signal.SIGUSR2
+_PARENT_GONE: Any = getattr(signal, "SIGUSR2", None)
+_GONE = 1
+"""The number of SIGHUP."""
 _PR_SET_PDEATHSIG = 1  # from linux/prctl.h
 
 
@@ -49,7 +53,7 @@ def leave_by_exceptions() -> None:
             atexit.register(ignore)
         first = now
         if gone:
-            raise Interrupted(signal.SIGHUP, "the process that started it has ended")
+            raise Interrupted(_GONE, "the process that started it has ended")
         raise Interrupted(number, signal.Signals(number).name)
 
     def ignore() -> None:
@@ -59,11 +63,11 @@ def leave_by_exceptions() -> None:
     wanted = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
     for number in wanted:
         signal.signal(number, interrupt)
-    if signal.SIGHUP in wanted and sys.platform == "linux":
+    if sys.platform == "linux" and _HANG_UP in wanted:
         signal.signal(_PARENT_GONE, interrupt)
         try:
             ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(_PARENT_GONE))
         except (OSError, AttributeError):
             return  # a C library without it: the other ways remain
         if os.getppid() != parent:
-            raise Interrupted(signal.SIGHUP, "the process that started it has ended")
+            raise Interrupted(_GONE, "the process that started it has ended")

@@ -7,7 +7,6 @@ else comes of a rehearsal: a run without one gives the same results, later.
 
 import json
 import os
-import resource
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -86,7 +85,7 @@ class Rehearsal:
         if self._process is not None:
             with self._process as process:
                 process.kill()
-            self.memory = peak_memory(resource.RUSAGE_CHILDREN)
+            self.memory = peak_memory(children=True)
 
 
 def rehearse(piece: Piece, folder: Path) -> Iterator[str]:

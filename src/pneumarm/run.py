@@ -19,14 +19,13 @@ import msgspec
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.console import Report, jsonable, peak_memory
+from pneumarm.console import jsonable, peak_memory
 from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper
 from pneumarm.control.condition import collected_results
 from pneumarm.control.monitor import Mode
 from pneumarm.control.transfer import monitor_of
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
-from pneumarm.kernels import compiling
 from pneumarm.learning import (
     LOOKING_AHEAD,
     LearnSettings,
@@ -42,6 +41,7 @@ from pneumarm.learning import test as test_agent
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning import PlanSettings
 from pneumarm.planning.bound import BoundSettings, known_bound
+from pneumarm.progress import Report, compiling
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
 from pneumarm.rehearsal import Piece, Rehearsal
 from pneumarm.report import save_demonstration, save_spec, write_report
@@ -132,12 +132,14 @@ class Run:
         self.folder, self.settings, self.progress, self._seen_by = folder, settings, progress, seen_by
         self._monitor = monitor
         self.results: dict[str, Any] = {}
+        self._stage = ""
         self.store = folder / "transitions.db"
         self.simulation = folder / "simulation.safetensors"
         self.agent = folder / "agent.safetensors"
         self.adapted = folder / "adapted.safetensors"
         self.episodes = folder / "episodes.csv"
         self._rehearsal = Rehearsal()
+        compiling.watch()
         self._claim()
 
     def _claim(self) -> None:
@@ -169,27 +171,34 @@ class Run:
 
     def do(self) -> dict[str, Any]:
         """Do all stages that are not done yet and return the results."""
+        stages = {
+            "collect": self._collect,
+            "simulation": self._fit,
+            "training": self._train,
+            "test": self._test,
+            "transfer": self._transfer,
+            "settle": self._move,
+            "bound": self._bound,
+        }
         with self._rehearsal:
-            for name, stage in (
-                ("collect", self._collect),
-                ("simulation", self._fit),
-                ("training", self._train),
-                ("test", self._test),
-                ("transfer", self._transfer),
-                ("settle", self._move),
-                ("bound", self._bound),
-            ):
+            for number, (name, stage) in enumerate(stages.items(), 1):
+                self._stage = f"stage {number} of {len(stages) + 1}"
                 if name not in self.results:
                     with self._noted(name):
                         if name != "collect":
                             self._rehearsal.wait_for(name)
                         self.results |= stage()
+        self._stage = f"stage {len(stages) + 1} of {len(stages) + 1}"
         if not (self.folder / "report.html").exists():
-            with self._noted("report"), self.progress("report") as report:
+            with self._noted("report"), self.progress("writing the report") as report:
                 report(0, 1)
                 write_report(self.folder)
                 report(1, 1)
         return self.results
+
+    def numbered(self, title: str) -> str:
+        """Return ``title``, of something that is being done, with the stage that it belongs to."""
+        return f"{self._stage}: {title}"
 
     @contextmanager
     def _noted(self, stage: str) -> Iterator[None]:
@@ -239,9 +248,11 @@ class Run:
             self._rehearsal.begin(Piece(arm.spec, wanted.fit, wanted.chosen, physics))
 
     def _fit(self) -> dict[str, Any]:
-        with self.progress("fitting the simulation") as report, Store.open(self.store) as store:
-            fitted = fit_store(store, replace(self.settings.fit, seed=self.settings.seed), progress=report)
-            analysis = analyse(store, fitted.simulation, fitted.filtered)
+        with Store.open(self.store) as store:
+            with self.progress("fitting the simulation") as report:
+                fitted = fit_store(store, replace(self.settings.fit, seed=self.settings.seed), progress=report)
+            with self.progress("measuring its errors"):
+                analysis = analyse(store, fitted.simulation, fitted.filtered)
         fitted.simulation.save(self.simulation)
         analysis.save(self.folder)
         return {"filter": analysis.figures["filter"], "simulation": fitted.results() | analysis.figures}
@@ -265,8 +276,9 @@ class Run:
     def _test(self) -> dict[str, Any]:
         simulation, agent = Simulation.load(self.simulation), load_agent(self.agent)
         begin, episodes, seed = self._begin_states(simulation), self.settings.test_episodes, self.settings.seed
-        tested = test_agent(agent, simulation, begin, episodes, seed)
-        ahead = test_ahead(agent, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
+        with self.progress("testing in the simulation"):
+            tested = test_agent(agent, simulation, begin, episodes, seed)
+            ahead = test_ahead(agent, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
         tested.save(self.folder / TEST)
         return {"test": results_with_lookahead(tested, ahead)}
 

@@ -1,7 +1,9 @@
 """A real browser without a window, for pages."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
@@ -19,6 +21,28 @@ FLAGS = [
 ]
 WIDTHS = {400: 860, 800: 1000, 1280: 860}
 """Of the windows in which pages are looked at, with their heights."""
+
+
+def keep(page: Page, name: str) -> None:
+    """Take a screenshot of the whole ``page``, for people, into the folder PNEUMARM_SCREENSHOTS where that is set."""
+    taken = page.screenshot(full_page=True)
+    if folder := os.environ.get("PNEUMARM_SCREENSHOTS"):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        (Path(folder) / f"{name}.png").write_bytes(taken)
+
+
+def emptiness(page: Page, name: str) -> list[float]:
+    """Return which share of each printed page is empty at its end; keep what is printed as :func:`keep` does."""
+    import pypdfium2
+
+    left = []
+    for number, sheet in enumerate(pypdfium2.PdfDocument(page.pdf(format="A4", prefer_css_page_size=True))):
+        drawn = sheet.render(scale=1).to_pil().convert("L")
+        if folder := os.environ.get("PNEUMARM_SCREENSHOTS"):
+            sheet.render(scale=1.2).to_pil().save(Path(folder) / f"{name}-print-{number + 1}.png")
+        box = drawn.point(lambda ink: 255 * (ink < 200)).getbbox()
+        left.append(1.0 if box is None else 1 - box[3] / drawn.height)
+    return left
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from children import wait_until
-from live.browser import WIDTHS, opened_browser, smallest_text, too_wide
+from live.browser import WIDTHS, keep, opened_browser, smallest_text, too_wide
 from live.chromium import missing
 from live.noted_arm import board, vented_after
 from live.serving import served
@@ -168,6 +168,7 @@ def test_the_page_fits_and_can_be_read(browser: Browser, server: Server, width: 
     with page_of(browser, server, width, color_scheme=scheme) as page:
         drag_to(page, 10.0)
         comes(page, "the arm moves", lambda: abs(angle(page)) > 3)
+        keep(page, f"live-{width}-{scheme}")
         assert too_wide(page) <= 0
         size, text = smallest_text(page)
         assert size >= READABLE, text

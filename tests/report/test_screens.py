@@ -1,28 +1,79 @@
-"""The pages in a real browser: on a phone, on a tablet and on a desk, light, dark and in print."""
+"""The pages in a real browser: on a phone, on a tablet and on a desk, light, dark and in print.
+
+``PNEUMARM_SCREENSHOTS=folder make test`` keeps what is seen, for people to look at.
+"""
 
 import io
 from collections.abc import Iterator
 from pathlib import Path
 
 import builders
+import numpy as np
 import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
-from live.browser import WIDTHS, opened_browser, smallest_text, too_wide
+from children import python
+from live.browser import WIDTHS, emptiness, keep, opened_browser, smallest_text, too_wide
 from live.chromium import missing
+from pneumarm.arm import open_arm
+from pneumarm.arm.virtual import Leak
+from pneumarm.checkup import diagnose, measure
+from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
+from pneumarm.experiments.experiment import Row, sorted_rows
+from pneumarm.experiments.results import write_page
 from pneumarm.report import run_page
+from pneumarm.report.checkup import checkup_page
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+ROOT = Path(__file__).parents[2]
 READABLE = 11.0  # px
 LETTERS = 733.0  # px, of a figure of 7.4 inch whose smallest letters, of 8 points, are to be READABLE
+MOST_EMPTY = 0.5
+"""Of a printed page that is not the last."""
+PAGES = ("report", "check-up", "experiment", "site")
+
+FIGURES = ("reward", "actions", "switches", "episodes", "success_rate", "gain", "met", "learning success_rate")
+"""Of a row of an experiment."""
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    file = tmp_path_factory.mktemp("screens") / "report.html"
-    file.write_text(run_page(builders.run(small=True)), encoding="utf-8")
-    return file
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Return a page of each kind; the site only where what builds it is installed."""
+    folder = tmp_path_factory.mktemp("screens")
+    (folder / "report.html").write_text(run_page(builders.run(small=True)), encoding="utf-8")
+    arm = open_arm("virtual:seed=3", 3)
+    arm.faults = (Leak(joint=1, muscle=2, factor=30),)  # type: ignore[attr-defined]
+    checkup = measure(arm)
+    (folder / "checkup.html").write_text(checkup_page(checkup, diagnose(checkup)), encoding="utf-8")
+    random, rows = np.random.default_rng(0), []
+    for trial in ALL_GOALS.trials:
+        for run in range(1, 5):
+            names = (
+                "reward",
+                "actions",
+                "switches",
+                "episodes",
+                "success_rate",
+                "gain",
+                "met",
+                "learning success_rate",
+            )
+            rows.append(Row("virtual:seed=1", trial, run, {name: random.uniform(0.5, 1) for name in names}, 0.0))
+    table = sorted_rows(rows)
+    experiment = write_page(ALL_GOALS, folder, ALL_GOALS.analyse(table), table.runs, table.arms)
+    found = {"report": folder / "report.html", "check-up": folder / "checkup.html", "experiment": experiment}
+    if (done := python("-m", "mkdocs", "build", "--site-dir", folder / "site", cwd=ROOT)).returncode == 0:
+        found["site"] = folder / "site" / "index.html"
+    else:
+        assert "No module named" in done.stderr, done.stderr
+    return found
+
+
+def page_named(pages: dict[str, Path], name: str) -> Path:
+    if name not in pages:
+        pytest.skip("mkdocs is not installed")
+    return pages[name]
 
 
 @pytest.fixture(scope="module")
@@ -31,37 +82,44 @@ def browser() -> Iterator[Browser]:
         yield browser
 
 
-def shown(browser: Browser, report: Path, width: int, **options: object) -> Page:
+def shown(browser: Browser, file: Path, width: int, **options: object) -> Page:
     page = browser.new_page(viewport={"width": width, "height": WIDTHS[width]}, **options)  # type: ignore[arg-type]
-    page.goto(report.as_uri())
+    page.goto(file.as_uri())
     return page
 
 
 def background(page: Page) -> int:
-    """Return how light the corner of what is seen is, 0 to 255."""
-    corner = Image.open(io.BytesIO(page.screenshot())).convert("L").getpixel((2, 2))
-    assert isinstance(corner, int)
-    return corner
+    """Return how light what is seen is between the letters, 0 to 255: the most frequent shade on the right."""
+    seen = Image.open(io.BytesIO(page.screenshot())).convert("L")
+    shades = seen.crop((seen.width // 3, seen.height // 8, seen.width, seen.height)).histogram()
+    return shades.index(max(shades))
 
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_page_fits_and_can_be_read(browser: Browser, report: Path, width: int, scheme: str) -> None:
-    page = shown(browser, report, width, color_scheme=scheme)
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_fits_and_can_be_read(
+    browser: Browser, pages: dict[str, Path], name: str, width: int, scheme: str
+) -> None:
+    page = shown(browser, page_named(pages, name), width, color_scheme=scheme)
+    keep(page, f"{name}-{width}-{scheme}")
     assert too_wide(page) <= 0
     size, text = smallest_text(page)
     assert size >= READABLE, text
-    widths = page.evaluate("[...document.images].map((one) => one.getBoundingClientRect().width)")
-    assert len(widths) > 3
-    assert min(widths) >= LETTERS
-    assert background(page) > 250 if scheme == "light" else background(page) < 40
+    if name != "site":
+        widths = page.evaluate("[...document.images].map((one) => one.getBoundingClientRect().width)")
+        assert len(widths) >= 3
+        assert min(widths) >= LETTERS
+    assert background(page) > 250 if scheme == "light" else background(page) < 60
     page.close()
 
 
-def test_a_page_is_printed_light_and_whole(browser: Browser, report: Path) -> None:
-    page = shown(browser, report, 800, color_scheme="dark")
-    page.emulate_media(media="print")
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_printed_light_and_whole(browser: Browser, pages: dict[str, Path], name: str) -> None:
+    page = shown(browser, page_named(pages, name), 800, color_scheme="dark")
+    page.emulate_media(media="print", color_scheme="dark")
     assert background(page) > 250
     assert too_wide(page) <= 0
-    assert page.pdf().startswith(b"%PDF")
+    left = emptiness(page, name)
+    assert max(left[:-1], default=0) <= MOST_EMPTY, left
     page.close()

@@ -49,7 +49,7 @@ def test_parquet_holds_the_same_rows_as_csv(recorded: Path, tmp_path: Path) -> N
     parquet = pytest.importorskip("pyarrow.parquet")
     with Store.open(recorded) as store:
         export_recording(store, tmp_path / "arm.csv")
-        assert export_recording(store, tmp_path / "arm.parquet").mapping is None
+        export_recording(store, tmp_path / "arm.parquet")
     table = parquet.read_table(tmp_path / "arm.parquet")
     with open(tmp_path / "arm.csv", newline="") as file:
         header, *rows = csv.reader(file)

@@ -133,7 +133,7 @@ def _look(watchdog: "weakref.ref[Watchdog]") -> None:
 def _interrupt(thread: int) -> None:
     """Raise KeyboardInterrupt in ``thread``."""
     handler: Callable[..., object] | int | None = signal.getsignal(signal.SIGINT)
-    if thread == main_thread().ident and callable(handler):
+    if thread == main_thread().ident and callable(handler) and hasattr(signal, "pthread_kill"):
         signal.pthread_kill(thread, signal.SIGINT)  # ends waits and sleeps too
     else:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(KeyboardInterrupt))

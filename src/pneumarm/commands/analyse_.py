@@ -6,6 +6,7 @@ from pneumarm.analysis import analyse
 from pneumarm.commands.common import Json
 from pneumarm.console import say, show, table
 from pneumarm.files import require_folder
+from pneumarm.progress import progress
 from pneumarm.report import write_analysis
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
@@ -25,11 +26,12 @@ def analyse_(db: Path, sim: Path, /, *, out: Path, json: Json = False) -> None:
     """
     require_folder(out)
     simulation = Simulation.load(sim)
-    with Store.open(db) as store:
+    with Store.open(db) as store, progress("measuring errors"):
         analysis = analyse(store, simulation)
     out.mkdir(exist_ok=True)
     analysis.save(out)
-    page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality, analysis.figures)
+    with progress("drawing"):
+        page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality, analysis.figures)
     say(f"page: {page}")
     errors = analysis.figures["held_out"]
     rows = [(name, *figures.values()) for name, figures in errors.items()]

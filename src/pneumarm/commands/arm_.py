@@ -26,9 +26,10 @@ from pneumarm.checkup import (
 from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, muscle_row
 from pneumarm.commands.asking import asked_for, missing_of
 from pneumarm.commands.common import Json, Settings
-from pneumarm.console import progress, say, show, table
+from pneumarm.console import say, show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_text
+from pneumarm.progress import progress
 from pneumarm.transitions.window import QUANTITIES
 
 

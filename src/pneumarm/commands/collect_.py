@@ -5,9 +5,10 @@ from typing import Annotated
 
 from pneumarm.arm import ArmSpec, open_arm
 from pneumarm.commands.common import Json, Monitoring, OwnMethod, Settings
-from pneumarm.console import progress, say, show, table
+from pneumarm.console import say, show, table
 from pneumarm.control import Monitor, open_controller
 from pneumarm.control.condition import LINK, collected_results, complaints
+from pneumarm.progress import progress
 from pneumarm.simulation.enough import EnoughSettings, collect_enough
 from pneumarm.transitions import FEWEST_TRANSITIONS, CollectResult, CollectSettings, Store, collect, require_enough
 

@@ -35,7 +35,7 @@ def take_config(arguments: Sequence[str], app: App) -> tuple[list[str], Dict | N
         UnusableInput: the file cannot be read, is no TOML, or has no table for the command.
 
     """
-    left, file = _without(arguments)
+    left, file = take_option(arguments, CONFIG, "a file")
     if file is None:
         return left, None
     try:
@@ -54,16 +54,22 @@ def take_config(arguments: Sequence[str], app: App) -> tuple[list[str], Dict | N
     return left, Dict(found, source=file)
 
 
-def _without(arguments: Sequence[str]) -> tuple[list[str], str | None]:
+def take_option(arguments: Sequence[str], option: str, expected: str) -> tuple[list[str], str | None]:
+    """Return ``arguments`` without ``option`` and its value, and that value, if it is given.
+
+    Raises:
+        UnusableInput: nothing comes after it, where ``expected`` was.
+
+    """
     given = list(arguments)
     for place, one in enumerate(given):
         if one == "--":
             break
-        if one.startswith(f"{CONFIG}="):
+        if one.startswith(f"{option}="):
             return given[:place] + given[place + 1 :], one.partition("=")[2]
-        if one == CONFIG:
+        if one == option:
             if place + 1 == len(given):
-                raise UnusableInput(f"{CONFIG}: expected a file after it")
+                raise UnusableInput(f"{option}: expected {expected} after it")
             return given[:place] + given[place + 2 :], given[place + 1]
     return given, None
 

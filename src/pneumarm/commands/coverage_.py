@@ -4,6 +4,7 @@ from pathlib import Path
 
 from pneumarm.commands.common import Json
 from pneumarm.console import show, table
+from pneumarm.progress import progress
 from pneumarm.simulation.enough import TOO_LITTLE, enough_data
 from pneumarm.transitions import Store, Window, new_cells
 
@@ -18,7 +19,7 @@ def coverage_(db: Path, /, *, json: Json = False) -> None:
     db
         The store.
     """
-    with Store.open(db) as store:
+    with Store.open(db) as store, progress("comparing simulations of a half and of all"):
         found, judged = new_cells(store, Window(store.joints)), enough_data(store)
     result = {
         **found.whole.summary(),

@@ -6,11 +6,12 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pneumarm.commands.common import Json, Settings
-from pneumarm.console import progress, say, show, table
+from pneumarm.console import say, show, table
 from pneumarm.experiments.experiment import LaboratorySettings
 from pneumarm.experiments.registry import experiment
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.sweep import sweep
+from pneumarm.progress import progress
 
 
 def experiment_(

@@ -7,7 +7,9 @@ from pneumarm.commands.common import Json, OwnMethod
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
 from pneumarm.errors import UnusableInput
-from pneumarm.files import require_folder, write_text
+from pneumarm.files import require_folder, write_bytes, write_text
+from pneumarm.learning.as_onnx import as_onnx
+from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.as_c import as_c
 from pneumarm.transitions import Store
@@ -15,15 +17,16 @@ from pneumarm.transitions.export import FORMATS, export_recording
 
 
 def export_(file: Path, /, *, out: Path, method: OwnMethod = None, json: Json = False) -> None:
-    """Export a recording as CSV or Parquet, or an agent as C, for other programs.
+    """Export a recording (CSV, Parquet, LeRobot, Minari) or an agent (ONNX, C) for other programs.
 
     Parameters
     ----------
     file
         The store, or the agent.
     out
-        File to write: .csv (with a .toml beside it, by which it is imported again) or .parquet of a store, .c of an
-        agent that settles, holds and tracks: its network and scaling as C99 that needs no library.
+        What to write. Of a store: .csv or .parquet (with a .toml beside it, by which it is imported again), .lerobot
+        (a folder, LeRobot's format v3.0) or .minari (a folder). Of an agent: .onnx, its network and scaling, or .c,
+        the same as C99 that needs no library, of one that settles, holds and tracks.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
@@ -32,12 +35,19 @@ def export_(file: Path, /, *, out: Path, method: OwnMethod = None, json: Json = 
     if out.suffix in FORMATS:
         with Store.open(file) as store:
             result = export_recording(store, out)._asdict()
-    elif out.suffix == ".c":
+    elif out.suffix in (".c", ".onnx"):
         agent = open_agent(file, method)
-        if not isinstance(agent, ServoAgent):
+        if not isinstance(agent, NetworkAgent):
+            raise UnusableInput(f"{file}: only agents of the methods servo and policy can be exported")
+        if out.suffix == ".onnx":
+            write_bytes(out, as_onnx(agent))
+        elif isinstance(agent, ServoAgent):
+            write_text(out, as_c(agent))
+        else:
             raise UnusableInput(f"{file}: only agents of the method servo are exported as C")
-        write_text(out, as_c(agent))
         result = {"weights": len(agent.policy), "inputs": agent.sizes[0], "period": agent.spec.period}
     else:
-        raise UnusableInput(f"{out}: expected a file that ends in {', '.join(FORMATS)} (a store) or .c (an agent)")
+        raise UnusableInput(
+            f"{out}: expected a name that ends in {', '.join(FORMATS)} (a store), .onnx or .c (an agent)"
+        )
     show(result, json, lambda: [table(("exported", ""), list(result.items()), str(out))])

@@ -6,8 +6,9 @@ from typing import Annotated
 
 from pneumarm.arm.seam import unit_of
 from pneumarm.commands.common import Json, Settings
-from pneumarm.console import progress, show, table
+from pneumarm.console import show, table
 from pneumarm.files import require_folder
+from pneumarm.progress import progress
 from pneumarm.simulation import FitSettings, fit_store
 from pneumarm.transitions import Store
 

@@ -8,7 +8,7 @@ from cyclopts.help import DefaultFormatter, HelpEntry, HelpPanel, InlineText
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
 
-HELP, HELP_ALL, CONFIG = "--help", "--help-all", "--config"
+HELP, HELP_ALL, CONFIG, LOG = "--help", "--help-all", "--config", "--log"
 _OPTIONS = "Parameters"
 """Title of the panel of a command's options."""
 _CITED = re.compile(r"\s*\(thesis[^()]*\)")
@@ -25,8 +25,12 @@ class AllOptions(DefaultFormatter):
         super().__call__(console, options, panel)
 
     def shown(self, entries: list[HelpEntry]) -> list[HelpEntry]:
-        """Return what is shown of the options of a command: all, and ``--config``, which every command has."""
-        return [*entries, _entry(CONFIG, "Read options from the table [COMMAND] of this TOML file.", "FILE")]
+        """Return what is shown of the options of a command: all, and those that every command has."""
+        return [
+            *entries,
+            _entry(CONFIG, "Read options from the table [COMMAND] of this TOML file.", "FILE"),
+            _entry(LOG, "What to say on progress: debug, info (the default) or warning.", "LEVEL"),
+        ]
 
 
 class FewOptions(AllOptions):

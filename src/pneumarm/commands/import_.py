@@ -8,17 +8,17 @@ from pneumarm.console import show, table
 from pneumarm.transitions import import_recording
 
 
-def import_(csv: Path, db: Path, /, *, mapping: Path, json: Json = False) -> None:
+def import_(recording: Path, db: Path, /, *, mapping: Path, json: Json = False) -> None:
     """Import a recording made elsewhere; a mapping file says what its columns are.
 
     Parameters
     ----------
-    csv
-        The recording, with a header line.
+    recording
+        The recording: CSV with a header line, .parquet, or the folder of a LeRobot dataset.
     db
         The store to make.
     mapping
         TOML file with columns, units, sequences and sampling period.
     """
-    imported = asdict(import_recording(csv, mapping, db))
+    imported = asdict(import_recording(recording, mapping, db))
     show(imported, json, lambda: [table(("imported", ""), list(imported.items()))])

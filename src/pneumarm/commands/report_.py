@@ -4,6 +4,7 @@ from pathlib import Path
 
 from pneumarm.commands.common import Json
 from pneumarm.console import show
+from pneumarm.progress import progress
 from pneumarm.report import write_report
 
 
@@ -15,5 +16,6 @@ def report_(folder: Path, /, *, json: Json = False) -> None:
     folder
         The folder of the run.
     """
-    page = write_report(folder)
+    with progress("drawing"):
+        page = write_report(folder)
     show({"report": str(page)}, json, lambda: [str(page)])

@@ -9,9 +9,10 @@ import msgspec
 from pneumarm.commands.common import COLUMNS, Json, Monitoring, Settings
 from pneumarm.commands.config_file import as_config
 from pneumarm.commands.versions_ import say_history
-from pneumarm.console import progress, say, show, table
+from pneumarm.console import say, show, table
 from pneumarm.control.condition import complaints
 from pneumarm.files import write_text
+from pneumarm.progress import compiling, progress, seconds_since_start
 from pneumarm.run import Run, RunSettings
 
 _MENTIONED = 0.5  # s of compiling
@@ -46,7 +47,8 @@ def run_(
     if write_config is not None:
         _write_config(write_config, {"out": str(out), **msgspec.to_builtins(settings)})
         return
-    results = Run(out, settings, progress, monitor=monitor).do()
+    run = Run(out, settings, lambda title: progress(run.numbered(title)), monitor=monitor)
+    results = run.do()
     if "enough" in results["collect"]:
         say(results["collect"]["enough"]["verdict"])
     phases = {
@@ -60,11 +62,13 @@ def run_(
     for stage, doing in (("collect", "collecting"), ("transfer", "moving")):
         for line in complaints(results[stage], doing):
             say(line)
-    seconds = sum(results["wall_seconds"].values())
     say("seconds of " + ", ".join(_spent(results)))
     beside = results["rehearsal_memory_mb"]
     also = f", {beside:.0f} MB in the process that compiled beside it" if beside else ""
-    say(f"report: {out / 'report.html'}; {seconds:.0f} s, at most {results['peak_memory_mb']:.0f} MB of memory{also}")
+    say(
+        f"report: {out / 'report.html'}; {_took(sum(results['wall_seconds'].values()))}, "
+        f"at most {results['peak_memory_mb']:.0f} MB of memory{also}"
+    )
 
 
 def _spent(results: dict[str, Any]) -> Iterator[str]:
@@ -72,6 +76,15 @@ def _spent(results: dict[str, Any]) -> Iterator[str]:
     for stage, seconds in results["wall_seconds"].items():
         compiled = results["compile_seconds"][stage]
         yield f"{stage} {seconds:.1f}" + (f" ({compiled:.1f} compiling)" if compiled >= _MENTIONED else "")
+
+
+def _took(stages: float) -> str:
+    """Return in words how long this call took, and how long all ``stages`` [s] if calls before did some of them."""
+    seconds, spent = seconds_since_start(), compiling.seconds
+    words = f"{seconds:.0f} s"
+    if spent >= _MENTIONED:
+        words += f", {spent:.0f} s of them compiling, once on this machine"
+    return words if stages <= seconds else f"{words}; {stages:.0f} s with the calls before"
 
 
 def _write_config(file: Path, settings: dict[str, Any]) -> None:

@@ -7,6 +7,7 @@ from pneumarm.console import show, table
 from pneumarm.control import open_agent
 from pneumarm.learning import LOOKING_AHEAD, results_with_lookahead, test_ahead
 from pneumarm.learning import test as test_agent
+from pneumarm.progress import progress
 from pneumarm.simulation import Simulation
 from pneumarm.task import begin_states
 from pneumarm.transitions import Store
@@ -49,8 +50,9 @@ def test_(
     trained, simulation = open_agent(agent, method), Simulation.load(sim)
     with Store.open(db) as store:
         begin = begin_states(store, simulation.window, simulation.scaling)
-    tested = test_agent(trained, simulation, begin, episodes, seed)
-    ahead = test_ahead(trained, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
+    with progress("testing"):
+        tested = test_agent(trained, simulation, begin, episodes, seed)
+        ahead = test_ahead(trained, simulation, begin, min(episodes, LOOKING_AHEAD), seed)
     result = results_with_lookahead(tested, ahead)
 
     def rows() -> list[tuple[object, ...]]:

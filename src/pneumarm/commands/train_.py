@@ -1,14 +1,18 @@
 """``pneumarm train``."""
 
+from contextlib import nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from pneumarm.commands.common import COLUMNS, Json, Settings
-from pneumarm.console import progress, show, table
+from pneumarm.console import show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder
 from pneumarm.learning import LearnSettings, train
+from pneumarm.learning.tensorboard import Scalars
+from pneumarm.learning.training import Progress
+from pneumarm.progress import progress
 from pneumarm.simulation import Simulation
 from pneumarm.task import begin_states
 from pneumarm.transitions import Store
@@ -22,6 +26,7 @@ def train_(
     out: Path,
     seed: int = 0,
     agents: int | None = None,
+    tensorboard: Path | None = None,
     settings: Annotated[LearnSettings, Settings] = LearnSettings(),
     json: Json = False,
 ) -> None:
@@ -39,21 +44,31 @@ def train_(
         Of the initial weights, the exploration and the begin states.
     agents
         Agents trained at once, of which the best is kept; by default as many as the method's settings say.
+    tensorboard
+        Folder to write the curves into while it learns, for `tensorboard --logdir`.
     """
     require_folder(out)
     chosen = settings.chosen if agents is None else with_agents(settings.chosen, agents)
     simulation = Simulation.load(sim)
     with Store.open(db) as store:
         begin = begin_states(store, simulation.window, simulation.scaling)
-    with progress("training") as report:
+    with progress("training") as report, nullcontext() if tensorboard is None else Scalars(tensorboard) as scalars:
+
+        def tell(now: Progress) -> None:
+            report(round(1000 * now.share), 1000)
+            if scalars is not None:
+                scalars.write(now)
+
         training = train(
             simulation,
             begin,
             chosen,
             seed,
             method=settings.found,
-            progress=lambda now: report(round(1000 * now.share), 1000),
+            progress=tell,
         )
+        if scalars is not None:
+            scalars.write(training)
     training.agent.save(out)
     result = training.results()
     figures = [(name, value) for name, value in result.items() if name != _EACH]

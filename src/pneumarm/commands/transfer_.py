@@ -6,9 +6,10 @@ from typing import Annotated
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import COLUMNS, Json, Monitoring, OwnMethod, Settings
 from pneumarm.commands.versions_ import say_history
-from pneumarm.console import progress, say, show, table
+from pneumarm.console import say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
 from pneumarm.control.condition import complaints
+from pneumarm.progress import progress
 
 
 def transfer_(

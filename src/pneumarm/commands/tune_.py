@@ -6,8 +6,9 @@ from typing import Annotated
 from pneumarm.arm import open_arm
 from pneumarm.classical import TuneSettings, tune
 from pneumarm.commands.common import Json, Settings
-from pneumarm.console import progress, say, show, table
+from pneumarm.console import say, show, table
 from pneumarm.files import require_folder
+from pneumarm.progress import progress
 
 
 def tune_(

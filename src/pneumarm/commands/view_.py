@@ -4,6 +4,7 @@ from pathlib import Path
 
 from pneumarm.commands.common import Json
 from pneumarm.console import show, table
+from pneumarm.progress import progress
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import check_view, write_view
 
@@ -38,7 +39,8 @@ def view_(
     target = out if out is not None else Path(f"{file.resolve().stem}.gif")
     check_view(target)
     shown = read_shown(file, sequence, begin, seconds)
-    write_view(shown, target)
+    with progress("drawing"):
+        write_view(shown, target)
     lasting = float(shown.time[-1])
     result = {"file": str(target), "seconds": lasting, "joints": shown.spec.joints}
     show(result, json, lambda: [table(("file", "shows [s]"), [(str(target), lasting)])])

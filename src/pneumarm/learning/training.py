@@ -39,6 +39,10 @@ class Progress(NamedTuple):
     """Of all learners together."""
     share: float
     """How far training is, 0 to 1."""
+    columns: tuple[str, ...] = ()
+    """What the curves tell, as of a :class:`Training`."""
+    curves: tuple[NDArray[np.float64], ...] = ()
+    """How learning went so far, each of shape (rows, columns)."""
 
 
 @dataclass(frozen=True)
@@ -238,6 +242,8 @@ def _progress(learners: Sequence[Learner[Any]]) -> Progress:
         agents=len(learners),
         episodes=sum(one.episodes for one in learners),
         share=float(np.mean([1.0 if one.ended else one.share for one in learners])),
+        columns=learners[0].columns,
+        curves=tuple(one.curve for one in learners),
     )
 
 

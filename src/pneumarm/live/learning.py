@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm
 from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Reading
-from pneumarm.console import Report
 from pneumarm.errors import PneumarmError
 from pneumarm.live.screen import Screen
+from pneumarm.progress import Report
 from pneumarm.run import Run, RunSettings, RunTransferSettings, settings_in
 
 TRANSITIONS = 36_000

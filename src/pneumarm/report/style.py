@@ -196,6 +196,14 @@ def counts_norm(count: Any) -> LogNorm:
     return LogNorm(1, max(2.0, float(np.max(count))))
 
 
+def counts_bar(figure: Figure, image: Any, axes: Axes, label: str, **options: Any) -> None:
+    """Add a bar of the colours of :func:`counts_norm` with three whole numbers at most: more would overlap."""
+    numbers = np.unique(np.geomspace(1, image.norm.vmax, 3).round()).tolist()
+    bar = figure.colorbar(image, ax=axes, ticks=FixedLocator(numbers), format="%d", pad=0.02, **options)
+    bar.minorticks_off()
+    bar.set_label(label)
+
+
 def whole_ticks(axes: Axes, which: str = "x") -> None:
     """Put ticks of ``axes`` at whole numbers only."""
     axis = axes.xaxis if which == "x" else axes.yaxis

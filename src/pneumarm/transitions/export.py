@@ -1,8 +1,8 @@
-"""Export a store for other programs: CSV, which can be imported again, or Parquet.
+"""Export a store for other programs: CSV, Parquet, a dataset of LeRobot or of Minari.
 
 A row is a reading and the command that followed it, all in sensor units as they are stored: counts, counts/ms,
-m/s2, Celsius. Marked rows are left out, which leaves a gap in the times. Beside a CSV file lies the mapping with
-which ``pneumarm import`` reads it; whether a sequence began at rest is not in it.
+m/s2, Celsius. Marked rows are left out, which leaves a gap in the times. Beside the file, or in the dataset of
+LeRobot, lies the mapping with which ``pneumarm import`` reads it; whether a sequence began at rest is not in it.
 """
 
 import csv
@@ -15,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
+from pneumarm.extras import extra
 from pneumarm.files import as_toml, require_folder, write_text, written_whole
+from pneumarm.transitions.lerobot import export_lerobot
+from pneumarm.transitions.minari import export_minari
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 
-FORMATS = (".csv", ".parquet")
+FORMATS = (".csv", ".parquet", ".lerobot", ".minari")
 """What can be written, by the end of the file's name."""
 _ANYTHING = (-1e9, 1e9)
 """Range in the mapping: what was recorded has been checked."""
@@ -43,7 +46,13 @@ def export_recording(store: Store, path: Path) -> Exported:
     """
     require_folder(path)
     if path.suffix not in FORMATS:
-        raise UnusableInput(f"{path}: a store is exported to a file whose name ends in {' or '.join(FORMATS)}")
+        raise UnusableInput(f"{path}: a store is exported to a name that ends in {' or '.join(FORMATS)}")
+    if path.suffix == ".minari":
+        return Exported(**export_minari(store, path), mapping=None)
+    if path.suffix == ".lerobot":
+        counts, mapping = export_lerobot(store, path), path / "pneumarm.toml"
+        write_text(mapping, _mapping(store, "episode_index", "observation.time"))
+        return Exported(**counts, mapping=str(mapping))
     sequences = set[int]()
 
     def tables() -> Iterator[NDArray[np.float64]]:
@@ -52,11 +61,9 @@ def export_recording(store: Store, path: Path) -> Exported:
             yield _table(rows, store.further)
 
     names = _names(store)
-    if path.suffix == ".parquet":
-        return Exported(_write_parquet(path, names, tables()), len(sequences), None)
-    written = _write_csv(path, names, tables())
+    written = (_write_parquet if path.suffix == ".parquet" else _write_csv)(path, names, tables())
     mapping = path.with_suffix(".toml")
-    write_text(mapping, _mapping(store))
+    write_text(mapping, _mapping(store, "sequence", "time"))
     return Exported(written, len(sequences), str(mapping))
 
 
@@ -93,11 +100,7 @@ def _number(value: float) -> str:
 
 
 def _write_parquet(path: Path, names: list[str], tables: Iterator[NDArray[np.float64]]) -> int:
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError as error:
-        raise UnusableInput(f"{path}: Parquet needs pyarrow: pip install 'pneumarm[parquet]'") from error
+    pyarrow, parquet = (extra(name, "parquet", f"{path}: Parquet") for name in ("pyarrow", "pyarrow.parquet"))
     types = [pyarrow.int64() if name == "sequence" else pyarrow.float64() for name in names]
     schema = pyarrow.schema(list(zip(names, types, strict=True)))
     count = 0
@@ -113,11 +116,11 @@ def _typed(table: NDArray[np.float64]) -> list[NDArray[Any]]:
     return [table[:, 0].astype(np.int64), *np.ascontiguousarray(table[:, 1:].T)]
 
 
-def _mapping(store: Store) -> str:
-    """Return the mapping file by which ``pneumarm import`` reads the CSV file of ``store``."""
+def _mapping(store: Store, sequence: str, time: str) -> str:
+    """Return the mapping file by which ``pneumarm import`` reads what was exported of ``store``."""
     spec = asdict(store.spec)
     arm = {name: value for name, value in spec.items() if name not in ("joints", "velocity_sensor", "sensors")}
-    lines = ["# How pneumarm import reads the CSV file of the same name.", 'sequence = "sequence"', 'time = "time"']
+    lines = ["# How pneumarm import reads what was exported.", f'sequence = "{sequence}"', f'time = "{time}"']
     lines += [f'commands = "{"pulses" if store.valves else "continuous"}"', "", "[arm]"]
     lines += [f"{name} = {as_toml(value)}" for name, value in arm.items() if value is not None]
     for joint in range(1, store.joints + 1):

@@ -1,11 +1,15 @@
 """One writer a store: a lock that the operating system lets go of when its holder dies."""
 
-import fcntl
 import os
 import socket
+from contextlib import suppress
 from pathlib import Path
 
+from filelock import lock_descriptor
+
 from pneumarm.errors import UnusableInput
+
+_CLOSED_IN_CHILDREN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOINHERIT", 0)
 
 
 class WriterLock:
@@ -25,20 +29,23 @@ class WriterLock:
         self._path = store.with_name(store.name + "-writer")
         while True:
             try:
-                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | _CLOSED_IN_CHILDREN, 0o644)
             except OSError as error:
                 raise UnusableInput(f"{store}: cannot be written ({error.strerror})") from error
-            try:
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                holder = os.read(self._file, 200).decode(errors="replace").strip() or "another process"
+            if not lock_descriptor(self._file, blocking=False):
+                holder = self._holder()
                 os.close(self._file)
-                raise UnusableInput(f"{store}: {holder} is writing to it; wait for it or stop it first") from error
+                raise UnusableInput(f"{store}: {holder} is writing to it; wait for it or stop it first")
             if self._is_current():
                 break
             os.close(self._file)  # the holder before us removed it between our opening and our locking
         os.ftruncate(self._file, 0)
-        os.write(self._file, f"process {os.getpid()} on {socket.gethostname()}".encode())
+        os.write(self._file, f" process {os.getpid()} on {socket.gethostname()}".encode())
+
+    def _holder(self) -> str:
+        """Return who holds the lock; where locks are of bytes, as on Windows, the first one cannot be read."""
+        os.lseek(self._file, 1, os.SEEK_SET)
+        return os.read(self._file, 200).decode(errors="replace").strip() or "another process"
 
     def _is_current(self) -> bool:
         try:
@@ -49,6 +56,11 @@ class WriterLock:
     def release(self) -> None:
         """Let go of the lock. May be called twice."""
         if self._file >= 0:
-            self._path.unlink(missing_ok=True)
-            os.close(self._file)
+            if os.name == "nt":  # where nobody can remove a file that is open
+                os.close(self._file)
+                with suppress(OSError):  # the next holder has it by now
+                    self._path.unlink(missing_ok=True)
+            else:  # nor may the next holder have it open when it is removed
+                self._path.unlink(missing_ok=True)
+                os.close(self._file)
             self._file = -1

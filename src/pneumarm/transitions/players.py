@@ -6,8 +6,6 @@ Thesis section 3.2.2 names both, besides a controller that is to be improved and
 import os
 import select
 import sys
-import termios
-import tty
 from types import TracebackType
 from typing import Self
 
@@ -78,6 +76,11 @@ class Keyboard:
         }
 
     def __enter__(self) -> Self:
+        try:
+            import termios
+            import tty
+        except ImportError as error:
+            raise UnusableInput("single keys are read on Linux and macOS only; give another controller") from error
         self._before = termios.tcgetattr(self._descriptor)
         tty.setcbreak(self._descriptor)
         return self
@@ -85,6 +88,8 @@ class Keyboard:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        import termios
+
         termios.tcsetattr(self._descriptor, termios.TCSADRAIN, self._before)
 
     def reset(self, goal: NDArray[np.float64]) -> None:

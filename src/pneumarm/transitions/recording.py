@@ -1,4 +1,6 @@
-"""Import a CSV recording made elsewhere into a store, by a mapping file (TOML) that says what its columns are.
+"""Import a recording made elsewhere into a store, by a mapping file (TOML) that says what its columns are.
+
+It is CSV, Parquet, or a dataset of LeRobot (:mod:`pneumarm.transitions.parquet`).
 
 The mapping, with every setting that is not of an arm's spec::
 
@@ -42,6 +44,7 @@ from pneumarm.arm.fill import filled
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
 from pneumarm.files import written_whole
+from pneumarm.transitions.parquet import is_parquet, lines_of
 from pneumarm.transitions.rows import Recorded, steps_of
 from pneumarm.transitions.store import Store, lock_vacant
 
@@ -148,7 +151,7 @@ class _Column:
 
 
 def import_recording(recording: Path | str, mapping: Path | str, store: Path | str) -> ImportResult:
-    """Import the CSV file ``recording`` into a new store, which is made whole or not at all, in bounded memory.
+    """Import ``recording`` into a new store, which is made whole or not at all, in bounded memory.
 
     Imported sequences do not begin at rest: windows begin within them. Rows further apart than one and a half
     periods are not joined.
@@ -319,18 +322,23 @@ class _Reader:
         self.single = 0
 
     def __iter__(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        if is_parquet(self._path):
+            yield from self._read(lines_of(self._path))
+            return
         if not self._path.is_file():
-            raise UnusableInput(f"{self._path}: expected a CSV recording, there is no such file")
+            raise UnusableInput(
+                f"{self._path}: expected a recording (CSV, Parquet, or a dataset of LeRobot), there is no such file"
+            )
         try:
             with open(self._path, encoding="utf-8-sig", newline="") as file:
-                yield from self._read(file)
+                yield from self._read(self._lines(file))
         except OSError as error:
             raise UnusableInput(f"{self._path}: cannot be read ({error.strerror})") from error
         except UnicodeDecodeError as error:
             raise UnusableInput(f"{self._path}: expected CSV in UTF-8, this is something else ({error})") from error
 
-    def _read(self, file: TextIO) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        lines = csv.reader(self._lines(file))
+    def _read(self, text: Iterator[str]) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        lines = csv.reader(text)
         try:
             header = next(lines, [])
             places = self._places(header)

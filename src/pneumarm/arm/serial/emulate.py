@@ -1,10 +1,8 @@
 """A board in pure Python behind a pseudo-terminal, in real time: for whoever has no hardware yet."""
 
 import os
-import pty
 import select
 import time
-import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -51,6 +49,13 @@ def serve(
         UnusableInput: the link cannot be made, or the arm has more joints than the board.
 
     """
+    try:
+        import pty
+        import tty
+    except ImportError as error:
+        raise UnusableInput(
+            "a serial port is emulated on Linux and macOS only; emulated:ARM emulates the board in one process"
+        ) from error
     with arm:
         board = EmulatedBoard(arm)
         _warm_up(board)

@@ -19,7 +19,7 @@ from pneumarm.kernels import kernel, part
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.simulation import Simulation
 
-_GAIN = np.float32(1.25)
+GAIN = np.float32(1.25)
 _LEAK = 0.05
 _AS_IF = 0.1
 WHOLE = np.float32(0.8)
@@ -81,11 +81,11 @@ def write_commands(parameters, x, said, slope, command):  # type: ignore[no-unty
         place, limit = 4 * joint + 2 + muscle, parameters.inlet[joint, muscle]
         for e in range(command.shape[1]):
             bent = said[c, e]
-            v = _GAIN * bent
+            v = GAIN * bent
             size = (abs(v) - dead) * stretch
             moves = _ZERO < size < _ONE
             if v > _ZERO and x[place, e] > limit:
                 size, moves = _ZERO, False
             pulse = rounded(min(max(size, _ZERO), _ONE), shortest)
             command[c, e] = pulse if v > _ZERO else -pulse
-            slope[c, e] = _GAIN * (_ONE - bent * bent) * stretch * (_ONE if moves else leak)
+            slope[c, e] = GAIN * (_ONE - bent * bent) * stretch * (_ONE if moves else leak)

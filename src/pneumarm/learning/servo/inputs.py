@@ -17,9 +17,10 @@ from pneumarm.kernels import kernel
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.simulation import Simulation
 
-_PRESSURE_CHANGE = np.float32(5.0)  # the pressures of a period differ by a fifth of what they differ by in all
-_FAR = np.float32(0.05)  # tolerances to an input of the usual size
-_BENDS = np.array([1 / 6, 1 / 1.2], np.float32)
+PRESSURE_CHANGE = np.float32(5.0)  # the pressures of a period differ by a fifth of what they differ by in all
+FAR = np.float32(0.05)  # tolerances to an input of the usual size
+BENDS = np.array([1 / 6, 1 / 1.2], np.float32)
+"""Tolerances to inputs that bend, coarsely and finely."""
 
 
 class SeenParameters(NamedTuple):
@@ -83,7 +84,7 @@ def write_inputs(parameters, x, noise, now, preview, inputs):  # type: ignore[no
                 pressure = x[place, e] + noise[now, read, e]
                 inputs[row, e] = pressure
                 before = x[observed + place, e] + noise[now - 1, read, e] if history > 1 else pressure
-                inputs[row + 1, e] = (pressure - before) * _PRESSURE_CHANGE
+                inputs[row + 1, e] = (pressure - before) * PRESSURE_CHANGE
             row += 2
     first = history * observed
     for i in range(2 * joints * (history - 1)):
@@ -96,9 +97,9 @@ def write_inputs(parameters, x, noise, now, preview, inputs):  # type: ignore[no
             for e in range(n):
                 here = x[4 * joint, e] + noise[now, 3 * joint, e]
                 distance = (preview[p, joint, e] - here) * scale
-                inputs[row, e] = distance * _FAR
-                inputs[row + 1, e] = distance * _BENDS[0]
-                inputs[row + 2, e] = distance * _BENDS[1]
+                inputs[row, e] = distance * FAR
+                inputs[row + 1, e] = distance * BENDS[0]
+                inputs[row + 2, e] = distance * BENDS[1]
             tansig(inputs[row + 1])
             tansig(inputs[row + 2])
             row += 3
@@ -126,8 +127,8 @@ def inputs_back(parameters, inputs, slopes, x_slopes):  # type: ignore[no-untype
             for e in range(n):
                 x_slopes[place, e] += slopes[row, e]
                 if history > 1:
-                    x_slopes[place, e] += slopes[row + 1, e] * _PRESSURE_CHANGE
-                    x_slopes[observed + place, e] -= slopes[row + 1, e] * _PRESSURE_CHANGE
+                    x_slopes[place, e] += slopes[row + 1, e] * PRESSURE_CHANGE
+                    x_slopes[observed + place, e] -= slopes[row + 1, e] * PRESSURE_CHANGE
             row += 2
     first = history * observed
     for i in range(2 * joints * (history - 1)):
@@ -138,9 +139,9 @@ def inputs_back(parameters, inputs, slopes, x_slopes):  # type: ignore[no-untype
         scale = parameters.tolerances[joint]
         for _ in range(parameters.steps.shape[0]):
             for e in range(n):
-                total = slopes[row, e] * _FAR
+                total = slopes[row, e] * FAR
                 for b in range(2):
                     bent = inputs[row + 1 + b, e]
-                    total += slopes[row + 1 + b, e] * _BENDS[b] * (np.float32(1.0) - bent * bent)
+                    total += slopes[row + 1 + b, e] * BENDS[b] * (np.float32(1.0) - bent * bent)
                 x_slopes[4 * joint, e] -= total * scale
             row += 3

@@ -188,7 +188,7 @@ function showLearning(now) {
 
 function showHealth(now) {
   const lines = (now.wrong ?? []).map((text) => ["", text]);
-  if (!lines.length) lines.push(["fine", now.mode === "learning" ? "The report will tell." : "Nothing that has been noticed."]);
+  if (!lines.length) lines.push(["fine", now.mode === "learning" ? "The report will tell." : "Nothing has been noticed."]);
   lines.push(...(now.was_wrong ?? []).map((text) => ["over", text]));
   $("wrong").replaceChildren(...lines.map(([kind, text]) => Object.assign(document.createElement("li"), { className: kind, textContent: text })));
   const counts = { "the guard": now.guard, "periods missed": now.missed, "air used": now.air == null ? null : `${now.air.toFixed(2)} l` };

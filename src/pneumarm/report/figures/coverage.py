@@ -13,6 +13,7 @@ from pneumarm.report.style import (
     DENSITY,
     INK,
     MIDDLE,
+    counts_bar,
     counts_norm,
     nothing,
     of_joint,
@@ -59,8 +60,7 @@ def projections(observation: Array, spec: ArmSpec) -> Figure:
             image = place.pcolormesh(
                 xs, ys, np.ma.masked_equal(count.T, 0), cmap=DENSITY, norm=counts_norm(count), rasterized=True
             )
-            bar = figure.colorbar(image, ax=place, location="top", aspect=30, pad=0.02)
-            bar.set_label("observations")
+            counts_bar(figure, image, place, "observations", location="top", aspect=30)
     return figure
 
 

@@ -9,6 +9,7 @@ from pneumarm.report.style import (
     DENSITY,
     INK,
     MIDDLE,
+    counts_bar,
     counts_norm,
     key,
     nothing,
@@ -53,7 +54,7 @@ def isoplot(observed: Array, simulated: Array, spec: ArmSpec, *, density: bool =
                 image = place.pcolormesh(
                     xs, ys, np.ma.masked_equal(count.T, 0), cmap=DENSITY, norm=counts_norm(count), rasterized=True
                 )
-                figure.colorbar(image, ax=place, aspect=25, pad=0.02).set_label("transitions")
+                counts_bar(figure, image, place, "transitions", aspect=25)
             else:
                 scatter(place, x, y, s=3, alpha=0.25)
             inclined = slope(x, y)

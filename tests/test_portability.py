@@ -1,0 +1,40 @@
+"""What only POSIX has is imported where it is needed alone: everything can be imported without it."""
+
+import pkgutil
+
+import pneumarm
+from children import python
+
+POSIX_ONLY = ("fcntl", "grp", "pty", "pwd", "resource", "termios", "tty")
+PROGRAM = """
+import builtins, importlib, os, signal
+os.environ["USERNAME"] = "somebody"
+def without(name, globals=None, locals=None, fromlist=(), level=0, imported=builtins.__import__):
+    if name in {blocked} and (globals or {{}}).get("__name__", "").startswith("pneumarm"):
+        raise ImportError(name)
+    return imported(name, globals, locals, fromlist, level)
+builtins.__import__ = without  # libraries know for themselves where they are
+for name in ("SIGHUP", "SIGUSR1", "SIGUSR2"):
+    delattr(signal, name)
+for name in ("getuid", "O_CLOEXEC", "sched_getaffinity"):
+    delattr(os, name)
+import pneumarm.cli
+for name in {modules}:
+    importlib.import_module(name)
+from pneumarm.console import peak_memory
+from pneumarm.leaving import leave_by_exceptions
+assert peak_memory() > 1
+leave_by_exceptions()
+from pneumarm.cli import main
+main(["arm", "emulate", "virtual", "--link", "arm.port"])
+"""
+
+
+def test_every_module_is_imported_without_what_only_posix_has() -> None:
+    """And what cannot work then says so in a line; names that Windows lacks are taken away, too."""
+    walked = pkgutil.walk_packages(pneumarm.__path__, "pneumarm.")
+    modules = [one.name for one in walked if not one.name.endswith("__main__") and ".gym" not in one.name]
+    assert len(modules) > 200
+    done = python("-c", PROGRAM.format(blocked=POSIX_ONLY, modules=modules))
+    assert done.returncode == 2, done.stderr
+    assert "emulated on Linux and macOS only" in done.stderr

@@ -1,0 +1,135 @@
+"""A store becomes a dataset of LeRobot, which is imported again, or of Minari, as their formats say."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.errors import UnusableInput
+from pneumarm.transitions import CollectSettings, Mark, Store, collect, import_recording
+from pneumarm.transitions.episodes import action_names, episodes, observation_names
+from pneumarm.transitions.export import export_recording
+from pneumarm.transitions.rows import joined
+
+DEFAULT_FEATURES = {
+    "timestamp": "float32",
+    **dict.fromkeys(("frame_index", "episode_index", "index", "task_index"), "int64"),
+}
+"""What the format says every dataset has."""
+
+
+@pytest.fixture(scope="module", params=[1, 2])
+def recorded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a store of one or of two joints; the latter with a sensor of velocity; some rows are marked."""
+    path = tmp_path_factory.mktemp("recorded") / "arm.db"
+    arm = VirtualArm(draw_parameters(3, request.param), seed=3, velocity_sensor=request.param == 2)
+    with arm, Store.for_arm(path, arm.spec) as store:
+        collect(arm, store, 2_000, settings=CollectSettings(actions=100))
+        store.mark(3, [Mark(10, 20, "a test")])
+    return path
+
+
+def test_a_dataset_of_lerobot_has_the_published_layout(recorded: Path, tmp_path: Path) -> None:
+    """What LeRobot reads first: versions, paths, types, where each episode lies, and that times are on the grid."""
+    parquet = pytest.importorskip("pyarrow.parquet")
+    folder = tmp_path / "arm.lerobot"
+    with Store.open(recorded) as store:
+        exported = export_recording(store, folder)
+        expected, names, actions = list(episodes(store)), observation_names(store), action_names(store)
+        sequences = store.sequences
+    assert len(expected) == sequences + 1  # the marked rows have cut one in two
+    info = json.loads((folder / "meta" / "info.json").read_text())
+    assert info["codebase_version"] == "v3.0"
+    assert info["total_episodes"] == exported.sequences == len(expected)
+    assert info["splits"] == {"train": f"0:{len(expected)}"}
+    assert {name: info["features"][name]["dtype"] for name in DEFAULT_FEATURES} == DEFAULT_FEATURES
+    assert info["features"]["observation.state"] == {"dtype": "float32", "shape": [len(names)], "names": names}
+    assert info["features"]["action"] == {"dtype": "float32", "shape": [len(actions)], "names": actions}
+    data = parquet.read_table(folder / info["data_path"].format(chunk_index=0, file_index=0))
+    assert data.column_names == list(info["features"])
+    assert data.num_rows == info["total_frames"] == exported.rows
+    np.testing.assert_array_equal(data["index"].to_numpy(), np.arange(data.num_rows))
+    on_grid = data["frame_index"].to_numpy() / info["fps"]
+    np.testing.assert_allclose(data["timestamp"].to_numpy(), on_grid, atol=1e-4)
+    rows = parquet.read_table(folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet").to_pylist()
+    state, action = (np.array(data[name].to_pylist()) for name in ("observation.state", "action"))
+    for number, (row, one) in enumerate(zip(rows, expected, strict=True)):
+        part = slice(row["dataset_from_index"], row["dataset_to_index"])
+        assert row["episode_index"] == number
+        assert row["length"] == part.stop - part.start == len(one.action)
+        assert (row["data/chunk_index"], row["data/file_index"]) == (0, 0)
+        np.testing.assert_allclose(state[part], one.observation[:-1], rtol=1e-6)
+        np.testing.assert_allclose(action[part], one.action, rtol=1e-6)
+        np.testing.assert_allclose(row["stats/action/mean"], one.action.mean(axis=0), atol=1e-6)
+    statistics = json.loads((folder / "meta" / "stats.json").read_text())
+    assert statistics.keys() == info["features"].keys()
+    for what in ("min", "max", "mean", "std"):
+        np.testing.assert_allclose(statistics["action"][what], getattr(action, what)(axis=0), atol=1e-6)
+    assert statistics["action"]["count"] == [data.num_rows]
+    assert parquet.read_table(folder / "meta" / "tasks.parquet")["task_index"].to_pylist() == [0]
+
+
+def test_its_tasks_are_read_by_pandas_as_lerobot_reads_them(recorded: Path, tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    with Store.open(recorded) as store:
+        export_recording(store, tmp_path / "arm.lerobot")
+        task = f"recording of {store.spec.name}"
+    tasks = pandas.read_parquet(tmp_path / "arm.lerobot" / "meta" / "tasks.parquet")
+    assert tasks.loc[task].task_index == 0
+    assert tasks.iloc[0].name == task
+
+
+@pytest.mark.parametrize("name", ["arm.parquet", "arm.lerobot"])
+def test_what_is_in_parquet_is_imported_again(recorded: Path, tmp_path: Path, name: str) -> None:
+    pytest.importorskip("pyarrow")
+    with Store.open(recorded) as store:
+        exported = export_recording(store, tmp_path / name)
+        before, spec, ends = joined(store.blocks()), store.spec, [len(one.action) for one in episodes(store)]
+    import_recording(tmp_path / name, str(exported.mapping), tmp_path / "again.db")
+    with Store.open(tmp_path / "again.db") as store:
+        after = joined(store.blocks())
+        assert store.spec == spec
+    kept = np.ones(len(before), bool)
+    if (
+        name == "arm.lerobot"
+    ):  # a frame is an observation with its action: the last observations of episodes have none
+        kept[np.cumsum([n + 1 for n in ends]) - 1] = False
+    np.testing.assert_array_equal(after.time, before.time[kept])
+    np.testing.assert_allclose(after.angle, before.angle[kept], rtol=1e-6)
+    np.testing.assert_allclose(after.pressure, before.pressure[kept], rtol=1e-6)
+
+
+def test_a_dataset_of_minari_is_opened_by_minari(recorded: Path, tmp_path: Path) -> None:
+    pytest.importorskip("h5py")
+    minari = pytest.importorskip("minari")
+    with Store.open(recorded) as store:
+        exported = export_recording(store, tmp_path / "arm.minari")
+        expected = list(episodes(store))
+    dataset = minari.MinariDataset(tmp_path / "arm.minari")
+    assert (dataset.total_episodes, dataset.total_steps) == (exported.sequences, exported.rows)
+    for found, one in zip(dataset.iterate_episodes(), expected, strict=True):
+        np.testing.assert_array_equal(found.observations, one.observation)
+        np.testing.assert_array_equal(found.actions, one.action)
+        assert found.truncations[-1]
+        assert not found.terminations.any()
+        assert dataset.observation_space.contains(found.observations[0])
+        assert dataset.action_space.contains(found.actions[0])
+
+
+def test_what_is_there_is_not_overwritten_and_what_is_missing_is_named(
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Store.open(recorded) as store:
+        for name in ("arm.lerobot", "arm.minari"):
+            (tmp_path / name).mkdir()
+            with pytest.raises(UnusableInput, match="exists already"):
+                export_recording(store, tmp_path / name)
+        for name, library in (("b.parquet", "pyarrow"), ("b.lerobot", "pyarrow"), ("b.minari", "h5py")):
+            monkeypatch.setitem(sys.modules, library, None)
+            with pytest.raises(UnusableInput, match=rf"needs {library}: pip install 'pneumarm\[{name[2:]}\]'"):
+                export_recording(store, tmp_path / name)
+            assert not (tmp_path / name).exists()

@@ -23,6 +23,7 @@ LONG = (
     "serial",
     "sound_arms",
     "success",
+    "wide_arms",
 )
 """What takes many minutes runs only when it is named."""
 

@@ -2,20 +2,27 @@
 
 import json
 import os
+import tempfile
 from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import open_arm
-from pneumarm.control import AgentController
+from pneumarm.arm import Arm, open_arm
+from pneumarm.control import AgentController, Monitor
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
-from pneumarm.learning import AnyAgent
+from pneumarm.learning import AnyAgent, Tracks, goals_of, train
+from pneumarm.learning.methods import find_method
+from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.simulation import FitSettings, StoreFit
+from pneumarm.simulation.enough import collect_enough
 from pneumarm.task import BeginStates, Movement
+from pneumarm.transitions import Store, collect
+from pneumarm.transitions.watch import Watch
 
 HELD_OUT = ",".join(str(seed) for seed in range(1001, 1011))
 """The arms to judge on; nothing is developed on them."""
@@ -94,3 +101,46 @@ def greedy_movements(
     """
     with open_arm(f"virtual:seed={arm}", seed) as opened:
         return there_and_back.greedy_movements(agent, opened, goals, numbers, SEED_OF_MOVEMENTS, controller)
+
+
+def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False) -> dict[str, Any]:
+    """Return what the agents of the arm ``name`` do when they arrive on it.
+
+    Made as ``pneumarm run`` makes them by default: collecting until more would not help, the fit, and a training of
+    the default agent and of the one for reaching. The first settles at ``goals`` and follows sinusoids, the second
+    reaches as many. With ``monitor`` the arm is watched while it is recorded; ``marked`` rows are then told.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        db = Path(folder) / "arm.db"
+        with open_arm(name, seed) as opened, Store.for_arm(db, opened.spec) as store:
+            watch = Monitor(opened.spec, mode="warn") if monitor else None
+            collect_enough(partial(_collected, opened, store, seed, watch), store)
+            minutes, transitions = opened.read().time / 60, store.transitions
+            marked = 0 if watch is None else sum(store.marked_rows(1).values())
+        made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
+    servo, reaching = (
+        train(made.simulation, begin, seed=seed, method=find_method(method)).agent for method in ("servo", "policy")
+    )
+    assert isinstance(servo, Tracks)
+    with open_arm(name, seed) as opened:
+        settings = MoveTrialSettings(goals=goals)
+        tried = try_moving(opened, servo.controller(), goals_of(servo), settings, seed=seed).results()
+    with open_arm(name, seed) as opened:
+        reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), seed)
+    return {
+        "minutes": minutes,
+        "transitions": transitions,
+        "marked": marked,
+        "history": made.simulation.window.history,
+        "settled": tried["settle"]["settled"],
+        "seconds": tried["settle"]["median_seconds"],
+        "rest": tried["settle"]["rest_error_deg"],
+        "changes": tried["settle"]["valve_changes_per_second"],
+        "track": [float(np.mean(one["rms_error_deg"])) for one in tried["track"]],
+        "success": [int(one.success) for one in reached],
+        "reward": [float(one.reward) for one in reached],
+    }
+
+
+def _collected(arm: Arm, store: Store, seed: int, watch: Watch | None, transitions: int) -> None:
+    collect(arm, store, transitions, seed, watch=watch)

@@ -13,28 +13,17 @@ PNEUMARM_FEW_FOLDER     where rows are kept; runs/few_sensors by default
 """
 
 import os
-import tempfile
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks._trials import Rows
-from pneumarm.arm import Arm, open_arm
-from pneumarm.experiments import there_and_back
-from pneumarm.learning import Tracks, goals_of, train
-from pneumarm.learning.methods import find_method
-from pneumarm.moving.trial import MoveTrialSettings, try_moving
-from pneumarm.simulation import FitSettings
-from pneumarm.simulation.enough import collect_enough
+from benchmarks._trials import Rows, on_arrival
 from pneumarm.statistics import mean_estimate, rate_estimate
-from pneumarm.transitions import Store, collect
 
 KINDS = {"all sensors": "", "angle alone": ",pressure_sensors=off"}
 """What is added to the name of an arm."""
-SEED = 0
 HEADER = (
     f"{'':13}{'arm':>5}{'min':>6}{'settled':>9}{'median':>8}{'rest':>7}"
     f"{'1/4, 1/2, 1 Hz':>19}{'success':>9}{'reward':>8}"
@@ -58,39 +47,7 @@ def measure() -> Iterator[str]:
 
 def row_of(kind: str, arm: int, goals: int) -> dict[str, Any]:
     """Return what the two agents of an arm do on it."""
-    name = f"virtual:seed={arm}{KINDS[kind]}"
-    with tempfile.TemporaryDirectory() as folder:
-        db = Path(folder) / "arm.db"
-        with open_arm(name, SEED) as opened, Store.for_arm(db, opened.spec) as store:
-            collect_enough(partial(collected, opened, store), store)
-            minutes = opened.read().time / 60
-        made, begin = there_and_back.fitted(db, FitSettings(seed=SEED))
-    servo, reaching = (
-        train(made.simulation, begin, seed=SEED, method=find_method(method)).agent for method in ("servo", "policy")
-    )
-    assert isinstance(servo, Tracks)
-    with open_arm(name, SEED) as opened:
-        settings = MoveTrialSettings(goals=goals)
-        tried = try_moving(opened, servo.controller(), goals_of(servo), settings, seed=SEED).results()
-    with open_arm(name, SEED) as opened:
-        reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), SEED)
-    return {
-        "kind": kind,
-        "arm": arm,
-        "goals": goals,
-        "minutes": minutes,
-        "settled": tried["settle"]["settled"],
-        "seconds": tried["settle"]["median_seconds"],
-        "rest": tried["settle"]["rest_error_deg"],
-        "track": [float(np.mean(one["rms_error_deg"])) for one in tried["track"]],
-        "success": [int(one.success) for one in reached],
-        "reward": [float(one.reward) for one in reached],
-    }
-
-
-def collected(arm: Arm, store: Store, transitions: int) -> None:
-    """Have so many ``transitions`` in ``store``."""
-    collect(arm, store, transitions, SEED)
+    return {"kind": kind, "arm": arm, "goals": goals, **on_arrival(f"virtual:seed={arm}{KINDS[kind]}", goals)}
 
 
 def line(kind: str, arm: str, rows: list[dict[str, Any]]) -> str:

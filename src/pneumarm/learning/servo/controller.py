@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
 _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
+_SWINGS = 3  # from one side of the goal to the other, after which valves stay closed until the joint is at rest
+_SWING = 0.5  # tolerances to either side that count as one, where noise is no larger
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
@@ -42,7 +44,8 @@ class ServoController:
     what each did before the next; what is left of the error is added to what is asked for (integral action), so that
     no bias of the simulation remains. Where the mean of the readings is off by less than ``quiet`` tolerances its
     valves stay closed, until it is off by more than ``alert``: closed muscles are springs of air that hold the joint,
-    nothing wears, and no noise of the sensors is answered.
+    nothing wears, and no noise of the sensors is answered. A joint that goes on swinging about its goal is being kept
+    swinging, by a model with less lag than the arm: its valves stay closed until it is at rest, by its own damping.
     """
 
     def __init__(self, agent: ServoAgent) -> None:
@@ -57,6 +60,7 @@ class ServoController:
         noise = float((wanted.reading_noise * agent.simulation.error_std[:, 0]).max())
         least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)
         self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
+        self._swing = max(_SWING * tolerance, _ANSWERED * noise)
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)
@@ -141,14 +145,17 @@ class ServoController:
         read = longer[-self._look :]
         error, half = now - read.mean(axis=0), self._look // 2
         drift = np.abs(read[-half:].mean(axis=0) - read[:half].mean(axis=0))
-        known = (len(read) == self._look) & stays
         slow = (len(longer) == self._angles.maxlen) & (np.ptp(longer, axis=0) < self._still + _EASY * np.abs(error))
         acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
-            still = drift[j] <= fast * self._still or slow[j]
-            if not known[j] or abs(error[j]) > far * self._near or not still:
+            if len(read) < self._look or not stays[j] or abs(error[j]) > far * self._near:
                 rest.leave()
+                continue
+            rest.see(now[j] - read[-1, j], self._swing)
+            if drift[j] > fast * self._still and not slow[j]:
+                rest.stir()
+                acts[j] = rest.swings < _SWINGS
                 continue
             rest.calm = True
             rest.quiet = abs(error[j]) < (self._alert_above if rest.quiet else self._quiet_below)
@@ -187,5 +194,19 @@ class _Rest:
         self.leave()
 
     def leave(self) -> None:
-        """Note that it is not."""
-        self.calm, self.quiet, self.look, self.bias = False, False, 0, 0.0
+        """Note that it is far from what is asked for, or that this moves."""
+        self.swings, self._side = 0, 0.0
+        self.stir()
+
+    def stir(self) -> None:
+        """Note that it is near, but moves."""
+        self.calm, self.quiet, self.look = False, False, 0
+        if self.swings < _SWINGS:
+            self.bias = 0.0
+
+    def see(self, error: float, swing: float) -> None:
+        """Count how often the ``error`` went from one side of the goal to the other, further than ``swing``."""
+        if abs(error) > swing:
+            side = math.copysign(1.0, error)
+            self.swings += side == -self._side
+            self._side = side

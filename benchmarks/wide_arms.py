@@ -1,0 +1,87 @@
+"""From a bare arm to movements, on arms drawn wide: what a person with an arm of any kind gets from a default run.
+
+python -m benchmarks wide_arms
+
+Each arm is recorded until more would not help, watched by a monitor that marks rows and does not stop; then the
+default agent, trained, settles at goals that the arm was seen to hold and follows sinusoids, and the agent for
+reaching reaches goals. What was measured is kept, so an interrupted benchmark goes on. Settings come from the
+environment:
+
+PNEUMARM_WIDE_ARMS       names of arms divided by blanks, or first and last seed of wide arms, such as the default,
+                         6000-6009; 5000-5299 are held out
+PNEUMARM_WIDE_GOALS      40 to settle at, and as many to reach
+PNEUMARM_WIDE_FOLDER     where rows are kept; runs/wide_arms by default
+PNEUMARM_WIDE_PROCESSES  2
+"""
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks._trials import Rows, on_arrival
+
+QUANTILES = 0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0
+COLUMNS = {
+    "minutes": "min",
+    "marked": "marked",
+    "history": "history",
+    "settled": "settled",
+    "seconds": "median [s]",
+    "rest": "rest [deg]",
+    "changes": "changes/s",
+    "slow": "1/4 Hz [deg]",
+    "fast": "1 Hz [deg]",
+    "success": "reached",
+    "reward": "reward",
+}
+
+
+def measure() -> Iterator[str]:
+    arms = names_of(os.environ.get("PNEUMARM_WIDE_ARMS", "6000-6009"))
+    goals = int(os.environ.get("PNEUMARM_WIDE_GOALS", "40"))
+    folder = Path(os.environ.get("PNEUMARM_WIDE_FOLDER", "runs/wide_arms"))
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = Rows(folder / "rows.jsonl", "arm", "goals")
+    wanted = [arm for arm in arms if rows.get(arm, goals) is None]
+    processes = int(os.environ.get("PNEUMARM_WIDE_PROCESSES", "2"))
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for arm, row in zip(wanted, pool.map(arrived, wanted, [goals] * len(wanted)), strict=True):
+            rows.add({"arm": arm, "goals": goals, **row})
+    table = [figures_of(row) for arm in arms if (row := rows.get(arm, goals)) is not None]
+    yield f"{'':22}" + "".join(f"{title:>13}" for title in COLUMNS.values())
+    for arm, figures in zip(arms, table, strict=True):
+        yield line(arm, figures)
+    for quantile in QUANTILES:
+        among = {name: float(np.quantile([one[name] for one in table], quantile)) for name in COLUMNS}
+        yield line(f"quantile {quantile:g}", among)
+
+
+def names_of(arms: str) -> list[str]:
+    """Return names of arms from the setting."""
+    first, _, last = arms.partition("-")
+    if first.isdigit() and last.isdigit():
+        return [f"virtual:wide,seed={seed}" for seed in range(int(first), int(last) + 1)]
+    return arms.split()
+
+
+def arrived(arm: str, goals: int) -> dict[str, Any]:
+    """Return what the agents of ``arm`` do on it."""
+    return on_arrival(arm, goals, monitor=True)
+
+
+def figures_of(row: dict[str, Any]) -> dict[str, float]:
+    """Return the figures of the table; a time that no movement has is infinite."""
+    slow, *_, fast = row["track"]
+    derived = {"slow": slow, "fast": fast, "success": np.mean(row["success"]), "reward": np.mean(row["reward"])}
+    seconds = float("inf") if row["seconds"] is None else row["seconds"]
+    return {name: float(({**row, **derived, "seconds": seconds})[name]) for name in COLUMNS}
+
+
+def line(name: str, figures: dict[str, float]) -> str:
+    """Return a line of the table."""
+    return f"{name:22}" + "".join(f"{figures[column]:13.3f}" for column in COLUMNS)

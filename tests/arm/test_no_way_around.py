@@ -22,6 +22,7 @@ SOURCE = Path(pneumarm.__file__).parent
 
 GUARDED = {
     "arm/guard.py": "the guard itself",
+    "arm/fill.py": "an arm, behind the guard like any other",
     "arm/corrected.py": "an arm, behind the guard like any other",
     "arm/passed_on.py": "an arm, behind the guard like any other",
     "arm/serial/board.py": "a controller, which does what it is asked behind the guard",

@@ -162,13 +162,13 @@ class EstimatedArm(PassedOn):
         self._fill.set_state(state[:size])
 
 
-def filled(spec: ArmSpec, time: NDArray[np.float64], command: NDArray[np.float64]) -> NDArray[np.float64]:
+def filled(spec: ArmSpec, times: NDArray[np.float64], command: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the pressures (n, joints, 2) [counts] of muscles that were vented at first, as they are estimated.
 
-    ``command`` (n, joints, 2) was applied at ``time`` (n,) [s], and none, NaN, after the last.
+    ``command`` (n, joints, 2) was applied at ``times`` (n,) [s], and none, NaN, after the last.
     """
     fill, found = Fill(spec), []
-    for now, applied in zip(time.tolist(), np.clip(np.nan_to_num(command), -1, 1), strict=True):
+    for now, applied in zip(times.tolist(), np.clip(np.nan_to_num(command), -1, 1), strict=True):
         fill.pass_until(now)
         found.append(fill.pressure)
         fill.command(applied)

@@ -60,8 +60,9 @@ class CollectBegin(BeginState):
     """Longest time that a muscle is inflated again [s] (thesis section 3.2.2: 1.2)."""
 
 
-_LONGEST_PULSES = 0.134  # s for which a muscle gets the same pulse in every period, at most
-_SEQUENCE, _HELD = 200 / 30, 10 / 30  # s that a sequence lasts, and for which an action is held at most
+_USUAL_RATE = 30.0  # Hz; at higher ones as many seconds as there, at lower ones as many periods
+_LONGEST_PULSES = 4  # most periods in a row in which a muscle gets the same pulse
+_ACTIONS, _HELD = 200, 10  # of a sequence; most periods for which an action is held
 _SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse sequence
 
 
@@ -70,12 +71,13 @@ class CollectSettings(Settings):
     """How transitions are collected."""
 
     actions: int | None = None
-    """Actions of a sequence (thesis section 3.2.2: 200); by default those of as many seconds as there, 6.7."""
+    """Actions of a sequence (thesis section 3.2.2: 200); by default that, or those of 6.7 s
+    if the arm is controlled faster than there."""
     velocity_share: float = 0.5
     """Share of sequences whose actions are held (the thesis decides "randomly")."""
     longest_hold: int | None = None
-    """Most control periods that an action is held, the least is 1 (the thesis does not say); by default those of a
-    third of a second."""
+    """Most control periods that an action is held, the least is 1 (the thesis does not say); by default 10, or
+    those of a third of a second if they are more."""
     pulses: float = 0.55
     """Share of the sequences in which valves open for pulses of random length, where the arm can do them; in the
     others they are open for whole periods, as in the thesis. A record of both serves controllers of both kinds."""
@@ -97,8 +99,13 @@ class CollectSettings(Settings):
 
     def for_period(self, period: float) -> Self:
         """Return the settings with the numbers of control periods [s] that they stand for where none are given."""
-        actions, held = (max(round(seconds / period), 1) for seconds in (_SEQUENCE, _HELD))
+        actions, held = (_periods(usual, period) for usual in (_ACTIONS, _HELD))
         return replace(self, actions=self.actions or actions, longest_hold=self.longest_hold or held)
+
+
+def _periods(usual: int, period: float) -> int:
+    """Return how many periods [s] are as long as so many at the usual rate, and no fewer."""
+    return max(usual, round(usual / (_USUAL_RATE * period)))
 
 
 WHOLE_PERIODS = CollectSettings(pulses=0.0)
@@ -379,7 +386,7 @@ def _random_pulses(spec: ArmSpec, sparse: float, actions: int, random: np.random
         opened = random.random(shape) < _SPARSE
         return "sparse", Trajectory(valves * opened * np.maximum(shares**2, shortest))
     commands = (valves * shares).reshape(actions, -1)
-    longest = max(round(_LONGEST_PULSES / spec.period), 1)
+    longest = _periods(_LONGEST_PULSES, spec.period)
     for muscle in range(commands.shape[1]):
         lengths = random.integers(1, longest, size=actions, endpoint=True)
         commands[:, muscle] = np.repeat(commands[:, muscle], lengths)[:actions]

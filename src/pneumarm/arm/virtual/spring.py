@@ -41,13 +41,17 @@ def with_springs(parameters: ArmParameters) -> ArmParameters:
 
 
 def _spring(like: MuscleParameters, stiffness: float, stretch: float) -> MuscleParameters:
-    """Return a spring of ``stiffness`` [N/m] that is stretched by ``stretch`` [m] with the joint in the middle."""
+    """Return a spring of ``stiffness`` [N/m] that is stretched by ``stretch`` [m] with the joint in the middle.
+
+    It is as long as the muscle that was ``like`` it, or as much as it is stretched.
+    """
+    length = max(stretch, like.rest_length)
     return replace(
         like,
-        rest_length=2 * stretch,  # at which what air there is has a sound volume
-        bladder_length=stretch,
-        length_at_zero=2 * stretch,
-        stop_length=10 * stretch,
+        rest_length=length + stretch,  # where the air in a braid has a sound volume
+        bladder_length=length,
+        length_at_zero=length + stretch,
+        stop_length=10 * (length + stretch),
         bladder_stiffness=stiffness,
         stop_stiffness=0.0,
         threshold=100 * BAR,

@@ -34,7 +34,7 @@ from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Veloci
 from pneumarm.transitions.choice import share_held_out
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
-from pneumarm.transitions.goals import seen_goals
+from pneumarm.transitions.goals import held_range, seen_goals
 from pneumarm.transitions.grid import GridSettings
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
@@ -405,7 +405,7 @@ def fit_store(
         filtered.transitions,
         filtered.stream("held-out"),
         spec=store.spec,
-        goal_range=store.percentiles(),
+        goal_range=_goal_range(store),
         valves=store.valves,
         generalisation=filtered.stream("generalisation") if coverage.kept < coverage.seen else None,
         settings=settings,
@@ -413,6 +413,12 @@ def fit_store(
     )
     goals = seen_goals(store.blocks, result.simulation.goal_range)
     return StoreFit(result._replace(simulation=result.simulation.with_goals(goals)), filtered)
+
+
+def _goal_range(store: Store) -> NDArray[np.float64]:
+    """Return the range of angles that goals are drawn from, (joints, 2) [counts]."""
+    seen = store.percentiles()
+    return seen if store.spec.muscles == 2 else held_range(store.blocks, seen, store.spec.period)
 
 
 def refiltered(store: Store, simulation: Simulation, grid: GridSettings | None = None) -> Filtered:

@@ -118,7 +118,7 @@ class VirtualArm(Arm):
 
     @faults.setter
     def faults(self, plan: Sequence[Fault]) -> None:
-        plan = check_plan(plan, self.spec.joints)
+        plan = check_plan(plan, self.spec.joints, muscles=self.spec.muscles)
         asked, before = self._asked(), self._player
         if before is not None:
             before.restore()

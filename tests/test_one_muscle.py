@@ -1,22 +1,28 @@
-"""Arms with one muscle a joint, against a spring: the whole job with physics of its own, and what refuses, in one line."""
+"""Arms with one muscle a joint: the whole job on one with physics of its own, and what refuses, in one line."""
 
 import json
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
 from pneumarm.arm import ArmSpec, guarded, open_arm
 from pneumarm.arm.valves import possible_actions, to_valves
-from pneumarm.arm.virtual import resting_angle
+from pneumarm.arm.virtual import StuckValve, resting_angle
 from pneumarm.classical import tune
 from pneumarm.cli import main as command_line
-from pneumarm.errors import UnusableInput
+from pneumarm.control import Monitor
+from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.gym import point_to_point
 from pneumarm.learning import load_agent
+from pneumarm.planning import PlanSettings
+from pneumarm.planning.search import problem
 from pneumarm.run import Run
 from pneumarm.simulation import Simulation
+from pneumarm.task.reward import Reward
 from pneumarm.transitions import Store, collect
+from pneumarm.transitions.goals import held_range
 from small import SMALL
 
 PLAIN, VIRTUAL = "python:tests.plain_arms:single", "virtual:seed=3,muscles=1"
@@ -71,6 +77,27 @@ def test_its_agent_moves_it_with_one_muscle_and_is_refused_by_an_arm_with_two(ru
     assert all(one["success"] for one in moved)
     assert main(["move", agent, "--arm", "python:tests.plain_arms:noisy", "15deg"]) == 2
     assert main(["track", agent, "--arm", PLAIN, "--reference", "sine:0.25Hz,10deg", "--seconds", "5"]) == 0
+
+
+def test_a_simulated_environment_and_plans_have_three_actions_too(run):
+    folder, _ = run
+    name = f"simulation:{folder / 'simulation.safetensors'}"
+    for env in (
+        point_to_point(name, transitions=folder / "transitions.db"),
+        gymnasium.make_vec(
+            "pneumarm/PointToPoint-v0", 4, "vector_entry_point", arm=name, transitions=folder / "transitions.db"
+        ),
+    ):
+        env.reset(seed=1)
+        many = getattr(env, "num_envs", 1) > 1
+        for action in range(3):
+            env.step(np.full(4, action) if many else action)
+        with pytest.raises(UnusableInput, match="0 to 2"):
+            env.step(np.full(4, 3) if many else 3)
+        env.close()
+    sought = problem(np.zeros(1), Reward(), PlanSettings(), muscles=1)
+    assert sought.commands.tolist() == [[[-1, 0]], [[0, 0]], [[1, 0]]]
+    assert main(["move", f"plan:{folder / 'simulation.safetensors'}", "--arm", PLAIN, "10deg"]) == 0
 
 
 def test_its_servo_says_nothing_to_the_other_muscle(run):
@@ -141,16 +168,40 @@ def test_what_needs_two_muscles_says_so_in_one_line(capsys):
 
 
 def test_without_a_pressure_sensor_too(tmp_path):
-    with open_arm("python:tests.plain_arms:single_angle_alone") as arm:
-        with Store.for_arm(tmp_path / "s.db", arm.spec) as store:
-            collect(arm, store, 2000, 1)
-            pressure = np.concatenate([block.pressure for block in store.blocks()])
+    name = "python:tests.plain_arms:single_angle_alone"
+    with open_arm(name) as arm, Store.for_arm(tmp_path / "s.db", arm.spec) as store:
+        collect(arm, store, 2000, 1)
+        pressure = np.concatenate([block.pressure for block in store.blocks()])
     assert (pressure[:, 0, 1] == 0).all()
     assert np.ptp(pressure[:, 0, 0]) > 100
 
 
-def test_an_environment_of_such_an_arm_takes_steps():
+def test_its_goals_are_angles_at_which_it_stands(tmp_path):
+    with open_arm("virtual:seed=13,muscles=1") as arm, Store.for_arm(tmp_path / "s.db", arm.spec) as store:
+        collect(arm, store, 4000, 1)
+        seen = store.percentiles()
+        ((low, high),) = arm.spec.degrees(held_range(store.blocks, seen, arm.spec.period))
+        full = min(arm.parameters.air.supply, arm.parameters.max_pressure)
+        vented, filled = (float(np.degrees(resting_angle(arm.parameters, [[p, 0.0]]))[0]) for p in (0.0, full))
+    assert arm.spec.degrees(seen)[0, 0] < vented - 2  # as far as it swings
+    assert vented - 1 < low < vented + 6
+    assert filled - 10 < high < filled + 1
+
+
+def test_the_monitor_finds_a_stuck_inlet_and_plans_name_no_other_muscle(tmp_path):
+    with open_arm(VIRTUAL) as arm, Store.for_arm(tmp_path / "stuck.db", arm.spec) as store:
+        with pytest.raises(UnusableInput, match="muscle 1"):
+            arm.faults = [StuckValve(joint=1, muscle=2, valve="inlet", position="closed")]
+        arm.faults = [StuckValve(joint=1, muscle=1, valve="inlet", position="closed")]
+        watch = Monitor(arm.spec)
+        with pytest.raises(ArmFailure):
+            collect(arm, store, 6000, 1, watch=watch)
+    assert {(one.joint, one.muscle) for one in watch.findings} == {(1, 1)}
+
+
+def test_an_environment_of_such_an_arm_has_three_actions():
     env = point_to_point(VIRTUAL)
+    assert env.action_space.n == 3
     observation, _ = env.reset(seed=1)
     following, *_ = env.step(env.action_space.sample())
     assert env.observation_space.contains(observation)

@@ -122,13 +122,12 @@ class GuardedArm(Arm):
             UnusableInput: it measures no pressures, and nobody has said that its supply is safe.
 
         """
-        if not arm.spec.pressure_sensors:
-            if not arm.spec.safe_supply:
-                arm.close()
-                raise UnusableInput(
-                    f"{arm.spec.name}: without pressure sensors only the supply keeps muscles from bursting; set "
-                    "it to what every muscle bears and say so, by safe_supply = true in the arm's spec or arm.toml"
-                )
+        if not (arm.spec.pressure_sensors or arm.spec.safe_supply):
+            arm.close()
+            raise UnusableInput(
+                f"{arm.spec.name}: without pressure sensors only the supply keeps muscles from bursting; set "
+                "it to what every muscle bears and say so, by safe_supply = true in the arm's spec or arm.toml"
+            )
         if arm.spec.muscles == 1 and not isinstance(arm, SingleArm | EstimatedArm):
             arm = SingleArm(arm)
         if not arm.spec.pressure_sensors:

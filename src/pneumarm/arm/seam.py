@@ -198,7 +198,7 @@ class Reading:
     angle: NDArray[np.float64]
     """Angles, shape (joints,) [counts]."""
     pressure: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    """Pressures, shape (joints, 2) [counts]; (joints, 1) of an arm with one muscle a joint; left out by an arm without
+    """Pressures, shape (joints, 2) [counts], or (joints, 1) where joints have one muscle; left out by an arm without
     pressure sensors, and estimated behind the guard."""
     velocity: NDArray[np.float64] | None = None
     """Angular velocities from a sensor of their own, shape (joints,) [counts/ms]."""
@@ -362,8 +362,8 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
         pressure = reading.pressure if none else _pressures(reading.pressure, spec)
     except (TypeError, ValueError, AttributeError) as error:
         raise ArmFailure(
-            f"{spec.name}: a reading needs a time, {spec.joints} angle(s) and {spec.joints} x {spec.muscles} pressures, "
-            f"got {reading!r} ({error})"
+            f"{spec.name}: a reading needs a time, {spec.joints} angle(s) and {spec.joints} x {spec.muscles} "
+            f"pressures, got {reading!r} ({error})"
         ) from error
     # For a handful of numbers Python is several times faster than np.isfinite, and this runs in every period.
     if not all(map(math.isfinite, [time, *angle.tolist(), *pressure.ravel().tolist()])):
@@ -376,7 +376,7 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
 
 
 def check_muscles(made_for: ArmSpec, found: ArmSpec, what: str) -> None:
-    """Raise UnusableInput where ``what`` was made for an arm of other muscles, or whose pressures come from elsewhere."""
+    """Raise UnusableInput where ``what`` was made for other muscles, or for pressures that come from elsewhere."""
     if made_for.muscles != found.muscles:
         raise UnusableInput(
             f"{what} for an arm with {made_for.muscles} muscle(s) a joint, {found.name} has {found.muscles}; record, "

@@ -8,9 +8,7 @@ from pneumarm.arm.valves import NEVER, possible_actions
 from pneumarm.networks.layers import split
 
 
-def leave_out(
-    spec: ArmSpec, weights: NDArray[np.float32], mask: NDArray[np.float32], sizes: tuple[int, ...]
-) -> None:
+def leave_out(spec: ArmSpec, weights: NDArray[np.float32], mask: NDArray[np.float32], sizes: tuple[int, ...]) -> None:
     """Have the network of ``weights`` (size,) never choose an action that the arm ``spec`` does not have.
 
     Its outputs for these always say so, whatever is learned: ``mask`` (size,) is 0 where a weight stays as it is.

@@ -292,7 +292,7 @@ def _rows_to_fit(rows: int, weights: int, seed: int) -> slice | NDArray[np.int64
 
 
 def _without(network: Network, inputs: NDArray[np.bool_]) -> Network:
-    """Return the network with no weight on those ``inputs`` (inputs,) of which the data say nothing: they are 0 there.
+    """Return the network with no weight on those ``inputs`` (inputs,) that never varied; they are 0, scaled.
 
     Such are all of a muscle that is not there. A network is fitted as well with any weight on them, and begins with
     random ones.

@@ -139,7 +139,7 @@ class Simulation:
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """Which of the outputs a sensor stands behind: not pressures that are estimated, or of muscles that none has."""
+        """Which outputs a sensor stands behind: no pressures that are estimated, or of a muscle that is not there."""
         places = self.outputs
         muscle = np.where(places < self.window.joint_size, places % len(QUANTITIES) - _VELOCITY, 0)
         return muscle <= (self.spec.muscles if self.spec.pressure_sensors else 0)

@@ -111,7 +111,7 @@ def seen_goals(blocks: Callable[[], Iterable[Rows]], range_: NDArray[np.float64]
 def held_range(
     blocks: Callable[[], Iterable[Rows]], range_: NDArray[np.float64], period: float
 ) -> NDArray[np.float64]:
-    """Return the part of ``range_`` (joints, 2) [counts] that joints with one muscle hold, by ``blocks()``, read twice.
+    """Return what of ``range_`` (joints, 2) [counts] joints with one muscle hold, by ``blocks()``, read twice.
 
     An end of it is the median angle of a slow joint whose muscle is empty, or full, where that was seen.
     """
@@ -141,9 +141,7 @@ def held_range(
     return np.where((held[:, :1] < held[:, 1:]), held, range_)
 
 
-def _stretches(
-    block: Rows, steps: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _stretches(block: Rows, steps: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return angles after ``steps``, how far apart those since then are, and pressures of muscle 1, (n, joints)."""
     if len(block) <= steps:
         none = np.zeros((0, block.angle.shape[1]))

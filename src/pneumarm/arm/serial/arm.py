@@ -294,7 +294,7 @@ class SerialArm(Arm):
         self._fed = self._line.now()
 
     def _both(self, command: NDArray[Any]) -> NDArray[Any]:
-        """Return ``command`` for the two muscles (joints, 2) that the board has a joint; closed where there is none."""
+        """Return ``command`` for the two muscles a joint (joints, 2) that the board knows; closed where none is."""
         both = np.zeros((self.spec.joints, 2), command.dtype)
         both[:, : self.spec.muscles] = command.reshape(self.spec.joints, -1)
         return both

@@ -229,7 +229,7 @@ class VirtualArm(Arm):
         return self.spec.joints, self.spec.muscles
 
     def _both(self, command: NDArray[Any]) -> NDArray[Any]:
-        """Return ``command`` with closed valves where springs are in place of muscles; empty where it has not its shape."""
+        """Return ``command`` with closed valves where springs are; with nothing in it where its shape is wrong."""
         if self.spec.muscles == 2:
             return command
         return np.concatenate([command, 0 * command], axis=1) if command.shape == self._shape else command[:0]

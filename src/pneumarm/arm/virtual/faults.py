@@ -419,8 +419,9 @@ def _check_place(fault: Fault, number: int, joints: int, muscles: int) -> None:
         places.append(fault.other)
     for joint, muscle in places:
         if not (0 <= joint < joints and 0 <= muscle < muscles):
+            there = "muscles 1 and 2" if muscles == 2 else "muscle 1"
             raise UnusableInput(
-                f"fault {number} ({fault.kind}): this arm has joints 1 to {joints} with {'muscles 1 and 2' if muscles == 2 else 'muscle 1'}, "
+                f"fault {number} ({fault.kind}): this arm has joints 1 to {joints} with {there}, "
                 f"got joint {joint + 1}, muscle {muscle + 1}"
             )
     if isinstance(fault, SwappedMuscles) and fault.index == fault.other:

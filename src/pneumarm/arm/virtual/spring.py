@@ -1,6 +1,6 @@
 """A spring in place of a joint's second muscle.
 
-It is made to fit the arm, as a person chooses one: with muscle 1 full the joint stands near one end, and with muscle 1
+It is made to fit the arm, as a person chooses one: with muscle 1 full the joint stands near one end, with muscle 1
 vented near the other. Its pull rises from one to the other by a fifth of what it is in the middle, or by more where
 muscle and weight ask for that; a spring that rose by less would be longer than people put up with.
 
@@ -23,7 +23,9 @@ _RISE = 0.2  # of the pull in the middle, from one end of the stroke to the othe
 
 def with_springs(parameters: ArmParameters) -> ArmParameters:
     """Return the arm with a spring in place of muscle 2 of every joint."""
-    slack = tuple(replace(one, muscles=(one.muscles[0], _spring(one.muscles[0], 0.0, 1.0))) for one in parameters.joints)
+    slack = tuple(
+        replace(one, muscles=(one.muscles[0], _spring(one.muscles[0], 0.0, 1.0))) for one in parameters.joints
+    )
     slack_arm = constants(replace(parameters, joints=slack))
     full = min(parameters.air.supply, parameters.max_pressure)
     made = []
@@ -36,7 +38,9 @@ def with_springs(parameters: ArmParameters) -> ArmParameters:
             pulls.append(float(static_torque(slack_arm, pressures, False, joints, j)) / joint.radius)
         middle = max(sum(pulls) / 2, 1.0)
         stiffness = max(pulls[1] - pulls[0], _RISE * middle) / (2 * reach * joint.radius)
-        made.append(replace(joint, muscles=(joint.muscles[0], _spring(joint.muscles[0], stiffness, middle / stiffness))))
+        made.append(
+            replace(joint, muscles=(joint.muscles[0], _spring(joint.muscles[0], stiffness, middle / stiffness)))
+        )
     return replace(parameters, joints=tuple(made))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pneumarm.arm import ArmSpec, guarded, open_arm
+from pneumarm.arm.spec_file import save_spec
 from pneumarm.arm.valves import possible_actions, to_valves
 from pneumarm.arm.virtual import StuckValve, resting_angle
 from pneumarm.classical import tune
@@ -165,6 +166,19 @@ def test_what_needs_two_muscles_says_so_in_one_line(capsys):
         open_arm("virtual:muscles=3")
     with pytest.raises(UnusableInput, match="muscles"):
         ArmSpec(muscles=3)
+
+
+def test_its_file_says_so_too(tmp_path):
+    save_spec(ArmSpec(name="two"), tmp_path / "arm.toml")
+    with pytest.raises(UnusableInput, match="muscle"):
+        open_arm(f"{PLAIN},spec={tmp_path / 'arm.toml'}")
+    with open_arm(PLAIN) as arm:
+        save_spec(arm.spec, tmp_path / "arm.toml")
+    with open_arm(f"{PLAIN},spec={tmp_path / 'arm.toml'}") as arm:
+        safe = guarded(arm)
+        safe.set_valves(np.ones((1, 2)))
+        assert safe.applied.tolist() == [[1, 0]]
+        assert safe.read().pressure.shape == (1, 2)
 
 
 def test_without_a_pressure_sensor_too(tmp_path):

@@ -388,8 +388,7 @@ def _random_pulses(
     valves, shares = random.integers(-1, 2, shape), random.uniform(shortest, 1.0, shape)
     if random.random() < sparse:
         opened = random.random(shape) < _SPARSE
-        short: NDArray[np.float64] = valves * opened * np.maximum(shares**2, shortest)
-        return "sparse", short
+        return "sparse", (valves * opened).astype(np.float64) * np.maximum(shares**2, shortest)
     commands = (valves * shares).reshape(actions, -1)
     longest = max(round(_LONGEST_PULSES / spec.period), 1)
     for muscle in range(commands.shape[1]):

@@ -61,7 +61,8 @@ class ServoController:
         least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)
         self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
         # Whole periods move an arm by more than a tolerance: without pulses it is to swing.
-        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if spec.pulses else math.inf
+        fine = spec.pulses and agent.simulation.commands == "pulses"
+        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if fine else math.inf
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)

@@ -12,6 +12,8 @@ sys.path.insert(0, str(HERE))  # for the stand-ins, here and in processes of the
 from stand_ins import make_recorded  # noqa: E402
 
 import children  # noqa: E402
+from pneumarm.arm.virtual import VirtualArm, draw_parameters  # noqa: E402
+from pneumarm.transitions import CollectSettings, Mark, Store, collect  # noqa: E402
 
 
 @pytest.fixture
@@ -28,3 +30,14 @@ def python():
         return children.python("-c", script, *arguments, env=environment)
 
     return run
+
+
+@pytest.fixture(scope="module", params=[1, 2])
+def exportable(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a store of one or of two joints; the latter with a sensor of velocity; some rows are marked."""
+    path = tmp_path_factory.mktemp("recorded") / "arm.db"
+    arm = VirtualArm(draw_parameters(3, request.param), seed=3, velocity_sensor=request.param == 2)
+    with arm, Store.for_arm(path, arm.spec) as store:
+        collect(arm, store, 2_000, settings=CollectSettings(actions=100))
+        store.mark(3, [Mark(10, 20, "a test")])
+    return path

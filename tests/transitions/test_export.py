@@ -6,26 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import UnusableInput
-from pneumarm.transitions import CollectSettings, Mark, Store, collect, import_recording
+from pneumarm.transitions import Store, import_recording
 from pneumarm.transitions.export import export_recording
 from pneumarm.transitions.rows import joined
 
 
-@pytest.fixture(scope="module", params=[1, 2])
-def recorded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a store of one or of two joints; the latter with a sensor of velocity; some rows are marked."""
-    path = tmp_path_factory.mktemp("recorded") / "arm.db"
-    arm = VirtualArm(draw_parameters(3, request.param), seed=3, velocity_sensor=request.param == 2)
-    with arm, Store.for_arm(path, arm.spec) as store:
-        collect(arm, store, 2_000, settings=CollectSettings(actions=100))
-        store.mark(3, [Mark(10, 20, "a test")])
-    return path
-
-
-def test_csv_comes_back_as_it_was(recorded: Path, tmp_path: Path) -> None:
-    with Store.open(recorded) as store:
+def test_csv_comes_back_as_it_was(exportable: Path, tmp_path: Path) -> None:
+    with Store.open(exportable) as store:
         exported = export_recording(store, tmp_path / "arm.csv")
         before = joined(store.blocks())
         spec, sequences = store.spec, store.sequences
@@ -45,9 +33,9 @@ def test_csv_comes_back_as_it_was(recorded: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.diff(after.step)[np.diff(after.sequence) == 0], gaps)
 
 
-def test_parquet_holds_the_same_rows_as_csv(recorded: Path, tmp_path: Path) -> None:
+def test_parquet_holds_the_same_rows_as_csv(exportable: Path, tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
-    with Store.open(recorded) as store:
+    with Store.open(exportable) as store:
         export_recording(store, tmp_path / "arm.csv")
         export_recording(store, tmp_path / "arm.parquet")
     table = parquet.read_table(tmp_path / "arm.parquet")
@@ -58,8 +46,8 @@ def test_parquet_holds_the_same_rows_as_csv(recorded: Path, tmp_path: Path) -> N
     np.testing.assert_array_equal(found, np.array(rows, float))
 
 
-def test_what_cannot_be_written_is_refused(recorded: Path, tmp_path: Path) -> None:
-    with Store.open(recorded) as store:
+def test_what_cannot_be_written_is_refused(exportable: Path, tmp_path: Path) -> None:
+    with Store.open(exportable) as store:
         with pytest.raises(UnusableInput, match=r"\.csv or \.parquet"):
             export_recording(store, tmp_path / "arm.xlsx")
         with pytest.raises(UnusableInput, match="does not exist"):

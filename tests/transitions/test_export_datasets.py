@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import UnusableInput
-from pneumarm.transitions import CollectSettings, Mark, Store, collect, import_recording
+from pneumarm.transitions import Store, import_recording
 from pneumarm.transitions.episodes import action_names, episodes, observation_names
 from pneumarm.transitions.export import export_recording
 from pneumarm.transitions.rows import joined
@@ -21,22 +20,11 @@ DEFAULT_FEATURES = {
 """What the format says every dataset has."""
 
 
-@pytest.fixture(scope="module", params=[1, 2])
-def recorded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a store of one or of two joints; the latter with a sensor of velocity; some rows are marked."""
-    path = tmp_path_factory.mktemp("recorded") / "arm.db"
-    arm = VirtualArm(draw_parameters(3, request.param), seed=3, velocity_sensor=request.param == 2)
-    with arm, Store.for_arm(path, arm.spec) as store:
-        collect(arm, store, 2_000, settings=CollectSettings(actions=100))
-        store.mark(3, [Mark(10, 20, "a test")])
-    return path
-
-
-def test_a_dataset_of_lerobot_has_the_published_layout(recorded: Path, tmp_path: Path) -> None:
+def test_a_dataset_of_lerobot_has_the_published_layout(exportable: Path, tmp_path: Path) -> None:
     """What LeRobot reads first: versions, paths, types, where each episode lies, and that times are on the grid."""
     parquet = pytest.importorskip("pyarrow.parquet")
     folder = tmp_path / "arm.lerobot"
-    with Store.open(recorded) as store:
+    with Store.open(exportable) as store:
         exported = export_recording(store, folder)
         expected, names, actions = list(episodes(store)), observation_names(store), action_names(store)
         sequences = store.sequences
@@ -72,10 +60,10 @@ def test_a_dataset_of_lerobot_has_the_published_layout(recorded: Path, tmp_path:
     assert parquet.read_table(folder / "meta" / "tasks.parquet")["task_index"].to_pylist() == [0]
 
 
-def test_its_tasks_are_read_by_pandas_as_lerobot_reads_them(recorded: Path, tmp_path: Path) -> None:
+def test_its_tasks_are_read_by_pandas_as_lerobot_reads_them(exportable: Path, tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
-    with Store.open(recorded) as store:
+    with Store.open(exportable) as store:
         export_recording(store, tmp_path / "arm.lerobot")
         task = f"recording of {store.spec.name}"
     tasks = pandas.read_parquet(tmp_path / "arm.lerobot" / "meta" / "tasks.parquet")
@@ -84,9 +72,9 @@ def test_its_tasks_are_read_by_pandas_as_lerobot_reads_them(recorded: Path, tmp_
 
 
 @pytest.mark.parametrize("name", ["arm.parquet", "arm.lerobot"])
-def test_what_is_in_parquet_is_imported_again(recorded: Path, tmp_path: Path, name: str) -> None:
+def test_what_is_in_parquet_is_imported_again(exportable: Path, tmp_path: Path, name: str) -> None:
     pytest.importorskip("pyarrow")
-    with Store.open(recorded) as store:
+    with Store.open(exportable) as store:
         exported = export_recording(store, tmp_path / name)
         before, spec, ends = joined(store.blocks()), store.spec, [len(one.action) for one in episodes(store)]
     import_recording(tmp_path / name, str(exported.mapping), tmp_path / "again.db")
@@ -103,10 +91,10 @@ def test_what_is_in_parquet_is_imported_again(recorded: Path, tmp_path: Path, na
     np.testing.assert_allclose(after.pressure, before.pressure[kept], rtol=1e-6)
 
 
-def test_a_dataset_of_minari_is_opened_by_minari(recorded: Path, tmp_path: Path) -> None:
+def test_a_dataset_of_minari_is_opened_by_minari(exportable: Path, tmp_path: Path) -> None:
     pytest.importorskip("h5py")
     minari = pytest.importorskip("minari")
-    with Store.open(recorded) as store:
+    with Store.open(exportable) as store:
         exported = export_recording(store, tmp_path / "arm.minari")
         expected = list(episodes(store))
     dataset = minari.MinariDataset(tmp_path / "arm.minari")
@@ -121,9 +109,9 @@ def test_a_dataset_of_minari_is_opened_by_minari(recorded: Path, tmp_path: Path)
 
 
 def test_what_is_there_is_not_overwritten_and_what_is_missing_is_named(
-    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    exportable: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with Store.open(recorded) as store:
+    with Store.open(exportable) as store:
         for name in ("arm.lerobot", "arm.minari"):
             (tmp_path / name).mkdir()
             with pytest.raises(UnusableInput, match="exists already"):

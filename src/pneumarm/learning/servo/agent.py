@@ -10,14 +10,13 @@ from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.inputs import input_size, seen_parameters
 from pneumarm.learning.servo.price import PriceParameters
-from pneumarm.learning.servo.settings import ServoSettings
+from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.transitions.watch import made_up_readings
 
 KIND = "pneumarm servo"
-_USUAL_PERIOD = 1 / 30  # s, for which prices are given
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,7 +77,7 @@ def price_of_a_change(simulation: Simulation, settings: ServoSettings) -> float:
 
     Errors cost by the step: at a higher rate there are more of them in a second, and a change must cost as much more.
     """
-    return settings.change * _USUAL_PERIOD / simulation.spec.period
+    return settings.change * USUAL_PERIOD / simulation.spec.period
 
 
 def servo_sizes(simulation: Simulation, settings: ServoSettings) -> tuple[int, ...]:

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from pneumarm.settings import Valid
 from pneumarm.task.settings import TaskSettings
 
+USUAL_PERIOD = 1 / 30
+"""Control period [s] (the thesis: 30 Hz) that prices and limits which count control periods are given for."""
+
 
 @dataclass(frozen=True)
 class ServoSettings(TaskSettings):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pneumarm.learning.servo.agent import ServoAgent, servo_sizes, servo_task
 from pneumarm.learning.servo.gradient import ServoTask, errors_of, learn_once, move_forward, tape
 from pneumarm.learning.servo.references import draw_references
-from pneumarm.learning.servo.settings import ServoSettings
+from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
 from pneumarm.networks.layers import adam, initial_weights, trainable
 from pneumarm.simulation.simulation import Simulation
@@ -22,7 +22,7 @@ _ROW = 25  # updates between two rows of the curves
 _FIRST_OUTPUT = 1.0  # the first policy opens valves now and then
 _RENEWED = 0.5  # share of arms that begin anew at rest; the others go on from where they are
 _FREE = 0.6  # share of the updates in which the price of changes rises to what it is
-_STEEPEST = 10.0, 40.0  # where derivatives are cut off in the first update and in the last
+_STEEPEST = 10.0, 40.0  # where derivatives are cut off in the first update and in the last, at the usual period
 _FASTEST = 4.0  # highest speed of a reference, in scaled velocities
 
 
@@ -164,7 +164,7 @@ class ServoLearner(Learner[ServoAgent]):
         later and later: a policy that makes arms swing has none that are of use from far away.
         """
         paid, share = (1.0, 1.0) if self.price_all_along else (min(self.share / _FREE, 1.0), self.share)
-        first, last = _STEEPEST
+        first, last = (one * USUAL_PERIOD / self.simulation.spec.period for one in _STEEPEST)
         return self.task._replace(
             prices=self.task.prices._replace(change=paid * self.task.prices.change),
             steepest=first * (last / first) ** share,

@@ -15,7 +15,9 @@ from pneumarm.transitions import WHOLE_PERIODS, CollectBegin, CollectSettings, S
 from pneumarm.transitions.collect import random_actions
 from pneumarm.transitions.rows import joined
 
-SHORT = CollectSettings(actions=100, pulses=0.0, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
+SHORT = CollectSettings(
+    actions=100, pulses=0.0, inlets=0.5, lean=0.0, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2)
+)
 
 
 def collected(folder, name="s.db", joints=1, count=2000, settings=SHORT, arm=None, **options):
@@ -149,7 +151,8 @@ class Killed(FirstOrderArm):
             os.kill(os.getpid(), signal.SIGKILL)
         return super().read()
 arm = Killed()
-settings = CollectSettings(actions=100, pulses=0.0, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2))
+begin = CollectBegin(deflate=0.5, inflate=0.5, settle=0.2)
+settings = CollectSettings(actions=100, pulses=0.0, inlets=0.5, lean=0.0, begin=begin)
 with (Store.append_to(path) if path.exists() else Store.create(path, arm.spec)) as store:
     collect(arm, store, 2000, settings=settings)
 """

@@ -146,6 +146,7 @@ def _movements(
 ) -> Planned:
     task = TaskSettings(reward=planner.reward, cutoff=settings.plan.cutoff)
     rows = []
+    planner.warm_up()
     for made in make_movements(arm, planner, task, drawn(goals, seed, range(settings.episodes))):
         rows.append(made.row())
         report(len(rows))

@@ -17,6 +17,7 @@ Where we differ from the thesis, or it leaves something open:
 """
 
 import json
+import math
 import time as wall_clock
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -31,9 +32,10 @@ from pneumarm.arm.counts import Counts
 from pneumarm.arm.cycle import BeginState, ControlCycle, Step
 from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, ArmSpec, Reading
-from pneumarm.arm.valves import ACTIONS, Command, to_valves
+from pneumarm.arm.valves import Command
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.settings import Settings, Valid
+from pneumarm.transitions.fill_times import FillTimes, find_fill_times
 from pneumarm.transitions.players import Trajectory
 from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.store import Store
@@ -63,6 +65,7 @@ class CollectBegin(BeginState):
 _USUAL_RATE = 30.0  # Hz; at higher ones as many seconds as there, at lower ones as many periods
 _LONGEST_PULSES = 4  # most periods in a row in which a muscle gets the same pulse
 _ACTIONS, _HELD = 200, 10  # of a sequence; most periods for which an action is held
+_FULL, _EMPTY = 4 / 3, 4.0  # times of nine tenths of the way in which muscles are full or empty
 _SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse sequence
 
 
@@ -83,8 +86,15 @@ class CollectSettings(Settings):
     others they are open for whole periods, as in the thesis. A record of both serves controllers of both kinds."""
     sparse: float = 0.45
     """Share of those in which most steps keep the valves closed and pulses are short, as near to rest."""
-    begin: CollectBegin = field(default_factory=CollectBegin)
-    """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5)."""
+    inlets: float | None = None
+    """Share of inlets among the valves that open (the thesis: a half); by default such that the muscles of this arm,
+    which may fill more slowly than they empty, are as often full as empty."""
+    lean: float = 1.0
+    """How far each muscle leans to inlets or to outlets for a whole sequence, drawn up to this in the logarithm of
+    their odds (the thesis: 0); so one muscle goes up while the other goes down, as far as they can."""
+    begin: CollectBegin | None = None
+    """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5); by
+    default by times that this arm's muscles take to fill and to empty."""
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting (thesis figure 2.8)."""
 
@@ -95,6 +105,8 @@ class CollectSettings(Settings):
             "longest_hold": self.longest_hold is None or self.longest_hold >= 1 or "1 or more",
             "pulses": 0 <= self.pulses <= 1,
             "sparse": 0 <= self.sparse <= 1,
+            "lean": 0 <= self.lean <= 10,
+            "inlets": self.inlets is None or 0 < self.inlets < 1 or "above 0 and below 1",
         }
 
     def for_period(self, period: float) -> Self:
@@ -102,14 +114,27 @@ class CollectSettings(Settings):
         actions, held = (_periods(usual, period) for usual in (_ACTIONS, _HELD))
         return replace(self, actions=self.actions or actions, longest_hold=self.longest_hold or held)
 
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is left to how fast an arm's muscles fill and empty."""
+        return self.begin is not None and self.inlets is not None
+
+    def for_arm(self, times: FillTimes) -> Self:
+        """Return the settings with what they leave to the ``times`` of an arm."""
+        begin = CollectBegin(
+            deflate=max(_EMPTY * times.emptying, CollectBegin.deflate), inflate=_FULL * times.filling
+        )
+        slowness = math.sqrt(times.filling / times.emptying)
+        return replace(self, begin=self.begin or begin, inlets=self.inlets or slowness / (1 + slowness))
+
 
 def _periods(usual: int, period: float) -> int:
     """Return how many periods [s] are as long as so many at the usual rate, and no fewer."""
     return max(usual, round(usual / (_USUAL_RATE * period)))
 
 
-WHOLE_PERIODS = CollectSettings(pulses=0.0)
-"""As in the thesis: every valve that opens is open for whole control periods."""
+WHOLE_PERIODS = CollectSettings(pulses=0.0, inlets=0.5, lean=0.0, begin=CollectBegin())
+"""As in the thesis: every valve that opens is open for whole control periods, on any arm for the same times."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +179,7 @@ class _Tally:
     missed_deadlines: int = 0
     peak_pressure: list[list[float]] = field(default_factory=list)
     link: dict[str, int] = field(default_factory=dict)
+    fill_times: list[float] | None = None
 
     @property
     def counts(self) -> Counts:
@@ -211,6 +237,8 @@ def collect(
     begun = wall_clock.perf_counter()
     collection = _Collection(arm, store, seed, settings, controller, goals, watch)
     try:
+        if collection.done < transitions:
+            collection.find_fill_times()
         while collection.done < transitions:
             collection.make_sequence()
             if progress is not None:
@@ -278,11 +306,22 @@ class _Collection:
                 watch.set_state(kept["watch"])
             warm_up(watch, arm.spec)
 
+    def find_fill_times(self) -> None:
+        """Take what the settings leave to this arm from its fill times, found now or by an earlier call."""
+        if self._settings.complete:
+            return
+        if self._tally.fill_times is None:
+            start = self._arm.read().time
+            self._tally.fill_times = list(find_fill_times(self._arm))
+            self._tally.seconds += self._arm.read().time - start
+        self._settings = self._settings.for_arm(FillTimes(*self._tally.fill_times))
+
     def make_sequence(self) -> None:
         """Bring the arm to a begin state, carry out one sequence, and store it."""
         arm, random = self._arm, np.random.default_rng([self._seed, self.number])
         cycle = ControlCycle(arm, self._settings.close_while_computing)
         before, start = Counts.now(cycle), arm.read().time
+        assert self._settings.begin is not None
         self._settings.begin.reach(arm, random)
         kind, actor, info = self._actor(random)
         remaining = iter(range(self._settings.actions or 0))
@@ -364,7 +403,7 @@ def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.G
     settings = settings.for_period(spec.period)
     assert settings.actions is not None
     assert settings.longest_hold is not None
-    actions = random.integers(ACTIONS, size=(settings.actions, spec.joints))
+    valves = _random_valves((settings.actions, spec.joints, 2), settings, random)
     drawn = np.tile(np.arange(settings.actions)[:, None], spec.joints)  # which action each step and joint does
     kind = "zero-velocity"
     if random.random() < settings.velocity_share:
@@ -373,16 +412,27 @@ def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.G
             lengths = random.integers(1, settings.longest_hold, size=settings.actions, endpoint=True)
             drawn[:, joint] = np.repeat(drawn[:, joint], lengths)[: settings.actions]
     if settings.pulses and spec.pulses and random.random() < settings.pulses:
-        return _random_pulses(spec, settings.sparse, settings.actions, random)
-    return kind, Trajectory(to_valves(actions)[drawn, np.arange(spec.joints)].astype(np.float64))
+        return _random_pulses(spec, settings, random)
+    return kind, Trajectory(valves[drawn, np.arange(spec.joints)].astype(np.float64))
 
 
-def _random_pulses(spec: ArmSpec, sparse: float, actions: int, random: np.random.Generator) -> tuple[str, Trajectory]:
+def _random_valves(
+    shape: tuple[int, int, int], settings: CollectSettings, random: np.random.Generator
+) -> NDArray[np.int64]:
+    """Return valves (steps, joints, 2), each closed with a probability of a third, and else an inlet or an outlet."""
+    inlets = 0.5 if settings.inlets is None else settings.inlets
+    odds = inlets / (1 - inlets) * np.exp(random.uniform(-settings.lean, settings.lean, shape[1:]))
+    side = np.where(random.random(shape) < odds / (1 + odds), 1, -1)
+    return np.where(random.random(shape) < 1 / 3, 0, side)
+
+
+def _random_pulses(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
     """Return a sequence of pulses, every muscle for itself: some repeated over a few periods, or few short ones."""
     shortest = min(spec.shortest_pulse / spec.period, 1.0)
+    actions = settings.actions or 0
     shape = (actions, spec.joints, 2)
-    valves, shares = random.integers(-1, 2, shape), random.uniform(shortest, 1.0, shape)
-    if random.random() < sparse:
+    valves, shares = _random_valves(shape, settings, random), random.uniform(shortest, 1.0, shape)
+    if random.random() < settings.sparse:
         opened = random.random(shape) < _SPARSE
         return "sparse", Trajectory(valves * opened * np.maximum(shares**2, shortest))
     commands = (valves * shares).reshape(actions, -1)

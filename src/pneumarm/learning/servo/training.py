@@ -22,7 +22,8 @@ _ROW = 25  # updates between two rows of the curves
 _FIRST_OUTPUT = 1.0  # the first policy opens valves now and then
 _RENEWED = 0.5  # share of arms that begin anew at rest; the others go on from where they are
 _FREE = 0.6  # share of the updates in which the price of changes rises to what it is
-_STEEPEST = 10.0, 40.0  # where derivatives are cut off in the first update and in the last, at the usual period
+_STEEPEST = 10.0  # where derivatives are cut off in the first update, at the usual period
+_STEEPEST_LAST = 40.0, 400.0  # and in the last, by every other agent: which is better depends on the arm
 _FASTEST = 4.0  # highest speed of a reference, in scaled velocities
 
 
@@ -161,13 +162,14 @@ class ServoLearner(Learner[ServoAgent]):
         """Return the task of this update.
 
         The price of changes rises, because who pays for them first never learns to move. Derivatives are cut off
-        later and later: a policy that makes arms swing has none that are of use from far away.
+        later and later: a policy that makes arms swing has none that are of use from far away. How late in the end is
+        another question on an arm that is hard to keep from swinging than on a slow one.
         """
         paid, share = (1.0, 1.0) if self.price_all_along else (min(self.share / _FREE, 1.0), self.share)
-        first, last = (one * USUAL_PERIOD / self.simulation.spec.period for one in _STEEPEST)
+        rise = _STEEPEST_LAST[self._number % len(_STEEPEST_LAST)] / _STEEPEST
         return self.task._replace(
             prices=self.task.prices._replace(change=paid * self.task.prices.change),
-            steepest=first * (last / first) ** share,
+            steepest=_STEEPEST * rise**share * USUAL_PERIOD / self.simulation.spec.period,
         )
 
     def _angles(self, step: int) -> NDArray[np.float32]:

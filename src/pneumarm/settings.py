@@ -14,8 +14,8 @@ class Settings:
     """Base of frozen dataclasses whose values are checked when they are made, in Python and on the command line.
 
     A class says by ``_valid`` which of its own fields are. What the classes that it inherits from say is asked as
-    well, so that none can be forgotten. Lists, and numbers and arrays of NumPy, become tuples and plain numbers first: they
-    are written to files and compared with those of files.
+    well, so that none can be forgotten. Lists, and numbers and arrays of NumPy, become tuples and plain numbers
+    first: they are written to files and compared with those of files.
     """
 
     def _valid(self) -> Valid:

@@ -253,7 +253,8 @@ def test_a_virtual_arm_is_moved_as_it_is_named(tmp_path: Path) -> None:
         new_arm(of, 1, LABORATORY, conditions.changed(parameters, conditions.NO_NOISE)) as quiet,
         open_arm(name) as named,
     ):
-        assert isinstance(arm, VirtualArm) and isinstance(quiet, VirtualArm)
+        assert isinstance(arm, VirtualArm)
+        assert isinstance(quiet, VirtualArm)
         assert arm.spec == quiet.spec == named.spec
         assert arm.parameters.sensors != quiet.parameters.sensors
         assert not arm.is_plain

@@ -49,7 +49,9 @@ def input_importance_alt(weights: Array, inputs: Sequence[str], outputs: Sequenc
     parts = []
     for name, w in zip(outputs, weights.T, strict=True):
         largest = np.argsort(-np.abs(w), kind="stable")[:3]
-        parts.append(f"change of {readable(name)}: " + ", ".join(f"{readable(inputs[i])} {w[i]:+.2f}" for i in largest))
+        parts.append(
+            f"change of {readable(name)}: " + ", ".join(f"{readable(inputs[i])} {w[i]:+.2f}" for i in largest)
+        )
     return "Standardised weights of a least-squares fit, the largest first. " + "; ".join(parts) + "."
 
 

@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 
 from cyclopts import App, CycloptsError
 
@@ -200,6 +200,8 @@ def _run(arguments: list[str]) -> int:
             raise
         if isinstance(error, OSError) and error.errno in _NO_BUG:
             complain(f"{f'{error.filename}: ' if error.filename else ''}{error.strerror}")
+            with suppress(OSError):
+                sys.stdout.close()  # or Python would try once more to write what is left
         else:
             complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
         return 1

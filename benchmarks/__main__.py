@@ -2,9 +2,12 @@
 
 import importlib
 import pkgutil
+import signal
 import sys
 
 import benchmarks
+from pneumarm.console import complain
+from pneumarm.errors import PneumarmError, UnusableInput
 
 LONG = (
     "adaptation",
@@ -27,10 +30,25 @@ LONG = (
 )
 """What takes many minutes runs only when it is named."""
 
-if __name__ == "__main__":
+
+def main(names: list[str]) -> int:
+    """Run the benchmarks ``names``, or all that are short; return what the process is to end with."""
     found = [module.name for module in pkgutil.iter_modules(benchmarks.__path__) if not module.name.startswith("_")]
-    names = sys.argv[1:] or [name for name in found if name not in LONG]
-    for name in names:
-        print(f"== {name.replace('_', ' ')}", flush=True)
-        for line in importlib.import_module(f"benchmarks.{name}").measure():
-            print(line, flush=True)
+    try:
+        for name in names or [name for name in found if name not in LONG]:
+            if name not in found:
+                raise UnusableInput(f"benchmark {name!r}: expected one of {', '.join(found)}")
+            print(f"== {name.replace('_', ' ')}", flush=True)
+            for line in importlib.import_module(f"benchmarks.{name}").measure():
+                print(line, flush=True)
+    except PneumarmError as error:
+        complain(error)
+        return error.exit_code
+    except KeyboardInterrupt:
+        complain("interrupted; a benchmark that keeps what was measured goes on when it is called again")
+        return 128 + signal.SIGINT
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

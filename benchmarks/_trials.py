@@ -1,14 +1,16 @@
 """What long benchmarks share: rows that outlast an interruption, and movements on an arm by their numbers."""
 
 import json
+import math
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, open_arm
@@ -63,6 +65,18 @@ class Rows:
 
     def _key(self, row: dict[str, Any]) -> tuple[Any, ...]:
         return tuple(row[key] for key in self.keys)
+
+
+def in_processes(
+    function: Callable[..., dict[str, Any]], tasks: Sequence[tuple[Any, ...]], processes: int
+) -> Iterator[dict[str, Any]]:
+    """Give what ``function`` returns of each task, as they come; processes end with whoever asks for them."""
+    return Parallel(processes, return_as="generator_unordered")(delayed(function)(*task) for task in tasks)  # type: ignore[no-any-return]
+
+
+def seconds_of(row: dict[str, Any]) -> float:
+    """Return the median time of a row of :func:`on_arrival`; a time that no movement has is infinite."""
+    return math.inf if row["seconds"] is None else float(row["seconds"])
 
 
 def collected(

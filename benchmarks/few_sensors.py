@@ -12,14 +12,13 @@ PNEUMARM_FEW_GOALS      200 to settle at, and as many to reach
 PNEUMARM_FEW_FOLDER     where rows are kept; runs/few_sensors by default
 """
 
-import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks._trials import Rows, on_arrival
+from benchmarks import _environment as environment
+from benchmarks._trials import Rows, on_arrival, seconds_of
 from pneumarm.statistics import mean_estimate, rate_estimate
 
 KINDS = {"all sensors": "", "angle alone": ",pressure_sensors=off"}
@@ -31,11 +30,9 @@ HEADER = (
 
 
 def measure() -> Iterator[str]:
-    arms = [int(arm) for arm in os.environ.get("PNEUMARM_FEW_ARMS", "11,12,13,14,15").split(",")]
-    goals = int(os.environ.get("PNEUMARM_FEW_GOALS", "200"))
-    folder = Path(os.environ.get("PNEUMARM_FEW_FOLDER", "runs/few_sensors"))
-    folder.mkdir(parents=True, exist_ok=True)
-    rows = Rows(folder / "rows.jsonl", "kind", "arm", "goals")
+    arms = environment.seeds("PNEUMARM_FEW_ARMS", "11,12,13,14,15")
+    goals = environment.whole("PNEUMARM_FEW_GOALS", 200)
+    rows = Rows(environment.folder("PNEUMARM_FEW_FOLDER", "runs/few_sensors") / "rows.jsonl", "kind", "arm", "goals")
     wanted = [(arm, goals) for arm in arms]
     yield HEADER
     for arm in arms:
@@ -56,10 +53,11 @@ def line(kind: str, arm: str, rows: list[dict[str, Any]]) -> str:
     def mean(name: str) -> float:
         return float(np.mean([row[name] for row in rows]))
 
+    seconds = float(np.mean([seconds_of(row) for row in rows]))
     success = rate_estimate(np.concatenate([row["success"] for row in rows]).astype(bool))
     reward = mean_estimate(np.concatenate([row["reward"] for row in rows]))
     track = ", ".join(f"{error:.2f}" for error in np.mean([row["track"] for row in rows], axis=0))
     return (
-        f"{kind:13}{arm:>5}{mean('minutes'):6.1f}{mean('settled'):9.4f}{mean('seconds'):8.2f}{mean('rest'):7.2f}"
+        f"{kind:13}{arm:>5}{mean('minutes'):6.1f}{mean('settled'):9.4f}{seconds:8.2f}{mean('rest'):7.2f}"
         f"{track:>19}{success.mean:9.4f}{reward.mean:8.2f}"
     )

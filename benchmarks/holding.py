@@ -20,19 +20,16 @@ PNEUMARM_MOVING_PROCESSES    2
 PNEUMARM_MOVING_FOLDER       runs/moving by default
 """
 
-import os
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks._trials import HELD_OUT, Rows
-from benchmarks.moving import Plan, arm_for, prepared
+from benchmarks._trials import Rows, in_processes
+from benchmarks.moving import Plan, arm_for, asked_for, prepared
 from pneumarm.arm import ControlCycle, guarded, open_arm
 from pneumarm.arm.virtual import Fault, Leak, Payload, Push, VirtualArm
 from pneumarm.control import TransferSettings, transfer
@@ -55,19 +52,13 @@ ADAPTED = TransferSettings(episodes=200, test_episodes=1)
 
 
 def measure() -> Iterator[str]:
-    environment = {name.removeprefix("PNEUMARM_MOVING_").lower(): value for name, value in os.environ.items()}
-    folder = Path(environment.get("folder", "runs/moving"))
-    folder.mkdir(parents=True, exist_ok=True)
-    plan = Plan(folder, 0, float(environment.get("minutes", "20")), 0.0)
-    controllers = environment.get("controllers", CONTROLLERS).split(",")
-    arms = [int(arm) for arm in environment.get("arms", HELD_OUT).split(",")]
-    seeds = [int(seed) for seed in environment.get("seeds", "0").split(",")]
-    rows = Rows(folder / "holding.jsonl", "controller", "arm", "seed", "minutes")
+    wished = asked_for(CONTROLLERS, "0")
+    plan, controllers, arms, seeds = wished.plan, wished.controllers, wished.arms, wished.seeds
+    rows = Rows(plan.folder / "holding.jsonl", "controller", "arm", "seed", "minutes")
     asked = [(name, arm, seed) for name in controllers for arm in arms for seed in seeds]
     wanted = [one for one in asked if rows.get(*one, plan.minutes) is None]
-    with ProcessPoolExecutor(int(environment.get("processes", "2")), mp_context=get_context("spawn")) as pool:
-        for row in pool.map(measured, [plan] * len(wanted), *zip(*wanted, strict=True)) if wanted else ():
-            rows.add(row)
+    for row in in_processes(measured, [(plan, *one) for one in wanted], wished.processes):
+        rows.add(row)
     yield (
         f"{'':10}{'controller':12}{'rows':>5}{'mean':>10}{'largest':>10}{'back, median':>14}{'longest':>9}"
         f"{'changes/s':>11}"

@@ -18,18 +18,16 @@ PNEUMARM_MOVING_FOLDER       where controllers and rows are kept; a call with th
                              ended. runs/moving by default
 """
 
-import os
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks._trials import HELD_OUT, Rows, collected, fitted
+from benchmarks import _environment as environment
+from benchmarks._trials import HELD_OUT, Rows, collected, fitted, in_processes
 from pneumarm.arm import open_arm
 from pneumarm.classical import TuneSettings, tune
 from pneumarm.control.named import open_tracking
@@ -58,26 +56,41 @@ class Plan:
     seconds: float
 
 
-def measure() -> Iterator[str]:
-    environment = {name.removeprefix("PNEUMARM_MOVING_").lower(): value for name, value in os.environ.items()}
-    folder = Path(environment.get("folder", "runs/moving"))
-    folder.mkdir(parents=True, exist_ok=True)
-    plan = Plan(
-        folder,
-        int(environment.get("goals", "500")),
-        float(environment.get("minutes", "20")),
-        float(environment.get("seconds", "30")),
+@dataclass(frozen=True)
+class Asked:
+    """What the environment asks for; the same for all benchmarks of moving."""
+
+    plan: Plan
+    controllers: list[str]
+    arms: list[int]
+    seeds: list[int]
+    processes: int
+
+
+def asked_for(controllers: str = CONTROLLERS, seeds: str = "0,1,2") -> Asked:
+    """Return what is asked for, by default ``controllers`` and ``seeds``."""
+    return Asked(
+        Plan(
+            environment.folder("PNEUMARM_MOVING_FOLDER", "runs/moving"),
+            environment.whole("PNEUMARM_MOVING_GOALS", 500),
+            environment.number("PNEUMARM_MOVING_MINUTES", 20.0),
+            environment.number("PNEUMARM_MOVING_SECONDS", 30.0),
+        ),
+        environment.words("PNEUMARM_MOVING_CONTROLLERS", controllers),
+        environment.seeds("PNEUMARM_MOVING_ARMS", HELD_OUT),
+        environment.seeds("PNEUMARM_MOVING_SEEDS", seeds),
+        environment.whole("PNEUMARM_MOVING_PROCESSES", 2),
     )
-    controllers = environment.get("controllers", CONTROLLERS).split(",")
-    arms = [int(arm) for arm in environment.get("arms", HELD_OUT).split(",")]
-    seeds = [int(seed) for seed in environment.get("seeds", "0,1,2").split(",")]
-    rows = Rows(folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds")
+
+
+def measure() -> Iterator[str]:
+    wished = asked_for()
+    plan, controllers, arms, seeds = wished.plan, wished.controllers, wished.arms, wished.seeds
+    rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds")
     asked = [(name, arm, seed) for name in controllers for arm in arms for seed in seeds]
     wanted = [one for one in asked if rows.get(*one, plan.goals, plan.minutes, plan.seconds) is None]
-    processes = int(environment.get("processes", "2"))
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        for row in pool.map(measured, [plan] * len(wanted), *zip(*wanted, strict=True)) if wanted else ():
-            rows.add(row)
+    for row in in_processes(measured, [(plan, *one) for one in wanted], wished.processes):
+        rows.add(row)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in controllers}
     for one in asked:
         row = rows.get(*one, plan.goals, plan.minutes, plan.seconds)

@@ -7,7 +7,6 @@ moving``, and so are the settings from the environment; movements are made on th
 of the first three (:mod:`pneumarm.planning.moving_bound`).
 """
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks._trials import HELD_OUT, Rows
-from benchmarks.moving import AMPLITUDES, CONTROLLERS, FREQUENCIES, TOLERANCE, Plan, arm_for, key, prepared
+from benchmarks._trials import Rows
+from benchmarks.moving import AMPLITUDES, FREQUENCIES, TOLERANCE, Plan, arm_for, asked_for, key, prepared
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control.named import open_tracking
@@ -39,16 +38,9 @@ Course = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def measure() -> Iterator[str]:
-    environment = {name.removeprefix("PNEUMARM_MOVING_").lower(): value for name, value in os.environ.items()}
-    plan = Plan(
-        Path(environment.get("folder", "runs/moving")),
-        int(environment.get("goals", "500")),
-        float(environment.get("minutes", "20")),
-        float(environment.get("seconds", "30")),
-    )
-    names = [name for name in environment.get("controllers", CONTROLLERS).split(",") if name != "plan"][: len(INKS)]
-    arms = [int(arm) for arm in environment.get("arms", HELD_OUT).split(",")]
-    seeds = [int(seed) for seed in environment.get("seeds", "0,1,2").split(",")]
+    wished = asked_for()
+    plan, arms, seeds = wished.plan, wished.arms, wished.seeds
+    names = [name for name in wished.controllers if name != "plan"][: len(INKS)]
     yield str(save(movements({name: made(plan, name, arms[0]) for name in names}), "moving.svg"))
     rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds")
     errors = {

@@ -7,8 +7,8 @@ default agent, trained, settles at goals that the arm was seen to hold and follo
 reaching reaches goals. What was measured is kept, so an interrupted benchmark goes on. Settings come from the
 environment:
 
-PNEUMARM_WIDE_ARMS       names of arms divided by blanks, or first and last seed of wide arms, such as the default,
-                         6000-6009; 5000-5299 are held out
+PNEUMARM_WIDE_ARMS       names of arms divided by blanks, or seeds of wide arms, such as the default, 6000-6009;
+                         5000-5299 are held out
 PNEUMARM_WIDE_GOALS      40 to settle at, and as many to reach
 PNEUMARM_WIDE_FOLDER     where rows are kept; runs/wide_arms by default
 PNEUMARM_WIDE_PROCESSES  2
@@ -16,14 +16,13 @@ PNEUMARM_WIDE_PROCESSES  2
 
 import os
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks._trials import Rows, on_arrival
+from benchmarks import _environment as environment
+from benchmarks._trials import Rows, in_processes, on_arrival, seconds_of
+from pneumarm.arm import open_arm
 
 QUANTILES = 0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0
 COLUMNS = {
@@ -43,15 +42,12 @@ COLUMNS = {
 
 def measure() -> Iterator[str]:
     arms = names_of(os.environ.get("PNEUMARM_WIDE_ARMS", "6000-6009"))
-    goals = int(os.environ.get("PNEUMARM_WIDE_GOALS", "40"))
-    folder = Path(os.environ.get("PNEUMARM_WIDE_FOLDER", "runs/wide_arms"))
-    folder.mkdir(parents=True, exist_ok=True)
-    rows = Rows(folder / "rows.jsonl", "arm", "goals")
+    goals = environment.whole("PNEUMARM_WIDE_GOALS", 40)
+    processes = environment.whole("PNEUMARM_WIDE_PROCESSES", 2)
+    rows = Rows(environment.folder("PNEUMARM_WIDE_FOLDER", "runs/wide_arms") / "rows.jsonl", "arm", "goals")
     wanted = [arm for arm in arms if rows.get(arm, goals) is None]
-    processes = int(os.environ.get("PNEUMARM_WIDE_PROCESSES", "2"))
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        for arm, row in zip(wanted, pool.map(arrived, wanted, [goals] * len(wanted)), strict=True):
-            rows.add({"arm": arm, "goals": goals, **row})
+    for row in in_processes(arrived, [(arm, goals) for arm in wanted], processes):
+        rows.add(row)
     table = [figures_of(row) for arm in arms if (row := rows.get(arm, goals)) is not None]
     yield f"{'':22}" + "".join(f"{title:>13}" for title in COLUMNS.values())
     for arm, figures in zip(arms, table, strict=True):
@@ -62,24 +58,30 @@ def measure() -> Iterator[str]:
 
 
 def names_of(arms: str) -> list[str]:
-    """Return names of arms from the setting."""
-    first, _, last = arms.partition("-")
-    if first.isdigit() and last.isdigit():
-        return [f"virtual:wide,seed={seed}" for seed in range(int(first), int(last) + 1)]
-    return arms.split()
+    """Return names of arms from the setting.
+
+    Raises:
+        UnusableInput: there is no arm of such a name.
+
+    """
+    try:
+        return [f"virtual:wide,seed={seed}" for seed in environment.seeds_in(arms)]
+    except ValueError:
+        for name in arms.split():
+            open_arm(name).close()
+        return arms.split()
 
 
 def arrived(arm: str, goals: int) -> dict[str, Any]:
-    """Return what the agents of ``arm`` do on it."""
-    return on_arrival(arm, goals, monitor=True)
+    """Return what the agents of ``arm`` do on it, as a row."""
+    return {"arm": arm, "goals": goals, **on_arrival(arm, goals, monitor=True)}
 
 
 def figures_of(row: dict[str, Any]) -> dict[str, float]:
-    """Return the figures of the table; a time that no movement has is infinite."""
+    """Return the figures of the table."""
     slow, *_, fast = row["track"]
     derived = {"slow": slow, "fast": fast, "success": np.mean(row["success"]), "reward": np.mean(row["reward"])}
-    seconds = float("inf") if row["seconds"] is None else row["seconds"]
-    return {name: float(({**row, **derived, "seconds": seconds})[name]) for name in COLUMNS}
+    return {name: float(({**row, **derived, "seconds": seconds_of(row)})[name]) for name in COLUMNS}
 
 
 def line(name: str, figures: dict[str, float]) -> str:

@@ -6,12 +6,54 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks import _environment as environment
 from benchmarks import minutes, success
+from benchmarks.__main__ import main
 from benchmarks._trials import Rows, collected, greedy_movements
+from benchmarks.wide_arms import names_of
 
+from pneumarm.errors import UnusableInput
 from pneumarm.learning import load_agent
 from pneumarm.task import Movement
 from pneumarm.transitions import Recorded
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "said"),
+    [
+        ("PNEUMARM_FEW_ARMS", "5-3", "expected seeds such as 1,2,3 or 5000-5009, got '5-3'"),
+        ("PNEUMARM_FEW_GOALS", "0", "expected a whole number, 1 or more, got '0'"),
+        ("PNEUMARM_FEW_FOLDER", __file__, "expected a folder"),
+    ],
+)
+def test_what_the_environment_says_wrong_is_told_in_a_line(
+    variable: str,
+    value: str,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(variable, value)
+    assert main(["few_sensors"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"pneumarm: {variable}: {said}")
+    assert told.count("\n") == 1
+
+
+def test_a_benchmark_that_there_is_not_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["nonsense"]) == 2
+    assert "benchmark 'nonsense': expected one of adaptation, " in capsys.readouterr().err
+
+
+def test_arms_are_read_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PNEUMARM_ARMS", "3,10-12")
+    assert environment.seeds("PNEUMARM_ARMS", "1") == [3, 10, 11, 12]
+    assert names_of("7-8") == ["virtual:wide,seed=7", "virtual:wide,seed=8"]
+    assert names_of("virtual:seed=3 virtual") == ["virtual:seed=3", "virtual"]
+    with pytest.raises(UnusableInput, match="arm 'robot'"):
+        names_of("robot")
 
 
 def test_rows_outlast_a_kill_in_the_middle_of_a_line(tmp_path: Path) -> None:

@@ -199,3 +199,22 @@ def test_it_is_installed_where_the_shell_looks(tmp_path: Path) -> None:
     file = Path(json.loads(done.stdout)["file"])
     assert file.is_relative_to(tmp_path)
     assert "_pneumarm" in file.read_text()
+
+
+def test_where_it_cannot_be_installed_is_told(tmp_path: Path) -> None:
+    (tmp_path / "home").touch()
+    environment = {**os.environ, "HOME": str(tmp_path / "home"), "MPLCONFIGDIR": str(tmp_path)}
+    done = python("-m", "pneumarm", "completion", "fish", "--install", env=environment)
+    assert done.returncode == 2
+    assert re.fullmatch(r"pneumarm: \S+: cannot be written \(.*\n", done.stderr), done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_an_answer_that_cannot_be_written_is_no_bug() -> None:
+    with (
+        open("/dev/full", "w") as full,
+        child(sys.executable, "-m", "pneumarm", "completion", "bash", stdout=full) as process,
+    ):
+        _, errors = process.communicate(timeout=LIMIT)
+    assert process.returncode == 1
+    assert errors.startswith("pneumarm: No space left on device"), errors

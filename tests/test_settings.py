@@ -4,8 +4,10 @@ from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
+import numpy as np
 import pytest
 
+from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.run import RunSettings
 from pneumarm.settings import Settings, Valid
@@ -57,6 +59,25 @@ def test_what_a_parent_demands_is_demanded_of_its_children() -> None:
         RunSettings(method="nonsense")
     with pytest.raises(UnusableInput, match="task cannot be 'track'; expected reach, what sarsa"):
         RunSettings(method="sarsa", task="track")
+
+
+def test_lists_and_numbers_of_numpy_become_tuples_and_plain_numbers() -> None:
+    spec = ArmSpec(
+        joints=np.int64(1),  # type: ignore[arg-type]
+        period=np.float32(0.0625),  # type: ignore[arg-type]
+        counts_per_degree=np.radians(1.0),
+        angle_range=[0, np.pi],  # type: ignore[arg-type]
+        fill_times=np.array([1.0, 0.5]),  # type: ignore[arg-type]
+    )
+    assert spec == ArmSpec(1, 0.0625, float(np.radians(1.0)), angle_range=(0, np.pi), fill_times=(1.0, 0.5))
+    assert [type(one) for one in (spec.joints, spec.period, spec.angle_range, spec.fill_times[1])] == [
+        int,
+        float,
+        tuple,
+        float,
+    ]
+    with pytest.raises(UnusableInput, match="angle_range cannot be"):
+        ArmSpec(angle_range=np.array([1.0, 0.0]))  # type: ignore[arg-type]
 
 
 def test_no_class_of_settings_can_forget_its_parent() -> None:

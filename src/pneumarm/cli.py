@@ -1,10 +1,11 @@
 """The command line. Commands are loaded when they are called, so that ``pneumarm --help`` answers at once."""
 
+import errno
 import os
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 
 from cyclopts import App, CycloptsError
 
@@ -136,6 +137,9 @@ COMMANDS = {
 }
 """Every command with its one-line help and an example."""
 
+_NO_BUG = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
+"""Of errors of the operating system: disks that are full, read-only or broken, and what is not allowed."""
+
 app = App(
     name="pneumarm",
     help="Learn to control an arm moved by pneumatic muscles and on/off valves, from its own recordings.",
@@ -175,6 +179,7 @@ def _run(arguments: list[str]) -> int:
         arguments = [HELP if one == HELP_ALL else one for one in arguments]
         with _told_in_full(arguments) if HELP in arguments else nullcontext():
             app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
     except CycloptsError as error:
         complain(f"{error} See {' '.join(['pneumarm', *(error.command_chain or ())])} --help.")
         return 2
@@ -193,7 +198,12 @@ def _run(arguments: list[str]) -> int:
     except Exception as error:
         if os.environ.get("PNEUMARM_DEBUG"):
             raise
-        complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
+        if isinstance(error, OSError) and error.errno in _NO_BUG:
+            complain(f"{f'{error.filename}: ' if error.filename else ''}{error.strerror}")
+            with suppress(OSError):
+                sys.stdout.close()  # or Python would try once more to write what is left
+        else:
+            complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
         return 1
     return 0
 

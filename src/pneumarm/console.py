@@ -62,7 +62,7 @@ def show(result: Mapping[str, Any], as_json: bool, table: Callable[[], Sequence[
         return
     out = Console(highlight=False, markup=False)  # "[bar]" is a unit, not a colour
     for part in table():
-        out.print(part)
+        out.print(part, soft_wrap=isinstance(part, str))
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[Any]], title: str = "") -> Table:

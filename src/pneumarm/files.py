@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -52,6 +53,28 @@ def require_folder(path: Path) -> None:
     """Raise UnusableInput where the folder that ``path`` lies in is missing, before hours go into its content."""
     if not path.parent.is_dir():
         raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
+
+
+@contextmanager
+def folder_written_whole(folder: Path) -> Iterator[Path]:
+    """Give a folder to write into, which gets the name ``folder`` when all is in it, and is removed otherwise.
+
+    Raises:
+        UnusableInput: ``folder`` exists, or cannot be written.
+
+    """
+    require_folder(folder)
+    if folder.exists():
+        raise UnusableInput(f"{folder}: exists already; give a folder that does not")
+    temporary = folder.absolute().with_name(f".{folder.name}.part")
+    shutil.rmtree(temporary, ignore_errors=True)
+    try:
+        yield temporary
+        temporary.rename(folder)
+    except OSError as error:
+        raise UnusableInput(f"{folder}: cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def write_text(path: Path, text: str) -> None:

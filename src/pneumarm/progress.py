@@ -223,5 +223,10 @@ class _Printing(logging.Handler):
     """Prints records on what is stderr now."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print ``record``."""
-        print(record.getMessage(), file=sys.stderr, flush=True)
+        """Print ``record``; a log on a disk that is full is no reason to end what an arm is doing."""
+        try:
+            print(record.getMessage(), file=sys.stderr, flush=True)
+        except BrokenPipeError:  # who read it has gone
+            raise
+        except OSError:
+            pass

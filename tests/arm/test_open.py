@@ -5,7 +5,7 @@ import pytest
 from pneumarm.arm import open_arm
 from pneumarm.arm.spec_file import save_spec
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, draw_wide, preset_parameters
-from pneumarm.errors import UnusableInput
+from pneumarm.errors import ArmFailure, UnusableInput
 
 USER = """
 from pneumarm.arm.virtual import VirtualArm
@@ -15,6 +15,10 @@ def mine():
 
 def nothing():
     return 3
+
+
+def unplugged():
+    raise OSError(2, "No such file or directory", "/dev/ttyACM9")
 """
 
 
@@ -38,6 +42,11 @@ def test_a_users_arm(tmp_path, monkeypatch):
         open_arm("python:their_arm:nothing")
     with pytest.raises(UnusableInput, match="expected a module and a callable"):
         open_arm("python:their_arm:absent")
+    with pytest.raises(ArmFailure, match=r"cannot be opened \(FileNotFoundError: .*ttyACM9"):
+        open_arm("python:their_arm:unplugged")
+    (tmp_path / "broken_arm.py").write_text("def mine(:")
+    with pytest.raises(UnusableInput, match=r"broken_arm cannot be imported \(SyntaxError"):
+        open_arm("python:broken_arm:mine")
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.arm.virtual.parameters import without_noise
 from pneumarm.control.playing import Player
@@ -24,6 +25,7 @@ from pneumarm.experiments.moving import (
     agent_of,
     draws,
     from_visits,
+    new_arm,
 )
 from pneumarm.experiments.on_the_arm_only import from_scratch
 from pneumarm.experiments.overnight.days import DAYS
@@ -40,6 +42,7 @@ from pneumarm.transitions import Store
 from small import SMALL
 
 PLAIN = "python:tests.plain_arms:linear"
+ANGLES = "virtual:seed=3,pressure_sensors=off"
 LABORATORY = LaboratorySettings(test_episodes=30, max_episodes=300)
 AGENT = replace(THESIS, agents=2, validation_episodes=20)
 
@@ -237,6 +240,29 @@ def test_they_move_any_arm(name: str, plain_laboratory: Path, tmp_path: Path) ->
     told = "Only a virtual arm can" in " ".join(analysis.summary)
     assert told == (name == "transfer")
     assert write_page(experiment, tmp_path, analysis, 1, (PLAIN,)).exists()
+
+
+def test_a_virtual_arm_is_moved_as_it_is_named(tmp_path: Path) -> None:
+    """Not as a plain one with the same parameters: without what is left out of it, at the rate that it is read at."""
+    name = "virtual:seed=3,rate=40,pressure_sensors=off,sensors=velocity"
+    of = Material(name, None)  # type: ignore[arg-type]
+    parameters = of.parameters
+    assert parameters is not None
+    with (
+        new_arm(of, 1, LABORATORY) as arm,
+        new_arm(of, 1, LABORATORY, conditions.changed(parameters, conditions.NO_NOISE)) as quiet,
+        open_arm(name) as named,
+    ):
+        assert isinstance(arm, VirtualArm)
+        assert isinstance(quiet, VirtualArm)
+        assert arm.spec == quiet.spec == named.spec
+        assert arm.parameters.sensors != quiet.parameters.sensors
+        assert not arm.is_plain
+    one = SMALL_ONES["transfer"]
+    experiment = replace(one, sizes=replace(one.sizes, learning=4, block=2, test=2, warming=1))
+    small = replace(LABORATORY, transitions=2_000, max_episodes=40)
+    done = sweep(experiment, tmp_path, [ANGLES], 1, small)
+    assert all(row.figures for row in done.rows.rows)
 
 
 def test_turn_by_turn_it_is_the_compiled_loop(small_material: Material) -> None:

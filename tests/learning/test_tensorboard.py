@@ -40,3 +40,10 @@ def test_what_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setitem(sys.modules, "tensorboardX", None)
     with pytest.raises(UnusableInput, match=r"needs tensorboardX: pip install 'pneumarm\[tensorboard\]'"):
         Scalars(tmp_path)
+
+
+def test_curves_need_a_folder(tmp_path: Path) -> None:
+    pytest.importorskip("tensorboardX")
+    (tmp_path / "file").touch()
+    with pytest.raises(UnusableInput, match="file: expected a folder for curves"):
+        Scalars(tmp_path / "file")

@@ -27,7 +27,7 @@ from pneumarm.report import (
 )
 from pneumarm.report.ledger import beside_thesis, ledger
 from pneumarm.report.run_report import TEST
-from pneumarm.report.sections import overview
+from pneumarm.report.sections import adapted, overview
 from pneumarm.task import Movements, read_episodes, write_episodes
 from pneumarm.task.movements import COLUMNS, movements
 
@@ -136,6 +136,31 @@ def test_comparison_names_ours_and_the_thesis():
     assert "36.70 by eq. 3.7" in rows["std of error after 1 s, angle [counts]"]
     assert rows["reward in the simulation"][2].startswith("10.18 (8.21 to 12.10 in 8 runs)")
     assert rows["transitions collected"][1] == "200,000"
+
+
+def test_what_is_estimated_is_told_from_what_is_measured():
+    run = builders.run(small=True)
+    spec = replace(run.spec, pressure_sensors=False, safe_supply=True)
+    rows = beside_thesis(run.results, run.quality, run.test, run.transfer, spec).rows
+    named = [row[0] for row in rows if "pressure" in row[0]]
+    assert named
+    assert all("estimated pressure" in name for name in named)
+    measured, estimated = (adapted(run.adaptation, of).figures[0].alt for of in (run.spec, spec))
+    assert "pressure 1" in measured
+    assert "angle" in estimated
+    assert "pressure" not in estimated
+
+
+@pytest.mark.parametrize(
+    ("closed_loop", "told"), [(39.9, "is 40.20; the controller is 2.10"), (45.0, "is 45.00; the controller is 1.80")]
+)
+def test_the_summary_names_the_better_of_the_two_bounds(closed_loop, told):
+    results = builders.results()
+    results["bound"]["closed_loop"] = builders.tested(closed_loop)
+    page = Page(
+        run_page(RunData(ArmSpec(), results, test=movements(0), transfer=builders.transfer(counts=(3, 3, 3))))
+    )
+    assert f"true physics finds there {told} below it" in " ".join(page.text)
 
 
 def test_comparison_of_an_unfinished_run_leaves_out_what_is_not_known():

@@ -3,6 +3,7 @@
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,15 @@ from pneumarm.transitions import Store, import_recording
 from pneumarm.transitions.episodes import action_names, episodes, observation_names
 from pneumarm.transitions.export import export_recording
 from pneumarm.transitions.rows import joined
+
+TOO_LARGE = """
+import resource, sys
+from pneumarm.cli import main
+from pneumarm.commands import export_  # with all that it needs compiled
+resource.setrlimit(resource.RLIMIT_FSIZE, (36_000, 36_000))
+main(["export", sys.argv[1], "--out", sys.argv[2]])
+"""
+"""Exports onto a disk that is full after 36 kB."""
 
 DEFAULT_FEATURES = {
     "timestamp": "float32",
@@ -69,6 +79,28 @@ def test_its_tasks_are_read_by_pandas_as_lerobot_reads_them(exportable: Path, tm
     tasks = pandas.read_parquet(tmp_path / "arm.lerobot" / "meta" / "tasks.parquet")
     assert tasks.loc[task].task_index == 0
     assert tasks.iloc[0].name == task
+
+
+@pytest.mark.parametrize(("name", "needs"), [("arm.lerobot", "pyarrow"), ("arm.minari", "minari")])
+def test_a_dataset_is_made_where_one_stands(
+    exportable: Path, tmp_path: Path, name: str, needs: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip(needs)
+    monkeypatch.chdir(tmp_path)
+    with Store.open(exportable) as store:
+        exported = export_recording(store, Path(name))
+        assert exported.sequences == store.sequences + 1
+        with pytest.raises(UnusableInput, match="exists already"):
+            export_recording(store, Path(name))
+    assert [one.name for one in tmp_path.iterdir()] == [name]
+
+
+def test_of_a_dataset_that_cannot_be_written_nothing_is_left(exportable: Path, tmp_path: Path, python: Any) -> None:
+    pytest.importorskip("pyarrow")
+    failed = python(TOO_LARGE, exportable, tmp_path / "arm.lerobot")
+    assert failed.returncode == 2, failed.stderr
+    assert "arm.lerobot: cannot be written" in failed.stderr
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", ["arm.parquet", "arm.lerobot"])

@@ -41,11 +41,11 @@ def sentences(events: Sequence[Event], quantities: Sequence[str]) -> list[str]:
             before, after = (float(np.exp(np.log(found[name]).mean())) for name in ("before", "after"))
             lines.append(
                 f"version {event.version} after movement {event.movement}: fitted to {found['movements']} movements, "
-                f"error {before:.2f} -> {after:.2f} times that of the fit"
+                f"error {after:.2f} instead of {before:.2f} times that of the fit"
             )
         elif event.what == "rolled back":
             lines.append(
                 f"version {found['taken_back']} taken back after movement {event.movement}: reward "
-                f"{found['reward_before']:.1f} -> {found['reward_after']:.1f}; again version {event.version}"
+                f"{found['reward_after']:.1f} instead of {found['reward_before']:.1f}; again version {event.version}"
             )
     return lines

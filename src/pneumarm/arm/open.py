@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pneumarm.arm.seam import Arm, ArmSpec
-from pneumarm.errors import UnusableInput
+from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 
 if TYPE_CHECKING:
     from pneumarm.arm.virtual import ArmParameters
@@ -49,6 +49,7 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
 
     Raises:
         UnusableInput: no arm has this name, or the file is not one of this arm.
+        ArmFailure: it cannot be opened.
 
     """
     place, options = _parts(name)
@@ -186,13 +187,25 @@ def _from_python(place: str) -> Arm:
     if "" not in sys.path:
         sys.path.insert(0, "")  # a user's module lies in the folder that they call us from
     try:
-        arm = getattr(importlib.import_module(module_name), attribute)()
+        made_by = getattr(importlib.import_module(module_name), attribute)
     except (ImportError, AttributeError, ValueError) as error:
         raise UnusableInput(
             f"arm python:{place}: expected a module and a callable in it that returns an Arm; {error}"
         ) from error
+    except Exception as error:  # whatever stands in it
+        raise UnusableInput(f"arm python:{place}: {module_name} cannot be imported ({_told(error)})") from error
+    try:
+        arm = made_by()
+    except PneumarmError:
+        raise
+    except Exception as error:  # whatever its maker's code or its hardware raises
+        raise ArmFailure(f"arm python:{place}: cannot be opened ({_told(error)})") from error
     if not isinstance(arm, Arm):
         raise UnusableInput(
             f"arm python:{place}: the callable must return a pneumarm.arm.Arm, it returned {type(arm).__name__}"
         )
     return arm
+
+
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

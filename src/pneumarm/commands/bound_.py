@@ -7,6 +7,7 @@ from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import show, table
+from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import load_agent
 from pneumarm.learning.servo import ServoAgent
@@ -85,6 +86,7 @@ def _servo(file: Path) -> ServoAgent:
 
 
 def _moving(arm: VirtualArm, agent: ServoAgent, settings: MovingBoundSettings, seed: int, json: bool) -> None:
+    check_fit(agent, arm)
     with progress("making movements better") as report:
         found = measure_moving_bound(arm, agent, settings, seed=seed, progress=report)
     frequencies = [f"{frequency:g}" for frequency in settings.frequencies]

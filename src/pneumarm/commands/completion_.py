@@ -5,6 +5,7 @@ from typing import Literal
 from pneumarm.commands.common import Json
 from pneumarm.commands.help_pages import HELP, HELP_ALL
 from pneumarm.console import show
+from pneumarm.errors import UnusableInput
 
 
 def completion_(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = False, json: Json = False) -> None:
@@ -23,8 +24,15 @@ def completion_(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fal
 
     app.help_flags = (HELP, HELP_ALL)
     if install:
-        file = str(app.install_completion(shell=shell))
-        show({"shell": shell, "file": file}, json, lambda: [f"{file}: begins to work in the next {shell}"])
+        try:
+            file = str(app.install_completion(shell=shell))
+        except OSError as error:
+            raise UnusableInput(
+                f"{error.filename or shell}: cannot be written ({error.strerror}); print the script and put it "
+                "where your shell looks"
+            ) from error
+        needs = ", if your .zshrc calls compinit" if shell == "zsh" else ""
+        show({"shell": shell, "file": file}, json, lambda: [f"{file}: begins to work in the next {shell}{needs}"])
         return
     script = app.generate_completion(shell=shell)
     if json:

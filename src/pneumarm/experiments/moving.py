@@ -104,10 +104,14 @@ class AgentsByTrial(OnTheArm):
 def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Arm:
     """Return the arm: a virtual one as it is in the morning, after a night of rest, any other as it is.
 
-    All trials of a run on a virtual arm meet the same noise. ``parameters`` are those of the arm, or others.
+    All trials of a run on a virtual arm meet the same noise. ``parameters`` are others than its own.
     """
-    seed, made_of = run_seed(laboratory, run), parameters or of.parameters
-    return open_arm(of.arm, seed % 2**31) if made_of is None else VirtualArm(made_of, seed=seed, name=of.arm)
+    seed = run_seed(laboratory, run)
+    arm = open_arm(of.arm, seed)
+    if parameters is None:
+        return arm
+    assert isinstance(arm, VirtualArm)
+    return arm.like(seed, parameters)
 
 
 def clock(arm: Arm) -> float:

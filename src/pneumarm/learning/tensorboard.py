@@ -4,6 +4,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
 from pneumarm.learning.training import Progress, Training
 
@@ -15,11 +16,15 @@ class Scalars:
         """Write into ``folder``, which is made if there is none; each learner gets a folder in it.
 
         Raises:
-            UnusableInput: tensorboardX is not installed.
+            UnusableInput: tensorboardX is not installed, or the folder cannot be made.
 
         """
         self._open = extra("tensorboardX", "tensorboard", "--tensorboard").SummaryWriter
         self._folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UnusableInput(f"{folder}: expected a folder for curves ({error.strerror})") from error
         self._writers: list[object] = []
         self._written: list[int] = []
 

@@ -105,7 +105,7 @@ def measure_bound(
     """Return what the planners achieve on fresh arms like ``parameters_of``.
 
     Args:
-        parameters_of: the arm whose parameters are taken; it is not moved.
+        parameters_of: the arm whose parameters and control period are taken; it is not moved.
         goals: what is drawn from, or their range (joints, 2) [counts].
         settings: how many movements, and which plans.
         seed: of begin states, goals and noise; begin states and goals are those of a transfer with the same seed.
@@ -122,7 +122,8 @@ def measure_bound(
         parameters = parameters_of.parameters
         if baseline == "open_loop":
             parameters = without_noise(parameters)
-        with VirtualArm(parameters, seed=seed, name=parameters_of.spec.name) as arm:
+        spec = parameters_of.spec
+        with VirtualArm(parameters, seed=seed, name=spec.name, period=spec.period) as arm:
             if simulation is not None and baseline == "simulated":
                 planner = simulated_planner(simulation, reward)
             else:
@@ -145,6 +146,7 @@ def _movements(
     report: Callable[[int], None],
 ) -> Planned:
     task = TaskSettings(reward=planner.reward, cutoff=settings.plan.cutoff)
+    planner.warm_up()
     rows = []
     planner.warm_up()
     for made in make_movements(arm, planner, task, drawn(goals, seed, range(settings.episodes))):

@@ -78,7 +78,7 @@ def measure_moving_bound(
     """Return the figures of each way to move, under ``settle``, and under ``track`` by frequency.
 
     Args:
-        like: the arm whose parameters are taken; it is not moved.
+        like: the arm of whose kind others are moved; it is not moved.
         agent: trained for that arm.
         settings: which movements.
         seed: of goals and noise.
@@ -97,8 +97,8 @@ def measure_moving_bound(
     total, done = 3 * (len(goals) + len(settings.frequencies)), 0
     errors: dict[Way, list[Array]] = {way: [] for way in WAYS}
     for found in (
-        _on_arm(VirtualArm(like.parameters, seed=seed), agent, goals, wave, settings),
-        _better_on_arm(VirtualArm(without_noise(like.parameters), seed=seed), agent, goals, wave, settings, random),
+        _on_arm(like.like(seed), agent, goals, wave, settings),
+        _better_on_arm(like.like(seed, without_noise(like.parameters)), agent, goals, wave, settings, random),
         _better_in_simulation(agent, goals, wave, settings, random),
     ):
         for some in found:

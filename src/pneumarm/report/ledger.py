@@ -180,7 +180,7 @@ def _simulated(results: Mapping[str, Any], quality: QualityData | None, spec: Ar
     rows = []
     for name, value in thesis.STEP_STD.items():
         unit = "counts/ms" if name == "velocity" else "counts"
-        words = name.replace("_", " ")
+        words = name.replace("pressure_", f"{spec.pressure_word} ")
         rows.append(
             [f"std of one-step error, {words} [{unit}]", _decimals(std.get(name)), f"{value:.2f}", "table 5.2"]
         )
@@ -193,7 +193,7 @@ def _simulated(results: Mapping[str, Any], quality: QualityData | None, spec: Ar
         expected = expectation(quality.propagation)[second - 1, :, i]
         rows.append(
             [
-                f"std of error after {seconds:.2g} s, {name.replace('_', ' ')} [counts]",
+                f"std of error after {seconds:.2g} s, {name.replace('pressure_', f'{spec.pressure_word} ')} [counts]",
                 f"{_decimals(measured)} measured, {_decimals(expected)} by eq. 3.7",
                 f"{thesis.SECOND_STD[name]:.2f} by eq. 3.7",
                 "table 5.2",

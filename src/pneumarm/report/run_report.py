@@ -174,9 +174,10 @@ def _summary(run: RunData) -> list[str]:
             text.append("On the arm it reaches " + " and ".join(parts) + ".")
     bound = run.results.get("bound", {})
     if "after" in bound.get("distance", {}):
-        below = bound["distance"]["after"]["open_loop"]["reward"]
+        best = max(bound["distance"]["after"], key=lambda plans: float(bound[plans]["reward"]))
+        below = bound["distance"]["after"][best]["reward"]
         text.append(
-            f"The best that planning with the arm's true physics finds there is {bound['open_loop']['reward']:.2f}; "
+            f"The best that planning with the arm's true physics finds there is {bound[best]['reward']:.2f}; "
             f"the controller is {abs(below):.2f} {'below' if below >= 0 else 'above'} it after adaptation."
         )
     text += summary_of_health(run.results)

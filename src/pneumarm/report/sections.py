@@ -66,7 +66,7 @@ def all_sections(run: RunData) -> list[Section]:
     if run.transfer is not None:
         sections.append(transferred(run.transfer, run.test))
         if run.adaptation is not None:
-            sections.append(adapted(run.adaptation))
+            sections.append(adapted(run.adaptation, run.spec))
         sections.append(by_displacement(run.transfer, run.test, run.spec))
     if run.demonstrations:
         sections.append(demonstrated(run.demonstrations, run.spec))
@@ -341,9 +341,10 @@ def transferred(data: TransferData, test: Movements | None) -> Section:
     """Return the curves of the transfer."""
     phases = phases_of(data)
     reference = levels(test) if test is not None else {}
-    learning = f"learning with a rate of {data.learning_rate:g}"
+    learning = f"learning with a rate of {data.learning_rate:g}" if data.learning_rate else "learning nothing"
     if data.adaptations:
-        learning = f"adapting between movements ({data.adaptations} time(s) the arm was found to differ)"
+        versions = "one new version" if data.adaptations == 1 else f"{data.adaptations} new versions"
+        learning = f"adapting between movements ({versions})"
     return Section(
         "Transfer to the arm",
         (
@@ -361,10 +362,12 @@ def transferred(data: TransferData, test: Movements | None) -> Section:
     )
 
 
-def adapted(data: Adapted) -> Section:
+def adapted(data: Adapted, spec: ArmSpec) -> Section:
     """Return how the simulation predicted the arm, when it was found to have changed, and the agent's versions."""
     marks = [CurveMark(event.movement, event.what) for event in data.events]
     happened = data.sentences
+    measured = [i for i, name in enumerate(data.quantities) if spec.pressure_sensors or "pressure" not in name]
+    squares, names = data.squares[..., measured], [data.quantities[i] for i in measured]
     text = [
         "After every movement the simulation's errors on the arm are compared with those of its fit. Where a "
         "simulation that is fitted to the newest movements predicts others of them better, the agent becomes a new "
@@ -378,10 +381,10 @@ def adapted(data: Adapted) -> Section:
         text,
         (
             Picture(
-                figures.adaptation_curves(data.squares, data.quantities, marks, math.sqrt(WatchSettings().allowance)),
+                figures.adaptation_curves(squares, names, marks, math.sqrt(WatchSettings().allowance)),
                 "Error of the simulation on the arm over that of its fit, as moving means of 20 movements; 1 is an "
                 "arm that is as it was (no figure in the thesis, whose agent learns while it moves, section 5.5).",
-                figures.adaptation_curves_alt(data.squares, data.quantities, marks),
+                figures.adaptation_curves_alt(squares, names, marks),
             ),
         ),
     )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
 from pneumarm.files import as_toml, require_folder, write_text, written_whole
-from pneumarm.transitions.lerobot import export_lerobot
+from pneumarm.transitions.lerobot import MAPPING, export_lerobot
 from pneumarm.transitions.minari import export_minari
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
@@ -50,9 +50,8 @@ def export_recording(store: Store, path: Path) -> Exported:
     if path.suffix == ".minari":
         return Exported(**export_minari(store, path), mapping=None)
     if path.suffix == ".lerobot":
-        counts, mapping = export_lerobot(store, path), path / "pneumarm.toml"
-        write_text(mapping, _mapping(store, "episode_index", "observation.time"))
-        return Exported(**counts, mapping=str(mapping))
+        counts = export_lerobot(store, path, _mapping(store, "episode_index", "observation.time"))
+        return Exported(**counts, mapping=str(path / MAPPING))
     sequences = set[int]()
 
     def tables() -> Iterator[NDArray[np.float64]]:

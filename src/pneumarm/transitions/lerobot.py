@@ -7,7 +7,6 @@ observation and the action that followed it. ``timestamp`` is on the grid of con
 """
 
 import json
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,13 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
-from pneumarm.files import require_folder
+from pneumarm.files import folder_written_whole
 from pneumarm.transitions.episodes import EpisodeRows, action_names, episodes, observation_names
 from pneumarm.transitions.store import Store
 
 VERSION = "v3.0"
 INFO = "meta/info.json"
+MAPPING = "pneumarm.toml"
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _EPISODES = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _TASKS = "meta/tasks.parquet"
@@ -34,31 +34,26 @@ _INDICES = ("frame_index", "episode_index", "index", "task_index")
 Statistics = dict[str, NDArray[Any]]
 
 
-def export_lerobot(store: Store, folder: Path) -> dict[str, int]:
+def export_lerobot(store: Store, folder: Path, mapping: str) -> dict[str, int]:
     """Write the rows of ``store`` into ``folder``, which is made, whole or not at all; return what was written.
+
+    The text of the ``mapping`` by which it is imported again lies beside them, as :data:`MAPPING`.
 
     Raises:
         UnusableInput: ``folder`` exists, pyarrow is not installed, there is nothing to write, or the arm's control
             rate is no whole number, which LeRobot cannot say.
 
     """
-    require_folder(folder)
     arrow, parquet = (extra(name, "lerobot", "a dataset of LeRobot") for name in ("pyarrow", "pyarrow.parquet"))
-    if folder.exists():
-        raise UnusableInput(f"{folder}: exists already; give a folder that does not")
     rate = round(1 / store.spec.period)
     if abs(rate * store.spec.period - 1) > 1e-6:
         raise UnusableInput(
             f"{store.path}: LeRobot knows whole numbers of frames a second only, this arm has "
             f"{1 / store.spec.period:g}; export .parquet"
         )
-    temporary = folder.with_name(f".{folder.name}.part")
-    shutil.rmtree(temporary, ignore_errors=True)
-    try:
+    with folder_written_whole(folder) as temporary:
         counts = _Writer(arrow, parquet, temporary, store, rate).write()
-        temporary.rename(folder)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        (temporary / MAPPING).write_text(mapping, encoding="utf-8")
     return counts
 
 

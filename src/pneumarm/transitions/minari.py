@@ -4,7 +4,6 @@ Observations and actions are those of :mod:`pneumarm.transitions.episodes`. What
 are 0, no episode terminates, and every one is truncated at its end.
 """
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 
 from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
-from pneumarm.files import require_folder
+from pneumarm.files import folder_written_whole
 from pneumarm.transitions.episodes import action_names, episodes, observation_names
 from pneumarm.transitions.store import Store
 
@@ -26,16 +25,13 @@ def export_minari(store: Store, folder: Path) -> dict[str, int]:
     ``minari.MinariDataset(folder)`` opens it.
 
     Raises:
-        UnusableInput: ``folder`` exists, or Minari is not installed.
+        UnusableInput: ``folder`` exists, Minari is not installed, or there is nothing to write.
 
     """
-    require_folder(folder)
     extra("h5py", "minari", _NEEDS)
     spaces = extra("gymnasium.spaces", "minari", _NEEDS)
     storage_of = extra("minari.dataset.minari_storage", "minari", _NEEDS).MinariStorage
     buffer_of = extra("minari.data_collector", "minari", _NEEDS).EpisodeBuffer
-    if folder.exists():
-        raise UnusableInput(f"{folder}: exists already; give a folder that does not")
     seen, done = len(observation_names(store)), len(action_names(store))
     most = 1.0 if store.valves else np.inf
     counts = {"rows": 0, "sequences": 0}
@@ -54,9 +50,7 @@ def export_minari(store: Store, folder: Path) -> dict[str, int]:
                 truncations=np.arange(n) == n - 1,
             )
 
-    temporary = folder.with_name(f".{folder.name}.part")
-    shutil.rmtree(temporary, ignore_errors=True)
-    try:
+    with folder_written_whole(folder) as temporary:
         storage = storage_of.new(
             temporary,
             observation_space=spaces.Box(-np.inf, np.inf, (seen,), np.float64),
@@ -72,9 +66,8 @@ def export_minari(store: Store, folder: Path) -> dict[str, int]:
             }
         )
         storage.update_episodes(buffers())
-        temporary.rename(folder)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        if not counts["sequences"]:
+            raise UnusableInput(f"{store.path}: holds nothing that could be exported")
     return counts
 
 

@@ -127,10 +127,24 @@ class VirtualArm(Arm):
         sides = (self.body.muscles["open"] + self.body.muscles["pending"]) % 2
         return (sides[..., INLET] - sides[..., OUTLET]).astype(np.int8)
 
+    def like(self, seed: int, parameters: ArmParameters | None = None) -> "VirtualArm":
+        """Return another arm that is as this one was when it was opened; ``parameters`` are others than its own."""
+        spec = self.spec
+        return VirtualArm(
+            self.parameters if parameters is None else parameters,
+            seed=seed,
+            name=spec.name,
+            faults=self.faults,
+            period=spec.period,
+            velocity_sensor=spec.velocity_sensor,
+            sensors=spec.sensors,
+            pressure_sensors=spec.pressure_sensors,
+        )
+
     @property
     def is_plain(self) -> bool:
-        """Whether kernels alone can move it: it plays no faults and has no further sensors."""
-        return self._player is None and self._further is None
+        """Whether kernels alone can move it: :attr:`plain` gives its body."""
+        return self._own_methods_only is None
 
     @property
     def plain(self) -> Body:
@@ -141,13 +155,20 @@ class VirtualArm(Arm):
                 pressure sensors, in place of which only the guard has estimates.
 
         """
-        if self._player is not None:
-            raise UnusableInput(f"{self.spec.name}: kernels cannot move an arm that plays faults; remove them")
-        if self._further is not None:
-            raise UnusableInput(f"{self.spec.name}: kernels cannot read further sensors; open the arm without them")
-        if not self.spec.pressure_sensors:
-            raise UnusableInput(f"{self.spec.name}: kernels cannot estimate pressures; open the arm with its sensors")
+        if self._own_methods_only is not None:
+            raise UnusableInput(f"{self.spec.name}: kernels cannot {self._own_methods_only}")
         return self.body
+
+    @property
+    def _own_methods_only(self) -> str | None:
+        """What it has that kernels cannot do, and what to do about it; None of a plain arm."""
+        if self._player is not None:
+            return "move an arm that plays faults; remove them"
+        if self._further is not None:
+            return "read further sensors; open the arm without them"
+        if not self.spec.pressure_sensors:
+            return "estimate pressures; open the arm with its sensors"
+        return None
 
     @property
     def time(self) -> float:

@@ -35,7 +35,7 @@ def input_importance(weights: Array, inputs: Sequence[str], outputs: Sequence[st
     for axis, name, w in zip(axes.flat, outputs, weights[order].T, strict=True):
         axis.barh(place, w, color=np.where(w >= 0, DARK, MIDDLE), height=0.7)
         axis.axvline(0, color=INK, lw=0.7)
-        axis.set_title(f"change of {name}")
+        axis.set_title(f"change of {readable(name)}")
         axis.set_xlabel("standardised weight [-]")
         axis.set_xlim(-limit, limit)
     for axis in axes[:, 0]:
@@ -49,7 +49,9 @@ def input_importance_alt(weights: Array, inputs: Sequence[str], outputs: Sequenc
     parts = []
     for name, w in zip(outputs, weights.T, strict=True):
         largest = np.argsort(-np.abs(w), kind="stable")[:3]
-        parts.append(f"change of {name}: " + ", ".join(f"{readable(inputs[i])} {w[i]:+.2f}" for i in largest))
+        parts.append(
+            f"change of {readable(name)}: " + ", ".join(f"{readable(inputs[i])} {w[i]:+.2f}" for i in largest)
+        )
     return "Standardised weights of a least-squares fit, the largest first. " + "; ".join(parts) + "."
 
 

@@ -24,6 +24,7 @@ from pneumarm.statistics import slope
 Array = NDArray[np.float64]
 
 _BINS = 70
+_TICKS = 6  # at most, between 0 and the ends: more would overlap where numbers have many digits
 
 
 @styled
@@ -67,6 +68,7 @@ def isoplot(observed: Array, simulated: Array, spec: ArmSpec, *, density: bool =
                 labels.append(f"slope {inclined:.3f}")
                 place.plot(ends, middle + inclined * ends, color=MIDDLE, lw=1.2)
             place.set(xlim=ends, ylim=ends)
+            place.locator_params(nbins=_TICKS)
             place.set_title(kind.name + of_joint(joint, joints))
             place.legend(keys, labels, loc="upper left")
     return figure

@@ -1,4 +1,4 @@
-"""What it costs to do without pressure sensors: the same arms with them and without.
+"""What it costs to do without pressure sensors, or without a second muscle: the same arms with them and without.
 
 python -m benchmarks few_sensors
 
@@ -8,6 +8,7 @@ goals and follows sinusoids, and the second reaches goals. What was measured is 
 on. Settings come from the environment:
 
 PNEUMARM_FEW_ARMS       seeds of virtual arms, "11,12,13,14,15"
+PNEUMARM_FEW_KINDS      which arms, "all sensors,angle alone,one muscle"
 PNEUMARM_FEW_GOALS      200 to settle at, and as many to reach
 PNEUMARM_FEW_FOLDER     where rows are kept; runs/few_sensors by default
 """
@@ -22,7 +23,7 @@ import numpy as np
 from benchmarks._trials import Rows, on_arrival
 from pneumarm.statistics import mean_estimate, rate_estimate
 
-KINDS = {"all sensors": "", "angle alone": ",pressure_sensors=off"}
+KINDS = {"all sensors": "", "angle alone": ",pressure_sensors=off", "one muscle": ",muscles=1"}
 """What is added to the name of an arm."""
 HEADER = (
     f"{'':13}{'arm':>5}{'min':>6}{'settled':>9}{'median':>8}{'rest':>7}"
@@ -32,6 +33,7 @@ HEADER = (
 
 def measure() -> Iterator[str]:
     arms = [int(arm) for arm in os.environ.get("PNEUMARM_FEW_ARMS", "11,12,13,14,15").split(",")]
+    kinds = os.environ.get("PNEUMARM_FEW_KINDS", ",".join(KINDS)).split(",")
     goals = int(os.environ.get("PNEUMARM_FEW_GOALS", "200"))
     folder = Path(os.environ.get("PNEUMARM_FEW_FOLDER", "runs/few_sensors"))
     folder.mkdir(parents=True, exist_ok=True)
@@ -39,9 +41,9 @@ def measure() -> Iterator[str]:
     wanted = [(arm, goals) for arm in arms]
     yield HEADER
     for arm in arms:
-        for kind in KINDS:
+        for kind in kinds:
             yield line(kind, str(arm), [rows.get(kind, arm, goals) or rows.add(row_of(kind, arm, goals))])
-    for kind in KINDS:
+    for kind in kinds:
         yield line(kind, "all", [row for row in rows if row["kind"] == kind and (row["arm"], row["goals"]) in wanted])
 
 

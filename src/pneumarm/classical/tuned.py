@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec
-from pneumarm.arm.seam import check_pressures
+from pneumarm.arm.seam import check_muscles
 from pneumarm.classical.calibration import Calibration
 from pneumarm.classical.cascade import Cascade, CascadeGains, Scheduled, ScheduledGains
 from pneumarm.classical.following import CommonGains, Following, Law
@@ -79,7 +79,7 @@ class Tuned:
                     f"this controller was tuned on an arm whose {name} is {tuned}, that of {arm.spec.name} is {found}"
                 )
 
-        check_pressures(self.spec, arm.spec, "this controller was tuned")
+        check_muscles(self.spec, arm.spec, "this controller was tuned")
 
     def __repr__(self) -> str:
         return f"<Tuned {self.kind} for {self.spec.name}, {1 / self.spec.period:.0f} Hz, cost {self.cost:.3f}>"

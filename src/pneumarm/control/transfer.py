@@ -12,7 +12,7 @@ import numpy as np
 from pneumarm.adaptation import AdaptationSettings, adaptation_of
 from pneumarm.arm import Arm, ControlCycle, Controller, guarded
 from pneumarm.arm.counts import Counts
-from pneumarm.arm.seam import check_pressures
+from pneumarm.arm.seam import check_muscles
 from pneumarm.control.agent import AgentController, controller_of, warm_up
 from pneumarm.control.condition import Condition
 from pneumarm.control.monitor import Mode, Monitor
@@ -440,5 +440,5 @@ def check_fit(agent: AnyAgent, arm: Arm) -> None:
             raise UnusableInput(
                 f"this agent was trained for an arm whose {name} is {trained}, that of {arm.spec.name} is {found}"
             )
-    check_pressures(agent.spec, arm.spec, "this agent was trained")
+    check_muscles(agent.spec, arm.spec, "this agent was trained")
     agent.window.require(arm.spec.further, arm.spec.name)

@@ -20,6 +20,7 @@ from pneumarm.arm.virtual.passing import drawn_lateness, pass_for, pass_time, pa
 from pneumarm.arm.virtual.playing import FaultPlayer
 from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.sensors import sense
+from pneumarm.arm.virtual.spring import with_springs
 from pneumarm.arm.virtual.start import start
 from pneumarm.arm.virtual.state import INLET, JOINT, MUSCLE, OUTLET, QUEUE, SLOW_TICK, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command, command_sides
@@ -56,6 +57,7 @@ class VirtualArm(Arm):
         velocity_sensor: whether it also reads the velocity, from faster samples of its angle.
         sensors: accelerometers and thermometers that it has besides; see :mod:`pneumarm.arm.virtual.further`.
         pressure_sensors: whether it reads pressures; where not, its supply is turned down to what its muscles bear.
+        muscles: of each joint; with 1 a spring pulls in place of muscle 2 (:mod:`pneumarm.arm.virtual.spring`).
 
     Raises:
         UnusableInput: the arm cannot play the faults, or has no joint for a sensor.
@@ -73,15 +75,19 @@ class VirtualArm(Arm):
         velocity_sensor: bool = False,
         sensors: Sequence[Sensor] = (),
         pressure_sensors: bool = True,
+        muscles: int = 2,
     ) -> None:
         self.parameters = parameters if parameters is not None else ArmParameters()
         if not pressure_sensors:
             self.parameters = _with_safe_supply(self.parameters)
+        if muscles == 1:
+            self.parameters = with_springs(self.parameters)
         joints, converter = len(self.parameters.joints), self.parameters.sensors
         period = self.parameters.period if period is None else period
         faster = min(1.0, period / PERIOD)
         self.spec = ArmSpec(
             joints=joints,
+            muscles=muscles,
             period=period,
             counts_per_degree=converter.counts_per_degree,
             counts_per_bar=converter.counts_per_bar,
@@ -112,7 +118,7 @@ class VirtualArm(Arm):
 
     @faults.setter
     def faults(self, plan: Sequence[Fault]) -> None:
-        plan = check_plan(plan, self.spec.joints)
+        plan = check_plan(plan, self.spec.joints, muscles=self.spec.muscles)
         asked, before = self._asked(), self._player
         if before is not None:
             before.restore()
@@ -129,16 +135,17 @@ class VirtualArm(Arm):
 
     @property
     def is_plain(self) -> bool:
-        """Whether kernels alone can move it: it plays no faults and has no further sensors."""
-        return self._player is None and self._further is None
+        """Whether kernels alone can move it: it plays no faults, and has the usual sensors and muscles."""
+        usual = self.spec.pressure_sensors and self.spec.muscles == 2
+        return self._player is None and self._further is None and usual
 
     @property
     def plain(self) -> Body:
         """The body of an arm that kernels alone can move.
 
         Raises:
-            UnusableInput: the arm plays faults or has further sensors, which only its own methods do, or it has no
-                pressure sensors, in place of which only the guard has estimates.
+            UnusableInput: the arm plays faults or has further sensors, which only its own methods do, it has no
+                pressure sensors, in place of which only the guard has estimates, or one muscle a joint.
 
         """
         if self._player is not None:
@@ -147,6 +154,7 @@ class VirtualArm(Arm):
             raise UnusableInput(f"{self.spec.name}: kernels cannot read further sensors; open the arm without them")
         if not self.spec.pressure_sensors:
             raise UnusableInput(f"{self.spec.name}: kernels cannot estimate pressures; open the arm with its sensors")
+        self.spec.require_pairs("kernels move joints with two; there is no bound of what this arm can do")
         return self.body
 
     @property
@@ -181,6 +189,8 @@ class VirtualArm(Arm):
         reading = Reading(_sense(self.body, angle, pressure), angle, pressure)
         if not self.spec.pressure_sensors:
             reading = Reading(reading.time, angle)
+        elif self.spec.muscles == 1:
+            reading = Reading(reading.time, angle, pressure[:, :1].copy())
         if self._further is None:
             return reading
         values = np.empty(len(self.spec.further))
@@ -188,18 +198,18 @@ class VirtualArm(Arm):
         return with_measured(reading, self.spec, values.tolist())
 
     def set_valves(self, valves: ArrayLike) -> None:
-        """Set the valves (joints, 2) of -1 out, 0 closed, +1 in; the air notices after the pipe's delay.
+        """Set the valves (joints, muscles) of -1 out, 0 closed, +1 in; the air notices after the pipe's delay.
 
         Raises:
             PneumarmError: other values or another shape.
 
         """
-        asked = np.asarray(valves)
+        asked = self._both(np.asarray(valves))
         if asked.shape == self.body.muscles.shape:
             exact = asked if asked.dtype == np.int8 else _as_int8(asked)
             if self._command(np.ascontiguousarray(exact)):
                 return
-        raise PneumarmError(f"valves must be {self.body.muscles.shape} of -1, 0 or +1, got {valves!r}")
+        raise PneumarmError(f"valves must be {self._shape} of -1, 0 or +1, got {valves!r}")
 
     def set_pulses(self, command: NDArray[np.float64]) -> bool:
         """Open the valves now and close each after its share of the control period, to the microsecond.
@@ -208,10 +218,21 @@ class VirtualArm(Arm):
             PneumarmError: shares beyond -1 to +1, or another shape.
 
         """
-        shape = self.body.muscles.shape
-        if command.shape != shape or not self._command(np.ascontiguousarray(command, np.float64)):
-            raise PneumarmError(f"pulses must be {shape} of numbers from -1 to +1, got {command!r}")
+        both = self._both(command)
+        if both.shape != self.body.muscles.shape or not self._command(np.ascontiguousarray(both, np.float64)):
+            raise PneumarmError(f"pulses must be {self._shape} of numbers from -1 to +1, got {command!r}")
         return True
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        """Of what sets the valves."""
+        return self.spec.joints, self.spec.muscles
+
+    def _both(self, command: NDArray[Any]) -> NDArray[Any]:
+        """Return ``command`` with closed valves where springs are; with nothing in it where its shape is wrong."""
+        if self.spec.muscles == 2:
+            return command
+        return np.concatenate([command, 0 * command], axis=1) if command.shape == self._shape else command[:0]
 
     def _command(self, command: Command) -> bool:
         """Give ``command`` to the valves; return False, with nothing done, where it is none."""
@@ -291,13 +312,13 @@ class VirtualArm(Arm):
 
     def rest(self, seconds: float) -> None:
         """Vent all muscles for ``seconds`` [s] and close the valves again; a night costs milliseconds."""
-        self.set_valves(np.full(self.body.muscles.shape, -1, np.int8))
+        self.set_valves(np.full(self._shape, -1, np.int8))
         self.wait(seconds)
-        self.set_valves(np.zeros(self.body.muscles.shape, np.int8))
+        self.set_valves(np.zeros(self._shape, np.int8))
 
     def close(self) -> None:
         """Close all valves."""
-        self.set_valves(np.zeros(self.body.muscles.shape, np.int8))
+        self.set_valves(np.zeros(self._shape, np.int8))
 
     def _parts(self) -> tuple[NDArray[Any], ...]:
         further = () if self._further is None else changing(self._further)

@@ -108,7 +108,7 @@ class PlainArm(Arm):
         while self._time < end - 1e-9:
             while self._coming and self._coming[0][0] <= self._time + 1e-9:
                 for pair, valves in zip(self._muscles, self._coming.pop(0)[1].tolist(), strict=True):
-                    for muscle, valve in zip(pair, valves, strict=True):
+                    for muscle, valve in zip(pair, valves, strict=False):
                         muscle.valve = valve
             until = min([end, self._time + _STEP, *(when for when, _ in self._coming[:1])])
             self._move(until - self._time)
@@ -133,7 +133,7 @@ class PlainArm(Arm):
                 muscle.squeeze(way * turned)
 
     def close(self) -> None:
-        self.set_valves(np.zeros((self.spec.joints, self.spec.muscles), np.int8))
+        self.set_valves(np.zeros((self.spec.joints, 2), np.int8))
 
 
 def linear() -> PlainArm:

@@ -173,6 +173,7 @@ def test_its_file_says_so_too(tmp_path):
     with pytest.raises(UnusableInput, match="muscle"):
         open_arm(f"{PLAIN},spec={tmp_path / 'arm.toml'}")
     with open_arm(PLAIN) as arm:
+        assert arm.read().pressure.shape == (1, 1)
         save_spec(arm.spec, tmp_path / "arm.toml")
     with open_arm(f"{PLAIN},spec={tmp_path / 'arm.toml'}") as arm:
         safe = guarded(arm)

@@ -6,14 +6,14 @@ from pneumarm.arm import Arm, ArmSpec, Reading
 
 
 class SmallestArm(Arm):
-    """An arm of any joints and muscles that a user wrote in plain lists: valves push angles and pressures about."""
+    """An arm of any number of joints that a user wrote in plain lists: valves push angles and pressures about."""
 
     def __init__(self, joints=1, **spec):
         self.spec = ArmSpec(joints=joints, name="smallest", **spec)
         self.time = 0.0
-        self.valves = [[0] * self.spec.muscles for _ in range(joints)]
+        self.valves = [[0, 0] for _ in range(joints)]
         self.angle = [500 for _ in range(joints)]
-        self.pressure = [[0] * self.spec.muscles for _ in range(joints)]
+        self.pressure = [[0, 0] for _ in range(joints)]
         self.calls = []
         self.closed = 0
 
@@ -33,11 +33,11 @@ class SmallestArm(Arm):
                 # 1 bar in a second, as in a real arm.
                 level = self.pressure[joint][muscle] + valve * 166 * seconds
                 self.pressure[joint][muscle] = max(0, level)
-            self.angle[joint] = 500 + self.pressure[joint][0] - sum(self.pressure[joint][1:])
+            self.angle[joint] = 500 + self.pressure[joint][0] - self.pressure[joint][1]
 
     def close(self):
         self.closed += 1
-        self.valves = [[0] * self.spec.muscles for _ in self.valves]
+        self.valves = [[0, 0] for _ in self.valves]
 
 
 @pytest.fixture(scope="session")

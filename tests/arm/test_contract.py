@@ -68,8 +68,10 @@ def arm(request, smallest_arm):
 
 
 def all_valves(arm, value):
-    """Return valves for ``arm`` itself; before the guard all have two muscles a joint."""
-    return np.full((arm.spec.joints, 2 if isinstance(arm, GuardedArm) else arm.spec.muscles), value, np.int8)
+    """Return valves of ``value``, those closed of muscles that are not there."""
+    valves = np.full((arm.spec.joints, 2), value, np.int8)
+    valves[:, arm.spec.muscles :] = 0
+    return valves
 
 
 def there(arm, values):
@@ -160,13 +162,13 @@ def test_each_muscle_obeys_its_own_valve(arm):
 def test_the_guard_keeps_inlets_of_full_muscles_closed(arm):
     with guarded(arm) as safe:
         assert guarded(safe) is safe
-        safe.set_valves(all_valves(safe, 1))
+        safe.set_valves(np.ones((arm.spec.joints, 2)))
         safe.wait(4.0)
         reading = safe.read()
         # No more than what comes in within one period and its dead time, and the noise.
         assert (reading.pressure <= safe.spec.max_pressure_counts + 20).all()
         over = reading.pressure > safe.spec.max_pressure_counts
-        safe.set_valves(all_valves(safe, 1))
+        safe.set_valves(np.ones((arm.spec.joints, 2)))
         assert np.array_equal(there(arm, safe.applied == 0), there(arm, over))
         assert (safe.applied[:, arm.spec.muscles :] == 0).all()
         assert (safe.peak_pressure >= reading.pressure).all()
@@ -175,9 +177,9 @@ def test_the_guard_keeps_inlets_of_full_muscles_closed(arm):
 def filled(arm, command, turns=12):
     """Return the pressures after ``turns`` control periods under a muscle's ``command``, then at rest."""
     safe = guarded(arm)
-    safe.set_valves(all_valves(safe, -1))
+    safe.set_valves(all_valves(arm, -1))
     safe.wait(2.0)
-    safe.set_valves(all_valves(safe, 0))
+    safe.set_valves(all_valves(arm, 0))
     shares = np.zeros((arm.spec.joints, 2))
     shares[0, 0] = command
     remaining = iter(range(turns))
@@ -204,13 +206,13 @@ def test_pulses_too_short_for_a_valve_are_none_or_the_shortest(arm):
     command[0] = np.nextafter(1.0, 0.0), -1.0
     safe.decide(command)
     assert there(arm, safe.applied)[0].tolist() == there(arm, command)[0].tolist()
-    safe.set_valves(all_valves(safe, 0))
+    safe.set_valves(all_valves(arm, 0))
 
 
 @pytest.mark.parametrize("wrong", [2, -2, 0.5, np.nan])
 def test_impossible_valves_are_refused_before_anything_is_set(arm, wrong):
     safe = guarded(arm)
-    safe.set_valves(all_valves(safe, -1))
+    safe.set_valves(all_valves(arm, -1))
     valves = np.zeros((arm.spec.joints, 2))
     valves[0, 1] = wrong
     with pytest.raises(PneumarmError, match="valves must be"):
@@ -222,12 +224,11 @@ def test_impossible_valves_are_refused_before_anything_is_set(arm, wrong):
 
 def test_the_cycle_keeps_period_and_latency(arm):
     cycle, turns = ControlCycle(guarded(arm)), 0
-    closed = np.zeros_like(cycle.arm.applied)
 
     def decide(reading):
         nonlocal turns
         turns += 1
-        return closed if turns <= 60 else None
+        return all_valves(arm, 0) if turns <= 60 else None
 
     steps = list(cycle.run(decide))
     times = np.array([step.reading.time for step in steps])
@@ -274,11 +275,11 @@ def test_a_state_can_be_restored_or_is_not_there(arm):
         with pytest.raises(UnusableInput, match="cannot be put into a saved state"):
             safe.set_state(b"")
         return
-    safe.set_valves(all_valves(safe, 1))
+    safe.set_valves(all_valves(arm, 1))
     safe.wait(0.3)
     first = safe.read()
     safe.set_state(state)
-    safe.set_valves(all_valves(safe, 1))
+    safe.set_valves(all_valves(arm, 1))
     safe.wait(0.3)
     again = safe.read()
     assert first.time == again.time

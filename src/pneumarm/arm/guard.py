@@ -14,7 +14,7 @@ What is asked for passes four rules, in this order:
 4. *Angle*: at an end of ``spec.angle_limits``, valves that push further out (air into the muscle that pulls there,
    air out of the other) stay closed. A joint may always be vented whole.
 
-Where joints have one muscle, valves of the second are closed whatever is asked for (:mod:`pneumarm.arm.single`).
+Where joints have one muscle, valves of the second stay closed whatever is asked for.
 
 Pulses are rounded to what the arm can do (:meth:`ArmSpec.possible`). On an arm that cannot time them itself
 (:meth:`Arm.set_pulses`) the guard does: it cuts the wait after them where one ends, and closes its valve.
@@ -35,7 +35,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.fill import EstimatedArm
 from pneumarm.arm.seam import Arm, Reading, checked
-from pneumarm.arm.single import SingleArm
 from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import Watchdog
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError, UnusableInput
@@ -122,19 +121,16 @@ class GuardedArm(Arm):
             UnusableInput: it measures no pressures, and nobody has said that its supply is safe.
 
         """
-        if not (arm.spec.pressure_sensors or arm.spec.safe_supply):
-            arm.close()
-            raise UnusableInput(
-                f"{arm.spec.name}: without pressure sensors only the supply keeps muscles from bursting; set "
-                "it to what every muscle bears and say so, by safe_supply = true in the arm's spec or arm.toml"
-            )
-        if arm.spec.muscles == 1 and not isinstance(arm, SingleArm | EstimatedArm):
-            arm = SingleArm(arm)
         if not arm.spec.pressure_sensors:
+            if not arm.spec.safe_supply:
+                arm.close()
+                raise UnusableInput(
+                    f"{arm.spec.name}: without pressure sensors only the supply keeps muscles from bursting; set "
+                    "it to what every muscle bears and say so, by safe_supply = true in the arm's spec or arm.toml"
+                )
             arm = arm if isinstance(arm, EstimatedArm) else EstimatedArm(arm)
         self.arm = arm
         self.spec = arm.spec
-        self._single = arm.spec.muscles == 1
         self._valves: NDArray[np.int8] = np.zeros((arm.spec.joints, 2), np.int8)  # as they are now
         self._closing: dict[int, float] = {}  # when pulses end, by flat place [s]
         self._times_pulses = False  # whether the arm ends them itself
@@ -322,7 +318,7 @@ class GuardedArm(Arm):
 
     def _set(self, command: Command) -> None:
         """Give ``command`` to the arm, and note when its pulses end."""
-        if self._single:
+        if self.spec.muscles == 1:
             command[:, 1] = 0  # a muscle that is not there
         self._closing, self._times_pulses = {}, False
         shares = [] if command.dtype == np.int8 else np.abs(command).ravel().tolist()

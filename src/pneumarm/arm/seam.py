@@ -73,9 +73,6 @@ class ArmSpec(Settings):
 
     joints: int = 1
     """Number of hinges, each with two antagonistic muscles, or with one."""
-    muscles: int = 2
-    """Muscles of each joint. 1: a spring or a weight pulls against it, towards lower angles, and the arm is set
-    valves, and gives pressures, of the shape (joints, 1); see :mod:`pneumarm.arm.single`."""
     period: float = 1 / 30
     """Control period [s] (thesis section 5.1: 30 Hz)."""
     counts_per_degree: float = 11.378
@@ -108,6 +105,9 @@ class ArmSpec(Settings):
     (thesis sections 5.1 and 7.3)."""
     sensors: tuple[Sensor, ...] = ()
     """Further sensors whose readings it carries, no two in one place or on one channel (thesis appendix A)."""
+    muscles: int = 2
+    """Muscles of each joint. 1: a spring or a weight pulls against it, towards lower angles. Valves of the second are
+    then never opened, and its pressure is 0 behind the guard, whatever the arm says."""
     latency: float = 0.0
     """Time [s] between reading and acting that the control cycle has to let pass on this arm.
 
@@ -198,8 +198,8 @@ class Reading:
     angle: NDArray[np.float64]
     """Angles, shape (joints,) [counts]."""
     pressure: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    """Pressures, shape (joints, 2) [counts], or (joints, 1) where joints have one muscle; left out by an arm without
-    pressure sensors, and estimated behind the guard."""
+    """Pressures, shape (joints, 2) [counts], of an arm with one muscle a joint also (joints, 1); left out by an arm
+    without pressure sensors, and estimated behind the guard."""
     velocity: NDArray[np.float64] | None = None
     """Angular velocities from a sensor of their own, shape (joints,) [counts/ms]."""
     temperature: NDArray[np.float64] | None = None
@@ -280,10 +280,7 @@ class Arm(ABC):
 
     @abstractmethod
     def set_valves(self, valves: NDArray[np.int8]) -> None:
-        """Set the valves (joints, 2) of -1 out, 0 closed, +1 in; takes effect now, holds until the next call.
-
-        Of an arm with one muscle a joint (joints, 1), here and in :meth:`set_pulses`.
-        """
+        """Set the valves (joints, 2) of -1 out, 0 closed, +1 in; takes effect now, holds until the next call."""
 
     @abstractmethod
     def wait(self, seconds: float) -> None:
@@ -351,8 +348,7 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
 
     Raises:
         ArmFailure: a value is missing, not finite or of the wrong shape; also of the further sensors of ``spec``.
-            An arm without pressure sensors may leave out the pressures. Where joints have one muscle, the pressure of
-            the other is 0, whether it is there or not.
+            An arm without pressure sensors may leave out the pressures, one with one muscle a joint those of others.
 
     """
     try:
@@ -375,13 +371,8 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
     return Reading(time, angle, pressure, reading.velocity, reading.temperature, reading.acceleration)
 
 
-def check_muscles(made_for: ArmSpec, found: ArmSpec, what: str) -> None:
-    """Raise UnusableInput where ``what`` was made for other muscles, or for pressures that come from elsewhere."""
-    if made_for.muscles != found.muscles:
-        raise UnusableInput(
-            f"{what} for an arm with {made_for.muscles} muscle(s) a joint, {found.name} has {found.muscles}; record, "
-            "fit and train on an arm like this"
-        )
+def check_pressures(made_for: ArmSpec, found: ArmSpec, what: str) -> None:
+    """Raise UnusableInput where ``what`` was made for an arm whose pressures come from elsewhere."""
     if made_for.pressure_sensors != found.pressure_sensors:
         words = ["without", "with"]
         raise UnusableInput(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec
-from pneumarm.arm.seam import check_muscles
+from pneumarm.arm.seam import check_pressures
 from pneumarm.classical.calibration import Calibration
 from pneumarm.classical.cascade import Cascade, CascadeGains, Scheduled, ScheduledGains
 from pneumarm.classical.following import CommonGains, Following, Law
@@ -72,14 +72,14 @@ class Tuned:
 
     def check_fit(self, arm: Arm) -> None:
         """Raise UnusableInput where it was tuned for an arm of another kind; of the period it is not asked."""
-        for name in ("joints", "counts_per_degree", "counts_per_bar", "angle_range"):
+        for name in ("joints", "muscles", "counts_per_degree", "counts_per_bar", "angle_range"):
             tuned, found = getattr(self.spec, name), getattr(arm.spec, name)
             if not np.allclose(tuned, found, rtol=1e-3):
                 raise UnusableInput(
                     f"this controller was tuned on an arm whose {name} is {tuned}, that of {arm.spec.name} is {found}"
                 )
 
-        check_muscles(self.spec, arm.spec, "this controller was tuned")
+        check_pressures(self.spec, arm.spec, "this controller was tuned")
 
     def __repr__(self) -> str:
         return f"<Tuned {self.kind} for {self.spec.name}, {1 / self.spec.period:.0f} Hz, cost {self.cost:.3f}>"

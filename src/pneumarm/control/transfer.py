@@ -12,7 +12,7 @@ import numpy as np
 from pneumarm.adaptation import AdaptationSettings, adaptation_of
 from pneumarm.arm import Arm, ControlCycle, Controller, guarded
 from pneumarm.arm.counts import Counts
-from pneumarm.arm.seam import check_muscles
+from pneumarm.arm.seam import check_pressures
 from pneumarm.control.agent import AgentController, controller_of, warm_up
 from pneumarm.control.condition import Condition
 from pneumarm.control.monitor import Mode, Monitor
@@ -434,11 +434,11 @@ def transfer_into(
 
 def check_fit(agent: AnyAgent, arm: Arm) -> None:
     """Raise UnusableInput where ``agent`` was not trained for an arm like this."""
-    for name in ("joints", "counts_per_degree", "counts_per_bar", "angle_range", "period"):
+    for name in ("joints", "muscles", "counts_per_degree", "counts_per_bar", "angle_range", "period"):
         trained, found = getattr(agent.spec, name), getattr(arm.spec, name)
         if not np.allclose(trained, found, rtol=1e-3):
             raise UnusableInput(
                 f"this agent was trained for an arm whose {name} is {trained}, that of {arm.spec.name} is {found}"
             )
-    check_muscles(agent.spec, arm.spec, "this agent was trained")
+    check_pressures(agent.spec, arm.spec, "this agent was trained")
     agent.window.require(arm.spec.further, arm.spec.name)

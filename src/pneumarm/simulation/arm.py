@@ -79,17 +79,17 @@ class SimulationArm(Arm):
         time = self._periods * self.spec.period + self._since
         reading = Reading(time, observation[:, 0].copy())
         if self.spec.pressure_sensors:
-            reading = replace(reading, pressure=observation[:, 2 : 2 + self.spec.muscles].copy())
+            reading = replace(reading, pressure=observation[:, 2:].copy())
         velocity = observation[:, 1] if self.spec.velocity_sensor else ()
         return with_measured(reading, self.spec, [*velocity, *further])
 
     def set_valves(self, valves: Command) -> None:
         """Set the valves; they take effect at the end of the running period."""
-        self._commanded[:, : self.spec.muscles] = valves
+        self._commanded = np.array(valves, np.float64).reshape(self.spec.joints, 2)
 
     def set_pulses(self, command: NDArray[np.float64]) -> bool:
         """Set pulses; they take effect at the end of the running period, and are over then."""
-        self._commanded[:, : self.spec.muscles] = command
+        self._commanded = command.copy()
         return True
 
     def wait(self, seconds: float) -> None:

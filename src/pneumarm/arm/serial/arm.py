@@ -3,7 +3,7 @@
 import secrets
 from contextlib import suppress
 from dataclasses import asdict, replace
-from typing import Any, NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,7 +171,7 @@ class SerialArm(Arm):
             ArmFailure: the board did not do so, and why.
 
         """
-        self._tell(_whole(self._both(np.asarray(valves, np.int8))))
+        self._tell(_whole(np.asarray(valves, np.int8).reshape(self.spec.joints, 2)))
 
     def set_pulses(self, command: NDArray[np.float64]) -> bool:
         """Open the valves (joints, 2); the board closes each after its share of the control period.
@@ -183,7 +183,6 @@ class SerialArm(Arm):
             ArmFailure: the board did not open them, and why.
 
         """
-        command = self._both(command)
         lengths = pulse_lengths(command, self.spec.period)
         pulses = tuple(muscle for muscle, length in enumerate(lengths) if 0 < length < HOLD)
         if self.version < PULSES_SINCE or any(lengths[muscle] > LONGEST_PULSE for muscle in pulses):
@@ -292,12 +291,6 @@ class SerialArm(Arm):
         self._armed = True
         self._command = _whole(self._closed_valves)
         self._fed = self._line.now()
-
-    def _both(self, command: NDArray[Any]) -> NDArray[Any]:
-        """Return ``command`` for the two muscles a joint (joints, 2) that the board knows; closed where none is."""
-        both = np.zeros((self.spec.joints, 2), command.dtype)
-        both[:, : self.spec.muscles] = command.reshape(self.spec.joints, -1)
-        return both
 
     def _tell(self, command: _Command) -> None:
         """Have the board carry out ``command``, or go on with it where it was told already."""

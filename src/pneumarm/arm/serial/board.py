@@ -195,7 +195,7 @@ class EmulatedBoard:
         return np.where(np.reshape(latched, self._asked.shape), -1, self._asked).astype(np.int8)
 
     def _apply(self) -> None:
-        self.arm.set_valves(np.ascontiguousarray(self._applied()[:, : self.arm.spec.muscles]))
+        self.arm.set_valves(self._applied())
 
     def _answered(self, frame: Frame) -> bytes:
         """Return the answer to ``frame``; nothing to one that is stale."""

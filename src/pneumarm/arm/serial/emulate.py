@@ -74,7 +74,7 @@ def _warm_up(board: EmulatedBoard) -> None:
     """Have the physics compiled, of every valve, before anyone counts the time."""
     arm = board.arm
     for value in (1, 0, -1):
-        arm.set_valves(np.full((arm.spec.joints, arm.spec.muscles), value, np.int8))
+        arm.set_valves(np.full((arm.spec.joints, 2), value, np.int8))
         board.run_until(board.time + 0.05)
 
 

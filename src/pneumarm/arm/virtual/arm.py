@@ -198,18 +198,18 @@ class VirtualArm(Arm):
         return with_measured(reading, self.spec, values.tolist())
 
     def set_valves(self, valves: ArrayLike) -> None:
-        """Set the valves (joints, muscles) of -1 out, 0 closed, +1 in; the air notices after the pipe's delay.
+        """Set the valves (joints, 2) of -1 out, 0 closed, +1 in; the air notices after the pipe's delay.
 
         Raises:
             PneumarmError: other values or another shape.
 
         """
-        asked = self._both(np.asarray(valves))
+        asked = np.asarray(valves)
         if asked.shape == self.body.muscles.shape:
             exact = asked if asked.dtype == np.int8 else _as_int8(asked)
             if self._command(np.ascontiguousarray(exact)):
                 return
-        raise PneumarmError(f"valves must be {self._shape} of -1, 0 or +1, got {valves!r}")
+        raise PneumarmError(f"valves must be {self.body.muscles.shape} of -1, 0 or +1, got {valves!r}")
 
     def set_pulses(self, command: NDArray[np.float64]) -> bool:
         """Open the valves now and close each after its share of the control period, to the microsecond.
@@ -218,21 +218,10 @@ class VirtualArm(Arm):
             PneumarmError: shares beyond -1 to +1, or another shape.
 
         """
-        both = self._both(command)
-        if both.shape != self.body.muscles.shape or not self._command(np.ascontiguousarray(both, np.float64)):
-            raise PneumarmError(f"pulses must be {self._shape} of numbers from -1 to +1, got {command!r}")
+        shape = self.body.muscles.shape
+        if command.shape != shape or not self._command(np.ascontiguousarray(command, np.float64)):
+            raise PneumarmError(f"pulses must be {shape} of numbers from -1 to +1, got {command!r}")
         return True
-
-    @property
-    def _shape(self) -> tuple[int, int]:
-        """Of what sets the valves."""
-        return self.spec.joints, self.spec.muscles
-
-    def _both(self, command: NDArray[Any]) -> NDArray[Any]:
-        """Return ``command`` with closed valves where springs are; with nothing in it where its shape is wrong."""
-        if self.spec.muscles == 2:
-            return command
-        return np.concatenate([command, 0 * command], axis=1) if command.shape == self._shape else command[:0]
 
     def _command(self, command: Command) -> bool:
         """Give ``command`` to the valves; return False, with nothing done, where it is none."""
@@ -312,13 +301,13 @@ class VirtualArm(Arm):
 
     def rest(self, seconds: float) -> None:
         """Vent all muscles for ``seconds`` [s] and close the valves again; a night costs milliseconds."""
-        self.set_valves(np.full(self._shape, -1, np.int8))
+        self.set_valves(np.full(self.body.muscles.shape, -1, np.int8))
         self.wait(seconds)
-        self.set_valves(np.zeros(self._shape, np.int8))
+        self.set_valves(np.zeros(self.body.muscles.shape, np.int8))
 
     def close(self) -> None:
         """Close all valves."""
-        self.set_valves(np.zeros(self._shape, np.int8))
+        self.set_valves(np.zeros(self.body.muscles.shape, np.int8))
 
     def _parts(self) -> tuple[NDArray[Any], ...]:
         further = () if self._further is None else changing(self._further)

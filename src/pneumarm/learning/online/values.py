@@ -21,7 +21,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS, NEVER, possible_actions
 from pneumarm.kernels import part
 from pneumarm.learning.online.settings import TrainSettings
@@ -107,15 +106,15 @@ def network_shapes(window: Window, hidden: int) -> Networks:
     return Networks(*(np.zeros(shape, np.float32) for shape in shapes))
 
 
-def draw_networks(spec: ArmSpec, window: Window, settings: TrainSettings, random: np.random.Generator) -> Networks:
+def draw_networks(window: Window, settings: TrainSettings, random: np.random.Generator, muscles: int = 2) -> Networks:
     """Return networks with all weights and biases uniform in the initial range (section 4.2.6).
 
-    Actions that the arm ``spec`` does not have are worth so little that none is ever chosen, and so ever changed.
+    Actions that joints with so many ``muscles`` do not have are worth so little that none is ever taken or changed.
     """
     most = settings.initial_weight
     shapes = network_shapes(window, settings.hidden)
     networks = Networks(*(random.uniform(-most, most, array.shape).astype(np.float32) for array in shapes))
-    networks.output_bias[:, ~possible_actions(spec.muscles)] = NEVER
+    networks.output_bias[:, ~possible_actions(muscles)] = NEVER
     return networks
 
 

@@ -107,7 +107,9 @@ def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: 
     All trials of a run on a virtual arm meet the same noise. ``parameters`` are those of the arm, or others.
     """
     seed, made_of = run_seed(laboratory, run), parameters or of.parameters
-    return open_arm(of.arm, seed % 2**31) if made_of is None else VirtualArm(made_of, seed=seed, name=of.arm)
+    if made_of is None:
+        return open_arm(of.arm, seed % 2**31)
+    return VirtualArm(made_of, seed=seed, name=of.arm, muscles=of.simulated.simulation.spec.muscles)
 
 
 def clock(arm: Arm) -> float:

@@ -117,12 +117,12 @@ def measure_bound(
     baselines: list[Baseline] = ["open_loop", "closed_loop"]
     if simulation is not None:
         baselines.append("simulated")
-    total, results = len(baselines) * settings.episodes, {}
+    spec, total, results = parameters_of.spec, len(baselines) * settings.episodes, {}
     for number, baseline in enumerate(baselines):
         parameters = parameters_of.parameters
         if baseline == "open_loop":
             parameters = without_noise(parameters)
-        with VirtualArm(parameters, seed=seed, name=parameters_of.spec.name) as arm:
+        with VirtualArm(parameters, seed=seed, name=spec.name, muscles=spec.muscles) as arm:
             if simulation is not None and baseline == "simulated":
                 planner = simulated_planner(simulation, reward)
             else:

@@ -96,9 +96,11 @@ def measure_moving_bound(
 
     total, done = 3 * (len(goals) + len(settings.frequencies)), 0
     errors: dict[Way, list[Array]] = {way: [] for way in WAYS}
+    arm = VirtualArm(like.parameters, seed=seed, muscles=spec.muscles)
+    quiet = VirtualArm(without_noise(like.parameters), seed=seed, muscles=spec.muscles)
     for found in (
-        _on_arm(VirtualArm(like.parameters, seed=seed), agent, goals, wave, settings),
-        _better_on_arm(VirtualArm(without_noise(like.parameters), seed=seed), agent, goals, wave, settings, random),
+        _on_arm(arm, agent, goals, wave, settings),
+        _better_on_arm(quiet, agent, goals, wave, settings, random),
         _better_in_simulation(agent, goals, wave, settings, random),
     ):
         for some in found:

@@ -154,7 +154,7 @@ class VirtualArm(Arm):
             raise UnusableInput(f"{self.spec.name}: kernels cannot read further sensors; open the arm without them")
         if not self.spec.pressure_sensors:
             raise UnusableInput(f"{self.spec.name}: kernels cannot estimate pressures; open the arm with its sensors")
-        self.spec.require_pairs("kernels move joints with two; there is no bound of what this arm can do")
+        self.spec.require_pairs("kernels alone move joints with two")
         return self.body
 
     @property

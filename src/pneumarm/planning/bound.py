@@ -128,6 +128,8 @@ def measure_bound(
             else:
                 planner = physics_planner(arm, reward, settings.plan, open_loop=baseline == "open_loop")
 
+            planner.warm_up()
+
             def report(done: int, before: int = number * settings.episodes) -> None:
                 if progress is not None:
                     progress(before + done, total)

@@ -1,4 +1,4 @@
-"""What it costs to do without pressure sensors: the same arms with them and without.
+"""What it costs to do without pressure sensors, or without a second muscle: the same arms with them and without.
 
 python -m benchmarks few_sensors
 
@@ -8,6 +8,7 @@ goals and follows sinusoids, and the second reaches goals. What was measured is 
 on. Settings come from the environment:
 
 PNEUMARM_FEW_ARMS       seeds of virtual arms, "11,12,13,14,15"
+PNEUMARM_FEW_KINDS      which arms, "all sensors,angle alone,one muscle"
 PNEUMARM_FEW_GOALS      200 to settle at, and as many to reach
 PNEUMARM_FEW_FOLDER     where rows are kept; runs/few_sensors by default
 """
@@ -19,9 +20,10 @@ import numpy as np
 
 from benchmarks import _environment as environment
 from benchmarks._trials import Rows, on_arrival, seconds_of
+from pneumarm.errors import UnusableInput
 from pneumarm.statistics import mean_estimate, rate_estimate
 
-KINDS = {"all sensors": "", "angle alone": ",pressure_sensors=off"}
+KINDS = {"all sensors": "", "angle alone": ",pressure_sensors=off", "one muscle": ",muscles=1"}
 """What is added to the name of an arm."""
 HEADER = (
     f"{'':13}{'arm':>5}{'min':>6}{'settled':>9}{'median':>8}{'rest':>7}"
@@ -31,14 +33,17 @@ HEADER = (
 
 def measure() -> Iterator[str]:
     arms = environment.seeds("PNEUMARM_FEW_ARMS", "11,12,13,14,15")
+    kinds = environment.words("PNEUMARM_FEW_KINDS", ",".join(KINDS))
+    if unknown := [kind for kind in kinds if kind not in KINDS]:
+        raise UnusableInput(f"PNEUMARM_FEW_KINDS: expected some of {', '.join(KINDS)}, got {unknown[0]!r}")
     goals = environment.whole("PNEUMARM_FEW_GOALS", 200)
     rows = Rows(environment.folder("PNEUMARM_FEW_FOLDER", "runs/few_sensors") / "rows.jsonl", "kind", "arm", "goals")
     wanted = [(arm, goals) for arm in arms]
     yield HEADER
     for arm in arms:
-        for kind in KINDS:
+        for kind in kinds:
             yield line(kind, str(arm), [rows.get(kind, arm, goals) or rows.add(row_of(kind, arm, goals))])
-    for kind in KINDS:
+    for kind in kinds:
         yield line(kind, "all", [row for row in rows if row["kind"] == kind and (row["arm"], row["goals"]) in wanted])
 
 

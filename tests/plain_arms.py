@@ -45,6 +45,8 @@ class Physics:
     """What a pressure sensor reads at atmosphere [counts]."""
     sag: float = 0.0
     """Part of the flow that an inlet loses while another is open."""
+    spring: tuple[float, float] = (0.0, 0.0)
+    """What pulls in place of a second muscle, as a pressure [bar] in the middle and its rise by a degree."""
 
 
 class _Muscle:
@@ -83,7 +85,7 @@ class PlainArm(Arm):
         self.spec, self._physics = spec, physics
         self._random = np.random.default_rng(seed)
         self._time = 0.0
-        self._muscles = [[_Muscle(), _Muscle()] for _ in range(spec.joints)]
+        self._muscles = [[_Muscle() for _ in range(spec.muscles)] for _ in range(spec.joints)]
         self._coming: list[tuple[float, NDArray[np.int8]]] = []
         self._angle, self._speed = [0.0] * spec.joints, [0.0] * spec.joints
 
@@ -92,7 +94,7 @@ class PlainArm(Arm):
         low, high = spec.angle_range
         angle = (low + high) / 2 + spec.counts_per_degree * np.array(self._angle)
         pressure = np.array([[muscle.inlet for muscle in pair] for pair in self._muscles])
-        counts = physics.zero + spec.counts_per_bar * pressure + physics.noise[1] * random.normal(size=(n, 2))
+        counts = physics.zero + spec.counts_per_bar * pressure + physics.noise[1] * random.normal(size=pressure.shape)
         noisy = np.clip(np.round(angle + physics.noise[0] * random.normal(size=n)), low, high)
         if not spec.pressure_sensors:
             return Reading(self._time, noisy)
@@ -106,7 +108,7 @@ class PlainArm(Arm):
         while self._time < end - 1e-9:
             while self._coming and self._coming[0][0] <= self._time + 1e-9:
                 for pair, valves in zip(self._muscles, self._coming.pop(0)[1].tolist(), strict=True):
-                    for muscle, valve in zip(pair, valves, strict=True):
+                    for muscle, valve in zip(pair, valves, strict=False):
                         muscle.valve = valve
             until = min([end, self._time + _STEP, *(when for when, _ in self._coming[:1])])
             self._move(until - self._time)
@@ -116,17 +118,19 @@ class PlainArm(Arm):
         physics = self._physics
         filling = sum(muscle.valve > 0 for pair in self._muscles for muscle in pair)
         omega = 2 * math.pi * physics.swing
-        for j, (first, second) in enumerate(self._muscles):
-            for muscle in (first, second):
+        for j, muscles in enumerate(self._muscles):
+            for muscle in muscles:
                 muscle.step(step, physics, max(filling - 1, 0))
-            rest, before = physics.reach * (first.pressure - second.pressure), self._angle[j]
+            before, (first, *others) = self._angle[j], muscles
+            against = others[0].pressure if others else physics.spring[0] + physics.spring[1] * before
+            rest = physics.reach * (first.pressure - against)
             self._speed[j] += step * (omega**2 * (rest - before) - 2 * physics.damping * omega * self._speed[j])
             self._angle[j] = min(max(before + step * self._speed[j], -physics.stop), physics.stop)
             if abs(self._angle[j]) == physics.stop:
                 self._speed[j] = 0.0
             turned = physics.squeeze * (self._angle[j] - before)
-            first.squeeze(-turned)
-            second.squeeze(turned)
+            for muscle, way in zip(muscles, (-1, 1), strict=False):
+                muscle.squeeze(way * turned)
 
     def close(self) -> None:
         self.set_valves(np.zeros((self.spec.joints, 2), np.int8))
@@ -220,6 +224,39 @@ def noisy() -> PlainArm:
         noise=(6.0, 10.0),
     )
     return PlainArm(spec, physics)
+
+
+def single() -> PlainArm:
+    """One muscle against a spring that grows stronger as it is stretched, 12 bits with noise, 25 Hz."""
+    spec = ArmSpec(
+        muscles=1,
+        period=0.04,
+        counts_per_degree=20.0,
+        counts_per_bar=900.0,
+        angle_range=(0.0, 4095.0),
+        max_pressure=1.6,
+        name="single",
+    )
+    physics = Physics(
+        lambda p: 1.8 * math.sqrt(max(1.8 - p, 0.0)),
+        lambda p: 2.0 * p**0.8,
+        60.0,
+        50.0,
+        2.2,
+        0.3,
+        0.003,
+        lag=0.01,
+        noise=(2.0, 4.0),
+        spring=(0.7, 0.004),
+    )
+    return PlainArm(spec, physics)
+
+
+def single_angle_alone() -> PlainArm:
+    """As :func:`single`, without a pressure sensor."""
+    arm = single()
+    arm.spec = replace(arm.spec, pressure_sensors=False, safe_supply=True, max_pressure=1.8)
+    return arm
 
 
 def with_pressures() -> PlainArm:

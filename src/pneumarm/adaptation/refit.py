@@ -202,11 +202,12 @@ def rehearse(simulation: Simulation, known: Transitions, count: int, random: np.
     lanes = -(-count // _REHEARSED_STEPS)
     sigma = sigma[random.integers(len(sigma), size=lanes)]
     actions = random.integers(len(VALVES), size=(lanes, window.joints))
+    valves = VALVES * (np.arange(2) < simulation.spec.muscles)
     inputs, target = [], []
     for _ in range(_REHEARSED_STEPS):
         drawn = random.integers(len(VALVES), size=actions.shape)
         actions = np.where(random.random(actions.shape) < _SWITCHES, drawn, actions)
-        command = VALVES[actions].reshape(lanes, window.command_size).astype(np.float32)
+        command = valves[actions].reshape(lanes, window.command_size).astype(np.float32)
         inputs.append(np.concatenate([sigma, command], axis=1))
         target.append(simulation.predict(inputs[-1]).astype(np.float32))
         sigma = _advanced(sigma, target[-1], command, window)

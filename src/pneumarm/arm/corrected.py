@@ -18,12 +18,17 @@ class CorrectedArm(PassedOn):
         """Take what is ``known`` of ``arm``.
 
         Raises:
-            UnusableInput: it is for another number of joints, or names sensors that the arm does not have.
+            UnusableInput: it is for another number of joints or muscles, or names sensors that the arm does not have.
 
         """
         if known.spec.joints != arm.spec.joints:
             raise UnusableInput(
                 f"the file is of an arm with {known.spec.joints} joint(s), this has {arm.spec.joints}"
+            )
+        if known.spec.muscles != arm.spec.muscles:
+            raise UnusableInput(
+                f"the file is of an arm with {known.spec.muscles} muscle(s) a joint, {arm.spec.name} has "
+                f"{arm.spec.muscles}; set muscles in it"
             )
         missing = [name for name in known.spec.further if name not in arm.spec.further]
         if missing:

@@ -14,6 +14,8 @@ What is asked for passes four rules, in this order:
 4. *Angle*: at an end of ``spec.angle_limits``, valves that push further out (air into the muscle that pulls there,
    air out of the other) stay closed. A joint may always be vented whole.
 
+Where joints have one muscle, valves of the second stay closed whatever is asked for.
+
 Pulses are rounded to what the arm can do (:meth:`ArmSpec.possible`). On an arm that cannot time them itself
 (:meth:`Arm.set_pulses`) the guard does: it cuts the wait after them where one ends, and closes its valve.
 
@@ -310,12 +312,14 @@ class GuardedArm(Arm):
         if self._inflation.spent:
             counts.inflation += _close(command, (command > 0) & np.reshape(self._inflation.blocked, command.shape))
         if self._outward is not None:
-            vented = (command < 0).all(axis=1, keepdims=True)
+            vented = (command[:, : self.spec.muscles] < 0).all(axis=1, keepdims=True)
             counts.angle += _close(command, (command != 0) & (np.sign(command) == self._outward) & ~vented)
         return command
 
     def _set(self, command: Command) -> None:
         """Give ``command`` to the arm, and note when its pulses end."""
+        if self.spec.muscles == 1:
+            command[:, 1] = 0  # a muscle that is not there
         self._closing, self._times_pulses = {}, False
         shares = [] if command.dtype == np.int8 else np.abs(command).ravel().tolist()
         if any(0 < share < 1 for share in shares):

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 _FORMS = (
     "virtual, virtual:seed=7, virtual:wide,seed=7, virtual:preset=A, virtual:seed=7,rate=200, "
     "virtual:joints=2,seed=7,coupling=0.5, virtual:seed=7,sensors=velocity+temperature, "
-    "virtual:seed=7,pressure_sensors=off, "
+    "virtual:seed=7,pressure_sensors=off, virtual:seed=7,muscles=1, "
     "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
     "emulated:ARM or python:module:callable, each with ,spec=arm.toml if you like"
 )
 _OPTION = re.compile(
-    r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|faults|spec)=|wide(?:,|$))"
+    r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|spec)=|wide(?:,|$))"
 )
 """Stands before an option; files may have commas in their names."""
 
@@ -36,7 +36,8 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     or C one of three readings of the thesis (:func:`pneumarm.arm.virtual.preset_parameters`),
     ``virtual:seed=N,sensors=velocity+acceleration+temperature`` one with further sensors, any of these
     (:mod:`pneumarm.arm.virtual.further`), ``virtual:seed=N,pressure_sensors=off`` one that reads angles alone, its
-    supply turned down to what its muscles bear, ``virtual:seed=N,faults=PLAN.toml`` one with faults
+    supply turned down to what its muscles bear, ``virtual:seed=N,muscles=1`` one with a spring in place of muscle 2
+    (:mod:`pneumarm.arm.virtual.spring`), ``virtual:seed=N,faults=PLAN.toml`` one with faults
     (:mod:`pneumarm.arm.virtual.faults`), ``virtual:seed=N,rate=200`` or ``period=0.005`` one that is controlled at
     200 Hz, not at the rate that it is made for, ``virtual:joints=2,seed=N`` a chain of several joints, up to 4, and
     with ``coupling=0.5`` one whose joints act on each other half as much;
@@ -129,7 +130,16 @@ def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | N
         velocity_sensor=velocity,
         sensors=sensors,
         pressure_sensors=_on(name, options, "pressure_sensors", spec is None or spec.pressure_sensors),
+        muscles=_muscles(name, options, 2 if spec is None else spec.muscles),
     )
+
+
+def _muscles(name: str, options: Mapping[str, str], usual: int) -> int:
+    """Return how many muscles ``options`` ask for a joint, ``usual`` where they do not say."""
+    given = options.get("muscles", str(usual))
+    if given not in ("1", "2"):
+        raise UnusableInput(f"arm {name!r}: a joint has 1 or 2 muscles, not {given!r}")
+    return int(given)
 
 
 def _parameters(name: str, options: Mapping[str, str]) -> "ArmParameters":

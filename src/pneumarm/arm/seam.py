@@ -72,7 +72,7 @@ class ArmSpec(Settings):
     """What pneumarm must know of an arm. All angles and pressures of the seam are in sensor counts."""
 
     joints: int = 1
-    """Number of hinges, each with two antagonistic muscles."""
+    """Number of hinges, each with two antagonistic muscles, or with one."""
     period: float = 1 / 30
     """Control period [s] (thesis section 5.1: 30 Hz)."""
     counts_per_degree: float = 11.378
@@ -105,6 +105,9 @@ class ArmSpec(Settings):
     (thesis sections 5.1 and 7.3)."""
     sensors: tuple[Sensor, ...] = ()
     """Further sensors whose readings it carries, no two in one place or on one channel (thesis appendix A)."""
+    muscles: int = 2
+    """Muscles of each joint. 1: a spring or a weight pulls against it, towards lower angles. Valves of the second are
+    then never opened, and its pressure is 0 behind the guard, whatever the arm says."""
     latency: float = 0.0
     """Time [s] between reading and acting that the control cycle has to let pass on this arm.
 
@@ -117,6 +120,7 @@ class ArmSpec(Settings):
         lowest, highest = self.angle_limits or (-1.0, 1.0)
         return {
             "joints": isinstance(self.joints, int) and self.joints >= 1,
+            "muscles": self.muscles in (1, 2) or "1 or 2",
             "velocity_sensor": isinstance(self.velocity_sensor, bool),
             "pulses": isinstance(self.pulses, bool),
             "shortest_pulse": _positive(self.shortest_pulse),
@@ -132,6 +136,7 @@ class ArmSpec(Settings):
             "angle_limits": math.isfinite(lowest) and math.isfinite(highest) and lowest < highest,
             "latency": math.isfinite(self.latency) and 0 <= self.latency < self.period,
             "sensors": all(one.joint <= self.joints for one in self.sensors)
+            and all((one.muscle or 1) <= self.muscles for one in self.sensors)
             and _unlike(one.name for one in self.sensors)
             and _unlike(one.channel for one in self.sensors),
         }
@@ -145,6 +150,11 @@ class ArmSpec(Settings):
     def max_pressure_counts(self) -> float:
         """The pressure limit [counts]."""
         return self.max_pressure * self.counts_per_bar
+
+    def require_pairs(self, why: str) -> None:
+        """Raise UnusableInput, and say ``why``, unless each joint has two muscles."""
+        if self.muscles != 2:
+            raise UnusableInput(f"{self.name} has one muscle a joint, and {why}")
 
     def possible(self, command: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the pulses (joints, 2) nearest to ``command`` that the arm can carry out, shares of a period."""
@@ -188,8 +198,8 @@ class Reading:
     angle: NDArray[np.float64]
     """Angles, shape (joints,) [counts]."""
     pressure: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    """Pressures, shape (joints, 2) [counts]; left out by an arm without pressure sensors, and estimated behind the
-    guard."""
+    """Pressures, shape (joints, 2) [counts], of an arm with one muscle a joint also (joints, 1); left out by an arm
+    without pressure sensors, and estimated behind the guard."""
     velocity: NDArray[np.float64] | None = None
     """Angular velocities from a sensor of their own, shape (joints,) [counts/ms]."""
     temperature: NDArray[np.float64] | None = None
@@ -338,18 +348,18 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
 
     Raises:
         ArmFailure: a value is missing, not finite or of the wrong shape; also of the further sensors of ``spec``.
-            An arm without pressure sensors may leave out the pressures.
+            An arm without pressure sensors may leave out the pressures, one with one muscle a joint those of others.
 
     """
     try:
         time = float(reading.time)
         angle = _array(reading.angle, (spec.joints,))
         none = not spec.pressure_sensors and np.size(reading.pressure) == 0
-        pressure = reading.pressure if none else _array(reading.pressure, (spec.joints, 2))
+        pressure = reading.pressure if none else _pressures(reading.pressure, spec)
     except (TypeError, ValueError, AttributeError) as error:
         raise ArmFailure(
-            f"{spec.name}: a reading needs a time, {spec.joints} angle(s) and {spec.joints} x 2 pressures, "
-            f"got {reading!r} ({error})"
+            f"{spec.name}: a reading needs a time, {spec.joints} angle(s) and {spec.joints} x {spec.muscles} "
+            f"pressures, got {reading!r} ({error})"
         ) from error
     # For a handful of numbers Python is several times faster than np.isfinite, and this runs in every period.
     if not all(map(math.isfinite, [time, *angle.tolist(), *pressure.ravel().tolist()])):
@@ -374,6 +384,16 @@ def check_pressures(made_for: ArmSpec, found: ArmSpec, what: str) -> None:
             f"{what} for an arm whose fill_times are {made_for.fill_times}, those of {found.name} are "
             f"{found.fill_times}; give the same arm.toml"
         )
+
+
+def _pressures(values: ArrayLike, spec: ArmSpec) -> NDArray[np.float64]:
+    """Return ``values`` as pressures (joints, 2) of ``spec``, 0 for muscles that are not there."""
+    if spec.muscles == 2:
+        return _array(values, (spec.joints, 2))
+    given = np.asarray(values, np.float64).reshape(spec.joints, -1)
+    if given.shape[1] > 2:
+        raise ValueError(f"{given.shape[1]} pressures a joint")
+    return np.stack([given[:, 0], np.zeros(spec.joints)], axis=1)
 
 
 def _array(values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -16,11 +16,19 @@ Command = NDArray[np.int8] | NDArray[np.float64]
 """Valves (joints, 2) of -1, 0, +1 as integers, or pulses (joints, 2) from -1 to +1 as floating-point numbers."""
 ACTIONS = 9
 """Actions of one joint."""
+NEVER = -1e9
+"""Value, or logit, of an action that an arm does not have: one that is never chosen."""
 CLOSED = 4
 """The action that keeps all four valves of a joint closed."""
 
 VALVES: NDArray[np.int8] = np.array([(a // 3 - 1, a % 3 - 1) for a in range(ACTIONS)], np.int8)
 """Valve settings by action, shape (9, 2)."""
+
+
+def possible_actions(muscles: int) -> NDArray[np.bool_]:
+    """Return which actions (9,) a joint with so many ``muscles`` has: all, or those that keep muscle 2 closed."""
+    possible: NDArray[np.bool_] = (VALVES[:, muscles:] == 0).all(axis=1)
+    return possible
 
 
 def to_valves(actions: ArrayLike) -> NDArray[np.int8]:

@@ -71,6 +71,7 @@ def leak_test(arm: Arm, test: LeakTest | None = None) -> LeakRates:
     """
     if not arm.spec.pressure_sensors:
         raise UnusableInput(f"{arm.spec.name} has no pressure sensors, by which leaks are found")
+    arm.spec.require_pairs("a leak test fills two muscles, so that the joint stays")
     test, guard = test or LeakTest(), guarded(arm)
     begin = guard.read().time
     readings = watch_closed(guard, test)

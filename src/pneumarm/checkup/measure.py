@@ -136,11 +136,12 @@ def measure(
     """Check ``arm``, whose joints must be free to move, for some two minutes; it is left vented and closed.
 
     Raises:
-        UnusableInput: the arm has no pressure sensors.
+        UnusableInput: the arm has no pressure sensors, or one muscle a joint.
         ArmFailure: the arm fails.
 
     """
     _require_pressures(arm)
+    arm.spec.require_pairs("a check-up compares the two muscles of a joint")
     guard = guarded(arm)
     bench = _Bench(guard, settings)
     told = progress or (lambda done, total: None)

@@ -72,7 +72,7 @@ class Tuned:
 
     def check_fit(self, arm: Arm) -> None:
         """Raise UnusableInput where it was tuned for an arm of another kind; of the period it is not asked."""
-        for name in ("joints", "counts_per_degree", "counts_per_bar", "angle_range"):
+        for name in ("joints", "muscles", "counts_per_degree", "counts_per_bar", "angle_range"):
             tuned, found = getattr(self.spec, name), getattr(arm.spec, name)
             if not np.allclose(tuned, found, rtol=1e-3):
                 raise UnusableInput(

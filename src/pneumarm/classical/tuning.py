@@ -82,12 +82,13 @@ def tune(
     Where the time is not enough to try any gains, the calibrated controller has those that it begins with.
 
     Raises:
-        UnusableInput: there is no such kind.
+        UnusableInput: there is no such kind, or the arm has one muscle a joint.
         ArmFailure: the arm does not answer to its valves.
 
     """
     if kind not in KINDS:
         raise UnusableInput(f"controller {kind!r}: expected one of {', '.join(KINDS)}")
+    arm.spec.require_pairs("classical controllers balance two; train an agent (`pneumarm run`), which needs one")
     if settings.rate:
         at_period(arm, 1 / settings.rate)
     guard = guarded(arm)

@@ -434,7 +434,7 @@ def transfer_into(
 
 def check_fit(agent: AnyAgent, arm: Arm) -> None:
     """Raise UnusableInput where ``agent`` was not trained for an arm like this."""
-    for name in ("joints", "counts_per_degree", "counts_per_bar", "angle_range", "period"):
+    for name in ("joints", "muscles", "counts_per_degree", "counts_per_bar", "angle_range", "period"):
         trained, found = getattr(agent.spec, name), getattr(arm.spec, name)
         if not np.allclose(trained, found, rtol=1e-3):
             raise UnusableInput(

@@ -69,7 +69,7 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._turns = Turns(arm, begin)
         self.arm = self._turns.arm
         self._tracker = StateTracker(window, scaling)
-        self.action_space = Box(-1.0, 1.0, (2 * window.joints,), np.float32)
+        self.action_space = Box(-1.0, 1.0, (arm.spec.muscles * window.joints,), np.float32)
         space = following_space(window, scaling, sensor_ranges(arm.spec, window), len(self._ahead))
         self.observation_space = cast("Space[Observation]", space)
         self._low, self._high = space.low, space.high
@@ -99,13 +99,16 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         return observation, self._info(reading, 0)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Open the valves for the shares of a control period that ``action`` (2 joints,) says."""
+        """Open the valves for the shares of a control period that ``action`` (muscles,) says."""
         if self._over:
             raise ResetNeeded("the episode is over; call reset() to begin another")
         pulses = np.asarray(action, np.float64)
-        if pulses.shape != (2 * self._spec.joints,) or not (np.abs(pulses) <= 1).all():
-            raise UnusableInput(f"an action needs {2 * self._spec.joints} shares of -1 to 1, got {action!r}")
-        reading, applied = self._turns.turn(pulses.reshape(-1, 2))
+        muscles = self._spec.muscles
+        if pulses.shape != (muscles * self._spec.joints,) or not (np.abs(pulses) <= 1).all():
+            raise UnusableInput(f"an action needs {muscles * self._spec.joints} shares of -1 to 1, got {action!r}")
+        both = np.zeros((self._spec.joints, 2))
+        both[:, :muscles] = pulses.reshape(-1, muscles)
+        reading, applied = self._turns.turn(both)
         changes = valve_changes(np.asarray(applied, np.float64)[None], self._applied)
         self._applied = np.asarray(applied, np.float64)
         self._tracker.commanded(applied)

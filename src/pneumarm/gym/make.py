@@ -51,7 +51,8 @@ def point_to_point(
     and 5). The arm is a learned simulation of one, a virtual arm, or a real one.
 
     ## Action Space
-    ``Discrete(9)``; ``MultiDiscrete([9] * joints)`` with several joints. Action ``3 * (v1 + 1) + (v2 + 1)`` sets the
+    ``Discrete(9)``; ``MultiDiscrete([9] * joints)`` with several joints; ``Discrete(3)`` for an arm with one muscle a
+    joint, whose valves are out, closed or in. Action ``3 * (v1 + 1) + (v2 + 1)`` sets the
     valves of muscle 1 and 2, each -1 (air out), 0 (closed) or +1 (air in), for a control period of 1/30 s:
 
     | Num | muscle 1 | muscle 2 |   | Num | muscle 1 | muscle 2 |   | Num | muscle 1 | muscle 2 |

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, BeginState, Reading
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.spaces import action_space, observation_space, sensor_ranges
+from pneumarm.gym.spaces import action_space, numbered, observation_space, sensor_ranges
 from pneumarm.gym.turns import Turns
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.task.settings import TaskSettings
@@ -47,7 +47,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._goals, self._task = goals, task
         self._tally = Tally(task, window.joints)
         self._tracker, self._scaling = StateTracker(window, scaling), scaling
-        self.action_space = action_space(window.joints)
+        self.action_space = action_space(arm.spec)
         space = observation_space(window, scaling, sensor_ranges(arm.spec, window), goals)
         self.observation_space = cast("Space[Observation]", space)
         self._low, self._high = space.low, space.high
@@ -84,7 +84,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         actions = np.asarray(action)
         if not self.action_space.contains(actions if actions.ndim else int(actions)):
             raise UnusableInput(f"actions must be in {self.action_space}, got {action!r}")
-        reading, applied = self._turns.turn(to_valves(actions.reshape(-1)))
+        reading, applied = self._turns.turn(to_valves(numbered(self.arm.spec)[actions.reshape(-1)]))
         self._tracker.commanded(applied)
         observation = self._observation(reading)
         self._tally.count(applied, reading.angle, self._tracker.velocity, self._goal)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.batch import act, begin_movement, observe, outcome, simulated_arms
-from pneumarm.gym.spaces import action_space, observation_space, sensor_ranges
+from pneumarm.gym.spaces import action_space, numbered, observation_space, sensor_ranges
 from pneumarm.kernels import kernel
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
@@ -73,7 +73,9 @@ class SimulatedPointToPoint(gymnasium.Env[Observation, Any]):
         self._handle = _handle(world, self._many, self._result)
         self._task = world.task
         self._over = True
-        self.action_space = action_space(window.joints)
+        self.action_space = action_space(simulation.spec)
+        self._numbered = numbered(simulation.spec)
+        self._count = len(self._numbered)
         self.observation_space = cast("Space[Observation]", simulated_space(simulation, begin))
         self._scalar = window.joints == 1
         self._actions = np.zeros((1, window.joints), np.int64)
@@ -111,13 +113,13 @@ class SimulatedPointToPoint(gymnasium.Env[Observation, Any]):
         if self._scalar:
             # A plain number is checked in a tenth of the time that the space takes.
             number = int(action)
-            if not 0 <= number < 9 or number != action:
-                raise UnusableInput(f"an action must be one of 0 to 8, got {action!r}")
-            self._actions[0, 0] = number
+            if not 0 <= number < self._count or number != action:
+                raise UnusableInput(f"an action must be one of 0 to {self._count - 1}, got {action!r}")
+            self._actions[0, 0] = self._numbered[number]
         else:
             if not self.action_space.contains(np.asarray(action)):
                 raise UnusableInput(f"actions must be in {self.action_space}, got {action!r}")
-            self._actions[0] = action
+            self._actions[0] = self._numbered[np.asarray(action)]
         reward, terminated, truncated = _step(self._handle, self._actions)
         self._over = terminated or truncated
         return self._result.observation[0].copy(), reward, terminated, truncated, {"is_success": terminated}

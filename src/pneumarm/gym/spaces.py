@@ -5,7 +5,7 @@ from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.arm.valves import ACTIONS
+from pneumarm.arm.valves import possible_actions
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.task.tracker import scaled_goal
 from pneumarm.transitions.window import QUANTITIES, Window
@@ -18,9 +18,15 @@ _ROUNDING = 1e-3  # of the scaled unit; observations are float32
 _EDGE = 0.1  # of the angle's range, on either side, where no goals lie on an arm of which nothing is recorded
 
 
-def action_space(joints: int) -> Discrete | MultiDiscrete:
-    """Return the nine valve settings of each of ``joints``."""
-    return Discrete(ACTIONS) if joints == 1 else MultiDiscrete([ACTIONS] * joints)
+def action_space(spec: ArmSpec) -> Discrete | MultiDiscrete:
+    """Return the valve settings of each joint: nine, or three where it has one muscle."""
+    count = len(numbered(spec))
+    return Discrete(count) if spec.joints == 1 else MultiDiscrete([count] * spec.joints)
+
+
+def numbered(spec: ArmSpec) -> NDArray[np.int64]:
+    """Return the actions 0..8 of a joint that the numbers of its action space stand for."""
+    return np.flatnonzero(possible_actions(spec.muscles))
 
 
 def nominal_scaling(spec: ArmSpec) -> Scaling:

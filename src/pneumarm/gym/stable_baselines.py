@@ -17,8 +17,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import UnusableInput
+from pneumarm.gym.spaces import numbered
 from pneumarm.gym.vector import PointToPointVector
 from pneumarm.learning.imported import Activation, ImportedPolicy
 from pneumarm.learning.online.settings import TrainSettings
@@ -137,7 +137,7 @@ def imported(model: Any, simulation: Simulation, settings: TrainSettings | None 
     known: dict[str, Activation] = {"Tanh": "tanh", "ReLU": "relu"}
     if len(activations) > 1 or not activations <= known.keys():
         raise UnusableInput(f"expected layers with Tanh or with ReLU between them, got {sorted(activations)}")
-    outputs = ACTIONS * simulation.window.joints
+    outputs = len(numbered(simulation.spec)) * simulation.window.joints
     if hasattr(policy, "quantile_net"):
         # The value of an action is the mean of its quantiles, which is a layer of fewer outputs.
         weights, bias = layers[-1]

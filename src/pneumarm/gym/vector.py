@@ -14,7 +14,7 @@ from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.batch import begin_batch, outcome, simulated_arms, step_batch
 from pneumarm.gym.simulated import simulated_space
-from pneumarm.gym.spaces import action_space
+from pneumarm.gym.spaces import action_space, numbered
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
@@ -68,7 +68,8 @@ class PointToPointVector(VectorEnv[Array, Array, Array]):
         self.num_envs = num_envs
         self.metadata = {"render_modes": [], "autoreset_mode": autoreset_mode}
         window = simulation.window
-        self.single_action_space = action_space(window.joints)
+        self.single_action_space = action_space(simulation.spec)
+        self._numbered = numbered(simulation.spec)
         self.single_observation_space = simulated_space(simulation, begin)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -110,8 +111,11 @@ class PointToPointVector(VectorEnv[Array, Array, Array]):
     def step(self, actions: ArrayLike) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
         """Take ``actions`` (num_envs,), or (num_envs, joints) with several joints."""
         taken = np.ascontiguousarray(actions, np.int64).reshape(self._many.actions.shape)
-        if taken.min() < 0 or taken.max() >= ACTIONS:
-            raise UnusableInput(f"actions must be 0 to {ACTIONS - 1}, got {taken.min()} to {taken.max()}")
+        count = len(self._numbered)
+        if taken.min() < 0 or taken.max() >= count:
+            raise UnusableInput(f"actions must be 0 to {count - 1}, got {taken.min()} to {taken.max()}")
+        if count < ACTIONS:
+            taken = self._numbered[taken]
         if not self._seeded:
             raise UnusableInput("call reset() before step()")
         result = self._result

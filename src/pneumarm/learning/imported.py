@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.arm.valves import ACTIONS
+from pneumarm.arm.valves import possible_actions
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning.online.settings import TrainSettings
@@ -48,7 +48,7 @@ class ImportedPolicy:
     goal_range: NDArray[np.float64]
     """Goals that it has learned to reach, shape (joints, 2) [counts]."""
     layers: tuple[tuple[Array, Array], ...]
-    """Weights (inputs, outputs) and biases (outputs,); the last has 9 outputs a joint."""
+    """Weights (inputs, outputs) and biases (outputs,); the last has an output for each action a joint has, 9 or 3."""
     activation: Activation = "tanh"
     """Between the layers."""
     settings: TrainSettings = field(default_factory=TrainSettings)
@@ -62,17 +62,22 @@ class ImportedPolicy:
                     f"a layer of {weights.shape} with {bias.size} biases does not fit to {sizes[-1]} inputs"
                 )
             sizes.append(bias.size)
-        if len(sizes) == 1 or sizes[-1] != ACTIONS * self.window.joints:
-            raise UnusableInput(f"a policy needs {ACTIONS} outputs a joint, this one has {sizes[-1]}")
+        if len(sizes) == 1 or sizes[-1] != len(self.actions) * self.window.joints:
+            raise UnusableInput(f"a policy needs {len(self.actions)} outputs a joint, this one has {sizes[-1]}")
+
+    @property
+    def actions(self) -> NDArray[np.int64]:
+        """Actions that a joint has, of 0..8, in the order of the outputs."""
+        return np.flatnonzero(possible_actions(self.spec.muscles))
 
     def values(self, inputs: ArrayLike) -> Array:
-        """Return a value for each action (..., joints, 9) of states with goals ``inputs`` (..., inputs)."""
+        """Return a value for each action (..., joints, actions) of states with goals ``inputs`` (..., inputs)."""
         x = np.asarray(inputs, np.float32)
         for number, (weights, bias) in enumerate(self.layers):
             x = x @ weights + bias
             if number < len(self.layers) - 1:
                 x = np.tanh(x) if self.activation == "tanh" else np.maximum(x, np.float32(0))
-        values: Array = x.reshape(*x.shape[:-1], self.window.joints, ACTIONS)
+        values: Array = x.reshape(*x.shape[:-1], self.window.joints, len(self.actions))
         return values
 
     def actor(self) -> "ImportedActor":
@@ -136,7 +141,7 @@ class ImportedActor:
     """An :class:`ImportedPolicy` acting step by step, greedily."""
 
     def __init__(self, policy: ImportedPolicy) -> None:
-        self._policy = policy
+        self._policy, self._actions = policy, policy.actions
         self._inputs = np.zeros(policy.window.state_size + policy.window.joints, np.float32)
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
@@ -149,8 +154,7 @@ class ImportedActor:
 
     def act(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of the current state."""
-        actions: NDArray[np.int64] = self._policy.values(self._inputs).argmax(axis=-1)
-        return actions
+        return self._actions[self._policy.values(self._inputs).argmax(axis=-1)]
 
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state``."""

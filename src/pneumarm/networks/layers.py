@@ -29,7 +29,7 @@ class Trainable(NamedTuple):
     slopes: Layers
     """The gradient's memory by layer."""
     mask: NDArray[np.float32]
-    """0 where a weight stays 0, otherwise 1, shape (size,)."""
+    """0 where a weight stays as it is, otherwise 1, shape (size,)."""
     mean: NDArray[np.float32]
     """Adam's average of the gradient, shape (size,)."""
     square: NDArray[np.float32]

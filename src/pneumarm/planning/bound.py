@@ -117,13 +117,13 @@ def measure_bound(
     baselines: list[Baseline] = ["open_loop", "closed_loop"]
     if simulation is not None:
         baselines.append("simulated")
-    total, results = len(baselines) * settings.episodes, {}
+    spec, total, results = parameters_of.spec, len(baselines) * settings.episodes, {}
     for number, baseline in enumerate(baselines):
         parameters = parameters_of.parameters
         if baseline == "open_loop":
             parameters = without_noise(parameters)
         spec = parameters_of.spec
-        with VirtualArm(parameters, seed=seed, name=spec.name, period=spec.period) as arm:
+        with VirtualArm(parameters, seed=seed, name=spec.name, period=spec.period, muscles=spec.muscles) as arm:
             if simulation is not None and baseline == "simulated":
                 planner = simulated_planner(simulation, reward)
             else:
@@ -148,7 +148,6 @@ def _movements(
     task = TaskSettings(reward=planner.reward, cutoff=settings.plan.cutoff)
     planner.warm_up()
     rows = []
-    planner.warm_up()
     for made in make_movements(arm, planner, task, drawn(goals, seed, range(settings.episodes))):
         rows.append(made.row())
         report(len(rows))

@@ -181,9 +181,11 @@ class Planner:
     """The last plan."""
 
     def __post_init__(self) -> None:
-        joints = self.model.spec.joints
-        self._workspace = tree(self.settings, joints)
-        self._problem = problem(np.zeros(joints), self.reward, self.settings, self.model.uncertainty)
+        spec = self.model.spec
+        self._workspace = tree(self.settings, spec.joints)
+        self._problem = problem(
+            np.zeros(spec.joints), self.reward, self.settings, self.model.uncertainty, spec.muscles
+        )
         self._turn = 0
         self._last = -1
         self._still = 0

@@ -26,7 +26,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from pneumarm.arm.valves import ACTIONS, VALVES
+from pneumarm.arm.valves import ACTIONS, VALVES, possible_actions
 from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel, part
@@ -109,7 +109,7 @@ class PlanProblem(NamedTuple):
     """What is sought. Made by :func:`problem`."""
 
     commands: NDArray[np.int8]
-    """Valves by action of the whole arm, shape (9**joints, joints, 2)."""
+    """Valves by action of the whole arm, shape (9**joints, joints, 2); 3**joints of one with one muscle a joint."""
     switched: NDArray[np.int64]
     """Joints that switch between two actions, shape (9**joints + 1, 9**joints); none from the last row: the begin."""
     goal: NDArray[np.float64]
@@ -163,9 +163,13 @@ class Plan(NamedTuple):
 
 
 def problem(
-    goal: NDArray[np.float64], reward: Reward, settings: PlanSettings, uncertainty: Uncertainty = CERTAIN
+    goal: NDArray[np.float64],
+    reward: Reward,
+    settings: PlanSettings,
+    uncertainty: Uncertainty = CERTAIN,
+    muscles: int = 2,
 ) -> PlanProblem:
-    """Return the problem of moving to ``goal`` (joints,) [counts] for ``reward``.
+    """Return the problem of moving to ``goal`` (joints,) [counts] for ``reward``, with so many ``muscles`` a joint.
 
     Raises:
         UnusableInput: an action or a switch is rewarded.
@@ -173,7 +177,7 @@ def problem(
     """
     if reward.action >= 0 or reward.switch > 0:
         raise UnusableInput("planning needs actions that cost something and switches that are not rewarded")
-    actions = np.array(list(product(range(ACTIONS), repeat=len(goal))))
+    actions = np.array(list(product(np.flatnonzero(possible_actions(muscles)), repeat=len(goal))))
     switched = (actions[:, None] != actions[None]).sum(axis=2)
     begin = np.zeros((1, len(actions)), np.int64)
     return PlanProblem(

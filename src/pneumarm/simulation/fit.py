@@ -34,7 +34,7 @@ from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Veloci
 from pneumarm.transitions.choice import share_held_out
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
-from pneumarm.transitions.goals import seen_goals
+from pneumarm.transitions.goals import held_range, seen_goals
 from pneumarm.transitions.grid import GridSettings
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
@@ -191,13 +191,14 @@ def fit(
     y = change / spread
     outputs = [window.input_names()[place].removesuffix("[k]") for place in places]
     linear = least_squares(x, y)
+    varied = np.ptp(x, axis=0) > 0
     fits: list[Fit] = []
     fitted = [linear]
     if settings.approximator == "network":
         targets = [y] if settings.one_network else [y[:, [i]] for i in range(len(places))]
         chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * spec.joints, settings.seed)
         fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, spec.joints, progress)
-        fitted = [one.network for one in fits]
+        fitted = [_without(one.network, ~varied) for one in fits]
     # The targets were in units of the change's spread, the simulation's are in those of the observation.
     factors = np.split(spread / scaling.observation_scale[places], len(fitted))
     networks = tuple(_rescaled(network, factor) for network, factor in zip(fitted, factors, strict=True))
@@ -270,6 +271,9 @@ def _fit_networks(
 
         y = targets[number]
         start = nguyen_widrow(x.shape[1], settings.hidden * joints, y.shape[1], int(seeds[number]))
+        if not y.any():  # what never changed needs no fit
+            start = replace(start, output_weights=np.zeros_like(start.output_weights))
+            return Fit(start, np.zeros(1), 0, converged=True)
         return levenberg_marquardt(x, y, start, solver, report)
 
     with ThreadPoolExecutor(min(len(targets), os.cpu_count() or 1)) as threads:
@@ -285,6 +289,17 @@ def _rows_to_fit(rows: int, weights: int, seed: int) -> slice | NDArray[np.int64
     if rows <= most:
         return slice(None)
     return np.sort(np.random.default_rng([seed, _ROWS]).choice(rows, most, replace=False))
+
+
+def _without(network: Network, inputs: NDArray[np.bool_]) -> Network:
+    """Return the network with no weight on those ``inputs`` (inputs,) that never varied; they are 0, scaled.
+
+    Such are all of a muscle that is not there. A network is fitted as well with any weight on them, and begins with
+    random ones.
+    """
+    if not inputs.any():
+        return network
+    return replace(network, hidden_weights=np.where(inputs[:, None], 0.0, network.hidden_weights))
 
 
 def _rescaled(network: Network, factor: NDArray[np.float64]) -> Network:
@@ -390,7 +405,7 @@ def fit_store(
         filtered.transitions,
         filtered.stream("held-out"),
         spec=store.spec,
-        goal_range=store.percentiles(),
+        goal_range=_goal_range(store),
         valves=store.valves,
         generalisation=filtered.stream("generalisation") if coverage.kept < coverage.seen else None,
         settings=settings,
@@ -398,6 +413,12 @@ def fit_store(
     )
     goals = seen_goals(store.blocks, result.simulation.goal_range)
     return StoreFit(result._replace(simulation=result.simulation.with_goals(goals)), filtered)
+
+
+def _goal_range(store: Store) -> NDArray[np.float64]:
+    """Return the range of angles that goals are drawn from, (joints, 2) [counts]."""
+    seen = store.percentiles()
+    return seen if store.spec.muscles == 2 else held_range(store.blocks, seen, store.spec.period)
 
 
 def refiltered(store: Store, simulation: Simulation, grid: GridSettings | None = None) -> Filtered:

@@ -139,10 +139,10 @@ class Simulation:
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """Which of the outputs a sensor stands behind: all of them, or all but the pressures, which are estimated."""
+        """Which outputs a sensor stands behind: no pressures that are estimated, or of a muscle that is not there."""
         places = self.outputs
-        pressure = (places < self.window.joint_size) & (places % len(QUANTITIES) > _VELOCITY)
-        return self.spec.pressure_sensors | ~pressure
+        muscle = np.where(places < self.window.joint_size, places % len(QUANTITIES) - _VELOCITY, 0)
+        return muscle <= (self.spec.muscles if self.spec.pressure_sensors else 0)
 
     @property
     def errors(self) -> NDArray[np.float64]:

@@ -91,6 +91,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
     window, scaling = simulation.window, simulation.scaling
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     commands = VALVES[None] / scaling.command_scale.reshape(window.joints, 1, 2)
+    commands[..., simulation.spec.muscles :] = 0.0
     task = Task(
         goal_range=np.ascontiguousarray(simulation.goals.range, np.float64),
         goal_ways=np.ascontiguousarray(simulation.goals.ways, np.float64),

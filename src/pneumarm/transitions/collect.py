@@ -400,6 +400,15 @@ class _Collection:
 
 def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
     """Return one of the kinds of random sequences: its name and its commands."""
+    kind, commands = _random_commands(spec, settings, random)
+    commands[..., spec.muscles :] = 0.0
+    return kind, Trajectory(commands)
+
+
+def _random_commands(
+    spec: ArmSpec, settings: CollectSettings, random: np.random.Generator
+) -> tuple[str, NDArray[np.float64]]:
+    """Return the name and the commands (actions, joints, 2) of a sequence of joints with two muscles."""
     settings = settings.for_period(spec.period)
     assert settings.actions is not None
     assert settings.longest_hold is not None
@@ -413,7 +422,7 @@ def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.G
             drawn[:, joint] = np.repeat(drawn[:, joint], lengths)[: settings.actions]
     if settings.pulses and spec.pulses and random.random() < settings.pulses:
         return _random_pulses(spec, settings, random)
-    return kind, Trajectory(valves[drawn, np.arange(spec.joints)].astype(np.float64))
+    return kind, valves[drawn, np.arange(spec.joints)].astype(np.float64)
 
 
 def _random_valves(
@@ -426,7 +435,9 @@ def _random_valves(
     return np.where(random.random(shape) < 1 / 3, 0, side)
 
 
-def _random_pulses(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
+def _random_pulses(
+    spec: ArmSpec, settings: CollectSettings, random: np.random.Generator
+) -> tuple[str, NDArray[np.float64]]:
     """Return a sequence of pulses, every muscle for itself: some repeated over a few periods, or few short ones."""
     shortest = min(spec.shortest_pulse / spec.period, 1.0)
     actions = settings.actions or 0
@@ -434,10 +445,10 @@ def _random_pulses(spec: ArmSpec, settings: CollectSettings, random: np.random.G
     valves, shares = _random_valves(shape, settings, random), random.uniform(shortest, 1.0, shape)
     if random.random() < settings.sparse:
         opened = random.random(shape) < _SPARSE
-        return "sparse", Trajectory(valves * opened * np.maximum(shares**2, shortest))
+        return "sparse", (valves * opened).astype(np.float64) * np.maximum(shares**2, shortest)
     commands = (valves * shares).reshape(actions, -1)
     longest = _periods(_LONGEST_PULSES, spec.period)
     for muscle in range(commands.shape[1]):
         lengths = random.integers(1, longest, size=actions, endpoint=True)
         commands[:, muscle] = np.repeat(commands[:, muscle], lengths)[:actions]
-    return "pulses", Trajectory(commands.reshape(shape))
+    return "pulses", commands.reshape(shape)

@@ -8,6 +8,9 @@ pair of joints goals also lie between percentiles of weighted sums of their angl
 
 in six directions alpha between the axes, h being half the range of a joint: a polygon around the combinations that
 were seen while both joints were slow. Where all combinations were seen, it leaves out next to nothing.
+
+A joint with one muscle swings far beyond where it can stand: with the muscle empty or full nothing is left that could
+pull it on. So its goals also lie between where it stood then.
 """
 
 from collections.abc import Callable, Iterable
@@ -22,6 +25,10 @@ from pneumarm.transitions.rows import Rows
 _DIRECTIONS = np.radians([22.5, 45.0, 67.5, 112.5, 135.0, 157.5])
 _SLOW = 0.3  # share of the readings in which a joint counts as slow
 _SHARES = 0.002, 0.998  # of slow readings: a uniform square loses 0.2 % at a corner
+_STRETCH = 0.2  # s in which a joint that stands hardly moves; one that turns round does
+_END = 0.03  # of the range of pressures, within which a muscle counts as empty or full
+_FULLEST = 0.005, 0.995  # shares of the pressures that this range spans
+_ENOUGH = 8  # readings at an end, to know where it is
 _TRIES = 1000  # draws until a goal counts as good whatever it is
 
 
@@ -99,6 +106,50 @@ def seen_goals(blocks: Callable[[], Iterable[Rows]], range_: NDArray[np.float64]
     if not sums.total:
         return Goals.of(range_)
     return Goals(range_, ways, sums(_SHARES).T + (ways @ middle)[:, None])
+
+
+def held_range(
+    blocks: Callable[[], Iterable[Rows]], range_: NDArray[np.float64], period: float
+) -> NDArray[np.float64]:
+    """Return what of ``range_`` (joints, 2) [counts] joints with one muscle hold, by ``blocks()``, read twice.
+
+    An end of it is the median angle of a slow joint whose muscle is empty, or full, where that was seen.
+    """
+    joints, steps = len(range_), max(2, round(_STRETCH / period))
+    spreads, pressures = Quantiles(joints), Quantiles(joints)
+    for block in blocks():
+        _, spread, pressure = _stretches(block, steps)
+        spreads.add(spread)
+        pressures.add(pressure)
+    if not spreads.total:
+        return range_
+    slow, (low, high) = spreads([_SLOW])[0], pressures(_FULLEST)
+    near = _END * (high - low)
+    stood = [[Quantiles(1), Quantiles(1)] for _ in range(joints)]
+    for block in blocks():
+        angle, spread, pressure = _stretches(block, steps)
+        for joint, ends in enumerate(stood):
+            still, now = spread[:, joint] <= slow[joint], pressure[:, joint]
+            for end, there in zip(
+                ends, (now <= low[joint] + near[joint], now >= high[joint] - near[joint]), strict=True
+            ):
+                end.add(angle[still & there, joint][:, None])
+    held = np.array(range_, np.float64)
+    for joint, ends in enumerate(stood):
+        lowest, highest = (float(end([0.5])[0, 0]) if end.total >= _ENOUGH else np.nan for end in ends)
+        held[joint] = np.fmax(held[joint, 0], lowest), np.fmin(held[joint, 1], highest)
+    return np.where((held[:, :1] < held[:, 1:]), held, range_)
+
+
+def _stretches(block: Rows, steps: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return angles after ``steps``, how far apart those since then are, and pressures of muscle 1, (n, joints)."""
+    if len(block) <= steps:
+        none = np.zeros((0, block.angle.shape[1]))
+        return none, none, none
+    joined = (block.sequence[steps:] == block.sequence[:-steps]) & (block.step[steps:] - block.step[:-steps] == steps)
+    angle = np.asarray(block.angle, np.float64)
+    spread = np.ptp(np.lib.stride_tricks.sliding_window_view(angle, steps + 1, axis=0), axis=-1)
+    return angle[steps:][joined], spread[joined], np.asarray(block.pressure[steps:, :, 0], np.float64)[joined]
 
 
 def _moved(block: Rows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

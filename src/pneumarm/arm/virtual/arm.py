@@ -20,6 +20,7 @@ from pneumarm.arm.virtual.passing import drawn_lateness, pass_for, pass_time, pa
 from pneumarm.arm.virtual.playing import FaultPlayer
 from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.sensors import sense
+from pneumarm.arm.virtual.spring import with_springs
 from pneumarm.arm.virtual.start import start
 from pneumarm.arm.virtual.state import INLET, JOINT, MUSCLE, OUTLET, QUEUE, SLOW_TICK, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command, command_sides
@@ -56,6 +57,7 @@ class VirtualArm(Arm):
         velocity_sensor: whether it also reads the velocity, from faster samples of its angle.
         sensors: accelerometers and thermometers that it has besides; see :mod:`pneumarm.arm.virtual.further`.
         pressure_sensors: whether it reads pressures; where not, its supply is turned down to what its muscles bear.
+        muscles: of each joint; with 1 a spring pulls in place of muscle 2 (:mod:`pneumarm.arm.virtual.spring`).
 
     Raises:
         UnusableInput: the arm cannot play the faults, or has no joint for a sensor.
@@ -73,15 +75,19 @@ class VirtualArm(Arm):
         velocity_sensor: bool = False,
         sensors: Sequence[Sensor] = (),
         pressure_sensors: bool = True,
+        muscles: int = 2,
     ) -> None:
         self.parameters = parameters if parameters is not None else ArmParameters()
         if not pressure_sensors:
             self.parameters = _with_safe_supply(self.parameters)
+        if muscles == 1:
+            self.parameters = with_springs(self.parameters)
         joints, converter = len(self.parameters.joints), self.parameters.sensors
         period = self.parameters.period if period is None else period
         faster = min(1.0, period / PERIOD)
         self.spec = ArmSpec(
             joints=joints,
+            muscles=muscles,
             period=period,
             counts_per_degree=converter.counts_per_degree,
             counts_per_bar=converter.counts_per_bar,
@@ -112,7 +118,7 @@ class VirtualArm(Arm):
 
     @faults.setter
     def faults(self, plan: Sequence[Fault]) -> None:
-        plan = check_plan(plan, self.spec.joints)
+        plan = check_plan(plan, self.spec.joints, muscles=self.spec.muscles)
         asked, before = self._asked(), self._player
         if before is not None:
             before.restore()
@@ -139,6 +145,7 @@ class VirtualArm(Arm):
             velocity_sensor=spec.velocity_sensor,
             sensors=spec.sensors,
             pressure_sensors=spec.pressure_sensors,
+            muscles=spec.muscles,
         )
 
     @property
@@ -151,8 +158,8 @@ class VirtualArm(Arm):
         """The body of an arm that kernels alone can move.
 
         Raises:
-            UnusableInput: the arm plays faults or has further sensors, which only its own methods do, or it has no
-                pressure sensors, in place of which only the guard has estimates.
+            UnusableInput: the arm plays faults or has further sensors, which only its own methods do, it has no
+                pressure sensors, in place of which only the guard has estimates, or one muscle a joint.
 
         """
         if self._own_methods_only is not None:
@@ -168,6 +175,8 @@ class VirtualArm(Arm):
             return "read further sensors; open the arm without them"
         if not self.spec.pressure_sensors:
             return "estimate pressures; open the arm with its sensors"
+        if self.spec.muscles != 2:
+            return "move joints with one muscle; open the arm with two a joint"
         return None
 
     @property
@@ -202,6 +211,8 @@ class VirtualArm(Arm):
         reading = Reading(_sense(self.body, angle, pressure), angle, pressure)
         if not self.spec.pressure_sensors:
             reading = Reading(reading.time, angle)
+        elif self.spec.muscles == 1:
+            reading = Reading(reading.time, angle, pressure[:, :1].copy())
         if self._further is None:
             return reading
         values = np.empty(len(self.spec.further))

@@ -384,8 +384,10 @@ def _fault(table: Any, where: str) -> Fault:
         raise UnusableInput(f"{where} ({kind}): {error}") from error
 
 
-def check_plan(plan: Sequence[Fault], joints: int, playable: Collection[type[Fault]] = VIRTUAL_FAULTS) -> Plan:
-    """Return ``plan`` as a tuple if an arm of ``joints`` joints can play it.
+def check_plan(
+    plan: Sequence[Fault], joints: int, playable: Collection[type[Fault]] = VIRTUAL_FAULTS, muscles: int = 2
+) -> Plan:
+    """Return ``plan`` as a tuple if an arm of ``joints`` joints, with so many ``muscles`` each, can play it.
 
     Raises:
         UnusableInput: a fault is not ``playable``, its place does not exist, or two are in the same part at once.
@@ -396,7 +398,7 @@ def check_plan(plan: Sequence[Fault], joints: int, playable: Collection[type[Fau
     for number, fault in enumerate(plan, 1):
         if type(fault) not in playable:
             raise UnusableInput(f"fault {number}: this arm cannot play {fault!r}; remove it")
-        _check_place(fault, number, joints)
+        _check_place(fault, number, joints, muscles)
         for before, other in enumerate(plan[: number - 1], 1):
             shared = fault.parts & other.parts
             if shared and fault.overlaps(other):
@@ -407,7 +409,7 @@ def check_plan(plan: Sequence[Fault], joints: int, playable: Collection[type[Fau
     return tuple(plan)
 
 
-def _check_place(fault: Fault, number: int, joints: int) -> None:
+def _check_place(fault: Fault, number: int, joints: int, muscles: int) -> None:
     places: list[tuple[int, int]] = []
     if isinstance(fault, _MuscleFault):
         places.append(fault.index)
@@ -416,9 +418,10 @@ def _check_place(fault: Fault, number: int, joints: int) -> None:
     if isinstance(fault, SwappedMuscles):
         places.append(fault.other)
     for joint, muscle in places:
-        if not (0 <= joint < joints and 0 <= muscle < 2):
+        if not (0 <= joint < joints and 0 <= muscle < muscles):
+            there = "muscles 1 and 2" if muscles == 2 else "muscle 1"
             raise UnusableInput(
-                f"fault {number} ({fault.kind}): this arm has joints 1 to {joints} with muscles 1 and 2, "
+                f"fault {number} ({fault.kind}): this arm has joints 1 to {joints} with {there}, "
                 f"got joint {joint + 1}, muscle {muscle + 1}"
             )
     if isinstance(fault, SwappedMuscles) and fault.index == fault.other:

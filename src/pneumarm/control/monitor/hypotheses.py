@@ -57,9 +57,13 @@ class Readings(NamedTuple):
         return Readings(self.source[:n], self.table[:n], self.leak[:n], self.supply[:n], self.as_told[:n])
 
 
-def hypotheses(joints: int) -> tuple[list[Hypothesis], Readings]:
-    """Return what may be wrong with the valves of an arm; the first one is that nothing is."""
+def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Readings]:
+    """Return what may be wrong with the valves of an arm; the first one is that nothing is.
+
+    ``of_each`` joint so many muscles are there, of which something may be wrong.
+    """
     muscles = 2 * joints
+    there = [m for m in range(muscles) if m % 2 < of_each]
     found: list[Hypothesis] = []
     sources, tables, leaks, supplies = [], [], [], []
 
@@ -86,7 +90,7 @@ def hypotheses(joints: int) -> tuple[list[Hypothesis], Readings]:
     add(Hypothesis("healthy", "nothing is wrong"))
     add(Hypothesis("low-supply", "the supply is low"), supply=HALF_SUPPLY)
     add(Hypothesis("low-supply", "the supply is gone"), supply=0.0)
-    for m in range(muscles):
+    for m in there:
         joint, muscle = m // 2 + 1, m % 2 + 1
         for detail, carried_out in (
             ("the inlet is stuck closed", (-1.0, 0.0, 0.0)),
@@ -98,7 +102,7 @@ def hypotheses(joints: int) -> tuple[list[Hypothesis], Readings]:
             add(Hypothesis("stuck-valve", detail, joint, muscle), {m: carried_out})
         add(Hypothesis("swapped-valves", "inlet and outlet are swapped", joint, muscle), {m: (1.0, 0.0, -1.0)})
         add(Hypothesis("leak", "a large leak", joint, muscle), leaking=m)
-    for first, second in combinations(range(muscles), 2):
+    for first, second in combinations(there, 2):
         other = f"the valves are those of joint {second // 2 + 1}, muscle {second % 2 + 1}"
         add(Hypothesis("swapped-muscles", other, first // 2 + 1, first % 2 + 1), swap=(first, second))
     source, table, leak, low = map(np.array, (sources, tables, leaks, supplies))

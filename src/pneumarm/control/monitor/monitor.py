@@ -81,7 +81,7 @@ class Monitor:
         """All that was found, in the order of being found."""
         self._earlier = 0  # so many findings are told on a clock of the arm that has ended
         self._open: dict[Key, int] = {}  # places in findings of what is not over
-        self._hypotheses, self._readings = hypotheses(spec.joints)
+        self._hypotheses, self._readings = hypotheses(spec.joints, spec.muscles)
         if not spec.pressure_sensors:  # estimates follow the commands, whatever valves and air do
             self._hypotheses, self._readings = self._hypotheses[:1], self._readings.first(1)
         self._weighing = self.settings.by_identification if simulation is None else self.settings.by_simulation

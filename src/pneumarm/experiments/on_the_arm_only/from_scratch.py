@@ -115,7 +115,7 @@ def look(arm: Arm, settings: TrainSettings, looks: int, seed: int) -> Agent:
     """
     window, spec = Window(arm.spec.joints), arm.spec
     random = np.random.default_rng([seed, _LOOKS])
-    networks = draw_networks(window, settings, random)
+    networks = draw_networks(window, settings, random, spec.muscles)
     nothing = Scaling(np.zeros(4 * spec.joints), np.ones(4 * spec.joints), np.ones(2 * spec.joints))
     blank = Agent(spec, window, nothing, np.tile(spec.angle_range, (spec.joints, 1)), networks, settings)
     durations = random.uniform(0.0, BEGIN.inflate, (looks, spec.joints, 2))

@@ -18,6 +18,7 @@ from pneumarm.learning.fleet import FleetLearner, train_fleet
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.policy.acting import Mind
 from pneumarm.learning.policy.inputs import input_parameters
+from pneumarm.learning.possible import leave_out
 from pneumarm.learning.training import Training
 from pneumarm.networks.layers import initial_weights, trainable
 from pneumarm.random import random_state, random_states
@@ -50,6 +51,7 @@ class ValueLearner(FleetLearner[Agent, BatchedSettings]):
         sizes = network_sizes(window, settings.hidden)
         mask = connections(window, settings.hidden)
         weights = initial_weights(sizes, _LAST_LAYER, np.random.default_rng([seed, _WEIGHTS, number])) * mask
+        leave_out(simulation.spec, weights, mask, sizes)
         self.values = trainable(weights, sizes, settings.arms, mask)
         env = environment(simulation, begin_states, settings)
         tolerance = settings.reward.angle_tolerance

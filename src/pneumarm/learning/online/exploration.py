@@ -38,7 +38,7 @@ def choose(values, epsilon, temperature, odds, random):  # type: ignore[no-untyp
     left = np.float32(uniform(random)) * total
     last = best
     for action in range(values.shape[0]):
-        if action != best:
+        if odds[action] > 0.0:  # one that is never to be chosen is not, however a draw is rounded
             last = action
             left -= odds[action]
             if left < 0.0:

@@ -80,7 +80,9 @@ class ShapedLearner(Learner[Agent]):
         super().__init__()
         self._env, self._simulation, self._settings, self._seed = env, simulation, settings, seed
         draw = np.random.default_rng([seed, _WEIGHTS, number])
-        self._weights = pack(draw_networks(simulation.window, settings, draw), simulation.window)
+        self._weights = pack(
+            draw_networks(simulation.window, settings, draw, simulation.spec.muscles), simulation.window
+        )
         self._random = random_state((seed, _TRAINING, number))
         self._first = initial_deviation(settings, simulation.spec)
         self._shaping = np.array([self._first, 0.0])

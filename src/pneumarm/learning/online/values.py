@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.valves import ACTIONS
+from pneumarm.arm.valves import ACTIONS, NEVER, possible_actions
 from pneumarm.kernels import part
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.networks.tansig import tansig
@@ -106,11 +106,16 @@ def network_shapes(window: Window, hidden: int) -> Networks:
     return Networks(*(np.zeros(shape, np.float32) for shape in shapes))
 
 
-def draw_networks(window: Window, settings: TrainSettings, random: np.random.Generator) -> Networks:
-    """Return networks with all weights and biases uniform in the initial range (section 4.2.6)."""
+def draw_networks(window: Window, settings: TrainSettings, random: np.random.Generator, muscles: int = 2) -> Networks:
+    """Return networks with all weights and biases uniform in the initial range (section 4.2.6).
+
+    Actions that joints with so many ``muscles`` do not have are worth so little that none is ever taken or changed.
+    """
     most = settings.initial_weight
     shapes = network_shapes(window, settings.hidden)
-    return Networks(*(random.uniform(-most, most, array.shape).astype(np.float32) for array in shapes))
+    networks = Networks(*(random.uniform(-most, most, array.shape).astype(np.float32) for array in shapes))
+    networks.output_bias[:, ~possible_actions(muscles)] = NEVER
+    return networks
 
 
 def pack(networks: Networks, window: Window) -> NDArray[np.float32]:

@@ -10,6 +10,7 @@ from pneumarm.learning.policy.agent import PolicyAgent, mind, policy_sizes
 from pneumarm.learning.policy.proximal import Rule, batch, collect, improve
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.policy.testing import run_policy
+from pneumarm.learning.possible import leave_out
 from pneumarm.learning.training import Training
 from pneumarm.networks.layers import initial_weights, trainable
 from pneumarm.random import random_state, random_states
@@ -52,7 +53,10 @@ class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):
         random = np.random.default_rng([seed, _WEIGHTS, number])
         self.sizes = policy_sizes(window, settings)
         value_sizes = (*self.sizes[:-1], 1)
-        self.policy = trainable(initial_weights(self.sizes, _FIRST_OUTPUT, random), self.sizes, settings.arms)
+        weights = initial_weights(self.sizes, _FIRST_OUTPUT, random)
+        mask = np.ones_like(weights)
+        leave_out(simulation.spec, weights, mask, self.sizes)
+        self.policy = trainable(weights, self.sizes, settings.arms, mask)
         self.value = trainable(initial_weights(value_sizes, 1.0, random), value_sizes, settings.arms)
         self.mind = mind(simulation, begin_states, settings, self.policy.flat)
         arms = fleet(self.mind.environment, random_states((seed, _ARMS, number), settings.arms))

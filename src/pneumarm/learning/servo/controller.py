@@ -34,6 +34,9 @@ _LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest e
 _BIASED = 8.0  # most tolerances that the integral adds to what is asked for
 _NEAR = 8.0  # tolerances within which an arm can be nearly at rest
 _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving reference are learned from
+_DONE = 0.7  # share of an error that pulses of a joint with one muscle may leave, for the next not to be more
+_SWINGING = 0.6  # s in which an error is added to what is asked for while a joint with one muscle swings
+_CLOSE, _KEPT = 2.5, 1.2  # tolerances of an error, for that, and most that is then added
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
@@ -46,6 +49,9 @@ class ServoController:
     valves stay closed, until it is off by more than ``alert``: closed muscles are springs of air that hold the joint,
     nothing wears, and no noise of the sensors is answered. A joint that goes on swinging about its goal is being kept
     swinging, by a model with less lag than the arm: its valves stay closed until it is at rest, by its own damping.
+
+    A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next
+    look, twice as many each time that those before did little, and integral action goes on while it swings.
     """
 
     def __init__(self, agent: ServoAgent) -> None:
@@ -60,6 +66,9 @@ class ServoController:
         noise = float((wanted.reading_noise * agent.simulation.error_std[:, 0]).max())
         least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)
         self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
+        single = spec.muscles == 1
+        self._most_pulses = self._look if single else 1
+        self._kept, self._close = (_KEPT * tolerance, _CLOSE * tolerance) if single else (0.0, 0.0)
         # Whole periods move an arm by more than a tolerance: without pulses it is to swing.
         fine = spec.pulses and agent.simulation.commands == "pulses"
         self._swing = max(_SWING * tolerance, _ANSWERED * noise) if fine else math.inf
@@ -156,16 +165,20 @@ class ServoController:
                 continue
             rest.see(now[j] - read[-1, j], self._swing)
             if drift[j] > fast * self._still and not slow[j]:
-                rest.stir()
+                close = abs(error[j]) < self._close
+                rest.stir(self._kept, error[j] * self.spec.period / _SWINGING if close else 0.0)
                 acts[j] = rest.swings < _SWINGS
                 continue
             rest.calm = True
             rest.quiet = abs(error[j]) < (self._alert_above if rest.quiet else self._quiet_below)
             rest.look = max(rest.look - 1, 0)
-            acts[j] = not rest.quiet and rest.look == 0
+            begins = not rest.quiet and rest.look == 0
+            if begins:
+                rest.begin(error[j], self._most_pulses)
+            acts[j] = not rest.quiet and rest.left > 0
             if acts[j]:
-                rest.look = self._look
-                if not saturated[j]:
+                rest.left, rest.look = rest.left - 1, self._look
+                if begins and not saturated[j]:
                     rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._most, self._most))
         return acts
 
@@ -198,13 +211,21 @@ class _Rest:
     def leave(self) -> None:
         """Note that it is far from what is asked for, or that this moves."""
         self.swings, self._side = 0, 0.0
-        self.stir()
+        self.bias = 0.0
+        self.stir(0.0, 0.0)
 
-    def stir(self) -> None:
-        """Note that it is near, but moves."""
+    def stir(self, kept: float, added: float) -> None:
+        """Note that it is near, but moves: its bias, with what is ``added``, is ``kept`` at most."""
         self.calm, self.quiet, self.look = False, False, 0
+        self.left, self._pulses, self._error = 0, 1, 0.0
         if self.swings < _SWINGS:
-            self.bias = 0.0
+            self.bias = min(max(self.bias + added, -kept), kept)
+
+    def begin(self, error: float, most: int) -> None:
+        """Note that a pulse is due for the ``error``; where those before did little, several in a row, ``most``."""
+        done = error * self._error <= 0 or abs(error) < _DONE * abs(self._error)
+        self._pulses, self._error = 1 if done else min(2 * self._pulses, most), error
+        self.left = self._pulses
 
     def see(self, error: float, swing: float) -> None:
         """Count how often the ``error`` went from one side of the goal to the other, further than ``swing``."""

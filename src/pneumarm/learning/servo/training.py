@@ -11,7 +11,7 @@ from pneumarm.learning.servo.gradient import ServoTask, errors_of, learn_once, m
 from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
-from pneumarm.networks.layers import adam, initial_weights, trainable
+from pneumarm.networks.layers import adam, initial_weights, split, trainable
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
@@ -76,7 +76,11 @@ class ServoLearner(Learner[ServoAgent]):
         sizes = servo_sizes(simulation, settings)
         if policy is None:
             policy = initial_weights(sizes, _FIRST_OUTPUT, np.random.default_rng([seed, _WEIGHTS, number]))
-        self.net = trainable(policy.copy(), sizes, settings.arms)
+        weights, mask = policy.copy(), np.ones_like(policy)
+        if simulation.spec.muscles == 1:  # a muscle that is not there is told nothing: 0 is a closed valve
+            for layers in (split(weights, sizes), split(mask, sizes)):
+                layers[-1][:, 1::2] = 0.0
+        self.net = trainable(weights, sizes, settings.arms, mask)
         self.tape = tape(self.task, max(round(settings.duration / simulation.spec.period), 2), settings.arms)
         self.updates = np.zeros(1, np.int64)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import to_valves
 from pneumarm.task import Reward, TaskSettings
 from pneumarm.task.movements import movements
@@ -17,7 +18,7 @@ REWARD = Reward(goal=40.0, action=-2.0, switch=-3.0)
 def test_an_arm_and_a_compiled_loop_count_alike(joints: int) -> None:
     random, task = np.random.default_rng(joints), TaskSettings(REWARD, cutoff=7)
     for e in range(40):
-        tally, record, last = Tally(task, joints), movements(1, joints), np.full(joints, -1)
+        tally, record, last = Tally(task, ArmSpec(joints=joints)), movements(1, joints), np.full(joints, -1)
         goal = random.uniform(400, 600, joints)
         while not tally.over:
             actions = random.integers(3, 5, joints)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pneumarm.arm.seam import Arm, ArmSpec
+from pneumarm.arm.slower import SlowerArm, usual_turns
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 
 if TYPE_CHECKING:
@@ -20,10 +21,10 @@ _FORMS = (
     "virtual:joints=2,seed=7,coupling=0.5, virtual:seed=7,sensors=velocity+temperature, "
     "virtual:seed=7,pressure_sensors=off, virtual:seed=7,muscles=1, "
     "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
-    "emulated:ARM or python:module:callable, each with ,spec=arm.toml if you like"
+    "emulated:ARM or python:module:callable (python:module:callable,every=2), each with ,spec=arm.toml if you like"
 )
 _OPTION = re.compile(
-    r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|spec)=|wide(?:,|$))"
+    r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|every|spec)=|wide(?:,|$))"
 )
 """Stands before an option; files may have commas in their names."""
 
@@ -43,7 +44,9 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     with ``coupling=0.5`` one whose joints act on each other half as much;
     ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
     ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
-    ``python:module:callable`` calls ``callable()`` for the arm.
+    ``python:module:callable`` calls ``callable()`` for the arm; with ``every=2`` it is controlled at every second of
+    its periods, by default at those that make some 30 Hz of a rate over 50 Hz (:mod:`pneumarm.arm.slower`), as
+    virtual arms are that are made for such a rate.
     ``spec`` is a file from ``pneumarm arm calibrate``, an option of any name: ``NAME,spec=arm.toml``.
     Options come in any order.
     The arm is not guarded: see :func:`pneumarm.arm.guarded`.
@@ -81,6 +84,10 @@ def _parts(name: str) -> tuple[str, dict[str, str]]:
 def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None = None) -> Arm:
     name = ":".join([place, *([",".join(map(_option, options.items()))] if options else [])])
     kind, _, rest = place.partition(":")
+    if kind != "python" and "every" in options:
+        raise UnusableInput(
+            f"arm {name!r}: every= is for arms of python:; a virtual arm has rate=, a board its arm.toml"
+        )
     if place == "virtual":
         return _virtual(name, options, seed, spec)
     if kind == "emulated" and rest:
@@ -88,6 +95,8 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
 
         inner = _open(rest, options, seed, spec)
         return SerialArm(BoardLine(EmulatedBoard(inner)), replace(spec or inner.spec, name=name))
+    if kind == "python" and rest.count(":") == 1 and not options.keys() - {"every"}:
+        return _from_python(rest, options.get("every"))
     if options:
         raise UnusableInput(f"arm {name!r}: only a virtual arm has {', '.join(options)}; leave that out")
     if kind == "simulation" and rest:
@@ -99,8 +108,6 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
         from pneumarm.arm.serial.port import SerialPort
 
         return SerialArm(SerialPort(rest), spec or ArmSpec(name=name))
-    if kind == "python" and rest.count(":") == 1:
-        return _from_python(rest)
     raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
 
 
@@ -121,12 +128,13 @@ def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | N
     else:
         velocity, sensors = (spec.velocity_sensor, spec.sensors) if spec is not None else (False, ())
     faults = read_plan(options["faults"]) if "faults" in options else ()
+    usual = usual_turns(parameters.period) * parameters.period
     return VirtualArm(
         parameters,
         seed=seed,
         name=name,
         faults=faults,
-        period=_period(name, options, None if spec is None else spec.period),
+        period=_period(name, options, usual if spec is None else spec.period),
         velocity_sensor=velocity,
         sensors=sensors,
         pressure_sensors=_on(name, options, "pressure_sensors", spec is None or spec.pressure_sensors),
@@ -170,7 +178,7 @@ def _parameters(name: str, options: Mapping[str, str]) -> "ArmParameters":
         raise UnusableInput(f"arm {name!r}: expected a coupling of 0 to 1") from error
 
 
-def _period(name: str, options: Mapping[str, str], usual: float | None) -> float | None:
+def _period(name: str, options: Mapping[str, str], usual: float) -> float:
     """Return the control period [s] that ``options`` ask for, ``usual`` where they ask for none."""
     given = [key for key in ("period", "rate") if key in options]
     if not given:
@@ -192,7 +200,17 @@ def _on(name: str, options: Mapping[str, str], option: str, usual: bool) -> bool
     return given == "on"
 
 
-def _from_python(place: str) -> Arm:
+def _from_python(place: str, every: str | None) -> Arm:
+    """Return the arm of a user's own, controlled at ``every`` so many of its periods, the usual ones if not given."""
+    if every is not None and not every.isdecimal():
+        raise UnusableInput(f"arm python:{place}: expected every=1 or more of its periods, not {every!r}")
+    arm = _made_by(place)
+    turns = int(every) if every is not None else usual_turns(arm.spec.period) if arm.spec.pulses else 1
+    return arm if turns == 1 else SlowerArm(arm, turns)
+
+
+def _made_by(place: str) -> Arm:
+    """Return what the callable of ``module:callable`` returns."""
     module_name, _, attribute = place.partition(":")
     if "" not in sys.path:
         sys.path.insert(0, "")  # a user's module lies in the folder that they call us from

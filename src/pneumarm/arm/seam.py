@@ -147,6 +147,16 @@ class ArmSpec(Settings):
         return "pressure" if self.pressure_sensors else "estimated pressure"
 
     @property
+    def angle_unit(self) -> float:
+        """What a count of the thesis' angle sensor, in which its thresholds are given, is on this one [counts]."""
+        return self.counts_per_degree / ArmSpec.counts_per_degree
+
+    @property
+    def pressure_unit(self) -> float:
+        """What a count of the thesis' pressure sensors is on these [counts]."""
+        return self.counts_per_bar / ArmSpec.counts_per_bar
+
+    @property
     def max_pressure_counts(self) -> float:
         """The pressure limit [counts]."""
         return self.max_pressure * self.counts_per_bar

@@ -89,7 +89,7 @@ class _Attempt:
         self.reference = goal if isinstance(goal, Reference) else constant(goal)
         self.goal = self.reference.at(0.0)
         self.velocity = np.zeros(self.goal.shape)
-        self.tally = Tally(task, self.goal.size)
+        self.tally = Tally(task, cycle.arm.spec)
         self.began = 0.0
         self.before: Reading | None = None
         if not isinstance(goal, Reference):

@@ -184,7 +184,8 @@ class Player:
             float(spec.latency),
         )
         task = agent.settings
-        self._rules = _Rules(task.reward.parameters, int(task.cutoff), float(begin.deflate), float(begin.settle))
+        reward = task.reward.on(spec).parameters
+        self._rules = _Rules(reward, int(task.cutoff), float(begin.deflate), float(begin.settle))
         self._range = np.ascontiguousarray(agent.goal_range, np.float64)
         self._weights = np.cumsum(task.begin_weights) / np.sum(task.begin_weights)
         self._aim_random = random_state((seed, 1))

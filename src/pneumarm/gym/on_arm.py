@@ -45,7 +45,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         self._turns = Turns(arm, begin)
         self.arm = self._turns.arm
         self._goals, self._task = goals, task
-        self._tally = Tally(task, window.joints)
+        self._tally = Tally(task, arm.spec)
         self._tracker, self._scaling = StateTracker(window, scaling), scaling
         self.action_space = action_space(arm.spec)
         space = observation_space(window, scaling, sensor_ranges(arm.spec, window), goals)
@@ -71,7 +71,7 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
                 raise UnusableInput(f"a goal needs {low.size} angle(s) in counts within {low} to {high}, got {goal}")
         self._goal = goal
         reading = self._turns.begin(self.np_random, fresh=seed is not None)
-        self._over, self._tally = False, Tally(self._task, goal.size)
+        self._over, self._tally = False, Tally(self._task, self.arm.spec)
         self._tracker.reset()
         observation = self._observation(reading)
         self._turns.ask()

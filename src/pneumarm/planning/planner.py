@@ -184,7 +184,7 @@ class Planner:
         spec = self.model.spec
         self._workspace = tree(self.settings, spec.joints)
         self._problem = problem(
-            np.zeros(spec.joints), self.reward, self.settings, self.model.uncertainty, spec.muscles
+            np.zeros(spec.joints), self.reward.on(spec), self.settings, self.model.uncertainty, spec.muscles
         )
         self._turn = 0
         self._last = -1

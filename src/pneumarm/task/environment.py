@@ -99,7 +99,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
         unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
         commands=np.ascontiguousarray(commands, np.float32),
         goal_place=places(simulation.window).goal,
-        reward=settings.reward.parameters,
+        reward=settings.reward.on(simulation.spec).parameters,
         cutoff=int(settings.cutoff),
     )
     return Environment(

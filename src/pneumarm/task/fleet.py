@@ -102,13 +102,15 @@ def limits(
     """Return the limits of an arm.
 
     ``still`` is the largest change that counts as none, ``tolerance`` the distance from the goal within which a joint
-    may stand still [both counts], ``patience`` the steps without change after which another action is taken.
+    may stand still [both in counts of the thesis' sensors], ``patience`` the steps without change after which another
+    action is taken.
     """
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+    units = np.array([spec.angle_unit, spec.pressure_unit, spec.pressure_unit])
     return Limits(
         inlet=np.ascontiguousarray((spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:], np.float32),
-        still=np.ascontiguousarray(still / scale[:, [0, 2, 3]], np.float32),
-        tolerance=(tolerance / scale[:, 0]).astype(np.float32),
+        still=np.ascontiguousarray(still * units / scale[:, [0, 2, 3]], np.float32),
+        tolerance=(tolerance * spec.angle_unit / scale[:, 0]).astype(np.float32),
         goal_place=places(window).goal,
         patience=patience,
     )

@@ -6,12 +6,13 @@ to it and slow.
 """
 
 import math
-from dataclasses import astuple, dataclass
-from typing import NamedTuple
+from dataclasses import astuple, dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.arm.seam import ArmSpec
 from pneumarm.kernels import part
 from pneumarm.settings import Settings, Valid
 
@@ -37,9 +38,10 @@ class Reward(Settings):
     switch: float = -8.0
     """Paid besides, to an action that differs from the one before it in the episode (thesis: -8)."""
     angle_tolerance: float = 25.0
-    """Largest distance from the goal at which it counts as reached [counts] (thesis: 25)."""
+    """Largest distance from the goal at which it counts as reached [counts of the thesis' sensor, 11.378 a degree]
+    (thesis: 25)."""
     velocity_tolerance: float = 1.0
-    """Highest speed at which it counts as reached [counts/ms] (thesis: 1)."""
+    """Highest speed at which it counts as reached [such counts/ms] (thesis: 1)."""
 
     def _valid(self) -> Valid:
         return {
@@ -49,6 +51,14 @@ class Reward(Settings):
             "angle_tolerance": 0 < self.angle_tolerance < math.inf,
             "velocity_tolerance": 0 < self.velocity_tolerance < math.inf,
         }
+
+    def on(self, spec: ArmSpec) -> Self:
+        """Return the same reward with tolerances in counts of the arm's own sensor."""
+        return replace(
+            self,
+            angle_tolerance=self.angle_tolerance * spec.angle_unit,
+            velocity_tolerance=self.velocity_tolerance * spec.angle_unit,
+        )
 
     @property
     def parameters(self) -> RewardParameters:

@@ -3,21 +3,22 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import Command
 from pneumarm.task.reward import paid
 from pneumarm.task.settings import TaskSettings
 
 
 class Tally:
-    """Actions, switches and reward of a movement of so many ``joints``, as ``task`` counts them.
+    """Actions, switches and reward of a movement of the arm that ``spec`` tells of, as ``task`` counts them.
 
     What counts are the valves as applied, whatever was asked for.
     """
 
-    def __init__(self, task: TaskSettings, joints: int) -> None:
-        self.task = task
+    def __init__(self, task: TaskSettings, spec: ArmSpec) -> None:
+        self.task, self._reward = task, task.reward.on(spec)
         self.actions = 0
-        self.switches = np.zeros(joints, np.int64)
+        self.switches = np.zeros(spec.joints, np.int64)
         """Shape (joints,)."""
         self.reward = 0.0
         """Sum of what was paid, all joints together."""
@@ -42,7 +43,7 @@ class Tally:
             goal: at that time, shape (joints,) [counts].
 
         """
-        reward = self.task.reward
+        reward = self._reward
         # As task/reward.py::is_switch, which knows actions: an arm may be given pulses as well.
         switched = (applied != (applied if self._last is None else self._last)).any(axis=1)
         self._last = applied

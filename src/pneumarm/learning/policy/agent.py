@@ -92,7 +92,9 @@ def mind(
         limits=limits(
             window, scaling, simulation.spec, settings.reward.angle_tolerance, settings.still, settings.patience
         ),
-        inputs=input_parameters(window, scaling, settings.squash),
+        inputs=input_parameters(
+            window, scaling, tuple(error * simulation.spec.angle_unit for error in settings.squash)
+        ),
         layers=split(policy, policy_sizes(window, settings)),
         hold=float(settings.hold),
         seeds=random_states(_LOOKAHEAD, max(settings.lookahead, 1)),

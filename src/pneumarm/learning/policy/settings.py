@@ -20,9 +20,9 @@ class PolicySettings(FleetSettings):
     hold: float = 3.0
     """Bonus, on its logit, of the action that is being held: a first guess at what switches cost."""
     squash: tuple[float, ...] = (25.0, 100.0)
-    """Errors of the angle at which the inputs that tell them bend, finely and coarsely [counts]."""
+    """Errors of the angle at which the inputs that tell them bend, finely and coarsely [counts of the thesis']."""
     still: float = 2.5
-    """Changes of angle and pressures up to this count as none [counts]."""
+    """Changes of angle and pressures up to this count as none [counts of the thesis' sensors]."""
     patience: int = 2
     """Steps without change, off the goal, after which another action must be taken; 0: never."""
     lookahead: int = 192

@@ -42,3 +42,12 @@ def test_what_is_no_number_has_not_reached_a_goal() -> None:
     assert not REWARD.reached([np.nan], [0.0], [500.0])
     assert not is_near(REWARD.parameters, np.nan, 500.0)
     assert not is_slow(REWARD.parameters, np.nan)
+
+
+def test_a_goal_is_reached_within_the_same_degrees_whatever_the_sensor_counts():
+    fine = ArmSpec(counts_per_degree=10 * ArmSpec.counts_per_degree)
+    for away, speed, reached in ((200, 5.0, True), (300, 5.0, False), (200, 15.0, False)):
+        tally = Tally(TaskSettings(), fine)
+        tally.count(np.zeros((1, 2), np.int8), np.array([5000.0 + away]), np.array([speed]), np.array([5000.0]))
+        assert tally.reached == reached
+    assert Reward().on(ArmSpec()) == Reward()

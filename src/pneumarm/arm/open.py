@@ -78,6 +78,22 @@ def _parts(name: str) -> tuple[str, dict[str, str]]:
     return place, options
 
 
+def with_options(name: str, **changed: str | None) -> str:
+    """Return the ``name`` of a virtual arm with other options, those that are None left out.
+
+    Raises:
+        UnusableInput: it is not a virtual arm's.
+
+    """
+    place, options = _parts(name)
+    if place != "virtual":
+        raise UnusableInput(
+            f"arm {name!r}: expected a virtual one, only that can have {' or '.join(changed)} changed"
+        )
+    kept = {key: value for key, value in {**options, **changed}.items() if value is not None}
+    return ":".join([place, *([",".join(map(_option, kept.items()))] if kept else [])])
+
+
 def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None = None) -> Arm:
     name = ":".join([place, *([",".join(map(_option, options.items()))] if options else [])])
     kind, _, rest = place.partition(":")

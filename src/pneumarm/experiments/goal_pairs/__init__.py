@@ -1,0 +1,13 @@
+"""Is one pair of goal angles learnable, and are all at once (section 6.1.4)?
+
+The thesis learned a single goal of two joints in about 100,000 episodes and left open whether all can be learned at
+once: that depends on the function approximator. Trials are the thesis' agents, one a joint with a common goal, and a
+policy learned in many simulated arms; each learns one goal, drawn anew for each arm, and all goals that the arm can
+hold. One goal is tested from all begin states.
+
+    pneumarm experiment goal-pairs --out laboratory
+"""
+
+from pneumarm.experiments.goal_pairs.pairs import GoalPairs
+
+EXPERIMENT = GoalPairs()

@@ -22,9 +22,10 @@ _FORMS = (
     "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
     "emulated:ARM or python:module:callable, each with ,spec=arm.toml if you like"
 )
-_OPTION = re.compile(
-    r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|spec)=|wide(?:,|$))"
+_OPTIONS = (
+    r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|spec)=|wide(?:,|$)"
 )
+_OPTION = re.compile(rf"[:,](?={_OPTIONS})")
 """Stands before an option; files may have commas in their names."""
 
 
@@ -76,6 +77,11 @@ def _parts(name: str) -> tuple[str, dict[str, str]]:
     if len(options) < len(given):
         raise UnusableInput(f"arm {name!r}: an option is given twice; expected {_FORMS}")
     return place, options
+
+
+def names_in(text: str) -> list[str]:
+    """Return the names of arms in ``text``, separated by commas as their options are."""
+    return re.split(rf",(?!{_OPTIONS})", text)
 
 
 def with_options(name: str, **changed: str | None) -> str:

@@ -28,6 +28,8 @@ PLACES = {
     "joint-data": "joint_data",
     "joint-data-long": "joint_data_long",
     "joint-exploration": "joint_exploration",
+    "joint-agents": "joint_agents",
+    "hierarchy": "hierarchy",
     "coupling": "coupling",
 }
 """Name: package below this one; each has an ``EXPERIMENT``."""

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -23,7 +23,7 @@ from pneumarm.experiments.there_and_back import (
     prepared,
     train_and_move,
 )
-from pneumarm.learning import PolicySettings, TrainSettings
+from pneumarm.learning import PolicySettings, TrainSettings, find_method
 from pneumarm.simulation import FitSettings
 
 ARMS = tuple(f"virtual:joints=2,seed={number}" for number in range(1, 6))
@@ -45,8 +45,11 @@ class Lesson:
 
     learning: Any
     """Settings of a method."""
-    one_goal: bool = False
-    """Whether a single goal is learned, the same in all trials of a run, or all that the arm can hold."""
+    method: str | None = None
+    """Name of that method, where it is no built-in one."""
+    goals: Literal["all", "one", "middle"] = "all"
+    """Whether all goals are learned that the arm can hold, a single one, drawn alike for all trials of a run, or the
+    one in the middle of the ranges of the joints."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +99,12 @@ class SeveralJoints(ThereAndBack):
 
 def learned(material: Prepared, lesson: Lesson, run: int, settings: LaboratorySettings) -> Figures:
     """Return how agents do that took ``lesson`` in the simulation of an arm, there and on the arm."""
-    if lesson.one_goal:
-        goal = one_goal(material, run, settings)
-        material = replace(material, simulation=material.simulation.with_goals(np.stack([goal, goal], axis=1)))
-    return train_and_move(material, lesson.learning, run, settings)
+    if lesson.goals != "all":
+        simulation = material.simulation
+        goal = simulation.goals.middle if lesson.goals == "middle" else one_goal(material, run, settings)
+        material = replace(material, simulation=simulation.with_goals(np.stack([goal, goal], axis=1)))
+    method = None if lesson.method is None else find_method(lesson.method)
+    return train_and_move(material, lesson.learning, run, settings, method=method)
 
 
 def one_goal(material: Prepared, run: int, settings: LaboratorySettings) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
 from pneumarm.control import AgentController, drawn, make_movements
+from pneumarm.control.agent import warm_up
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
@@ -236,6 +237,7 @@ def train_and_move(
     simulated = test(agent, material.simulation, material.begin, settings.test_episodes, 0)
     wanted = material.simulation.goals if goals is None else goals
     numbers = range(min(MOVEMENTS, settings.test_episodes))
+    warm_up(agent)
     with opened(material.arm, seed % 2**31, recipe.frequency) as arm:
         closes = recipe.close_while_computing
         rows = greedy_movements(agent, arm, wanted, numbers, seed, close_while_computing=closes)

@@ -2,8 +2,8 @@
 
 The thesis built its arm so that the joints disturb each other as much as possible. Factor: the share of that
 coupling, by inertia, weight and cables, of a virtual arm, from none to all of it. A simulation is fitted to each of
-these arms; the thesis' agents learn one goal in it, a policy all of them, and move that arm. With any other arm there
-is nothing to turn down.
+these arms; the thesis' agents learn one goal in it, that in the middle, a policy all of them, and move that arm. With
+any other arm there is nothing to turn down.
 
     pneumarm experiment coupling --out laboratory
 """

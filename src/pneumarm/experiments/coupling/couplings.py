@@ -26,7 +26,7 @@ class Coupling(SeveralJoints):
     @property
     def lessons(self) -> Mapping[str, Lesson]:
         """By who learns and the share."""
-        lessons = dict(zip(_WHO, (Lesson(self.policy), Lesson(self.thesis, one_goal=True)), strict=True))
+        lessons = dict(zip(_WHO, (Lesson(self.policy), Lesson(self.thesis, goals="middle")), strict=True))
         return {f"{who}, {share:g}": lesson for who, lesson in lessons.items() for share in self.shares}
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:

@@ -2,8 +2,8 @@
 
 The thesis learned a single goal of two joints in about 100,000 episodes and left open whether all can be learned at
 once: that depends on the function approximator. Trials are the thesis' agents, one a joint with a common goal, and a
-policy learned in many simulated arms; each learns one goal, drawn anew for each arm, and all goals that the arm can
-hold. One goal is tested from all begin states.
+policy learned in many simulated arms; each learns the goal in the middle, a goal that is drawn anew for each arm, and
+all goals that the arm can hold. Each is tested from all begin states.
 
     pneumarm experiment goal-pairs --out laboratory
 """

@@ -9,7 +9,7 @@ from pneumarm.experiments.several_joints import SUCCESS
 
 
 def analysis(experiment: GoalPairs, rows: TrialRows) -> Analysis:
-    """Return how each does with one goal and with all."""
+    """Return how each does with the middle goal, with another and with all."""
     found, trials = measured(rows), experiment.trials
     words = experiment.words.filled(found)
     (pairs,) = words.sections
@@ -26,13 +26,13 @@ def analysis(experiment: GoalPairs, rows: TrialRows) -> Analysis:
 
 def measured(rows: TrialRows) -> dict[str, Interval]:
     """Return what claims are judged by."""
-    one, all_, policy_one, policy_all = 1, 2, 3, 4
+    middle, one, all_, policy_all = 1, 2, 3, 6
     return {
+        "middle": mean(rows, SUCCESS, middle),
+        "episodes": mean(rows, "episodes", middle),
         "one": mean(rows, SUCCESS, one),
-        "episodes": mean(rows, "episodes", one),
-        "one_on_arm": mean(rows, "success_rate", one),
         "all_goals": mean(rows, SUCCESS, all_),
-        "policy_one": mean(rows, SUCCESS, policy_one),
+        "policy_one": mean(rows, SUCCESS, 5),
         "policy": mean(rows, SUCCESS, policy_all),
         "policy_episodes": mean(rows, "episodes", policy_all),
         "policy_on_arm": mean(rows, "success_rate", policy_all),

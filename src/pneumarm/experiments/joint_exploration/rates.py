@@ -39,7 +39,7 @@ class JointExploration(SeveralJoints):
             "no shaping": {"shaping": None},
         }
         return {
-            words: Lesson(with_settings(self.thesis, changes), one_goal=True) for words, changes in varied.items()
+            words: Lesson(with_settings(self.thesis, changes), goals="middle") for words, changes in varied.items()
         }
 
     def measure(self, material: Prepared, trial: int, run: int, settings: LaboratorySettings) -> Figures:

@@ -1,0 +1,13 @@
+"""Who should act for two joints: agents with a common goal, with goals of their own, or one for both (section 6.1.2)?
+
+The thesis takes an agent a joint with a common goal, expects the best results of that, and thinks one agent with 81
+actions impossible. These three, with its networks and its shaping, and a policy whose joints choose independently
+given the state, each learn one goal, that in the middle, and all goals. Whoever learns, a movement succeeds where
+both joints are at their goals at once.
+
+    pneumarm experiment joint-agents --out laboratory
+"""
+
+from pneumarm.experiments.joint_agents.teams import JointAgents
+
+EXPERIMENT = JointAgents()

@@ -95,6 +95,7 @@ def test_the_goal_of_a_run_is_one_that_the_arm_can_hold(material: Prepared) -> N
     assert material.simulation.goals.contain(goals).all()
     assert np.ptp(goals, axis=0).min() > 100
     np.testing.assert_array_equal(goals[3], one_goal(material, 4, SMALL))
+    assert (goals[3] != one_goal(replace(material, arm="another"), 4, SMALL)).all()
 
 
 def test_two_agents_explore_together_as_often_as_one() -> None:
@@ -159,6 +160,8 @@ def made_up(chosen: SeveralJoints, figures: dict[str, dict[int, float]]) -> Tria
         (4, "One agent with 81 actions", SIMULATED, 3, 0.2, 0.9),
         (5, "With an upper agent one goal takes fewer", "episodes", 3, 0.5, 2.0),
         (5, "With an upper agent more movements", SIMULATED, 7, 2.0, 0.5),
+        (5, "It takes fewer episodes than with flat agents that have their own", "episodes", 3, 0.5, 2.0),
+        (5, "More succeed than with own goals", SIMULATED, 6, 0.5, 2.0),
         (5, "An upper agent that sees angles", "in simulation: reward", 4, 0.5, 2.0),
     ],
 )

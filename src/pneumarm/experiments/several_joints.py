@@ -3,6 +3,7 @@
 They go from an arm and back to it as those of :mod:`.there_and_back` do. What a trial learns is a :class:`Lesson`.
 """
 
+import zlib
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -48,8 +49,8 @@ class Lesson:
     method: str | None = None
     """Name of that method, where it is no built-in one."""
     goals: Literal["all", "one", "middle"] = "all"
-    """Whether all goals are learned that the arm can hold, a single one, drawn alike for all trials of a run, or the
-    one in the middle of the ranges of the joints."""
+    """Whether all goals are learned that the arm can hold, a single one, drawn alike for all trials of a run on an
+    arm, or the one in the middle of the ranges of the joints."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +109,8 @@ def learned(material: Prepared, lesson: Lesson, run: int, settings: LaboratorySe
 
 
 def one_goal(material: Prepared, run: int, settings: LaboratorySettings) -> NDArray[np.float64]:
-    """Return the goal of all trials of ``run`` that learn a single one (joints,) [counts]; the arm can hold it."""
-    random = np.random.default_rng([run_seed(settings, run), _GOAL])
+    """Return the goal of all trials of ``run`` on an arm that learn a single one (joints,) [counts]; it can hold it."""
+    random = np.random.default_rng([run_seed(settings, run), _GOAL, zlib.crc32(material.arm.encode())])
     return material.simulation.goals.draw(random, 1)[0]
 
 

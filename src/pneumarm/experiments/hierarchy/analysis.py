@@ -36,6 +36,7 @@ def measured(rows: TrialRows) -> dict[str, Interval]:
     all_ = len(WHO)
     return {
         "faster": difference(rows, "episodes", angles, common),
+        "than_own_faster": difference(rows, "episodes", angles, own),
         "reward": difference(rows, _REWARD, angles, common),
         "than_own": difference(rows, _REWARD, angles, own),
         "low": difference(rows, _REWARD, angles, whole),

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
+from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import TrainSettings, test, train
 from pneumarm.learning.online.loop import learn, spread, workspace
-from pneumarm.learning.online.values import learner, network_shapes, pack, unpack
+from pneumarm.learning.online.values import draw_networks, learner, network_shapes, pack, unpack
 from pneumarm.transitions.window import Window
 
 WINDOW = Window(2)
@@ -55,6 +56,18 @@ def test_every_combination_of_actions_is_a_choice_of_one_agent() -> None:
         seen.add(tuple(actions))
     assert len(seen) == 9**3
     assert {action for actions in seen for action in actions} == set(range(9))
+
+
+@pytest.mark.parametrize(("team", "count"), [("common", 3), ("own", 3), ("one", 9)])
+def test_an_agent_of_joints_with_one_muscle_never_fills_the_other(team: Any, count: int) -> None:
+    networks = draw_networks(WINDOW, TrainSettings(team=team), np.random.default_rng(0), muscles=1)
+    for values in networks.output_bias:
+        choices = np.flatnonzero(values > -1e3)
+        assert len(choices) == count
+        for choice in choices:
+            actions = np.zeros(2 // len(networks.output_bias), np.int64)
+            spread(np.array([choice]), actions)
+            assert (to_valves(actions)[:, 1] == 0).all()
 
 
 @pytest.mark.parametrize("team", ["common", "own", "one"])

@@ -22,9 +22,7 @@ _FORMS = (
     "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
     "emulated:ARM or python:module:callable, each with ,spec=arm.toml if you like"
 )
-_OPTIONS = (
-    r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|spec)=|wide(?:,|$)"
-)
+_OPTIONS = r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|spec)=|wide(?:,|$)"
 _OPTION = re.compile(rf"[:,](?={_OPTIONS})")
 """Stands before an option; files may have commas in their names."""
 

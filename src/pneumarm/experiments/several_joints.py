@@ -109,7 +109,7 @@ def learned(material: Prepared, lesson: Lesson, run: int, settings: LaboratorySe
 
 
 def one_goal(material: Prepared, run: int, settings: LaboratorySettings) -> NDArray[np.float64]:
-    """Return the goal of all trials of ``run`` on an arm that learn a single one (joints,) [counts], one it can hold."""
+    """Return the goal of a run that learns a single one, shape (joints,) [counts]; the arm can hold it."""
     random = np.random.default_rng([run_seed(settings, run), _GOAL, zlib.crc32(material.arm.encode())])
     return material.simulation.goals.draw(random, 1)[0]
 

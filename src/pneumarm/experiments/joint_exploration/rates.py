@@ -1,11 +1,12 @@
 """Rates of exploring at the begin of shaping, and what is demanded there."""
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneumarm.experiments.experiment import Figures, LaboratorySettings
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned
 from pneumarm.experiments.there_and_back import Prepared
 from pneumarm.experiments.trainings import with_settings
@@ -45,15 +46,16 @@ class JointExploration(SeveralJoints):
     def measure(self, material: Prepared, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Learn with the rate of ``trial`` and move the arm; count how often an agent of any joint explores."""
         lesson = self.lessons[self.trials[trial]]
-        return {"exploring": exploring(material, lesson.learning), **learned(material, lesson, run, settings)}
+        seed = run_seed(settings, run) ^ zlib.crc32(material.arm.encode())
+        return {"exploring": exploring(material, lesson.learning, seed), **learned(material, lesson, run, settings)}
 
 
-def exploring(material: Prepared, settings: TrainSettings) -> float:
+def exploring(material: Prepared, settings: TrainSettings, seed: int) -> float:
     """Return the share of the actions at the begin of training in which at least one joint's agent explores."""
     first = settings.shaping.exploration if settings.shaping else settings.exploration
     begun = replace(settings, agents=1, max_episodes=1, validation_episodes=1)
-    agent = train(material.simulation, material.begin, begun).agent
-    learner = OnlineLearner(agent, 0.0, first, seed=0)
+    agent = train(material.simulation, material.begin, begun, seed).agent
+    learner = OnlineLearner(agent, 0.0, first, seed=seed)
     learner.begin(material.begin.states[0], material.begin.angle[0])
     count = 0
     for _ in range(_COUNTED):

@@ -223,10 +223,8 @@ def measure() -> Iterator[str]:
 
     def composed(steps: int = STEPS) -> Any:
         weights, one = start.copy(), episode(endless, random_state(1))
-        task = endless.task._replace(cutoff=steps)
-        outcome = train_episode(
-            endless._replace(task=task), learner(weights, settings), schedule, one, workspace(one)
-        )
+        task, learns = endless.task._replace(cutoff=steps), learner(weights, settings)
+        outcome = train_episode(endless._replace(task=task), learns, schedule, one, workspace(learns, one.goal.size))
         return weights, outcome[1]
 
     one = episode(endless, random_state(1))

@@ -23,6 +23,7 @@ OF_THE_THESIS = {
     *("control-frequency", "state-history", "enough-data", "noise-for-transfer", "switch-punishment", "all-goals"),
     *("long-training", "optimal-settings", "no-shaping", "transfer", "transferability", "valves-closed", "goal-area"),
     *("shaping-settings", "fine-tuning", "overnight", "on-the-arm-only", "displacement"),
+    *("goal-pairs", "joint-data", "joint-data-long", "joint-exploration", "coupling", "joint-agents", "hierarchy"),
 }
 
 

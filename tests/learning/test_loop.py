@@ -37,7 +37,8 @@ def one_episode(
     weights = pack(networks, simulation.window)
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
-    outcome = train_episode(env, learner(weights, settings), GREEDY, one, workspace(one))
+    work = learner(weights, settings)
+    outcome = train_episode(env, work, GREEDY, one, workspace(work, one.goal.size))
     return outcome, 50 * unpack(weights, simulation.window, settings.hidden).output_bias[0]
 
 
@@ -76,8 +77,9 @@ def _chunk(joints: int, count: int, method: str = "q-learning") -> dict[str, lis
     env = environment(simulation, synthetic_begin_states(simulation), settings)
     weights = pack(draw_networks(simulation.window, settings, np.random.default_rng(0)), simulation.window)
     one = episode(env, random_state(4))
+    work = learner(weights, settings)
     performance, steps, _ = train_episodes(
-        env, learner(weights, settings), Schedule(150.0, 0.5, 20.0, 0.002), one, workspace(one), count, 0.5
+        env, work, Schedule(150.0, 0.5, 20.0, 0.002), one, workspace(work, one.goal.size), count, 0.5
     )
     return {
         "weights": weights.ravel().tolist(),
@@ -113,7 +115,7 @@ def test_performance_is_the_moving_average_of_successes(simulation: Simulation, 
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     work = learner(pack(networks, simulation.window), settings)
-    performance, steps, _ = train_episodes(env, work, GREEDY, one, workspace(one), 500, 0.2)
+    performance, steps, _ = train_episodes(env, work, GREEDY, one, workspace(work, one.goal.size), 500, 0.2)
     assert steps == 500
     assert performance == pytest.approx(1 - 0.8 * 0.998**500, rel=1e-9)
 
@@ -131,6 +133,8 @@ def test_training_ends_with_the_episode_in_which_the_performance_is_enough(
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     work = learner(pack(networks, simulation.window), settings)
-    performance, steps, count = train_episodes(env, work, GREEDY._replace(enough=0.5), one, workspace(one), 500, 0.2)
+    performance, steps, count = train_episodes(
+        env, work, GREEDY._replace(enough=0.5), one, workspace(work, one.goal.size), 500, 0.2
+    )
     assert (steps, count) == (235, 235)
     assert 0.5 <= performance < 0.5 + 0.002

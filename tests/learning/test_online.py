@@ -23,7 +23,9 @@ def an_agent(simulation: Simulation, **settings: object) -> Agent:
 
 
 @pytest.mark.parametrize("joints", [1, 2])
-@pytest.mark.parametrize("settings", [{}, {"method": "q-learning", "trace_decay": 0.3}])
+@pytest.mark.parametrize(
+    "settings", [{}, {"method": "q-learning", "trace_decay": 0.3}, {"team": "own"}, {"team": "one"}]
+)
 def test_learns_what_the_training_loop_learns(joints: int, settings: dict) -> None:
     """Twenty greedy episodes, once in the compiled loop, once step by step: the same weights bit for bit."""
     simulation = synthetic_simulation(joints)
@@ -31,15 +33,17 @@ def test_learns_what_the_training_loop_learns(joints: int, settings: dict) -> No
     env = environment(simulation, synthetic_begin_states(simulation), agent.settings)
     weights = agent.weights()
     one = episode(env, random_state(7))
+    work = learner(weights, agent.settings)
     for _ in range(20):
-        train_episode(env, learner(weights, agent.settings), Schedule(60.0, 0.0, 1.0, 0.0), one, workspace(one))
+        train_episode(env, work, Schedule(60.0, 0.0, 1.0, 0.0), one, workspace(work, one.goal.size))
 
     online = OnlineLearner(agent, agent.settings.learning_rate)
     other, size = episode(env, random_state(7)), simulation.window.state_size
+    agents = 1 if agent.settings.team == "one" else joints
     for _ in range(20):
         begin_episode(env, other, 60.0, other.state.random)
         online.begin(other.state.x[:size], other.goal)
-        other.state.random[:] = _draws(other.state.random, joints)  # the loop draws whether to explore
+        other.state.random[:] = _draws(other.state.random, agents)  # the loop draws whether to explore
         for _ in range(12):
             is_reached = take(env, other, online.act())
             assert is_reached == reached(env.task, other)
@@ -47,7 +51,7 @@ def test_learns_what_the_training_loop_learns(joints: int, settings: dict) -> No
             online.observe(rewards, other.state.x[:size], is_reached)
             if is_reached:
                 break
-            other.state.random[:] = _draws(other.state.random, joints)
+            other.state.random[:] = _draws(other.state.random, agents)
     np.testing.assert_array_equal(online.agent.weights(), weights)
     assert (weights != agent.weights()).any()
 

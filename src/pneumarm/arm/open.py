@@ -23,9 +23,10 @@ _FORMS = (
     "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
     "emulated:ARM or python:module:callable (python:module:callable,every=2), each with ,spec=arm.toml if you like"
 )
-_OPTION = re.compile(
-    r"[:,](?=(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|every|spec)=|wide(?:,|$))"
+_OPTIONS = (
+    r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|every|spec)=|wide(?:,|$)"
 )
+_OPTION = re.compile(rf"[:,](?={_OPTIONS})")
 """Stands before an option; files may have commas in their names."""
 
 
@@ -79,6 +80,27 @@ def _parts(name: str) -> tuple[str, dict[str, str]]:
     if len(options) < len(given):
         raise UnusableInput(f"arm {name!r}: an option is given twice; expected {_FORMS}")
     return place, options
+
+
+def names_in(text: str) -> list[str]:
+    """Return the names of arms in ``text``, separated by commas as their options are."""
+    return re.split(rf",(?!{_OPTIONS})", text)
+
+
+def with_options(name: str, **changed: str | None) -> str:
+    """Return the ``name`` of a virtual arm with other options, those that are None left out.
+
+    Raises:
+        UnusableInput: it is not a virtual arm's.
+
+    """
+    place, options = _parts(name)
+    if place != "virtual":
+        raise UnusableInput(
+            f"arm {name!r}: expected a virtual one, only that can have {' or '.join(changed)} changed"
+        )
+    kept = {key: value for key, value in {**options, **changed}.items() if value is not None}
+    return ":".join([place, *([",".join(map(_option, kept.items()))] if kept else [])])
 
 
 def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None = None) -> Arm:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from pneumarm.arm.open import names_in
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import say, show, table
 from pneumarm.experiments.experiment import LaboratorySettings
@@ -46,7 +47,7 @@ def experiment_(
         Address of the scheduler of a dask cluster, such as tcp://127.0.0.1:8786, to compute there.
     """
     chosen = experiment(name)
-    names = chosen.arms if arms is None else arms.split(",")
+    names = chosen.arms if arms is None else names_in(arms)
     done = sweep(chosen, out, names, runs, settings, workers=workers, dask=dask, progress=progress)
     analysis = chosen.analyse(done.rows)
     page = write_page(chosen, out / chosen.name, analysis, done.rows.runs, done.rows.arms)

@@ -31,7 +31,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel, part
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import begin_acting, learn_and_act
-from pneumarm.learning.online.loop import Schedule, Workspace, workspace_of
+from pneumarm.learning.online.loop import Schedule, Workspace, workspace
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state, uniform
@@ -156,11 +156,12 @@ class Player:
         self._schedule = _schedule(exploration)
         x = np.zeros(place.size, np.float32)
         x[place.one] = 1
+        learns = learner(agent.weights(), agent.settings, learning_rate)
         self._mind = _Mind(
-            learner(agent.weights(), agent.settings, learning_rate),
+            learns,
             x,
             np.zeros(window.state_size, np.float32),
-            workspace_of(joints, place.size),
+            workspace(learns, joints),
             random_state(seed),
             place,
             np.ascontiguousarray(window.of_joints(scaling.observation_offset), np.float64),
@@ -353,11 +354,12 @@ def _begin(watched, mind, schedule, goal, velocity):  # type: ignore[no-untyped-
 
 @kernel
 def _judge(watched, rules, goal, velocity, turn, gained):  # type: ignore[no-untyped-def]
-    """Set what each joint has ``gained`` by its last action and whether it switched; return whether all are there."""
+    """Set what each joint has ``gained`` by its last action, whether it switched and is there; return if all are."""
     is_reached = True
     for j in range(goal.size):
-        is_reached = is_reached and is_near(rules.reward, watched.angle[j], goal[j])
-        is_reached = is_reached and is_slow(rules.reward, velocity[j])
+        is_there = is_near(rules.reward, watched.angle[j], goal[j]) and is_slow(rules.reward, velocity[j])
+        turn.there[j] = is_there
+        is_reached = is_reached and is_there
     for j in range(goal.size):
         action = _action(watched.applied[j, 0], watched.applied[j, 1])
         turn.switched[j] = 1 if is_switch(turn.last[j], action) else 0
@@ -367,10 +369,11 @@ def _judge(watched, rules, goal, velocity, turn, gained):  # type: ignore[no-unt
 
 
 class _Turn(NamedTuple):
-    """The last actions as applied, and whether they were switches, each of shape (joints,)."""
+    """The last actions as applied, whether they were switches, and who is at its goal, each of shape (joints,)."""
 
     last: NDArray[np.int64]
     switched: NDArray[np.int64]
+    there: NDArray[np.bool_]
 
 
 @kernel
@@ -378,7 +381,7 @@ def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignor
     """Make movement ``e`` to ``goal``, as ``move`` does; return whether it succeeded."""
     joints = goal.size
     before, velocity, gained = np.zeros(joints), np.zeros(joints), np.zeros(joints)
-    turn = _Turn(np.full(joints, -1), np.zeros(joints, np.int64))
+    turn = _Turn(np.full(joints, -1), np.zeros(joints, np.int64), np.zeros(joints, np.bool_))
     success, is_first, due, then = False, True, 0.0, 0.0
     while True:
         time = _read(body, watched)
@@ -394,7 +397,8 @@ def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignor
             success = _judge(watched, rules, goal, velocity, turn, gained)
             note_action(rules.reward, turn.switched, success, record, e)
             _push(mind, watched, velocity, False)
-            learn_and_act(mind.learner, schedule, mind.x, mind.workspace, mind.random, (gained, mind.sigma), success)
+            seen = gained, turn.there, mind.sigma
+            learn_and_act(mind.learner, schedule, mind.x, mind.workspace, mind.random, seen, success)
             if not goes_on(rules, success, record, e):
                 break
         before[:] = watched.angle

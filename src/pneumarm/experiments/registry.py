@@ -24,6 +24,13 @@ PLACES = {
     "overnight": "overnight",
     "on-the-arm-only": "on_the_arm_only",
     "displacement": "displacement",
+    "goal-pairs": "goal_pairs",
+    "joint-data": "joint_data",
+    "joint-data-long": "joint_data_long",
+    "joint-exploration": "joint_exploration",
+    "joint-agents": "joint_agents",
+    "hierarchy": "hierarchy",
+    "coupling": "coupling",
 }
 """Name: package below this one; each has an ``EXPERIMENT``."""
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
 from pneumarm.control import AgentController, drawn, make_movements
+from pneumarm.control.agent import warm_up
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
@@ -28,6 +29,7 @@ from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
 from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, QUANTITIES, CollectSettings, Store, collect
 from pneumarm.transitions.choice import joined
+from pneumarm.transitions.goals import Goals
 
 TRANSITIONS = 40_000
 """Transitions of a simulation, at most as many as the laboratory's: 22 minutes on the arm."""
@@ -209,7 +211,7 @@ def train_and_move(
     train_settings: Any,
     run: int,
     settings: LaboratorySettings,
-    goals: NDArray[np.float64] | None = None,
+    goals: Goals | NDArray[np.float64] | None = None,
     method: Method | None = None,
 ) -> Figures:
     """Train agents, test the best in its simulation, and move the arm with it; nothing is learned on the arm.
@@ -222,7 +224,7 @@ def train_and_move(
         train_settings: of the agents, those of any method.
         run: that weights and movements are those of.
         settings: of the laboratory.
-        goals: range of the goals on the arm, shape (joints, 2) [counts]; the simulation's by default.
+        goals: those on the arm, or their range, shape (joints, 2) [counts]; the simulation's by default.
         method: that the settings are of, where it is not a built-in one.
 
     """
@@ -233,12 +235,13 @@ def train_and_move(
     training = train(material.simulation, material.begin, chosen, seed, method=method, threads=1)
     agent = training.agent
     simulated = test(agent, material.simulation, material.begin, settings.test_episodes, 0)
-    span = material.simulation.goal_range if goals is None else goals
+    wanted = material.simulation.goals if goals is None else goals
     numbers = range(min(MOVEMENTS, settings.test_episodes))
+    warm_up(agent)
     with opened(material.arm, seed % 2**31, recipe.frequency) as arm:
         closes = recipe.close_while_computing
-        rows = greedy_movements(agent, arm, span, numbers, seed, close_while_computing=closes)
-    made = of_rows(one.row() for one in rows)
+        rows = greedy_movements(agent, arm, wanted, numbers, seed, close_while_computing=closes)
+    made = of_rows((one.row() for one in rows), material.simulation.spec.joints)
     return {
         BEFORE + "reward": float(simulated.reward.mean()),
         BEFORE + "success_rate": float(simulated.success.mean()),
@@ -252,7 +255,7 @@ def train_and_move(
 def greedy_movements(
     agent: Acts,
     arm: Arm,
-    goals: NDArray[np.float64],
+    goals: Goals | NDArray[np.float64],
     numbers: Iterable[int],
     seed: int,
     controller: AgentController | None = None,
@@ -264,7 +267,7 @@ def greedy_movements(
     Args:
         agent: what moves it.
         arm: any.
-        goals: range of the goals, shape (joints, 2) [counts].
+        goals: to reach, or their range, shape (joints, 2) [counts].
         numbers: of the movements; with ``seed`` they decide begin state and goal, whoever moves.
         seed: of the movements.
         controller: what acts in the agent's place.

@@ -138,5 +138,5 @@ def _learning(env: Environment, weights: NDArray[np.float32], settings: TrainSet
     deviation = float(high - low) if settings.shaping else np.inf
     schedule = Schedule(deviation, float(last.epsilon), float(last.temperature), _NEWEST)
     learns = learner(weights.copy(), settings)
-    performance, _, _ = train_episodes(env, learns, schedule, one, workspace(one), count, 0.0)
+    performance, _, _ = train_episodes(env, learns, schedule, one, workspace(learns, one.goal.size), count, 0.0)
     return float(performance / (1 - (1 - _NEWEST) ** count))

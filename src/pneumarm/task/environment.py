@@ -200,14 +200,20 @@ def velocity(task, episode, joint):  # type: ignore[no-untyped-def]
 
 
 @part
+def at_goal(task, episode, joint):  # type: ignore[no-untyped-def]
+    """Return whether ``joint`` is at its goal and slow (thesis eq. 5.1, 5.2)."""
+    if not is_near(task.reward, angle(task, episode, joint), episode.goal[joint]):
+        return False
+    return is_slow(task.reward, velocity(task, episode, joint))
+
+
+@part
 def reached(task, episode):  # type: ignore[no-untyped-def]
-    """Return whether every joint is at its goal and slow (thesis eq. 5.1, 5.2)."""
+    """Return whether every joint is at its goal and slow."""
+    are_all = True
     for joint in range(episode.goal.shape[0]):
-        if not is_near(task.reward, angle(task, episode, joint), episode.goal[joint]):
-            return False
-        if not is_slow(task.reward, velocity(task, episode, joint)):
-            return False
-    return True
+        are_all = are_all and at_goal(task, episode, joint)
+    return are_all
 
 
 @part

@@ -256,7 +256,8 @@ def _evidence(judged: Judged) -> Section:
 
 
 def _more(name: str, laboratory: Path) -> str:
-    arms = ",".join(f"virtual:seed={seed}" for seed in range(1, FEWEST_ARMS + 1))
+    own = experiment(name).arms
+    arms = ",".join(own if len(own) >= FEWEST_ARMS else (f"virtual:seed={n}" for n in range(1, FEWEST_ARMS + 1)))
     runs = -(-FEWEST_RUNS // FEWEST_ARMS)
     return f"pneumarm experiment {name} --out {laboratory} --arms {arms} --runs {runs}"
 

@@ -54,7 +54,7 @@ class Agent:
 
     def with_weights(self, weights: NDArray[np.float32]) -> Self:
         """Return the agent with other ``weights``, as of :meth:`weights`."""
-        return replace(self, networks=unpack(weights, self.window, self.settings.hidden))
+        return replace(self, networks=unpack(weights, self.window, self.settings.hidden, self.settings.team))
 
     def actor(self) -> "OnlineLearner":
         """Return the agent acting step by step, greedily."""
@@ -130,4 +130,8 @@ _SCALING = ("observation_offset", "observation_scale", "command_scale")
 def _expected(window: Window, settings: TrainSettings) -> dict[str, NDArray[Any]]:
     observed, commanded = np.zeros(window.observation_size), np.zeros(window.command_size)
     scaling = dict(zip(_SCALING, (observed, observed, commanded), strict=True))
-    return network_shapes(window, settings.hidden)._asdict() | scaling | {"goal_range": np.zeros((window.joints, 2))}
+    return (
+        network_shapes(window, settings.hidden, settings.team)._asdict()
+        | scaling
+        | {"goal_range": np.zeros((window.joints, 2))}
+    )

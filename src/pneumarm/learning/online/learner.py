@@ -8,18 +8,19 @@ import json
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm.valves import ACTIONS, VALVES
+from pneumarm.arm.valves import VALVES
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.kernels import part
 from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.loop import Schedule, look_ahead, workspace_of
+from pneumarm.learning.online.loop import Schedule, learn, look_ahead, remember, spread, workspace
 from pneumarm.learning.online.settings import Exploration
-from pneumarm.learning.online.values import action_values, forget_traces, learner, td_target, update
+from pneumarm.learning.online.values import action_values, forget_traces, learner
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import places
+from pneumarm.task.reward import is_near, is_slow
 from pneumarm.task.tracker import scaled_goal
 
-_SAVED = ("weights", "traces", "traced", "random", "x", "actions", "next_actions", "next_values", "cut")
+_SAVED = ("weights", "traces", "traced", "random", "x", "chosen", "next_chosen", "next_actions", "next_values", "cut")
 
 
 class OnlineLearner:
@@ -54,7 +55,7 @@ class OnlineLearner:
         self._places = places(agent.window)
         self._x = np.zeros(self._places.size, np.float32)
         self._x[self._places.one] = 1
-        self._workspace = workspace_of(joints, self._places.size)
+        self._workspace = workspace(self._learner, joints)
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
@@ -72,7 +73,8 @@ class OnlineLearner:
 
     def greedy(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of highest value in the current state; changes nothing."""
-        best: NDArray[np.int64] = self.values().argmax(axis=1)
+        best = np.zeros_like(self._workspace.next_actions)
+        spread.py_func(self.values().argmax(axis=1), best)
         return best
 
     def valves(self) -> NDArray[np.int8]:
@@ -81,10 +83,13 @@ class OnlineLearner:
         return valves
 
     def values(self) -> NDArray[np.float32]:
-        """Return the action values in the current state, shape (joints, 9), in units of reward."""
-        values = np.zeros((self._agent.window.joints, ACTIONS), np.float32)
-        for joint in range(len(values)):
-            action_values(self._learner, joint, self._x, values[joint])
+        """Return the action values in the current state, shape (agents, choices), in units of reward.
+
+        That is (joints, 9), unless one agent acts for all joints.
+        """
+        values = np.zeros(self._learner.traced.shape, np.float32)
+        for agent in range(len(values)):
+            action_values(self._learner, agent, self._x, values[agent])
         return values
 
     def follow(self, next_state: ArrayLike) -> None:
@@ -100,13 +105,25 @@ class OnlineLearner:
         """Learn from what the actions of :meth:`act` led to.
 
         ``reward`` is a number or one a joint (joints,), ``next_state`` (state_size,) scaled, and ``terminal`` says
-        whether the goals are reached: the value of a terminal state is 0, a cut-off is not terminal.
+        whether the goals are reached: the value of a terminal state is 0, a cut-off is not terminal. Agents with
+        goals of their own see in ``next_state`` who is there.
         """
         self.act()
-        paid = np.broadcast_to(np.asarray(reward, np.float64), self._workspace.actions.shape).copy()
+        paid = np.broadcast_to(np.asarray(reward, np.float64), self._workspace.paid.shape).copy()
         next_state = self._checked(next_state)
-        seen = paid, next_state
+        seen = paid, self._there(next_state), next_state
         learn_and_act(self._learner, self.schedule, self._x, self._workspace, self._random, seen, bool(terminal))
+
+    def _there(self, state: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Return which joints are at their goals in the scaled ``state``, shape (joints,)."""
+        window, scaling = self._agent.window, self._agent.scaling
+        offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+        seen = window.of_joints(state[: window.observation_size]) * scale + offset
+        goal = self._x[self._places.goal : self._places.one] * scale[:, 0] + offset[:, 0]
+        reward = self._agent.settings.reward.on(self._agent.spec)
+        near, slow = is_near.py_func(reward, seen[:, 0], goal), is_slow.py_func(reward, seen[:, 1])
+        there: NDArray[np.bool_] = near & slow
+        return there
 
     @property
     def agent(self) -> Agent:
@@ -148,27 +165,25 @@ class OnlineLearner:
 @part
 def begin_acting(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
     """Begin an episode in the state and goal ``x``: choose its first actions."""
-    for joint in range(workspace.actions.shape[0]):
-        forget_traces(learner, joint)
+    for agent in range(workspace.chosen.shape[0]):
+        forget_traces(learner, agent)
     look_ahead(learner, schedule, x, workspace, random)
 
 
 @part
 def learn_and_act(learner, schedule, x, workspace, random, seen, terminal):  # type: ignore[no-untyped-def]
-    """Do what the training loop does after an action; ``seen`` are the rewards (joints,) and the next state."""
-    paid, next_state = seen
-    for i in range(x.shape[0]):
-        workspace.before[i] = x[i]
+    """Do what the training loop does after an action.
+
+    ``seen`` are the rewards (joints,), who is at its goal (joints,), and the next state.
+    """
+    paid, there, next_state = seen
+    remember(workspace, x)
     for i in range(next_state.shape[0]):
         x[i] = next_state[i]
-    for joint in range(workspace.actions.shape[0]):
-        workspace.actions[joint] = workspace.next_actions[joint]
     if not terminal:
         look_ahead(learner, schedule, x, workspace, random)
     if learner.rate == 0.0:
         return
-    for joint in range(workspace.actions.shape[0]):
-        target = td_target(paid[joint], learner.discount, workspace.next_values[joint], terminal)
-        update(learner, joint, workspace.before, workspace.actions[joint], target)
-        if workspace.cut[joint]:
-            forget_traces(learner, joint)
+    for joint in range(paid.shape[0]):
+        workspace.paid[joint], workspace.there[joint] = paid[joint], there[joint]
+    learn(learner, workspace, terminal)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import part
 from pneumarm.learning.online.exploration import choose, greedy
-from pneumarm.learning.online.values import action_values, forget_traces, td_target, update
-from pneumarm.task.environment import Episode, begin_episode, gained, take
+from pneumarm.learning.online.values import ActionValues, action_values, forget_traces, td_target, update
+from pneumarm.task.environment import at_goal, begin_episode, gained, take
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
 from pneumarm.task.reward import paid
 
@@ -28,34 +28,39 @@ class Workspace(NamedTuple):
     before: NDArray[np.float32]
     """State vector before the action, shape (inputs,)."""
     values: NDArray[np.float32]
-    """Action values, shape (9,)."""
+    """Action values of an agent, shape (choices,)."""
     odds: NDArray[np.float32]
-    """For exploring, shape (9,)."""
-    actions: NDArray[np.int64]
-    """Actions to take, shape (joints,)."""
+    """For exploring, same shape."""
+    chosen: NDArray[np.int64]
+    """What agents have chosen to be done now, shape (agents,)."""
     next_values: NDArray[np.float64]
-    """Value that the target looks ahead to, shape (joints,)."""
+    """Value that the target looks ahead to, shape (agents,)."""
     cut: NDArray[np.int64]
-    """Whether the traces are cut, shape (joints,)."""
+    """Whether the traces are cut, shape (agents,)."""
+    next_chosen: NDArray[np.int64]
+    """What agents have chosen to be done next, shape (agents,)."""
     next_actions: NDArray[np.int64]
-    """Shape (joints,)."""
+    """The same as actions, shape (joints,)."""
+    paid: NDArray[np.float64]
+    """What each joint was paid for its last action, shape (joints,)."""
+    there: NDArray[np.bool_]
+    """Whether each joint is at its goal, shape (joints,); of interest only to agents with goals of their own."""
 
 
-def workspace(episode: Episode) -> Workspace:
-    """Return workspace for a loop on ``episode``."""
-    return workspace_of(episode.goal.size, episode.state.x.size)
-
-
-def workspace_of(joints: int, inputs: int) -> Workspace:
-    """Return workspace for so many joints and inputs."""
+def workspace(learner: ActionValues, joints: int) -> Workspace:
+    """Return workspace for a loop in which ``learner`` moves so many joints."""
+    agents, choices = learner.traced.shape
     return Workspace(
-        before=np.zeros(inputs, np.float32),
-        values=np.zeros(ACTIONS, np.float32),
-        odds=np.zeros(ACTIONS, np.float32),
-        actions=np.full(joints, -1, np.int64),
-        next_values=np.zeros(joints),
-        cut=np.zeros(joints, np.int64),
+        before=np.zeros(learner.weights.shape[1] - 2, np.float32),
+        values=np.zeros(choices, np.float32),
+        odds=np.zeros(choices, np.float32),
+        chosen=np.full(agents, -1, np.int64),
+        next_values=np.zeros(agents),
+        cut=np.zeros(agents, np.int64),
+        next_chosen=np.full(agents, -1, np.int64),
         next_actions=np.full(joints, -1, np.int64),
+        paid=np.zeros(joints),
+        there=np.zeros(joints, np.bool_),
     )
 
 
@@ -75,16 +80,60 @@ class Schedule(NamedTuple):
 @part
 def look_ahead(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
     """Choose the next actions in ``x`` and find the values that the targets look ahead to."""
-    for joint in range(workspace.actions.shape[0]):
-        action_values(learner, joint, x, workspace.values)
+    decide(learner, schedule, x, workspace, random)
+    spread(workspace.next_chosen, workspace.next_actions)
+
+
+@part
+def decide(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
+    """Let agents choose what to do next in ``x``."""
+    for agent in range(workspace.next_chosen.shape[0]):
+        action_values(learner, agent, x, workspace.values)
         chosen = choose(workspace.values, schedule.epsilon, schedule.temperature, workspace.odds, random)
-        workspace.next_actions[joint] = chosen
-        workspace.next_values[joint] = workspace.values[chosen]
-        workspace.cut[joint] = 0
+        workspace.next_chosen[agent] = chosen
+        workspace.next_values[agent] = workspace.values[chosen]
+        workspace.cut[agent] = 0
         if learner.off_policy:
             best = greedy(workspace.values)
-            workspace.next_values[joint] = workspace.values[best]
-            workspace.cut[joint] = 1 if chosen != best else 0
+            workspace.next_values[agent] = workspace.values[best]
+            workspace.cut[agent] = 1 if chosen != best else 0
+
+
+@part
+def spread(chosen, actions):  # type: ignore[no-untyped-def]
+    """Set ``actions`` (joints,) to what their agents have ``chosen`` (agents,), see :mod:`.values`."""
+    each = actions.shape[0] // chosen.shape[0]
+    for agent in range(chosen.shape[0]):
+        left = chosen[agent]
+        for joint in range(agent * each, (agent + 1) * each):
+            actions[joint] = left % ACTIONS
+            left //= ACTIONS
+
+
+@part
+def learn(learner, workspace, is_reached):  # type: ignore[no-untyped-def]
+    """Move the values of what was chosen towards their targets; the goal of all joints ``is_reached`` or not."""
+    each = workspace.paid.shape[0] // workspace.chosen.shape[0]
+    usual = learner.reward.goal if is_reached else learner.reward.action
+    for agent in range(workspace.chosen.shape[0]):
+        reward, is_over = workspace.paid[agent * each], is_reached
+        for joint in range(agent * each + 1, (agent + 1) * each):
+            reward += workspace.paid[joint] - usual  # the goal is paid for once, switches of all joints
+        if learner.own and workspace.there[agent] and not is_reached:
+            reward, is_over = reward + learner.reward.goal - learner.reward.action, True
+        target = td_target(reward, learner.discount, workspace.next_values[agent], is_over)
+        update(learner, agent, workspace.before, workspace.chosen[agent], target)
+        if workspace.cut[agent]:
+            forget_traces(learner, agent)
+
+
+@part
+def remember(workspace, x):  # type: ignore[no-untyped-def]
+    """Remember the state ``x`` (inputs,) and what was chosen there."""
+    for i in range(x.shape[0]):
+        workspace.before[i] = x[i]
+    for agent in range(workspace.chosen.shape[0]):
+        workspace.chosen[agent] = workspace.next_chosen[agent]
 
 
 @part
@@ -92,24 +141,19 @@ def train_episode(environment, learner, schedule, episode, workspace):  # type: 
     """Run one episode, learning; return actions taken, sum of rewards, and whether the goal was reached."""
     x, random, total = episode.state.x, episode.state.random, 0.0
     begin_episode(environment, episode, schedule.deviation, random)
-    for joint in range(workspace.actions.shape[0]):
-        forget_traces(learner, joint)
+    for agent in range(workspace.chosen.shape[0]):
+        forget_traces(learner, agent)
     look_ahead(learner, schedule, x, workspace, random)
     for k in range(environment.task.cutoff):
-        for i in range(x.shape[0]):
-            workspace.before[i] = x[i]
-        for joint in range(workspace.actions.shape[0]):
-            workspace.actions[joint] = workspace.next_actions[joint]
-        is_reached = take(environment, episode, workspace.actions)
+        remember(workspace, x)
+        is_reached = take(environment, episode, workspace.next_actions)
         if not is_reached:
             look_ahead(learner, schedule, x, workspace, random)
         total += gained(environment.task, episode, is_reached)
-        for joint in range(workspace.actions.shape[0]):
-            reward = paid(environment.task.reward, is_reached, episode.switched[joint])
-            target = td_target(reward, learner.discount, workspace.next_values[joint], is_reached)
-            update(learner, joint, workspace.before, workspace.actions[joint], target)
-            if workspace.cut[joint]:
-                forget_traces(learner, joint)
+        for joint in range(episode.goal.shape[0]):
+            workspace.paid[joint] = paid(environment.task.reward, is_reached, episode.switched[joint])
+            workspace.there[joint] = at_goal(environment.task, episode, joint)
+        learn(learner, workspace, is_reached)
         if is_reached:
             return k + 1, total, True
     return environment.task.cutoff, total, False
@@ -140,15 +184,16 @@ def test_episodes(environment, learner, schedule, episode, workspace, random, re
         note_begin(task, episode, record, e)
         is_reached = False
         while goes_on(task, is_reached, record, e):
-            for joint in range(episode.goal.shape[0]):
-                action_values(learner, joint, x, workspace.values)
+            for agent in range(workspace.chosen.shape[0]):
+                action_values(learner, agent, x, workspace.values)
                 if schedule.epsilon == 0.0:
-                    workspace.actions[joint] = greedy(workspace.values)
+                    workspace.chosen[agent] = greedy(workspace.values)
                 else:
                     epsilon, temperature = schedule.epsilon, schedule.temperature
-                    workspace.actions[joint] = choose(
+                    workspace.chosen[agent] = choose(
                         workspace.values, epsilon, temperature, workspace.odds, episode.state.random
                     )
-            is_reached = take(environment, episode, workspace.actions)
+            spread(workspace.chosen, workspace.next_actions)
+            is_reached = take(environment, episode, workspace.next_actions)
             note_action(task.reward, episode.switched, is_reached, record, e)
         note_end(task, episode, is_reached, record, e)

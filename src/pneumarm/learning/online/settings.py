@@ -8,6 +8,7 @@ from pneumarm.settings import Settings, Valid
 from pneumarm.task.settings import TaskSettings
 
 Method = Literal["sarsa", "q-learning"]
+Team = Literal["common", "own", "one"]
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,9 @@ class TrainSettings(TaskSettings):
 
     method: Method = "sarsa"
     """Which action value is the target: the next one taken (eq. 4.9) or the highest (eq. 4.10) (thesis: SARSA)."""
+    team: Team = "common"
+    """Who acts for several joints: an agent a joint, each paid when all are at their goals (common) or when its own
+    joint is (own), or one agent with a network for each combination of actions (one) (thesis 6.1.2: common)."""
     learning_rate: float = 0.05
     """beta (thesis: 0.05)."""
     hidden: int = 5
@@ -108,6 +112,7 @@ class TrainSettings(TaskSettings):
     def _valid(self) -> Valid:
         return {
             "method": self.method in ("sarsa", "q-learning"),
+            "team": self.team in ("common", "own", "one"),
             "learning_rate": 0 <= self.learning_rate < math.inf,
             "hidden": 1 <= self.hidden <= 1024,
             "trace_decay": 0 <= self.trace_decay <= 1,

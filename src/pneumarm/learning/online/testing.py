@@ -29,5 +29,6 @@ def run_test(
     one = episode(env, random_state((*seed, NOISE)))
     record = movements(episodes, one.goal.size)
     schedule = Schedule(np.inf, float(exploration.epsilon), float(exploration.temperature), 0.0)
-    test_episodes(env, learner(weights, settings), schedule, one, workspace(one), random_state(seed), record)
+    acts = learner(weights, settings)
+    test_episodes(env, acts, schedule, one, workspace(acts, one.goal.size), random_state(seed), record)
     return record

@@ -5,15 +5,16 @@ state window, the noise and the traces, all set at the start of every episode, n
 """
 
 import time
+from abc import abstractmethod
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.loop import train_episodes, workspace
+from pneumarm.learning.online.loop import Schedule, train_episodes, workspace
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.learning.online.shaping import adjusted, initial_deviation, stage
 from pneumarm.learning.online.testing import run_test
@@ -22,7 +23,7 @@ from pneumarm.learning.training import Learner, Progress, Training, identity_of,
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
-from pneumarm.task.environment import Environment, environment, episode
+from pneumarm.task.environment import Environment, Episode, environment, episode
 from pneumarm.task.movements import Movements
 
 _WEIGHTS, _TRAINING, _VALIDATION = 0, 1, 2  # streams of random numbers
@@ -55,7 +56,7 @@ def train(
     settings = settings or TrainSettings()
     env = environment(simulation, begin_states, settings)
     return train_side_by_side(
-        lambda number: ShapedLearner(env, simulation, settings, seed, number),
+        lambda number: OnlineTrainee(env, simulation, settings, seed, number),
         settings.agents,
         settings.validation_episodes,
         identity_of(env, settings, seed),
@@ -65,8 +66,12 @@ def train(
     )
 
 
-class ShapedLearner(Learner[Agent]):
-    """The thesis' networks, learning in episodes that begin ever farther from their goals (section 4.3.2).
+AgentT = TypeVar("AgentT")
+SettingsT = TypeVar("SettingsT", bound=TrainSettings)
+
+
+class ShapedLearner(Learner[AgentT], Generic[AgentT, SettingsT]):
+    """Who learns in episodes that begin ever farther from their goals (section 4.3.2).
 
     Its curve has a row every 500 episodes, or as often as shaping adjusts the deviation [counts]; that is told as it
     was until then.
@@ -74,9 +79,7 @@ class ShapedLearner(Learner[Agent]):
 
     columns = CURVES
 
-    def __init__(
-        self, env: Environment, simulation: Simulation, settings: TrainSettings, seed: int, number: int
-    ) -> None:
+    def __init__(self, env: Environment, simulation: Simulation, settings: SettingsT, seed: int, number: int) -> None:
         super().__init__()
         self._env, self._simulation, self._settings, self._seed = env, simulation, settings, seed
         draw = np.random.default_rng([seed, _WEIGHTS, number])
@@ -149,16 +152,29 @@ class ShapedLearner(Learner[Agent]):
         now = stage(float(self._shaping[0]), self._settings, self._simulation.spec)
         # What threads write must not lie on a cache line together, or each slows the other down.
         one = _apart(episode(self._env, self._random))
-        worker = _apart(learner(self._weights, self._settings))
-        remembered = _apart(workspace(one))
         began = time.thread_time()
-        performance, steps, count = train_episodes(
-            self._env, worker, now.schedule, one, remembered, count, float(self._shaping[1])
-        )
+        performance, steps, count = self._run(now.schedule, one, count)
         spent = time.thread_time() - began
-        self._random[:], self._weights[:] = one.state.random, worker.weights
+        self._random[:] = one.state.random
         self._counts[:2] += count, steps
         return now, performance, spent
+
+    @abstractmethod
+    def _run(self, schedule: Schedule, one: Episode, count: int) -> tuple[float, int, int]:
+        """Learn from at most ``count`` episodes; return performance, steps and episodes."""
+
+
+class OnlineTrainee(ShapedLearner[Agent, TrainSettings]):
+    """The thesis' networks."""
+
+    def _run(self, schedule: Schedule, one: Episode, count: int) -> tuple[float, int, int]:
+        worker = _apart(learner(self._weights, self._settings))
+        remembered = _apart(workspace(worker, one.goal.size))
+        found: tuple[float, int, int] = train_episodes(
+            self._env, worker, schedule, one, remembered, count, float(self._shaping[1])
+        )
+        self._weights[:] = worker.weights
+        return found
 
     def validate(self, episodes: int) -> Movements:
         """Return greedy movements."""
@@ -172,7 +188,7 @@ class ShapedLearner(Learner[Agent]):
             window=simulation.window,
             scaling=simulation.scaling,
             goal_range=simulation.goal_range,
-            networks=unpack(self._weights, simulation.window, settings.hidden),
+            networks=unpack(self._weights, simulation.window, settings.hidden, settings.team),
             settings=settings,
         )
 

@@ -12,8 +12,10 @@ because the number of actions is not part of the state and cannot be blamed (sec
 With Q-learning the traces are Watkins': they are cut where an exploring action is taken, because what follows is not
 what the target assumes (Sutton and Barto, Reinforcement Learning, section 7.6; the thesis does not say which).
 
-With several joints each has networks of its own that see the whole state and all goals. They share the reward of
-the goal; each pays for its own switches.
+With several joints each has an agent with networks of its own that see the whole state and all goals. They share
+the reward of the goal (section 6.1.2); each pays for its own switches. With own goals an agent is paid as soon as its
+joint is at its goal, and what follows is worth nothing to it. One agent for all joints has a network for each
+combination of their actions: what it chooses, ``c``, has the action ``c // 9^j mod 9`` of joint ``j``.
 """
 
 from typing import NamedTuple
@@ -23,9 +25,10 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS, NEVER, possible_actions
 from pneumarm.kernels import part
-from pneumarm.learning.online.settings import TrainSettings
+from pneumarm.learning.online.settings import Team, TrainSettings
 from pneumarm.networks.tansig import tansig
 from pneumarm.simulation.kernel import UNIT_BLOCK, padded, places
+from pneumarm.task.reward import RewardParameters
 from pneumarm.transitions.window import Window
 from pneumarm.vectors import LANES, add_products, follow, weighted_sums
 
@@ -37,15 +40,15 @@ class ActionValues(NamedTuple):
     """The networks of an agent as a kernel changes them. Made by :func:`learner`."""
 
     weights: NDArray[np.float32]
-    """Shape (joints, inputs + 2, units): by input, then the output weights, then the output biases. The networks of
+    """Shape (agents, inputs + 2, units): by input, then the output weights, then the output biases. The networks of
     the actions lie side by side: hidden unit ``h`` of action ``a`` is at ``a width + h``, its output bias at
-    ``a width``."""
+    ``a width``. There is an agent a joint, or one for all."""
     traces: NDArray[np.float32]
     """Eligibility of each weight, same shape; not used if ``decay`` is 0."""
     traced: NDArray[np.bool_]
-    """Which networks have traces that are not 0, shape (joints, 9)."""
+    """Which networks have traces that are not 0, shape (agents, choices); 9 choices for each joint of an agent."""
     hidden: NDArray[np.float32]
-    """Workspace for all networks of a joint, shape (units,)."""
+    """Workspace for all networks of an agent, shape (units,)."""
     activation: NDArray[np.float32]
     """Workspace for the hidden units of one network, shape (width,); 0 beyond them."""
     slope: NDArray[np.float32]
@@ -62,17 +65,24 @@ class ActionValues(NamedTuple):
     """Return that an output of 1 stands for."""
     off_policy: bool
     """Q-learning."""
+    own: bool
+    """Whether each agent has a goal of its own."""
+    reward: RewardParameters
+    """What is paid."""
 
 
 def learner(
-    weights: NDArray[np.float32], settings: TrainSettings, learning_rate: float | None = None
+    weights: NDArray[np.float32],
+    settings: TrainSettings,
+    learning_rate: float | None = None,
+    choices: int | None = None,
 ) -> ActionValues:
-    """Return a learner that changes ``weights`` in place."""
+    """Return a learner that changes ``weights`` in place; an agent has ``choices``, by default those of its team."""
     width = padded(settings.hidden, LANES)
     return ActionValues(
         weights=weights,
         traces=np.zeros_like(weights),
-        traced=np.zeros((len(weights), ACTIONS), np.bool_),
+        traced=np.zeros((len(weights), choices or _choices(weights.shape[2] // width, settings.team)), np.bool_),
         hidden=np.zeros(weights.shape[2], np.float32),
         activation=np.zeros(width, np.float32),
         slope=np.zeros(width, np.float32),
@@ -82,11 +92,24 @@ def learner(
         decay=float(settings.trace_decay),
         scale=float(settings.return_scale),
         off_policy=settings.method == "q-learning",
+        own=settings.team == "own",
+        reward=settings.reward.parameters,
     )
 
 
+def _choices(networks: int, team: Team) -> int:
+    """Return how many choices there are where there is room for so many ``networks`` an agent."""
+    choices = ACTIONS
+    while team == "one" and choices * ACTIONS <= networks:
+        choices *= ACTIONS
+    return choices
+
+
 class Networks(NamedTuple):
-    """The weights of an agent's networks without padding, one network an action of each joint."""
+    """The weights of an agent's networks without padding, one network an action of each joint.
+
+    One agent for all joints has 9^joints networks in place of (joints, 9): (1, 9^joints).
+    """
 
     hidden_weights: NDArray[np.float32]
     """Shape (joints, 9, state_size + joints, hidden); inputs are sigma and the goals (thesis eq. 4.12)."""
@@ -98,10 +121,10 @@ class Networks(NamedTuple):
     """Shape (joints, 9)."""
 
 
-def network_shapes(window: Window, hidden: int) -> Networks:
+def network_shapes(window: Window, hidden: int, team: Team = "common") -> Networks:
     """Return empty networks whose arrays have the right shapes."""
     joints, inputs = window.joints, window.state_size + window.joints
-    networks = joints, ACTIONS
+    networks = (1, ACTIONS**joints) if team == "one" else (joints, ACTIONS)
     shapes = (*networks, inputs, hidden), (*networks, hidden), (*networks, hidden), networks
     return Networks(*(np.zeros(shape, np.float32) for shape in shapes))
 
@@ -112,19 +135,22 @@ def draw_networks(window: Window, settings: TrainSettings, random: np.random.Gen
     Actions that joints with so many ``muscles`` do not have are worth so little that none is ever taken or changed.
     """
     most = settings.initial_weight
-    shapes = network_shapes(window, settings.hidden)
+    shapes = network_shapes(window, settings.hidden, settings.team)
     networks = Networks(*(random.uniform(-most, most, array.shape).astype(np.float32) for array in shapes))
-    networks.output_bias[:, ~possible_actions(muscles)] = NEVER
+    possible = each = possible_actions(muscles)
+    while len(possible) < networks.output_bias.shape[1]:  # one agent has combinations of what its joints have
+        possible = (possible[:, None] & each).ravel()
+    networks.output_bias[:, ~possible] = NEVER
     return networks
 
 
 def pack(networks: Networks, window: Window) -> NDArray[np.float32]:
     """Return ``networks`` as the weights of a :class:`ActionValues`."""
     place, state = places(window), window.state_size
-    joints, _, _, size = networks.hidden_weights.shape
+    agents, choices, _, size = networks.hidden_weights.shape
     width = padded(size, LANES)
-    weights = np.zeros((joints, place.size + 2, padded(ACTIONS * width, UNIT_BLOCK)), np.float32)
-    rows = _by_action(weights, width)
+    weights = np.zeros((agents, place.size + 2, padded(choices * width, UNIT_BLOCK)), np.float32)
+    rows = _by_action(weights, width, choices)
     rows[:, :, :state, :size] = networks.hidden_weights[:, :, :state]
     rows[:, :, place.goal : place.one, :size] = networks.hidden_weights[:, :, state:]
     rows[:, :, place.one, :size] = networks.hidden_bias
@@ -133,10 +159,11 @@ def pack(networks: Networks, window: Window) -> NDArray[np.float32]:
     return weights
 
 
-def unpack(weights: NDArray[np.float32], window: Window, hidden: int) -> Networks:
+def unpack(weights: NDArray[np.float32], window: Window, hidden: int, team: Team = "common") -> Networks:
     """Return what :func:`pack` packed."""
     place, state = places(window), window.state_size
-    rows = _by_action(weights, padded(hidden, LANES))
+    width = padded(hidden, LANES)
+    rows = _by_action(weights, width, _choices(weights.shape[2] // width, team))
     return Networks(
         np.concatenate([rows[:, :, :state, :hidden], rows[:, :, place.goal : place.one, :hidden]], axis=2),
         rows[:, :, place.one, :hidden].copy(),
@@ -145,20 +172,20 @@ def unpack(weights: NDArray[np.float32], window: Window, hidden: int) -> Network
     )
 
 
-def _by_action(weights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
-    """Return ``weights`` of a :class:`ActionValues` seen network by network, shape (joints, 9, inputs + 2, width)."""
-    used = weights[:, :, : ACTIONS * width]
-    return used.reshape(*used.shape[:2], ACTIONS, width).transpose(0, 2, 1, 3)
+def _by_action(weights: NDArray[np.float32], width: int, choices: int) -> NDArray[np.float32]:
+    """Return ``weights`` of a :class:`ActionValues` by network, shape (agents, choices, inputs + 2, width)."""
+    used = weights[:, :, : choices * width]
+    return used.reshape(*used.shape[:2], choices, width).transpose(0, 2, 1, 3)
 
 
 @part
-def action_values(learner, joint, x, values):  # type: ignore[no-untyped-def]
-    """Set ``values`` (9,) to the action values of ``joint`` in the state and goal ``x``, in units of reward."""
-    weights, hidden = learner.weights[joint], learner.hidden
+def action_values(learner, agent, x, values):  # type: ignore[no-untyped-def]
+    """Set ``values`` (choices,) to the action values of ``agent`` in the state and goal ``x``, in units of reward."""
+    weights, hidden = learner.weights[agent], learner.hidden
     row, width = x.shape[0], learner.activation.shape[0]
     weighted_sums(x, weights, 0, hidden)
     tansig(hidden)
-    for action in range(ACTIONS):
+    for action in range(values.shape[0]):
         value = weights[row + 1, action * width]
         for h in range(learner.size):
             u = np.uint64(action * width + h)  # an unsigned index needs no test for wrapping around
@@ -173,12 +200,12 @@ def td_target(reward, discount, next_value, terminal):  # type: ignore[no-untype
 
 
 @part(fastmath=_IN_ORDER)
-def backpropagate(learner, joint, x, action):  # type: ignore[no-untyped-def]
+def backpropagate(learner, agent, x, action):  # type: ignore[no-untyped-def]
     """Return the value of ``action`` in ``x`` and leave its network's activations and slopes in the learner.
 
     ``slope`` is the derivative of the network's output by what enters each hidden unit.
     """
-    weights, activation, slope = learner.weights[joint], learner.activation, learner.slope
+    weights, activation, slope = learner.weights[agent], learner.activation, learner.slope
     row, first = x.shape[0], action * activation.shape[0]
     weighted_sums(x, weights, first, activation)
     tansig(activation)
@@ -206,36 +233,36 @@ def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-
 
 
 @part
-def update(learner, joint, x, action, target):  # type: ignore[no-untyped-def]
+def update(learner, agent, x, action, target):  # type: ignore[no-untyped-def]
     """Move the value of ``action`` in ``x`` towards ``target``; return the error delta, in units of reward."""
-    delta = target - backpropagate(learner, joint, x, action)
+    delta = target - backpropagate(learner, agent, x, action)
     factor = np.float32(learner.rate * delta / learner.scale)
     if learner.decay == 0.0:
-        add_gradient(learner, learner.weights[joint], x, action, factor)
+        add_gradient(learner, learner.weights[agent], x, action, factor)
     else:
-        add_gradient(learner, learner.traces[joint], x, action, np.float32(1.0))
-        learner.traced[joint, action] = True
-        follow_traces(learner, joint, factor)
+        add_gradient(learner, learner.traces[agent], x, action, np.float32(1.0))
+        learner.traced[agent, action] = True
+        follow_traces(learner, agent, factor)
     return delta
 
 
 @part
-def follow_traces(learner, joint, factor):  # type: ignore[no-untyped-def]
-    """Move all weights of ``joint`` by ``factor`` along their traces, and let these decay."""
-    weights, traces = learner.weights[joint], learner.traces[joint]
+def follow_traces(learner, agent, factor):  # type: ignore[no-untyped-def]
+    """Move all weights of ``agent`` by ``factor`` along their traces, and let these decay."""
+    weights, traces = learner.weights[agent], learner.traces[agent]
     decay, width = np.float32(learner.discount * learner.decay), learner.activation.shape[0]
-    for action in range(ACTIONS):
-        if learner.traced[joint, action]:
+    for action in range(learner.traced.shape[1]):
+        if learner.traced[agent, action]:
             follow(weights, traces, action * width, width, factor, decay)
 
 
 @part
-def forget_traces(learner, joint):  # type: ignore[no-untyped-def]
-    """Set the traces of ``joint`` to 0, as at the start of every episode."""
-    traces, width = learner.traces[joint], learner.activation.shape[0]
-    for action in range(ACTIONS):
-        if learner.traced[joint, action]:
-            learner.traced[joint, action] = False
+def forget_traces(learner, agent):  # type: ignore[no-untyped-def]
+    """Set the traces of ``agent`` to 0, as at the start of every episode."""
+    traces, width = learner.traces[agent], learner.activation.shape[0]
+    for action in range(learner.traced.shape[1]):
+        if learner.traced[agent, action]:
+            learner.traced[agent, action] = False
             for i in range(traces.shape[0]):
                 for u in range(action * width, (action + 1) * width):
                     traces[i, np.uint64(u)] = np.float32(0.0)

@@ -1,0 +1,45 @@
+"""Arms whose joints act on each other less."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pneumarm.arm.open import with_options
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned
+from pneumarm.experiments.there_and_back import Prepared, prepared
+from pneumarm.experiments.words import words_of
+
+_WHO = ("policy, all goals", "thesis' agents, one goal")
+
+
+@dataclass(frozen=True)
+class Coupling(SeveralJoints):
+    """A policy with all goals and thesis' agents with one, on arms of more and more coupling."""
+
+    shares: tuple[float, ...] = (0.0, 0.5, 1.0)
+    """Of the coupling that the arm has, in ascending order."""
+    name = "coupling"
+    words = words_of(__package__)
+
+    @property
+    def lessons(self) -> Mapping[str, Lesson]:
+        """By who learns and the share."""
+        lessons = dict(zip(_WHO, (Lesson(self.policy), Lesson(self.thesis, goals="middle")), strict=True))
+        return {f"{who}, {share:g}": lesson for who, lesson in lessons.items() for share in self.shares}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
+        """Return a simulation of the arm with each share of its coupling.
+
+        Raises:
+            UnusableInput: it is not a virtual arm.
+
+        """
+        names = [arm if share == 1 else with_options(arm, coupling=f"{share:g}") for share in self.shares]
+        return [prepared(name, folder, self.within(settings), settings, progress) for name in names]
+
+    def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Learn with the share of ``trial``, and move that arm."""
+        chosen = material[(trial - 1) % len(self.shares)]
+        return {**chosen.figures, **learned(chosen, self.lessons[self.trials[trial]], run, settings)}

@@ -1,0 +1,55 @@
+"""Numbers of transitions, each with its simulation."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pneumarm.arm.open import with_options
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned
+from pneumarm.experiments.there_and_back import Prepared, prepared
+from pneumarm.experiments.words import words_of
+
+
+@dataclass(frozen=True)
+class JointData(SeveralJoints):
+    """Simulations of more and more transitions, and one of one joint."""
+
+    sizes: tuple[int, ...] = (3_000, 6_000, 12_000, 24_000)
+    """Transitions, in ascending order; the laboratory's number does not shorten them: they are the question."""
+    name: str = "joint-data"
+    words = words_of(__package__)
+
+    @property
+    def lessons(self) -> Mapping[str, Lesson]:
+        """By the transitions."""
+        return {f"{size:,}": Lesson(self.policy) for size in self.sizes}
+
+    @property
+    def alone(self) -> int:
+        """Number of the trial with one joint."""
+        return len(self.sizes) + 1
+
+    @property
+    def trials(self) -> Mapping[int, str]:
+        """The transitions, and one joint."""
+        return {**super().trials, self.alone: f"one joint, {self.sizes[-1]:,}"}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
+        """Return a simulation of each number of transitions, and of a virtual arm one of an arm of one joint."""
+        recipes = [replace(self.recipe, transitions=size) for size in self.sizes]
+        made = [prepared(arm, folder, recipe, settings, progress) for recipe in recipes]
+        if arm.startswith("virtual"):
+            single = with_options(arm, joints=None, coupling=None)
+            made.append(prepared(single, folder, recipes[-1], settings, progress))
+        return made
+
+    def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Return how good the simulation of ``trial`` is, and of several joints what its policy does."""
+        if trial > len(material):
+            return {}
+        chosen = material[trial - 1]
+        if trial == self.alone:
+            return chosen.figures
+        return {**chosen.figures, **learned(chosen, self.lessons[self.trials[trial]], run, settings)}

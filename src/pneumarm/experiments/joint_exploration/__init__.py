@@ -1,0 +1,15 @@
+"""Does exploring by each of two agents make it harder to learn together (section 6.1.3)?
+
+Where both explore with a probability of 0.5, at least one does with 0.75. The thesis proposes a lower rate, or a less
+demanding criterion. The thesis' agents learn one goal, that in the middle, with its shaping, with the rates at which
+one of two explores with 0.5, with a low rate, with half the criterion at the beginning, and without shaping.
+
+    pneumarm experiment joint-exploration --out laboratory
+
+Answer here, on arms 1 to 3: three of four actions explore indeed, but neither lower rates nor half the criterion are
+shown to save episodes with the goal in the middle.
+"""
+
+from pneumarm.experiments.joint_exploration.rates import JointExploration
+
+EXPERIMENT = JointExploration()

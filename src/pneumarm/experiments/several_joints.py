@@ -1,0 +1,118 @@
+"""What experiments of chapter 6 share: arms of two joints, and agents that learn one goal or all of them.
+
+They go from an arm and back to it as those of :mod:`.there_and_back` do. What a trial learns is a :class:`Lesson`.
+"""
+
+import zlib
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.there_and_back import (
+    BEFORE,
+    MOVEMENTS,
+    Prepared,
+    Recipe,
+    ThereAndBack,
+    prepared,
+    train_and_move,
+)
+from pneumarm.learning import PolicySettings, TrainSettings, find_method
+from pneumarm.simulation import FitSettings
+
+ARMS = tuple(f"virtual:joints=2,seed={number}" for number in range(1, 6))
+"""Five arms of two joints to develop on; those to judge on are ``virtual:joints=2,seed=1001`` to ``1005``."""
+TRANSITIONS = 12_000
+"""Transitions of a simulation, at most as many as the laboratory's: 7 minutes on the arm."""
+FIT = FitSettings(epochs=30)
+"""Of a simulation: twice the thesis' epochs; twice as many again take 5 % off its errors."""
+THESIS = TrainSettings(agents=1, validation_episodes=100, max_episodes=100_000)
+"""Thesis' agents, one a joint, with as many episodes as it needed for a single goal (section 6.1.4)."""
+POLICY = PolicySettings(agents=1, validation_episodes=100, lookahead=0)
+"""A policy learned in many simulated arms; on the arm it does what it says, as the thesis' agents do."""
+_GOAL = 6  # stream of random numbers
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What is learned in a trial, and how."""
+
+    learning: Any
+    """Settings of a method."""
+    method: str | None = None
+    """Name of that method, where it is no built-in one."""
+    goals: Literal["all", "one", "middle"] = "all"
+    """Whether all goals are learned that the arm can hold, a single one, drawn alike for all trials of a run on an
+    arm, or the one in the middle of the ranges of the joints."""
+
+
+@dataclass(frozen=True)
+class SeveralJoints(ThereAndBack):
+    """An experiment on arms of several joints, by default of two, in which every trial is a lesson."""
+
+    runs: int = 1
+    arms: tuple[str, ...] = ARMS
+    recipe: Recipe = field(default_factory=lambda: Recipe(TRANSITIONS, fit=FIT))
+    """Of the simulation; never more transitions than the laboratory's."""
+    thesis: TrainSettings = THESIS
+    """Of trials in which the thesis' agents learn."""
+    policy: PolicySettings = POLICY
+    """Of trials in which a policy learns."""
+
+    @property
+    @abstractmethod
+    def lessons(self) -> Mapping[str, Lesson]:
+        """What is learned in each trial, by what the trial is called."""
+
+    @property
+    def trials(self) -> Mapping[int, str]:
+        """The lessons."""
+        return dict(enumerate(self.lessons, 1))
+
+    def settings(self) -> Any:
+        """Return the lessons, and what their simulations and figures rest on."""
+        return {
+            "experiment": self.name,
+            "lessons": {words: msgspec.to_builtins(lesson) for words, lesson in self.lessons.items()},
+            "recipe": msgspec.to_builtins(self.recipe),
+            "movements": MOVEMENTS,
+        }
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
+        """Return the arm's simulation."""
+        return prepared(arm, folder, self.within(settings), settings, progress)
+
+    def within(self, settings: LaboratorySettings) -> Recipe:
+        """Return the recipe with no more transitions than those of the laboratory."""
+        return replace(self.recipe, transitions=min(self.recipe.transitions, settings.transitions))
+
+    def measure(self, material: Any, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+        """Learn what ``trial`` is about, and move the arm with it."""
+        return learned(material, self.lessons[self.trials[trial]], run, settings)
+
+
+def learned(material: Prepared, lesson: Lesson, run: int, settings: LaboratorySettings) -> Figures:
+    """Return how agents do that took ``lesson`` in the simulation of an arm, there and on the arm."""
+    if lesson.goals != "all":
+        simulation = material.simulation
+        goal = simulation.goals.middle if lesson.goals == "middle" else one_goal(material, run, settings)
+        material = replace(material, simulation=simulation.with_goals(np.stack([goal, goal], axis=1)))
+    method = None if lesson.method is None else find_method(lesson.method)
+    return train_and_move(material, lesson.learning, run, settings, method=method)
+
+
+def one_goal(material: Prepared, run: int, settings: LaboratorySettings) -> NDArray[np.float64]:
+    """Return the goal of a run that learns a single one, shape (joints,) [counts]; the arm can hold it."""
+    random = np.random.default_rng([run_seed(settings, run), _GOAL, zlib.crc32(material.arm.encode())])
+    return material.simulation.goals.draw(random, 1)[0]
+
+
+SUCCESS = BEFORE + "success_rate"
+"""Share of successes in the simulation."""

@@ -1,0 +1,187 @@
+"""The experiments of chapter 6 at a small size, and what their parts and their verdicts rest on."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from pneumarm.arm.open import names_in, with_options
+from pneumarm.errors import UnusableInput
+from pneumarm.experiments.claims import keys_of
+from pneumarm.experiments.coupling.couplings import Coupling
+from pneumarm.experiments.experiment import Claim, LaboratorySettings, Row, TrialRows, sorted_rows
+from pneumarm.experiments.goal_pairs.pairs import GoalPairs
+from pneumarm.experiments.hierarchy.levels import Levels
+from pneumarm.experiments.joint_agents.teams import JointAgents
+from pneumarm.experiments.joint_data.transitions import JointData
+from pneumarm.experiments.joint_exploration.rates import TOGETHER, JointExploration
+from pneumarm.experiments.registry import experiment
+from pneumarm.experiments.results import write_page
+from pneumarm.experiments.several_joints import POLICY, SeveralJoints, one_goal
+from pneumarm.experiments.sweep import sweep
+from pneumarm.experiments.there_and_back import Prepared, Recipe
+from pneumarm.simulation import FitSettings
+
+SIMULATED = "in simulation: success_rate"
+ARM = "virtual:joints=2,seed=3"
+SMALL = LaboratorySettings(transitions=2400, test_episodes=4, max_episodes=20)
+FEW: dict[str, Any] = {
+    "recipe": Recipe(2400, fit=FitSettings(epochs=3)),
+    "policy": replace(POLICY, updates=2, arms=16, steps=8, validation_episodes=2),
+}
+EXPERIMENTS: list[SeveralJoints] = [
+    GoalPairs(**FEW),
+    JointData(sizes=(2000, 2400), **FEW),
+    JointExploration(**FEW),
+    Coupling(shares=(0.0, 1.0), **FEW),
+    JointAgents(**FEW),
+    Levels(**FEW),
+]
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("joints") / "laboratory"
+
+
+def _silent(done: float, total: float) -> None:
+    pass
+
+
+@pytest.fixture(scope="module")
+def material(laboratory: Path) -> Prepared:
+    laboratory.mkdir(exist_ok=True)
+    return EXPERIMENTS[0].prepare(ARM, laboratory / "arms" / "apart", SMALL, _silent)
+
+
+@pytest.mark.parametrize("chosen", EXPERIMENTS, ids=lambda chosen: chosen.name)
+def test_an_experiment_from_the_arm_to_its_page(chosen: SeveralJoints, laboratory: Path) -> None:
+    """Every row once, every claim judged, everything on the page."""
+    done = sweep(chosen, laboratory, [ARM], 1, SMALL)
+    assert done.computed == len(chosen.trials)
+    assert sweep(chosen, laboratory, [ARM], 1, SMALL).computed == 0
+    analysis = chosen.analyse(done.rows)
+    page = write_page(chosen, laboratory / chosen.name, analysis, 1, (ARM,)).read_text()
+    assert {claim.about for claim in analysis.claims} == keys_of(chosen.name)
+    assert "nan" not in page.split("data:image")[0]
+    found = json.loads((laboratory / chosen.name / "results.json").read_text())
+    first = next(iter(chosen.trials.values()))
+    assert any(first in table for table in found["ours"].values())
+    json.dumps(chosen.settings())
+    named = experiment(chosen.name)
+    assert type(named) is type(chosen)
+    assert len(named.arms) == 5
+
+
+@pytest.mark.parametrize("chosen", EXPERIMENTS, ids=lambda chosen: chosen.name)
+def test_a_lesson_is_learned_alike_again(chosen: SeveralJoints, laboratory: Path) -> None:
+    done = sweep(chosen, laboratory, [ARM], 1, SMALL)
+    folder = next(one for one in (laboratory / "arms").iterdir() if one.name != "apart")
+    again = chosen.measure(chosen.prepare(ARM, folder, SMALL, _silent), 1, 1, SMALL)
+    assert dict(again) == next(row.figures for row in done.rows.rows if row.trial == 1)
+
+
+# Parts ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_goal_of_a_run_is_one_that_the_arm_can_hold(material: Prepared) -> None:
+    goals = np.array([one_goal(material, run, SMALL) for run in range(1, 21)])
+    assert goals.shape == (20, 2)
+    assert material.simulation.goals.contain(goals).all()
+    assert np.ptp(goals, axis=0).min() > 100
+    np.testing.assert_array_equal(goals[3], one_goal(material, 4, SMALL))
+    assert (goals[3] != one_goal(replace(material, arm="another"), 4, SMALL)).all()
+
+
+def test_two_agents_explore_together_as_often_as_one() -> None:
+    assert pytest.approx(0.5) == TOGETHER * (2 - TOGETHER)
+    rates = [lesson.learning.shaping for lesson in JointExploration().lessons.values()]
+    assert [one and one.exploration.epsilon for one in rates] == [0.5, TOGETHER, 0.1, 0.5, None]
+
+
+def test_names_of_arms_and_their_options_have_commas() -> None:
+    named = ["virtual:joints=2,seed=1", "virtual", "virtual:wide,seed=3", "python:mine:Arm", "virtual:seed=2"]
+    assert names_in(",".join(named)) == named
+
+
+def test_options_of_an_arm_change() -> None:
+    assert with_options("virtual:joints=2,seed=1", coupling="0.5") == "virtual:joints=2,seed=1,coupling=0.5"
+    assert with_options("virtual:seed=1,joints=2,coupling=0.5", joints=None, coupling=None) == "virtual:seed=1"
+    assert with_options("virtual:joints=2", joints=None) == "virtual"
+    with pytest.raises(UnusableInput, match=r"serial:/dev/ttyACM0.*expected a virtual one.*coupling"):
+        with_options("serial:/dev/ttyACM0", coupling="0")
+
+
+def test_another_arm_has_no_simulation_of_one_joint(material: Prepared) -> None:
+    """Then that trial has no figures, and claims that need them are left out."""
+    chosen = JointData(sizes=(2000, 2400), **FEW)
+    assert chosen.measure([material, material], chosen.alone, 1, SMALL) == {}
+    rows = [row for row in made_up(chosen, {}).rows if row.trial != chosen.alone]
+    rows += [Row(f"arm {arm}", chosen.alone, 1, {}, 0.0) for arm in range(5)]
+    assert {claim.about for claim in claims_of(chosen, sorted_rows(rows))} == {"joint-data"}
+
+
+# Verdicts -------------------------------------------------------------------------------------------------------
+
+
+def made_up(chosen: SeveralJoints, figures: dict[str, dict[int, float]]) -> TrialRows:
+    """Return rows of five arms in which figures have the value given for a trial, else 1."""
+    columns = [*chosen.words.columns]
+    names = {column.figure for column in columns} | {"reward", "episodes", "success_rate", *figures}
+    return sorted_rows(
+        Row(f"arm {arm}", trial, 1, {n: figures.get(n, {}).get(trial, 1.0) * (1 + 1e-3 * arm) for n in names}, 0.0)
+        for arm in range(5)
+        for trial in chosen.trials
+    )
+
+
+@pytest.mark.parametrize(
+    ("chosen", "begins", "figure", "trial", "holds", "fails"),
+    [
+        (0, "The thesis' agents learn the goal in the middle", SIMULATED, 1, 0.95, 0.2),
+        (0, "They do in less", "episodes", 1, 4e4, 2e5),
+        (0, "They learn any goal as well", SIMULATED, 2, 0.95, 0.1),
+        (0, "The thesis' agents learn all goals", SIMULATED, 3, 0.95, 0.1),
+        (0, "A policy learned in many arms", SIMULATED, 6, 0.95, 0.1),
+        (1, "The simulation is worse", "std angle", 2, 2.0, 0.5),
+        (1, "It is only a bit worse", "std angle", 2, 1.2, 3.0),
+        (1, "2,400 transitions are enough", "success_rate", 2, 0.95, 0.5),
+        (2, "A lower rate", "episodes", 2, 0.5, 2.0),
+        (2, "With 0.5 each", "exploring", 1, 0.75, 0.5),
+        (3, "With coupling a policy", "reward", 2, 0.5, 2.0),
+        (3, "With coupling the thesis' agents", "episodes", 4, 2.0, 0.5),
+        (4, "With a common goal agents succeed more often than with their own, of one", SIMULATED, 2, 0.5, 2.0),
+        (4, "With a common goal agents succeed more often than with their own, of all", SIMULATED, 6, 0.5, 2.0),
+        (4, "One agent with 81 actions", SIMULATED, 3, 0.2, 0.9),
+        (5, "With an upper agent one goal takes fewer", "episodes", 3, 0.5, 2.0),
+        (5, "With an upper agent more movements", SIMULATED, 7, 2.0, 0.5),
+        (5, "It takes fewer episodes than with flat agents that have their own", "episodes", 3, 0.5, 2.0),
+        (5, "More succeed than with own goals", SIMULATED, 6, 0.5, 2.0),
+        (5, "An upper agent that sees angles", "in simulation: reward", 4, 0.5, 2.0),
+    ],
+)
+def test_verdicts_follow_from_the_rows(
+    chosen: int, begins: str, figure: str, trial: int, holds: float, fails: float
+) -> None:
+    for value, expected in ((holds, "holds"), (fails, "does not hold")):
+        claims = claims_of(EXPERIMENTS[chosen], made_up(EXPERIMENTS[chosen], {figure: {trial: value}}))
+        assert next(claim for claim in claims if claim.text.startswith(begins)).verdict == expected
+
+
+def claims_of(chosen: SeveralJoints, rows: TrialRows) -> Sequence[Claim]:
+    with pytest.MonkeyPatch.context() as patch:  # claims need no pictures, which take long
+        for drawn in ("_against", "_dots"):
+            patch.setattr(f"pneumarm.experiments.pictures.{drawn}", lambda *given: Figure())
+        return chosen.analyse(rows).claims
+
+
+def test_flat_and_hierarchical_agents_have_the_same_budget() -> None:
+    """All but who acts is alike."""
+    lessons = [lesson.learning for lesson in Levels().lessons.values()]
+    for name in ("max_episodes", "shaping", "exploration", "learning_rate", "hidden", "reward", "agents", "method"):
+        assert len({getattr(learning, name) for learning in lessons}) == 1

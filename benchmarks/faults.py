@@ -52,7 +52,7 @@ from pneumarm.simulation import Simulation
 from pneumarm.simulation.fit import FitSettings, fit_store
 from pneumarm.statistics import wilson
 from pneumarm.task.begin import begin_states
-from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, CollectBegin, CollectSettings, Store, collect
 from pneumarm.transitions.collect import random_actions
 from pneumarm.transitions.rows import Mark, Recorded
 from pneumarm.transitions.watch import Watch
@@ -253,7 +253,7 @@ def watched_steps(arm: Arm, monitor: Watch, seed: int, settings: CollectSettings
     settings = settings.for_period(arm.spec.period)
     random, guard = np.random.default_rng([seed, 7]), guarded(arm)
     while True:
-        settings.begin.reach(guard, random)
+        (settings.begin or CollectBegin()).reach(guard, random)
         _, actor = random_actions(arm.spec, settings, random)
         actor.reset(np.zeros(arm.spec.joints))
         left = iter(range(settings.actions or 0))

@@ -13,9 +13,9 @@ from pneumarm.arm.virtual import VirtualArm, draw_parameters
 class Logged(VirtualArm):
     """The virtual arm number 3, which logs who sets its valves."""
 
-    def __init__(self, parameters=None, *, seed=3, name="logged"):
+    def __init__(self, parameters=None, *, seed=3, name="logged", **options):
         self._log = open(os.environ["PNEUMARM_TEST_LOG"], "a", buffering=1)  # noqa: SIM115
-        super().__init__(parameters or draw_parameters(3), seed=seed, name=name)
+        super().__init__(parameters or draw_parameters(3), seed=seed, name=name, **options)
 
     def set_valves(self, valves):
         caller = sys._getframe(1)

@@ -127,7 +127,7 @@ def test_finished_movements_are_kept_when_the_link_is_lost_in_a_transfer(agent: 
 
     def pull_out(done: float, total: float) -> None:
         if done == 5:
-            arm._line.left = 110  # type: ignore[attr-defined]  # in the next movement
+            arm._line.left = 97  # type: ignore[attr-defined]  # in the next movement
 
     with pytest.raises(ArmFailure, match="line to the board is gone"):
         transfer_into(folder, agent, arm, SHORT, seed=1, progress=pull_out)

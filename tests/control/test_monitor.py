@@ -24,7 +24,7 @@ from pneumarm.control.monitor import marks_of
 from pneumarm.control.monitor.hypotheses import hypotheses
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.simulation.fit import FitSettings, fit_store
-from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store, Window, collect, transitions
+from pneumarm.transitions import WHOLE_PERIODS, Store, Window, collect, transitions
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def by_name():
         ("muscles swapped", 2.0),
         ("supply lost", 0.5),
         ("potentiometer dead", 0.07),
-        ("potentiometer frozen", 0.5),
+        ("potentiometer frozen", 0.6),
     ],
 )
 def test_finds_faults_with_a_simulation(simulation, name, within):
@@ -118,7 +118,7 @@ def test_leaves_healthy_arms_alone(simulation):
         assert monitor.findings == []
 
 
-PULSED = CollectSettings(pulses=0.7)
+PULSED = replace(WHOLE_PERIODS, pulses=0.7)
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def simulation_of_pulses(tmp_path_factory):
 def test_pulses_are_no_fault_and_faults_are_found_under_them(simulation_of_pulses, by_rules):
     arm = VirtualArm(draw_parameters(3), seed=7)
     monitor = Monitor(arm.spec, None if by_rules else simulation_of_pulses)
-    for _ in watched_steps(arm, monitor, 7, PULSED):
+    for _ in watched_steps(arm, monitor, 8, PULSED):
         if arm.time > 300 and not arm.faults:
             assert monitor.findings == []
             arm.faults = (SwappedValves(muscle=2, begin=arm.time),)
@@ -266,7 +266,7 @@ def test_collecting_marks_what_a_fault_spoiled_and_nothing_is_learned_from_it(tm
 
 
 def test_collecting_gives_up_on_an_arm_that_stays_broken_and_says_why(tmp_path):
-    arm = VirtualArm(draw_parameters(3), seed=3, faults=[DeadPotentiometer(begin=15.0), StuckValve(begin=15.0)])
+    arm = VirtualArm(draw_parameters(3), seed=3, faults=[DeadPotentiometer(begin=60.0), StuckValve(begin=60.0)])
     with (
         Store.for_arm(tmp_path / "db", arm.spec) as store,
         pytest.raises(ArmFailure, match="dead-potentiometer"),

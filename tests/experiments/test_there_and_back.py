@@ -237,7 +237,7 @@ def test_the_period_helps_where_steps_differ(material: Prepared) -> None:
         return these._replace(interval=interval, target=target)
 
     kept, apart = uneven(kept), uneven(apart)
-    chosen = replace(QUICK, history=2, epochs=10)
+    chosen = replace(QUICK, history=2, epochs=30)
     anything = np.array([[-np.inf] * 4, [np.inf] * 4])
     blind, told = (errors_with_period(kept, apart, window, chosen, anything, one) for one in (0.035, None))
     assert blind["angle"] == pytest.approx(1000 * 0.03 / np.sqrt(12), rel=0.1)

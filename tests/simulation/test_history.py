@@ -11,7 +11,7 @@ from pneumarm.simulation import FitSettings, fit_store
 from pneumarm.simulation.history import USUAL, chosen_history
 from pneumarm.transitions import Store, collect
 
-TRANSITIONS = 4000
+TRANSITIONS = 10_000
 
 
 def recorded(arm: Arm, path: Path) -> Path:

@@ -185,3 +185,9 @@ def test_flat_and_hierarchical_agents_have_the_same_budget() -> None:
     lessons = [lesson.learning for lesson in Levels().lessons.values()]
     for name in ("max_episodes", "shaping", "exploration", "learning_rate", "hidden", "reward", "agents", "method"):
         assert len({getattr(learning, name) for learning in lessons}) == 1
+
+
+@pytest.mark.parametrize("asked", EXPERIMENTS, ids=lambda asked: type(asked).__name__)
+def test_an_arm_of_one_joint_is_refused(asked: SeveralJoints, tmp_path: Path) -> None:
+    with pytest.raises(UnusableInput, match=r"'virtual:seed=1' has one joint; expected several"):
+        asked.prepare("virtual:seed=1", tmp_path, SMALL, _silent)

@@ -14,6 +14,7 @@ from pneumarm.arm.seam import Reading
 from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import PATIENCE
 from pneumarm.errors import PneumarmError
+from pneumarm.settings import Settings, Valid
 
 Decide = Callable[[Reading], Command | None]
 
@@ -118,7 +119,7 @@ def missed_turns(late: float, period: float) -> int:
 
 
 @dataclass(frozen=True)
-class BeginState:
+class BeginState(Settings):
     """How the arm is brought to a random begin state at rest (thesis sections 3.2.2 and 5.5)."""
 
     deflate: float = 2.0
@@ -127,6 +128,9 @@ class BeginState:
     """Longest time that a muscle is inflated again [s] (1.2 while collecting, 1.5 between episodes)."""
     settle: float = 1.0
     """Time in which the oscillations damp out, all valves closed [s]."""
+
+    def _valid(self) -> Valid:
+        return {name: 0 <= value <= 600 or "0 to 600 s" for name, value in vars(self).items()}
 
     def reach(self, arm: GuardedArm, random: np.random.Generator) -> None:
         """Vent, inflate every muscle for a time uniform in 0..``inflate``, and wait."""

@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.there_and_back import (
     BEFORE,
@@ -21,6 +22,7 @@ from pneumarm.experiments.there_and_back import (
     Prepared,
     Recipe,
     ThereAndBack,
+    opened,
     prepared,
     train_and_move,
 )
@@ -87,7 +89,7 @@ class SeveralJoints(ThereAndBack):
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
         """Return the arm's simulation."""
-        return prepared(arm, folder, self.within(settings), settings, progress)
+        return of_several(arm, folder, self.within(settings), settings, progress)
 
     def within(self, settings: LaboratorySettings) -> Recipe:
         """Return the recipe with no more transitions than those of the laboratory."""
@@ -96,6 +98,19 @@ class SeveralJoints(ThereAndBack):
     def measure(self, material: Any, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Learn what ``trial`` is about, and move the arm with it."""
         return learned(material, self.lessons[self.trials[trial]], run, settings)
+
+
+def of_several(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySettings, progress: Report) -> Prepared:
+    """Return what ``recipe`` makes of ``arm``, as :func:`~.there_and_back.prepared` does.
+
+    Raises:
+        UnusableInput: no arm has this name, or it has one joint, about which there is no question here.
+
+    """
+    with opened(arm, settings.seed) as found:
+        if found.spec.joints == 1:
+            raise UnusableInput(f"arm {arm!r} has one joint; expected several, such as {ARMS[0]}")
+    return prepared(arm, folder, recipe, settings, progress)
 
 
 def learned(material: Prepared, lesson: Lesson, run: int, settings: LaboratorySettings) -> Figures:

@@ -7,8 +7,8 @@ from typing import Any
 
 from pneumarm.arm.open import with_options
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
-from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned
-from pneumarm.experiments.there_and_back import Prepared, prepared
+from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned, of_several
+from pneumarm.experiments.there_and_back import Prepared
 from pneumarm.experiments.words import words_of
 
 _WHO = ("policy, all goals", "thesis' agents, one goal")
@@ -37,7 +37,7 @@ class Coupling(SeveralJoints):
 
         """
         names = [arm if share == 1 else with_options(arm, coupling=f"{share:g}") for share in self.shares]
-        return [prepared(name, folder, self.within(settings), settings, progress) for name in names]
+        return [of_several(name, folder, self.within(settings), settings, progress) for name in names]
 
     def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Learn with the share of ``trial``, and move that arm."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from pneumarm.arm.open import with_options
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
-from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned
+from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned, of_several
 from pneumarm.experiments.there_and_back import Prepared, prepared
 from pneumarm.experiments.words import words_of
 
@@ -39,7 +39,7 @@ class JointData(SeveralJoints):
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
         """Return a simulation of each number of transitions, and of a virtual arm one of an arm of one joint."""
         recipes = [replace(self.recipe, transitions=size) for size in self.sizes]
-        made = [prepared(arm, folder, recipe, settings, progress) for recipe in recipes]
+        made = [of_several(arm, folder, recipe, settings, progress) for recipe in recipes]
         if arm.startswith("virtual"):
             single = with_options(arm, joints=None, coupling=None)
             made.append(prepared(single, folder, recipes[-1], settings, progress))

@@ -189,5 +189,5 @@ def test_flat_and_hierarchical_agents_have_the_same_budget() -> None:
 
 @pytest.mark.parametrize("asked", EXPERIMENTS, ids=lambda asked: type(asked).__name__)
 def test_an_arm_of_one_joint_is_refused(asked: SeveralJoints, tmp_path: Path) -> None:
-    with pytest.raises(UnusableInput, match=r"'virtual:seed=1' has one joint; expected several"):
+    with pytest.raises(UnusableInput, match=r"'virtual:seed=1.*one joint"):
         asked.prepare("virtual:seed=1", tmp_path, SMALL, _silent)

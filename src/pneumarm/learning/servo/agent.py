@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+
 from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.commands import command_parameters, shortest_share
@@ -17,6 +19,7 @@ from pneumarm.task.begin import BeginStates
 from pneumarm.transitions.watch import made_up_readings
 
 KIND = "pneumarm servo"
+_PAST_THE_LIMIT = 0.2
 
 
 @dataclass(frozen=True, repr=False)
@@ -63,11 +66,18 @@ class ServoAgent(NetworkAgent):
 def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:
     """Return what does not change while a servo learns or acts."""
     change = price_of_a_change(simulation, settings)
+    window, scaling = simulation.window, simulation.scaling
+    offset, scale = (window.of_joints(one)[:, 2:] for one in (scaling.observation_offset, scaling.observation_scale))
+    lowest, highest = np.moveaxis(simulation.pressure_range, -1, 0)
+    slack = settings.slack if simulation.spec.muscles > 1 else 0.0  # one muscle has the pressure of its angle
     return ServoTask(
         simulation=simulation_parameters(simulation),
         inputs=seen_parameters(simulation, settings.preview, settings.tolerance),
         commands=command_parameters(simulation, settings.dead, shortest_share(simulation.spec)),
-        prices=PriceParameters(settings.precision, settings.far, settings.flat, change),
+        prices=PriceParameters(settings.precision, settings.far, settings.flat, change, slack, settings.stiffness),
+        lowest=((lowest - offset) / scale).astype(np.float32),
+        full=(scale / np.maximum(highest - lowest, 1e-9)).astype(np.float32),
+        past_the_limit=_PAST_THE_LIMIT,
         steepest=1e9,
     )
 

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from pneumarm.kernels import kernel
 from pneumarm.learning.servo.commands import CommandParameters, write_commands
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, inputs_back, write_inputs
-from pneumarm.learning.servo.price import PriceParameters, price_of_changes, price_of_error
+from pneumarm.learning.servo.price import PriceParameters, price_of_changes, price_of_error, price_of_slack
 from pneumarm.networks.layers import Trainable, backward, forward, through_weights
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
 from pneumarm.simulation.kernel import SimulationParameters
 
-_ZERO = np.float32(0.0)
+_ZERO, _FULL = np.float32(0.0), np.float32(1.0)
 
 
 class ServoTask(NamedTuple):
@@ -33,6 +33,15 @@ class ServoTask(NamedTuple):
     inputs: SeenParameters
     commands: CommandParameters
     prices: PriceParameters
+    lowest: NDArray[np.float32]
+    """Lowest pressures, shape (joints, 2) [scaled]."""
+    full: NDArray[np.float32]
+    """From scaled pressures to shares of the range, shape (joints, 2)."""
+    past_the_limit: float
+    """Share of the gradient that passes where a prediction was cut off at the limit of its sensor.
+
+    The pressure of an empty muscle is: without that share nothing would ever teach a policy to fill it again.
+    """
     steepest: float
     """Most that the cost to come changes with the state of an arm, in prices of a step for an error of a tolerance.
 
@@ -50,7 +59,7 @@ class Tape(NamedTuple):
     hidden: NDArray[np.float32]
     """Hidden units of the simulation, shape (steps, units, n)."""
     free: NDArray[np.float32]
-    """Which predictions were not cut off, shape (steps, outputs, n)."""
+    """1 where a prediction was not cut off, else the share of the gradient that passes, shape (steps, outputs, n)."""
     inputs: NDArray[np.float32]
     """What the policy saw, shape (steps, inputs, n)."""
     slope: NDArray[np.float32]
@@ -111,7 +120,7 @@ def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
         write_commands(task.commands, x, net.units[-1], tape.slope[t], x[first : first + commanded])
         step_all(simulation, x, tape.x[t + 1], tape.work)
         tape.hidden[t] = tape.work.hidden
-        tape.free[t] = tape.work.free
+        tape.free[t] = np.maximum(tape.work.free, np.float32(task.past_the_limit))
 
 
 @kernel(fastmath=FASTMATH)
@@ -142,6 +151,14 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
             scale = task.inputs.tolerances[joint] * share
             for e in range(n):
                 later[4 * joint, e] += row[1, e] * scale
+            for muscle in range(2):
+                place, lowest, full = 4 * joint + 2 + muscle, task.lowest[joint, muscle], task.full[joint, muscle]
+                for e in range(n):
+                    stays = tape.reference[t + 1, joint, e] == tape.reference[t, joint, e]
+                    row[1, e] = (tape.x[t + 1, place, e] - lowest) * full if stays else _FULL
+                total += price_of_slack(task.prices, row[0], row[1], row[2])
+                for e in range(n):
+                    later[place, e] += row[2, e] * full * share
         tape.work.hidden[:] = tape.hidden[t]
         tape.work.free[:] = tape.free[t]
         step_back(simulation, later, sooner, tape.work)

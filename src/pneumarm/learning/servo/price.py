@@ -2,10 +2,13 @@
 
     error:   log(1 + (max(|e| - flat, 0) / precision)^2) / 2 + far |e|          e in tolerances
     valves:  change (o (1 - o' same) + o (1 - held) + o' (1 - same)(1 - o))
+    slack:   slack max(stiffness - q, 0) / (1 + (e / 5)^2)                      of each muscle, of joints that stay
 
 where o tells whether a valve opens in a period, held whether it is still open at its end, o' held of the period
 before, and same whether it was the same valve. Counts have no slope, so o and held are smooth stand-ins:
-o = 1.1 m / (m + 0.1) and held = max(m - 0.8, 0) / 0.2 of a pulse of m periods.
+o = 1.1 m / (m + 0.1) and held = max(m - 0.8, 0) / 0.2 of a pulse of m periods. A muscle is slack by what its
+pressure, q of the range, is short of the stiffness that is wanted. That matters less far from the goal; no slope
+goes through this weight, or staying away would pay.
 """
 
 from typing import NamedTuple
@@ -17,6 +20,7 @@ from pneumarm.networks.tansig import FASTMATH
 
 _ONE, _ZERO = np.float32(1.0), np.float32(0.0)
 _SOFT, _LONG = np.float32(0.1), np.float32(0.8)
+NEAR = np.float32(1 / 5)  # of an error in tolerances
 
 
 class PriceParameters(NamedTuple):
@@ -26,6 +30,8 @@ class PriceParameters(NamedTuple):
     far: float
     flat: float
     change: float
+    slack: float = 0.0
+    stiffness: float = 0.0
 
 
 @kernel(fastmath=FASTMATH)
@@ -40,6 +46,24 @@ def price_of_error(prices, error, slope):  # type: ignore[no-untyped-def]
         square = _ONE + beyond * beyond
         total += np.float32(0.5) * np.log(square) + far * size
         slope[e] = sign * (sharp * beyond / square + far)
+    return total
+
+
+@kernel(fastmath=FASTMATH)
+def price_of_slack(prices, error, pressure, slope):  # type: ignore[no-untyped-def]
+    """Return the sum of the prices of the slack of a muscle with the ``pressure`` (n,), as a share of the range.
+
+    ``error`` (n,) is the joint's in tolerances. Sets ``slope`` (n,) to the derivatives by the pressure.
+    """
+    slack, stiffness, total = np.float32(prices.slack), np.float32(prices.stiffness), _ZERO
+    for e in range(pressure.shape[0]):
+        short = stiffness - pressure[e]
+        slope[e] = _ZERO
+        if short > _ZERO:
+            far = NEAR * error[e]
+            price = slack / (_ONE + far * far)
+            total += price * short
+            slope[e] = -price
     return total
 
 

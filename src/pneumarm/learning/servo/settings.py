@@ -43,6 +43,13 @@ class ServoSettings(TaskSettings):
     """Price of an error for each tolerance, besides the logarithmic one of being out of precision."""
     change: float = 0.15
     """Price of opening or closing a valve, at 30 Hz; at other rates as much in errors times seconds."""
+    stiffness: float = 0.3
+    """Share of the range of pressures that both muscles are to keep where a goal stays, as far as its angle allows.
+
+    Pressure in both makes a joint stiff, damps it, and makes a pulse move it less.
+    """
+    slack: float = 3.0
+    """Price of the pressure that a muscle is short of that, by the whole range of pressures."""
     dead: float = 0.15
     """Share of the policy's output around 0 that keeps a valve closed."""
     known: float = 0.6
@@ -71,6 +78,8 @@ class ServoSettings(TaskSettings):
             "flat": 0 <= self.flat < math.inf,
             "far": 0 <= self.far < math.inf,
             "change": 0 <= self.change < math.inf,
+            "slack": 0 <= self.slack < math.inf,
+            "stiffness": 0 <= self.stiffness <= 1 or "0 to 1",
             "dead": 0 <= self.dead < 1,
             "known": 0 <= self.known <= 1,
             "reading_noise": 0 <= self.reading_noise < math.inf,

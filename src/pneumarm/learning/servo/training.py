@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.learning.servo.agent import ServoAgent, servo_sizes, servo_task
 from pneumarm.learning.servo.gradient import ServoTask, errors_of, learn_once, move_forward, tape
+from pneumarm.learning.servo.price import NEAR
 from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
@@ -137,7 +138,7 @@ class ServoLearner(Learner[ServoAgent]):
             prices = self.task.prices
             beyond = np.maximum(error - prices.flat, 0) / prices.precision
             cost = (0.5 * np.log1p(beyond**2) + prices.far * error).sum(axis=(0, 1))
-            made.reward[:] = -cost - prices.change * changes.sum(axis=0)
+            made.reward[:] = -cost - prices.change * changes.sum(axis=0) - self._slack()
             made.success[:] = (error[-steps // 3 :] <= 1).all(axis=(0, 1))
             parts.append(made)
         return Movements(*(np.concatenate(columns)[:episodes] for columns in zip(*parts, strict=True)))
@@ -185,6 +186,17 @@ class ServoLearner(Learner[ServoAgent]):
         window, scaling = self.simulation.window, self.simulation.scaling
         offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
         return angle * scale[:, :1] + offset[:, :1]
+
+    def _slack(self) -> NDArray[np.float64]:
+        """Return the price of slack muscles in the movements on the tape, shape (n,)."""
+        task, joints = self.task, self.simulation.window.joints
+        observed = self.tape.x[1:, : 4 * joints].reshape(-1, joints, 4, self.settings.arms)
+        pressure = (observed[:, :, 2:] - task.lowest[..., None]) * task.full[..., None]
+        stays = self.tape.reference[1:] == self.tape.reference[:-1]
+        near = stays / (1 + (NEAR * errors_of(task, self.tape)) ** 2)
+        short = np.maximum(task.prices.stiffness - pressure, 0).sum(axis=2)
+        slack: NDArray[np.float64] = task.prices.slack * (near * short).sum(axis=(0, 1))
+        return slack
 
     def _valve_changes(self) -> NDArray[np.int64]:
         """Return how often valves opened or closed in the movements on the tape, shape (joints, n)."""

@@ -4,13 +4,15 @@ python -m benchmarks holding
 
 Each controller of :mod:`benchmarks.moving` moves to a goal and holds it, while
 
+    calm      nothing happens, for ten minutes
     leak      one muscle leaks 30 times as much as it did, for ten minutes
     pushes    something pushes with 0.3 N m for 0.2 s, this way and that way in turn, every 4 s
     payload   30 % more payload is put on after 5 s
 
-Errors are those of the readings from two seconds on; *back* is the time from a push, or from when the payload is put
-on, until the joint stays within a degree. ``agent+`` is the agent after 200 movements of adaptation on the arm with
-the leak or the payload. Settings come from the environment, and what is there is not made again, as for ``moving``:
+Errors and changes of valves are those from two seconds on; *back* is the time from a push, or from when the payload
+is put on, until the joint stays within a degree. ``agent+`` is the agent after 200 movements of adaptation on the arm
+with the leak or the payload. Settings come from the environment, and what is there is not made again, as for
+``moving``:
 
 PNEUMARM_MOVING_CONTROLLERS  "agent,agent+,pid"
 PNEUMARM_MOVING_ARMS         seeds of virtual arms; the ten held-out arms by default
@@ -45,9 +47,12 @@ GOALS = (-20.0, 0.0, 20.0)
 CALM = 2.0
 """Errors count after so many seconds, in which the goal is reached."""
 TOLERANCE = 1.0
-LEAK, LEAKING = 30.0, 600.0
+LONG = 600.0
+LEAK = 30.0
 PUSH, PUSHED, EVERY, PUSHES = 0.3, 0.2, 4.0, 10
 MORE, PUT_ON, LOADED = 0.3, 5.0, 20.0
+SECONDS = {"calm": LONG, "leak": LONG, "pushes": EVERY * (PUSHES + 1), "payload": PUT_ON + LOADED}
+"""How long a goal is held."""
 ADAPTED = TransferSettings(episodes=200, test_episodes=1)
 
 
@@ -63,7 +68,7 @@ def measure() -> Iterator[str]:
         f"{'':10}{'controller':12}{'rows':>5}{'mean':>10}{'largest':>10}{'back, median':>14}{'longest':>9}"
         f"{'changes/s':>11}"
     )
-    for what in ("leak", "pushes", "payload"):
+    for what in SECONDS:
         for name in controllers:
             found = [row for row in (rows.get(*one, plan.minutes) for one in asked if one[0] == name) if row]
             parts = [part for row in found for part in row[what]]
@@ -81,6 +86,8 @@ def measure() -> Iterator[str]:
 
 def faults_for(arm: VirtualArm, what: str, begin: float) -> tuple[Fault, ...]:
     """Return what happens to ``arm`` from the time ``begin`` on, when a goal is given."""
+    if what == "calm":
+        return ()
     if what == "leak":
         return (Leak(factor=LEAK),)
     if what == "payload":
@@ -94,7 +101,7 @@ def faults_for(arm: VirtualArm, what: str, begin: float) -> tuple[Fault, ...]:
 
 def measured(plan: Plan, name: str, arm: int, seed: int) -> dict[str, Any]:
     row: dict[str, Any] = {"controller": name, "arm": arm, "seed": seed, "minutes": plan.minutes}
-    for what, seconds in (("leak", LEAKING), ("pushes", EVERY * (PUSHES + 1)), ("payload", PUT_ON + LOADED)):
+    for what, seconds in SECONDS.items():
         controller = adapted(plan, arm, seed, what) if name == "agent+" else prepared(plan, name, arm, seed)
         row[what] = []
         with open_arm(arm_for(name, arm), 2000 + seed) as opened:
@@ -116,7 +123,7 @@ def measured(plan: Plan, name: str, arm: int, seed: int) -> dict[str, Any]:
                     {
                         "mean": float(error[late].mean()),
                         "largest": float(error[late].max()),
-                        "changes": valve_changes(recorded.command[:-1], np.zeros((1, 2))) / seconds,
+                        "changes": valve_changes(recorded.command[late][:-1], np.zeros((1, 2))) / (seconds - CALM),
                         "back": times_back(passed, error, what),
                     }
                 )
@@ -125,7 +132,7 @@ def measured(plan: Plan, name: str, arm: int, seed: int) -> dict[str, Any]:
 
 def times_back(passed: NDArray[np.float64], error: NDArray[np.float64], what: str) -> list[float | None]:
     """Return how long after each disturbance the ``error`` (n,) [deg] is small for good; None where it never is."""
-    if what == "leak":
+    if what in ("calm", "leak"):
         return []
     begins = [PUT_ON] if what == "payload" else [EVERY * number for number in range(1, PUSHES + 1)]
     ends = [*begins[1:], np.inf]
@@ -140,10 +147,10 @@ def times_back(passed: NDArray[np.float64], error: NDArray[np.float64], what: st
 
 
 def adapted(plan: Plan, arm: int, seed: int, what: str) -> str:
-    """Return the file of the agent after adaptation on the arm with a leak or more payload; pushes teach nothing."""
+    """Return the file of the agent after adaptation on the arm with a leak or more payload; nothing else teaches."""
     file = plan.folder / f"agent-{arm}-{seed}-{plan.minutes:g}"
     prepared(plan, "agent", arm, seed)
-    if what == "pushes":
+    if what in ("calm", "pushes"):
         return str(file)
     changed = file.with_name(f"{file.name}-{what}")
     if not changed.exists():

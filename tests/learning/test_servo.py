@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from learning.synthetic_arm import synthetic_begin_states, synthetic_simulation
-from pneumarm.arm import guarded
+from pneumarm.arm import Reading, guarded
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
@@ -165,3 +165,16 @@ def test_a_goal_must_be_one_of_the_arm(trained: ServoAgent):
     with pytest.raises(UnusableInput, match="1 finite angle"):
         controller.reset(np.array([1.0, 2.0]))
     controller.track(constant([500.0]))
+
+
+@pytest.mark.parametrize(("asked", "goes_on"), [(1.0, True), (0.4, False)])
+def test_near_its_goal_only_a_pulse_shorter_than_the_period_is_looked_at(
+    trained: ServoAgent, monkeypatch: pytest.MonkeyPatch, asked: float, goes_on: bool
+):
+    controller = trained.controller()
+    monkeypatch.setattr(controller._actor, "pulses", lambda *_: np.array([[asked, 0.0]]))
+    controller.reset(np.array([512.0]))
+    off = 512.0 - 3 * trained.spec.counts_per_degree  # at rest, three degrees off
+    readings = [Reading(k * trained.spec.period, np.array([off]), np.full((1, 2), 300.0)) for k in range(40)]
+    opened = np.array([controller.act(one)[0, 0] != 0 for one in readings])[10:]
+    assert opened.mean() == 1 if goes_on else opened.mean() < 0.4

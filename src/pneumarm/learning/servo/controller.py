@@ -44,11 +44,12 @@ class ServoController:
     """Maps readings to pulses with a :class:`~.agent.ServoAgent`.
 
     Where the goal stays the same and a joint is nearly at rest near to it, it moves by single pulses, and looks at
-    what each did before the next; what is left of the error is added to what is asked for (integral action), so that
-    no bias of the simulation remains. Where the mean of the readings is off by less than ``quiet`` tolerances its
-    valves stay closed, until it is off by more than ``alert``: closed muscles are springs of air that hold the joint,
-    nothing wears, and no noise of the sensors is answered. A joint that goes on swinging about its goal is being kept
-    swinging, by a model with less lag than the arm: its valves stay closed until it is at rest, by its own damping.
+    what each did before the next, unless a valve is to be open for whole periods; what is left of the error is added
+    to what is asked for (integral action), so that no bias of the simulation remains. Where the mean of the readings
+    is off by less than ``quiet`` tolerances its valves stay closed, until it is off by more than ``alert``: closed
+    muscles are springs of air that hold the joint, nothing wears, and no noise of the sensors is answered. A joint
+    that goes on swinging about its goal is being kept swinging, by a model with less lag than the arm: its valves
+    stay closed until it is at rest, by its own damping.
 
     A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next
     look, twice as many each time that those before did little, and integral action goes on while it swings.
@@ -175,9 +176,9 @@ class ServoController:
             begins = not rest.quiet and rest.look == 0
             if begins:
                 rest.begin(error[j], self._most_pulses)
-            acts[j] = not rest.quiet and rest.left > 0
+            acts[j] = not rest.quiet and (rest.left > 0 or saturated[j])
             if acts[j]:
-                rest.left, rest.look = rest.left - 1, self._look
+                rest.left, rest.look = max(rest.left - 1, 0), self._look
                 if begins and not saturated[j]:
                     rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._most, self._most))
         return acts

@@ -43,12 +43,12 @@ class ServoSettings(TaskSettings):
     """Price of an error for each tolerance, besides the logarithmic one of being out of precision."""
     change: float = 0.15
     """Price of opening or closing a valve, at 30 Hz; at other rates as much in errors times seconds."""
-    stiffness: float = 0.3
+    stiffness: float = 0.25
     """Share of the range of pressures that both muscles are to keep where a goal stays, as far as its angle allows.
 
     Pressure in both makes a joint stiff, damps it, and makes a pulse move it less.
     """
-    slack: float = 3.0
+    slack: float = 2.0
     """Price of the pressure that a muscle is short of that, by the whole range of pressures."""
     dead: float = 0.15
     """Share of the policy's output around 0 that keeps a valve closed."""

@@ -1,7 +1,14 @@
-"""The settings of a small run of the whole job."""
+"""A small run of the whole job: its settings, and what it gives on an arm of another kind."""
 
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pneumarm.cli import main as command_line
 from pneumarm.learning import Shaping, TrainSettings
-from pneumarm.run import RunSettings, RunTransferSettings
+from pneumarm.run import Run, RunSettings, RunTransferSettings
 from pneumarm.simulation import FitSettings
 
 SMALL = RunSettings(
@@ -15,3 +22,15 @@ SMALL = RunSettings(
     thesis=TrainSettings(agents=2, max_episodes=3_000, validation_episodes=100, shaping=Shaping(episodes=100)),
     transfer=RunTransferSettings(episodes=30, test_episodes=20),
 )
+
+
+def servo_on(arm: str, folder: Path) -> dict[str, Any]:
+    """Return the results of the whole job with the default agent on ``arm``, done in ``folder``."""
+    return Run(folder, replace(SMALL, arm=arm, bound_episodes=0, method="servo", test_episodes=50)).do()
+
+
+def exit_status(arguments: list[str]) -> int | str | None:
+    """Return the exit status of the command line."""
+    with pytest.raises(SystemExit) as left:
+        command_line(arguments)
+    return left.value.code

@@ -1,7 +1,6 @@
 """Arms that read angles alone: the whole job on one with physics of its own, and what refuses, in one line."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,13 +9,11 @@ from pneumarm.arm import guarded, open_arm
 from pneumarm.arm.virtual import FrozenPotentiometer
 from pneumarm.checkup import measure
 from pneumarm.classical import TuneSettings, tune
-from pneumarm.cli import main as command_line
 from pneumarm.control import Monitor
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.gym import point_to_point
-from pneumarm.run import Run
 from pneumarm.transitions import Store, collect, import_recording
-from small import SMALL
+from small import exit_status, servo_on
 
 PLAIN, VIRTUAL = "python:tests.plain_arms:angle_alone", "virtual:seed=3,pressure_sensors=off"
 MAPPING = """
@@ -34,18 +31,11 @@ command_2 = {column = "command_2"}
 """
 
 
-def main(arguments):
-    """Return the exit status of the command line."""
-    with pytest.raises(SystemExit) as left:
-        command_line(arguments)
-    return left.value.code
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """Return the folder and the results of the whole job on an arm with physics of its own."""
     folder = tmp_path_factory.mktemp("angle_alone") / "run"
-    return folder, Run(folder, replace(SMALL, arm=PLAIN, bound_episodes=0, method="servo", test_episodes=50)).do()
+    return folder, servo_on(PLAIN, folder)
 
 
 def test_the_whole_job_settles_and_its_report_says_what_was_estimated(run):
@@ -60,19 +50,19 @@ def test_the_whole_job_settles_and_its_report_says_what_was_estimated(run):
 def test_its_agent_is_refused_by_an_arm_with_pressures_and_moves_its_own(run, capsys):
     folder, _ = run
     agent = str(folder / "agent.safetensors")
-    assert main(["move", agent, "--arm", PLAIN, "15deg", "-10deg", "--json"]) == 0
+    assert exit_status(["move", agent, "--arm", PLAIN, "15deg", "-10deg", "--json"]) == 0
     moved = json.loads(capsys.readouterr().out.splitlines()[-1])["movements"]
     assert all(one["success"] for one in moved)
-    assert main(["move", agent, "--arm", "python:tests.plain_arms:with_pressures", "15deg"]) == 2
+    assert exit_status(["move", agent, "--arm", "python:tests.plain_arms:with_pressures", "15deg"]) == 2
     assert "without pressure sensors" in capsys.readouterr().err
 
 
 def test_the_check_up_says_in_one_line_that_it_cannot_judge_such_an_arm(capsys):
     with open_arm(VIRTUAL) as arm, pytest.raises(UnusableInput, match="no pressure sensors"):
         measure(arm)
-    assert main(["arm", "check", VIRTUAL]) == 2
+    assert exit_status(["arm", "check", VIRTUAL]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
-    assert main(["arm", "sensors", VIRTUAL, "--seconds", "0.3", "--json"]) == 0
+    assert exit_status(["arm", "sensors", VIRTUAL, "--seconds", "0.3", "--json"]) == 0
     assert [row["sensor"] for row in json.loads(capsys.readouterr().out.splitlines()[-1])["sensors"]] == ["angle"]
 
 

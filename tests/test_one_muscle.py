@@ -12,7 +12,6 @@ from pneumarm.arm.spec_file import save_spec
 from pneumarm.arm.valves import possible_actions, to_valves
 from pneumarm.arm.virtual import StuckValve, resting_angle
 from pneumarm.classical import tune
-from pneumarm.cli import main as command_line
 from pneumarm.control import Monitor
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.gym import point_to_point
@@ -24,23 +23,16 @@ from pneumarm.simulation import Simulation
 from pneumarm.task.reward import Reward
 from pneumarm.transitions import Store, collect
 from pneumarm.transitions.goals import held_range
-from small import SMALL
+from small import SMALL, exit_status, servo_on
 
 PLAIN, VIRTUAL = "python:tests.plain_arms:single", "virtual:seed=3,muscles=1"
-
-
-def main(arguments):
-    """Return the exit status of the command line."""
-    with pytest.raises(SystemExit) as left:
-        command_line(arguments)
-    return left.value.code
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """Return the folder and the results of the whole job on an arm with physics of its own."""
     folder = tmp_path_factory.mktemp("one_muscle") / "run"
-    return folder, Run(folder, replace(SMALL, arm=PLAIN, bound_episodes=0, method="servo", test_episodes=50)).do()
+    return folder, servo_on(PLAIN, folder)
 
 
 def test_the_whole_job_settles_and_finds_nothing_wrong(run):
@@ -73,11 +65,11 @@ def test_its_simulation_does_not_see_the_muscle_that_is_not_there(run):
 def test_its_agent_moves_it_with_one_muscle_and_is_refused_by_an_arm_with_two(run, capsys):
     folder, _ = run
     agent = str(folder / "agent.safetensors")
-    assert main(["move", agent, "--arm", PLAIN, "15deg", "-10deg", "--json"]) == 0
+    assert exit_status(["move", agent, "--arm", PLAIN, "15deg", "-10deg", "--json"]) == 0
     moved = json.loads(capsys.readouterr().out.splitlines()[-1])["movements"]
     assert all(one["success"] for one in moved)
-    assert main(["move", agent, "--arm", "python:tests.plain_arms:noisy", "15deg"]) == 2
-    assert main(["track", agent, "--arm", PLAIN, "--reference", "sine:0.25Hz,10deg", "--seconds", "5"]) == 0
+    assert exit_status(["move", agent, "--arm", "python:tests.plain_arms:noisy", "15deg"]) == 2
+    assert exit_status(["track", agent, "--arm", PLAIN, "--reference", "sine:0.25Hz,10deg", "--seconds", "5"]) == 0
 
 
 def test_a_simulated_environment_and_plans_have_three_actions_too(run):
@@ -98,7 +90,7 @@ def test_a_simulated_environment_and_plans_have_three_actions_too(run):
         env.close()
     sought = problem(np.zeros(1), Reward(), PlanSettings(), muscles=1)
     assert sought.commands.tolist() == [[[-1, 0]], [[0, 0]], [[1, 0]]]
-    assert main(["move", f"plan:{folder / 'simulation.safetensors'}", "--arm", PLAIN, "10deg"]) == 0
+    assert exit_status(["move", f"plan:{folder / 'simulation.safetensors'}", "--arm", PLAIN, "10deg"]) == 0
 
 
 def test_its_servo_says_nothing_to_the_other_muscle(run):
@@ -160,7 +152,7 @@ def test_a_joint_with_one_muscle_may_always_be_vented():
 def test_what_needs_two_muscles_says_so_in_one_line(capsys):
     with open_arm(VIRTUAL) as arm, pytest.raises(UnusableInput, match="one muscle a joint"):
         tune("pid", arm)
-    assert main(["arm", "check", VIRTUAL]) == 2
+    assert exit_status(["arm", "check", VIRTUAL]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
     with pytest.raises(UnusableInput, match="1 or 2"):
         open_arm("virtual:muscles=3")

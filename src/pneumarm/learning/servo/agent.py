@@ -19,7 +19,7 @@ from pneumarm.task.begin import BeginStates
 from pneumarm.transitions.watch import made_up_readings
 
 KIND = "pneumarm servo"
-_PAST_THE_LIMIT = 0.2
+_PAST_THE_LIMIT = 0.2  # share of the gradient, see ServoTask
 
 
 @dataclass(frozen=True, repr=False)

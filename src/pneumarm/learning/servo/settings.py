@@ -78,7 +78,7 @@ class ServoSettings(TaskSettings):
             "flat": 0 <= self.flat < math.inf,
             "far": 0 <= self.far < math.inf,
             "change": 0 <= self.change < math.inf,
-            "slack": 0 <= self.slack < math.inf,
+            "slack": 0 <= self.slack < math.inf or "0 or more",
             "stiffness": 0 <= self.stiffness <= 1 or "0 to 1",
             "dead": 0 <= self.dead < 1,
             "known": 0 <= self.known <= 1,

@@ -129,3 +129,12 @@ def test_any_number_of_joints(joints: int) -> None:
     made = move(ControlCycle(arm), Both(1, 0, 1, 0), np.full(joints, 100.0), TaskSettings(cutoff=4))
     assert made.switches.tolist() == [3] * joints
     assert made.reward == -4 - 8 * 3 * joints
+
+
+def test_what_a_controller_does_after_the_end_is_recorded_and_not_counted() -> None:
+    pupil, begin = Pupil(1, 1, 0, 0, 1, 1), 455
+    held = move(ControlCycle(guarded(Dial(begin))), pupil, GOAL, hold=0.24)
+    ended = move(ControlCycle(guarded(Dial(begin))), Pupil(1, 1), GOAL)
+    assert held.row() == ended.row()
+    assert len(pupil.told) == 2
+    assert held.recorded.angle[:, 0].tolist() == [455, 465, 475, 475, 475, 485, 495]

@@ -13,7 +13,13 @@ from pneumarm.errors import UnusableInput
 from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import learn_once
-from pneumarm.learning.servo.price import PriceParameters, price_of_changes, price_of_error, price_of_slack
+from pneumarm.learning.servo.price import (
+    PriceParameters,
+    price_of_changes,
+    price_of_error,
+    price_of_slack,
+    prices_of_errors,
+)
 from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.moving import MoveSettings, move, track
@@ -74,7 +80,7 @@ def test_an_empty_muscle_is_taught_to_fill_and_slack_is_judged_by_its_price():
 def test_prices_have_the_slopes_that_they_say():
     prices, step = PriceParameters(precision=0.3, far=0.06, flat=0.1, change=0.5), 1e-3
     error, slope = np.linspace(-5, 5, 40, dtype=np.float32), np.zeros(40, np.float32)
-    price_of_error(prices, error, slope)
+    assert price_of_error(prices, error, slope) == pytest.approx(prices_of_errors(prices, error).sum(), rel=1e-5)
     for e in (3, 17, 30):
         one = [price_of_error(prices, error[e : e + 1] + np.float32(d), slope[:1].copy()) for d in (step, -step)]
         assert (one[0] - one[1]) / (2 * step) == pytest.approx(slope[e], abs=0.02)
@@ -196,3 +202,14 @@ def test_near_its_goal_only_a_pulse_shorter_than_the_period_is_looked_at(
     readings = [Reading(k * trained.spec.period, np.array([off]), np.full((1, 2), 300.0)) for k in range(40)]
     opened = np.array([controller.act(one)[0, 0] != 0 for one in readings])[10:]
     assert opened.mean() == 1 if goes_on else opened.mean() < 0.4
+
+
+def test_a_movement_is_worth_more_the_sooner_it_is_there_and_the_nearer_it_stays(trained: ServoAgent):
+    degree, goal = trained.spec.counts_per_degree, trained.goal_range.mean(axis=1)
+
+    def worth(*errors: float) -> float:
+        return trained.worth(goal + degree * np.array(errors)[:, None], goal)
+
+    assert worth(0.0, 0.0) == pytest.approx(0)
+    assert worth(20, 10, 0.2, 0.2) > worth(20, 10, 5, 0.2) > worth(20, 10, 5, 2)
+    assert worth(3, -3) == pytest.approx(worth(-3, 3))

@@ -46,6 +46,7 @@ def move(
     watch: Watch | None = None,
     broken: Callable[[Recorded], None] | None = None,
     velocity: Literal["derived", "measured"] = "derived",
+    hold: float = 0.0,
 ) -> Movement:
     """Move the arm, at rest with closed valves, until ``goal`` is reached or the movement is cut off.
 
@@ -57,6 +58,8 @@ def move(
         watch: sees every reading, such as a :class:`~pneumarm.control.Monitor`.
         broken: given what there is of a movement that breaks off, of the kind :data:`BROKEN`, before that is raised.
         velocity: whether a goal is reached by the velocity derived from the angles, or by that of the arm's sensor.
+        hold: for how long the controller goes on, from when the goal was given [s]. What it does after the end of
+            the movement is recorded and not counted.
 
     """
 
@@ -66,11 +69,13 @@ def move(
         if recorded is not None and broken is not None:
             broken(recorded)
 
-    attempt = _Attempt(cycle, controller, goal, task, velocity == "measured")
+    attempt = _Attempt(cycle, controller, goal, task, velocity == "measured", hold)
     steps = watched(cycle.run(attempt.decide), watch, at_rest=True, broken=keep)
     recorded = Recorded.from_steps(steps, cycle.arm.spec, kind=MOVEMENT, at_rest=True)
     made = attempt.tally
-    return Movement(attempt.goal, made.actions, made.switches, made.reward, made.reached, attempt.velocity, recorded)
+    return Movement(
+        attempt.goal, made.actions, made.switches, made.reward, made.reached, attempt.velocity, recorded, made.actions
+    )
 
 
 class _Attempt:
@@ -83,8 +88,9 @@ class _Attempt:
         goal: ArrayLike | Reference,
         task: TaskSettings,
         measures: bool,
+        hold: float,
     ) -> None:
-        self.cycle, self.controller, self.measures = cycle, controller, measures
+        self.cycle, self.controller, self.measures, self.hold = cycle, controller, measures, hold
         self.learner = controller if isinstance(controller, LearningController) else None
         self.reference = goal if isinstance(goal, Reference) else constant(goal)
         self.goal = self.reference.at(0.0)
@@ -103,12 +109,12 @@ class _Attempt:
         """Count what the last action led to; then return the valves of the next, or None at the end."""
         if self.before is None:
             self.began = reading.time
-        else:
+        elif not self.tally.over:
             gained = self._count(self.before, reading)
             if self.learner is not None:
                 self.learner.observe(reading, self.cycle.applied, gained, self.tally.reached)
-            if self.tally.over:
-                return None
+        if self.tally.over and reading.time - self.began > self.hold - self.cycle.arm.spec.period / 2:
+            return None
         self.before = reading
         return self.controller.act(reading)
 

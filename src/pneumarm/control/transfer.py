@@ -20,7 +20,7 @@ from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
-from pneumarm.learning import AnyAgent, LearningActor, Learns, SimulationAgent, fingerprint, goals_of
+from pneumarm.learning import AnyAgent, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import Store
@@ -51,6 +51,10 @@ class TransferSettings(Settings):
     A difference from the thesis, which keeps the last weights (0 does): with a constant learning rate they go on
     fluctuating, and where they happen to stand at the end decides how good the agent is (B. T. Polyak and
     A. B. Juditsky, "Acceleration of stochastic approximation by averaging", SIAM J. Control Optim. 30, 1992)."""
+    hold: float = 2.0
+    """For how long an agent that settles and holds has each goal, from when it is given [s].
+
+    The movement is counted up to where the goal is reached, and the agent adapts to all of it."""
     adaptation: AdaptationSettings = field(default_factory=AdaptationSettings)
     """How a policy adapts between movements; with a learning rate of 0 it does not."""
     close_while_computing: bool = False
@@ -62,6 +66,7 @@ class TransferSettings(Settings):
             "learning_rate": 0 <= self.learning_rate <= 1 or "0 to 1",
             "test_episodes": self.test_episodes >= 1 or "1 or more",
             "averaged": 0 <= self.averaged <= 1 or "0 to 1",
+            "hold": 0 <= self.hold <= 3600 or "0 to 3600 s",
         }
 
     def movements(self, phase: Phase) -> int:
@@ -279,8 +284,10 @@ class Transfer:
         agent = self._arrived
         draw = draw_movement(goals_of(agent), self._seed, test, number)
         BEGIN.reach(self._cycle.arm, draw.random)
-        velocity = agent.window.velocity
-        return move(self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity)
+        velocity, hold = agent.window.velocity, self._settings.hold if isinstance(agent, Tracks) else 0.0
+        return move(
+            self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity, hold
+        )
 
     def _adapt(self) -> None:
         """Let the agent adapt where that is due."""
@@ -299,10 +306,12 @@ class Transfer:
         info = {_PHASE: phase, **movement.row()}
         if self._adapting is not None:
             judges = self._settings.learning_rate > 0 and phase == "learning"
-            sound = not self._watch.marks(movement.recorded)
-            info[_SQUARES] = self._adapting.observe(
-                rows_of(movement.recorded), movement.reward, judges=judges, sound=sound
-            )
+            recorded = movement.recorded
+            sound = not self._watch.marks(recorded)
+            worth = movement.reward
+            if isinstance(self._arrived, Tracks):
+                worth = self._arrived.worth(recorded.angle[1:], movement.goal)
+            info[_SQUARES] = self._adapting.observe(rows_of(recorded), worth, judges=judges, sound=sound)
             self._judge()
         self._done.append(info)
         self._waiting.append(replace(movement.recorded, info=info))

@@ -123,6 +123,9 @@ class Tracks(Protocol):
     def controller(self) -> TrackingController:
         """Return what moves the arm, ready: it waits for nothing to be compiled."""
 
+    def worth(self, angle: NDArray[np.float64], goal: NDArray[np.float64]) -> float:
+        """Return how good a movement to ``goal`` (joints,) by ``angle`` (n, joints) [counts] was: more is better."""
+
 
 @runtime_checkable
 class Adapts(Acts, Saved, Protocol):

@@ -129,9 +129,11 @@ class Movement:
     reward: float
     success: bool
     velocity_end: Array
-    """Velocity at the last reading, shape (joints,) [counts/ms]."""
+    """Velocity where it ended, shape (joints,) [counts/ms]."""
     recorded: Recorded
-    """All readings and commands, ready for a store."""
+    """All readings and commands, ready for a store; those after its end too, where the goal was held on."""
+    ended: int = -1
+    """Number of the reading at which it ended, the last one by default."""
 
     @property
     def time_start(self) -> float:
@@ -140,8 +142,8 @@ class Movement:
 
     @property
     def time_end(self) -> float:
-        """Arm time of the last reading [s]."""
-        return float(self.recorded.time[-1])
+        """Arm time of its end [s]."""
+        return float(self.recorded.time[self.ended])
 
     @property
     def angle_begin(self) -> Array:
@@ -150,8 +152,8 @@ class Movement:
 
     @property
     def angle_end(self) -> Array:
-        """Angles at the last reading, shape (joints,) [counts]."""
-        return self.recorded.angle[-1]
+        """Angles at its end, shape (joints,) [counts]."""
+        return self.recorded.angle[self.ended]
 
     def row(self) -> dict[str, Any]:
         """Return its figures as plain values, as one of :meth:`Movements.rows`."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.actor import ServoActor
@@ -11,7 +12,7 @@ from pneumarm.learning.servo.commands import command_parameters, shortest_share
 from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.inputs import input_size, seen_parameters
-from pneumarm.learning.servo.price import PriceParameters
+from pneumarm.learning.servo.price import PriceParameters, prices_of_errors
 from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
@@ -48,6 +49,12 @@ class ServoAgent(NetworkAgent):
         for reading in made_up_readings(self.spec):
             controller.act(reading)
         return ServoController(self)
+
+    def worth(self, angle: NDArray[np.float64], goal: NDArray[np.float64]) -> float:
+        """Return minus the mean price of the errors from ``goal`` (joints,) at ``angle`` (n, joints) [counts]."""
+        tolerance = self.settings.tolerance * self.spec.counts_per_degree
+        paid = prices_of_errors(self.task.prices, (angle - goal) / tolerance)
+        return -float(paid.sum(axis=1).mean())
 
     def actor(self) -> ServoActor:
         """Return it acting state by state."""

@@ -14,6 +14,7 @@ goes through this weight, or staying away would pay.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel, part
 from pneumarm.networks.tansig import FASTMATH
@@ -32,6 +33,13 @@ class PriceParameters(NamedTuple):
     change: float
     slack: float = 0.0
     stiffness: float = 0.0
+
+
+def prices_of_errors(prices: PriceParameters, error: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return the price of each ``error`` in tolerances."""
+    size = np.abs(error)
+    beyond = np.maximum(size - prices.flat, 0) / prices.precision
+    return 0.5 * np.log1p(beyond**2) + prices.far * size
 
 
 @kernel(fastmath=FASTMATH)

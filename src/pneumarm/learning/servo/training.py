@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.learning.servo.agent import ServoAgent, servo_sizes, servo_task
 from pneumarm.learning.servo.gradient import ServoTask, errors_of, learn_once, move_forward, tape
-from pneumarm.learning.servo.price import NEAR
+from pneumarm.learning.servo.price import NEAR, prices_of_errors
 from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
@@ -129,17 +129,16 @@ class ServoLearner(Learner[ServoAgent]):
             self._prepare(np.random.default_rng([self._seed, _VALIDATION, part]), np.ones(self.settings.arms, bool))
             move_forward(self.task, self.net, self.tape)
             made = movements(self.settings.arms, joints)
-            error = np.abs(errors_of(self.task, self.tape))
+            error = errors_of(self.task, self.tape)
             made.goal[:], made.angle_begin[:], made.angle_end[:] = (
                 self._counts(x).T for x in (self.tape.reference[-1], self._angles(0), self._angles(-1))
             )
             changes = self._valve_changes()
             made.actions[:], made.switches[:] = steps, changes.T
             prices = self.task.prices
-            beyond = np.maximum(error - prices.flat, 0) / prices.precision
-            cost = (0.5 * np.log1p(beyond**2) + prices.far * error).sum(axis=(0, 1))
+            cost = prices_of_errors(prices, error).sum(axis=(0, 1))
             made.reward[:] = -cost - prices.change * changes.sum(axis=0) - self._slack()
-            made.success[:] = (error[-steps // 3 :] <= 1).all(axis=(0, 1))
+            made.success[:] = (np.abs(error[-steps // 3 :]) <= 1).all(axis=(0, 1))
             parts.append(made)
         return Movements(*(np.concatenate(columns)[:episodes] for columns in zip(*parts, strict=True)))
 

@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, open_arm
 from pneumarm.control import AgentController, Monitor
+from pneumarm.control.transfer import monitor_of, transfer
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent, Tracks, goals_of, train
 from pneumarm.learning.methods import find_method
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
+from pneumarm.run import RunTransferSettings
 from pneumarm.simulation import FitSettings, StoreFit
 from pneumarm.simulation.enough import collect_enough
 from pneumarm.task import BeginStates, Movement
@@ -117,12 +119,13 @@ def greedy_movements(
         return there_and_back.greedy_movements(agent, opened, goals, numbers, SEED_OF_MOVEMENTS, controller)
 
 
-def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False) -> dict[str, Any]:
-    """Return what the agents of the arm ``name`` do when they arrive on it.
+def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adapts: bool = False) -> dict[str, Any]:
+    """Return what the agents of the arm ``name`` do when they arrive on it; with ``adapts`` what one does later, too.
 
     Made as ``pneumarm run`` makes them by default: collecting until more would not help, the fit, and a training of
     the default agent and of the one for reaching. The first settles at ``goals`` and follows sinusoids, the second
     reaches as many. With ``monitor`` the arm is watched while it is recorded; ``marked`` rows are then told.
+    ``adapts``: the first adapts to as many movements as in a run, and settles and follows again.
     """
     with tempfile.TemporaryDirectory() as folder:
         db = Path(folder) / "arm.db"
@@ -135,10 +138,9 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False) -> d
     servo, reaching = (
         train(made.simulation, begin, seed=seed, method=find_method(method)).agent for method in ("servo", "policy")
     )
-    assert isinstance(servo, Tracks)
-    with open_arm(name, seed) as opened:
-        settings = MoveTrialSettings(goals=goals)
-        tried = try_moving(opened, servo.controller(), goals_of(servo), settings, seed=seed).results()
+    settings = MoveTrialSettings(goals=goals)
+    tried = moved_by(servo, name, settings, seed)
+    later = moved_by(adapted(servo, name, seed), name, settings, seed) if adapts else None
     with open_arm(name, seed) as opened:
         reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), seed)
     return {
@@ -146,14 +148,40 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False) -> d
         "transitions": transitions,
         "marked": marked,
         "history": made.simulation.window.history,
+        **_moving_figures(tried),
+        "adapted": None if later is None else _moving_figures(later),
+        "success": [int(one.success) for one in reached],
+        "reward": [float(one.reward) for one in reached],
+    }
+
+
+def _moving_figures(tried: dict[str, Any]) -> dict[str, Any]:
+    """Return the figures of a trial of moving in short."""
+    return {
         "settled": tried["settle"]["settled"],
         "seconds": tried["settle"]["median_seconds"],
         "rest": tried["settle"]["rest_error_deg"],
         "changes": tried["settle"]["valve_changes_per_second"],
         "track": [float(np.mean(one["rms_error_deg"])) for one in tried["track"]],
-        "success": [int(one.success) for one in reached],
-        "reward": [float(one.reward) for one in reached],
     }
+
+
+def adapted(agent: AnyAgent, name: str, seed: int) -> AnyAgent:
+    """Return ``agent`` after the movements of a default run on the arm ``name``."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        open_arm(name, seed) as opened,
+        Store.for_arm(Path(folder) / "arm.db", opened.spec) as store,
+    ):
+        watch = monitor_of(agent, opened, "warn")
+        return transfer(agent, opened, store, RunTransferSettings(), seed=seed, watch=watch).agent
+
+
+def moved_by(agent: AnyAgent, name: str, settings: MoveTrialSettings, seed: int) -> dict[str, Any]:
+    """Return what a default ``agent`` does on the arm ``name``, opened anew."""
+    assert isinstance(agent, Tracks)
+    with open_arm(name, seed) as opened:
+        return try_moving(opened, agent.controller(), goals_of(agent), settings, seed=seed).results()
 
 
 def _collected(arm: Arm, store: Store, seed: int, watch: Watch | None, transitions: int) -> None:

@@ -3,12 +3,12 @@
 python -m benchmarks wide_arms
 
 Each arm is recorded until more would not help, watched by a monitor that marks rows and does not stop; then the
-default agent, trained, settles at goals that the arm was seen to hold and follows sinusoids, and the agent for
-reaching reaches goals. What was measured is kept, so an interrupted benchmark goes on. Settings come from the
-environment:
+default agent, trained, settles at goals that the arm was seen to hold and follows sinusoids, on arrival and after it
+has adapted to as many movements as in a run, and the agent for reaching reaches goals. What was measured is kept, so
+an interrupted benchmark goes on. Settings come from the environment:
 
 PNEUMARM_WIDE_ARMS       names of arms divided by blanks, or seeds of wide arms, such as the default, 6000-6009;
-                         5000-5299 are held out
+                         5000-5299 are held out. python:tests.friction_arms:joint_1 and so on have other physics
 PNEUMARM_WIDE_GOALS      40 to settle at, and as many to reach
 PNEUMARM_WIDE_FOLDER     where rows are kept; runs/wide_arms by default
 PNEUMARM_WIDE_PROCESSES  2
@@ -30,8 +30,11 @@ COLUMNS = {
     "marked": "marked",
     "history": "history",
     "settled": "settled",
+    "settled_adapted": "adapted",
     "seconds": "median [s]",
+    "seconds_adapted": "adapted",
     "rest": "rest [deg]",
+    "rest_adapted": "adapted",
     "changes": "changes/s",
     "slow": "1/4 Hz [deg]",
     "fast": "1 Hz [deg]",
@@ -49,7 +52,7 @@ def measure() -> Iterator[str]:
     for row in in_processes(arrived, [(arm, goals) for arm in wanted], processes):
         rows.add(row)
     table = [figures_of(row) for arm in arms if (row := rows.get(arm, goals)) is not None]
-    yield f"{'':22}" + "".join(f"{title:>13}" for title in COLUMNS.values())
+    yield f"{'':34}" + "".join(f"{title:>13}" for title in COLUMNS.values())
     for arm, figures in zip(arms, table, strict=True):
         yield line(arm, figures)
     for quantile in QUANTILES:
@@ -74,16 +77,18 @@ def names_of(arms: str) -> list[str]:
 
 def arrived(arm: str, goals: int) -> dict[str, Any]:
     """Return what the agents of ``arm`` do on it, as a row."""
-    return {"arm": arm, "goals": goals, **on_arrival(arm, goals, monitor=True)}
+    return {"arm": arm, "goals": goals, **on_arrival(arm, goals, monitor=True, adapts=True)}
 
 
 def figures_of(row: dict[str, Any]) -> dict[str, float]:
     """Return the figures of the table."""
     slow, *_, fast = row["track"]
     derived = {"slow": slow, "fast": fast, "success": np.mean(row["success"]), "reward": np.mean(row["reward"])}
-    return {name: float(({**row, **derived, "seconds": seconds_of(row)})[name]) for name in COLUMNS}
+    later = {f"{name}_adapted": row["adapted"][name] for name in ("settled", "rest")}
+    seconds = {"seconds": seconds_of(row), "seconds_adapted": seconds_of(row["adapted"])}
+    return {name: float((row | derived | later | seconds)[name]) for name in COLUMNS}
 
 
 def line(name: str, figures: dict[str, float]) -> str:
     """Return a line of the table."""
-    return f"{name:22}" + "".join(f"{figures[column]:13.3f}" for column in COLUMNS)
+    return f"{name:34}" + "".join(f"{figures[column]:13.3f}" for column in COLUMNS)

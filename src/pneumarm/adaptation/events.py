@@ -45,7 +45,8 @@ def sentences(events: Sequence[Event], quantities: Sequence[str]) -> list[str]:
             )
         elif event.what == "rolled back":
             lines.append(
-                f"version {found['taken_back']} taken back after movement {event.movement}: its "
-                f"movements earned {found['reward_after']:.2f} instead of {found['reward_before']:.2f}; again version {event.version}"
+                f"version {found['taken_back']} taken back after movement {event.movement}: its movements "
+                f"earned {found['reward_after']:.2f} instead of {found['reward_before']:.2f}; again version "
+                f"{event.version}"
             )
     return lines

@@ -192,7 +192,9 @@ class Bench:
             with Store.for_arm(Path(place) / "db", arm.spec) as store:
                 collect(arm, store, self.collected, seed, settings=WHOLE_PERIODS)
                 simulation = fit_store(store, FitSettings(seed=seed)).simulation
-                return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+                return simulation, begin_states(
+                    store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec
+                )
 
 
 # The table --------------------------------------------------------------------------------------------------------

@@ -71,7 +71,9 @@ def prepared(folder: Path, arm: int) -> tuple[Simulation, BeginStates]:
         if not file.exists():
             fit_store(store, FitSettings(seed=arm)).simulation.save(file)
         simulation = Simulation.load(file)
-        return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+        return simulation, begin_states(
+            store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec
+        )
 
 
 def train_by(method: str, simulation: Simulation, begin: BeginStates, seed: int) -> Training[Any]:

@@ -387,7 +387,7 @@ def trained(folder: Path, arm: int, simulation: Simulation) -> AnyAgent:
     file = folder / f"{arm}.agent"
     if not file.exists():
         with Store.open(folder / f"{arm}.db") as store:
-            begin = begin_states(store, simulation.window, simulation.scaling)
+            begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
         train(simulation, begin, None, 1).agent.save(file)
     return load_agent(file)
 

@@ -131,7 +131,7 @@ def rehearse(piece: Piece, folder: Path) -> Iterator[str]:
     with Store.create(folder / "made-up.db", piece.spec) as store:
         store.append_all(_made_up(piece.spec))
         simulation = fit_store(store, replace(piece.fit, epochs=1)).simulation
-        begin = begin_states(store, simulation.window, simulation.scaling)
+        begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
         yield "simulation"
         agent = train(simulation, begin, replace(piece.servo, agents=1, updates=1, validation_movements=8)).agent
         yield "training"

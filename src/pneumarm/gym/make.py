@@ -298,7 +298,7 @@ def _begin(simulation: Simulation, transitions: str | Path | BeginStates | None)
             "a simulation knows no begin states: give transitions=, the store of the recordings that it was fitted to"
         )
     with Store.open(Path(transitions)) as store:
-        return begin_states(store.blocks(), simulation.window, simulation.scaling)
+        return begin_states(store.blocks(), simulation.window, simulation.scaling, simulation.spec)
 
 
 def _goals(goals: ArrayLike, joints: int) -> Any:

@@ -2,13 +2,20 @@
 
 import math
 import os
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
 from pneumarm.errors import UnusableInput
 
 Value = TypeVar("Value")
+
+
+def text(name: str, usual: str) -> str:
+    """Return the variable ``name`` as it is."""
+    return os.environ.get(name, usual)
 
 
 def words(name: str, usual: str) -> list[str]:
@@ -24,6 +31,11 @@ def whole(name: str, usual: int, least: int = 1) -> int:
 def number(name: str, usual: float) -> float:
     """Return a number above 0."""
     return _read(name, str(usual), lambda value: _positive(float(value)), "a number above 0")
+
+
+def numbers(name: str, usual: str) -> list[float]:
+    """Return numbers above 0."""
+    return _read(name, usual, _numbers, "numbers above 0 divided by commas")
 
 
 def seeds(name: str, usual: str) -> list[int]:
@@ -45,8 +57,15 @@ def folder(name: str, usual: str) -> Path:
     return _read(name, usual, _made, "a folder that can be made and written")
 
 
+@contextmanager
+def kept_folder(name: str) -> Iterator[Path]:
+    """Give the folder that the variable ``name`` says, which is made where there is none, or else a temporary one."""
+    with tempfile.TemporaryDirectory() as temporary:
+        yield folder(name, temporary)
+
+
 def _read(name: str, usual: str, meaning: Callable[[str], Value], expected: str) -> Value:
-    value = os.environ.get(name, usual)
+    value = text(name, usual)
     try:
         return meaning(value)
     except (ValueError, OSError) as error:
@@ -63,6 +82,10 @@ def _at_least(value: int, least: int) -> int:
     if value < least:
         raise ValueError
     return value
+
+
+def _numbers(value: str) -> list[float]:
+    return [_positive(float(one)) for one in value.split(",")]
 
 
 def _positive(value: float) -> float:

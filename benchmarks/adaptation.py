@@ -26,7 +26,6 @@ PNEUMARM_ADAPTATION_FOLDER     where stores, simulations, agents, rows and the p
 """
 
 import json
-import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, replace
@@ -38,6 +37,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from benchmarks import _environment as environment
 from benchmarks.agents import prepared
 from pneumarm.adaptation import AdaptationSettings, TrialSettings, WatchSettings
 from pneumarm.adaptation.change import ChangeDetector
@@ -64,6 +64,7 @@ TORN = 300
 """How much more than a sound one a torn muscle leaks: 7.5 % of its pressure a second."""
 WINDOW, SHARE = 100, 0.95
 """Of the definition of *recovered*."""
+FOLDER = "PNEUMARM_ADAPTATION_FOLDER"
 BASELINES = ("fresh", "without", "adapting")
 
 
@@ -191,7 +192,9 @@ class Bench:
             with Store.for_arm(Path(place) / "db", arm.spec) as store:
                 collect(arm, store, self.collected, seed, settings=WHOLE_PERIODS)
                 simulation = fit_store(store, FitSettings(seed=seed)).simulation
-                return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+                return simulation, begin_states(
+                    store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec
+                )
 
 
 # The table --------------------------------------------------------------------------------------------------------
@@ -205,14 +208,11 @@ HEADER = (
 
 
 def measure() -> Iterator[str]:
-    seeds = [int(word) for word in os.environ.get("PNEUMARM_ADAPTATION_SEEDS", "1,2,3,4,5").split(",")]
-    changes = os.environ.get("PNEUMARM_ADAPTATION_CHANGES", ",".join(CHANGES)).split(",")
-    movements = int(os.environ.get("PNEUMARM_ADAPTATION_MOVEMENTS", "300"))
-    collected = int(os.environ.get("PNEUMARM_ADAPTATION_COLLECTED", "200000"))
-    kept = os.environ.get("PNEUMARM_ADAPTATION_FOLDER")
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(kept or temporary)
-        folder.mkdir(exist_ok=True)
+    seeds = environment.seeds("PNEUMARM_ADAPTATION_SEEDS", "1,2,3,4,5")
+    changes = environment.words("PNEUMARM_ADAPTATION_CHANGES", ",".join(CHANGES))
+    movements = environment.whole("PNEUMARM_ADAPTATION_MOVEMENTS", 300)
+    collected = environment.whole("PNEUMARM_ADAPTATION_COLLECTED", 200_000)
+    with environment.kept_folder(FOLDER) as folder:
         bench, found = Bench(folder, movements, collected), {}
         yield HEADER
         for change in changes:
@@ -221,7 +221,7 @@ def measure() -> Iterator[str]:
             ]
             yield line(change, found[change])
         yield from rates(found)
-        if kept:
+        if environment.text(FOLDER, ""):
             curves(found).savefig(folder / "adaptation.png", dpi=150)
             yield f"curves: {folder / 'adaptation.png'}"
 

@@ -11,8 +11,6 @@ PNEUMARM_AGENTS_FOLDER     where collected stores and simulations are kept; a te
 Seconds of training are wall time with validation; decision times are processor time at the 99th percentile.
 """
 
-import os
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -22,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import _environment as environment
 from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
 from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.learning import AnyAgent, LearnSettings, PolicySettings, Training, test, train
@@ -38,26 +37,22 @@ HEADER = (
 )
 
 
-def listed(name: str, default: str) -> list[str]:
-    return os.environ.get(f"PNEUMARM_AGENTS_{name}", default).split(",")
-
-
 def measure() -> Iterator[str]:
-    movements = int(os.environ.get("PNEUMARM_AGENTS_MOVEMENTS", "500"))
-    methods, seeds = listed("METHODS", "policy,batched,sarsa"), listed("SEEDS", "1,2")
+    arms = environment.seeds("PNEUMARM_AGENTS_ARMS", "1,2,3")
+    seeds = environment.seeds("PNEUMARM_AGENTS_SEEDS", "1,2")
+    methods = environment.words("PNEUMARM_AGENTS_METHODS", "policy,batched,sarsa")
+    movements = environment.whole("PNEUMARM_AGENTS_MOVEMENTS", 500)
     found: dict[str, list[tuple[dict[str, Any], Training[Any]]]] = {method: [] for method in methods}
     failures: dict[str, Counter[str]] = {method: Counter() for method in methods}
     yield HEADER
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(os.environ.get("PNEUMARM_AGENTS_FOLDER", temporary))
-        folder.mkdir(exist_ok=True)
-        for arm in listed("ARMS", "1,2,3"):
-            simulation, begin = prepared(folder, int(arm))
+    with environment.kept_folder("PNEUMARM_AGENTS_FOLDER") as folder:
+        for arm in arms:
+            simulation, begin = prepared(folder, arm)
             for seed in seeds:
                 for method in methods:
-                    trained = train_by(method, simulation, begin, int(seed))
+                    trained = train_by(method, simulation, begin, seed)
                     simulated = test(trained.agent, simulation, begin).reward.mean()
-                    made, p99 = greedy_movements(trained.agent, int(arm), movements)
+                    made, p99 = greedy_movements(trained.agent, arm, movements)
                     figures = of_rows(one.row() for one in made).results()
                     found[method].append((figures, trained))
                     failures[method].update(kind(one) for one in made if not one.success)
@@ -76,7 +71,9 @@ def prepared(folder: Path, arm: int) -> tuple[Simulation, BeginStates]:
         if not file.exists():
             fit_store(store, FitSettings(seed=arm)).simulation.save(file)
         simulation = Simulation.load(file)
-        return simulation, begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+        return simulation, begin_states(
+            store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec
+        )
 
 
 def train_by(method: str, simulation: Simulation, begin: BeginStates, seed: int) -> Training[Any]:
@@ -122,14 +119,14 @@ def kind(movement: Movement) -> str:
 
 
 def row(
-    arm: str, seed: str, method: str, trained: Training[Any], simulated: float, figures: dict[str, Any], p99: float
+    arm: int, seed: int, method: str, trained: Training[Any], simulated: float, figures: dict[str, Any], p99: float
 ) -> str:
     low, high = figures["intervals"]["reward"]
     worst, best = figures["intervals"]["success_rate"]
     reward = f"{figures['reward']:.2f} ± {(high - low) / 2:.2f}"
     success = f"{figures['success_rate']:.4f} ({worst:.3f}..{best:.3f})"
     return (
-        f"{arm:6}{seed:>5} {method:14}{trained.seconds:5.1f} s{simulated:15.2f}{reward:>17}{success:>22}"
+        f"{arm:<6}{seed:>5} {method:14}{trained.seconds:5.1f} s{simulated:15.2f}{reward:>17}{success:>22}"
         f"{figures['actions']:9.2f}{figures['switches']:9.2f}{p99:6.2f} ms"
     )
 

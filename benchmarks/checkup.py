@@ -6,12 +6,12 @@ PNEUMARM_CHECKUP_ARMS takes others, as 1-10.
 python -m benchmarks checkup
 """
 
-import os
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks import _environment as environment
 from pneumarm.arm.corrected import CorrectedArm
 from pneumarm.arm.spec_file import SoundState
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
@@ -110,8 +110,7 @@ def complaints_of(case: Case, arm: int) -> set[str]:
 
 def measure() -> Iterator[str]:
     """Yield lines with what was found on healthy arms, and then on faulty ones."""
-    first, last = map(int, os.environ.get("PNEUMARM_CHECKUP_ARMS", ARMS).split("-"))
-    arms = range(first, last + 1)
+    arms = environment.seeds("PNEUMARM_CHECKUP_ARMS", ARMS)
     complaints, later, figures = 0, 0, []
     for arm in arms:
         known = calibrate(check_up(VirtualArm(draw_parameters(arm), seed=arm))).file
@@ -126,7 +125,8 @@ def measure() -> Iterator[str]:
             moved = (ends(again.joints[0]) - known.sound.ends[0]) / known.spec.counts_per_degree
             figures[-1]["ends moved [degrees]"] = float(np.abs(moved).max())
     count = len(arms) * NOISES
-    yield f"arms {first} to {last}, healthy: {complaints} of {count} complained of, calibrated {later} of {count}"
+    which = f"arms {arms[0]} to {arms[-1]}"
+    yield f"{which}, healthy: {complaints} of {count} complained of, calibrated {later} of {count}"
     limits = (LEAK, HIGH_SUPPLY, LEAP, LOGARITHMIC, WORN, -RISING, ENDS)
     for name, limit in zip(figures[0], limits, strict=True):
         worst = max(np.sign(limit) * each[name] for each in figures)

@@ -15,7 +15,6 @@ PNEUMARM_FAULTS_FOLDER   where stores, simulations and agents are kept; a tempor
 """
 
 import math
-import os
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from benchmarks import _environment as environment
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, Reading, Step, guarded
 from pneumarm.arm.virtual import (
     ArmParameters,
@@ -316,12 +316,10 @@ def judged(played: Played, simulation: Simulation | None) -> Case:
 
 
 def measure() -> Iterator[str]:
-    arms = [int(one) for one in os.environ.get("PNEUMARM_FAULTS_ARMS", ",".join(map(str, range(1, 21)))).split(",")]
-    cases = int(os.environ.get("PNEUMARM_FAULTS_CASES", "40"))
-    hours = float(os.environ.get("PNEUMARM_FAULTS_HOURS", "10"))
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(os.environ.get("PNEUMARM_FAULTS_FOLDER", temporary))
-        folder.mkdir(exist_ok=True)
+    arms = environment.seeds("PNEUMARM_FAULTS_ARMS", "1-20")
+    cases = environment.whole("PNEUMARM_FAULTS_CASES", 40)
+    hours = environment.number("PNEUMARM_FAULTS_HOURS", 10.0)
+    with environment.kept_folder("PNEUMARM_FAULTS_FOLDER") as folder:
         simulations = {arm: fitted(folder, arm) for arm in arms}
         agents = {arm: trained(folder, arm, simulations[arm]) for arm in arms}
         lines: dict[str, list[str]] = {"collecting, with simulation": [], "collecting, rules alone": [], "moving": []}
@@ -389,7 +387,7 @@ def trained(folder: Path, arm: int, simulation: Simulation) -> AnyAgent:
     file = folder / f"{arm}.agent"
     if not file.exists():
         with Store.open(folder / f"{arm}.db") as store:
-            begin = begin_states(store, simulation.window, simulation.scaling)
+            begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
         train(simulation, begin, None, 1).agent.save(file)
     return load_agent(file)
 

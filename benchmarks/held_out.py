@@ -5,7 +5,6 @@ Takes about a minute an arm on two cores. Settings of ``pneumarm run`` may be gi
 """
 
 import json
-import os
 import shlex
 import subprocess
 import sys
@@ -14,15 +13,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-ARMS = [f"virtual:seed={seed}" for seed in range(1001, 1011)]
+from benchmarks import _environment as environment
+from pneumarm.arm.open import names_in
+
+ARMS = ",".join(f"virtual:seed={seed}" for seed in range(1001, 1011))
 HEADER = f"{'arm':18}{'':12}{'reward':>18}{'success':>22}{'actions':>9}{'switches':>9}"
 
 
 def measure() -> Iterator[str]:
-    arms = os.environ.get("PNEUMARM_HELD_OUT_ARMS")
+    arms = names_in(environment.text("PNEUMARM_HELD_OUT_ARMS", ARMS))
     yield HEADER
     found = []
-    for arm in arms.split(",") if arms else ARMS:
+    for arm in arms:
         found.append(run(arm))
         yield from rows(arm, found[-1])
     for name, phase in (("simulation", "test"), ("arrival", "before"), ("adapted", "after")):
@@ -37,7 +39,7 @@ def measure() -> Iterator[str]:
 def run(arm: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pneumarm.cli", "run", "--arm", arm, "--out", str(Path(folder) / "run")]
-        command += ["--json", *shlex.split(os.environ.get("PNEUMARM_HELD_OUT", ""))]
+        command += ["--json", *shlex.split(environment.text("PNEUMARM_HELD_OUT", ""))]
         done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     results: dict[str, Any] = json.loads(done.stdout)
     return results

@@ -8,13 +8,13 @@ PNEUMARM_LABORATORY_RUNS   8; fewer for a shorter benchmark
 PNEUMARM_LABORATORY        folder of a laboratory whose arm is used; otherwise one is collected and fitted first
 """
 
-import os
 import resource
 import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks import _environment as environment
 from pneumarm.experiments.experiment import LaboratorySettings
 from pneumarm.experiments.registry import experiment
 from pneumarm.experiments.sweep import Sweep, arm_folder, sweep
@@ -24,9 +24,9 @@ ARM = "virtual"
 
 
 def measure() -> Iterator[str]:
-    runs = int(os.environ.get("PNEUMARM_LABORATORY_RUNS", "8"))
+    runs = environment.whole("PNEUMARM_LABORATORY_RUNS", 8)
     with tempfile.TemporaryDirectory() as temporary:
-        prepared = Path(os.environ.get("PNEUMARM_LABORATORY", temporary))
+        prepared = environment.folder("PNEUMARM_LABORATORY", temporary)
         ALL_GOALS.prepare(ARM, arm_folder(prepared, ARM), LaboratorySettings(), lambda done, total: None)
         found = {}
         for name, workers in (("1 thread", 1), ("2 threads", 2)):

@@ -7,7 +7,6 @@ with ten pages open, after which the memory of the program and of a page is told
 the time, and in the end.
 """
 
-import os
 import re
 import subprocess
 import sys
@@ -19,12 +18,13 @@ from time import monotonic, sleep
 
 import numpy as np
 
+from benchmarks import _environment as environment
 from pneumarm.arm import open_arm
 from pneumarm.classical import TuneSettings, tune
 
 ROOT = Path(__file__).parents[1]
-STOPS = int(os.environ.get("PNEUMARM_LIVE_STOPS", "30"))
-MINUTES = float(os.environ.get("PNEUMARM_LIVE_MINUTES", "2"))
+STOPS = environment.whole("PNEUMARM_LIVE_STOPS", 30)
+MINUTES = environment.number("PNEUMARM_LIVE_MINUTES", 2.0)
 WATCHERS = 9
 
 

@@ -18,7 +18,6 @@ Intervals are Student's, over the pairs of arm and seed, of the difference to th
 """
 
 import math
-import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,6 +28,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from benchmarks import _environment as environment
 from benchmarks._trials import HELD_OUT, Rows, collected, fitted, greedy_movements
 from pneumarm.learning import test, train
 from pneumarm.report.style import DARK, GREY, MIDDLE, key, legend_below, panels, styled
@@ -42,13 +42,11 @@ HEADER = (
 
 
 def measure() -> Iterator[str]:
-    folder = Path(os.environ.get("PNEUMARM_MINUTES_FOLDER", "runs/minutes"))
-    folder.mkdir(parents=True, exist_ok=True)
-    arms = [int(arm) for arm in os.environ.get("PNEUMARM_MINUTES_ARMS", HELD_OUT).split(",")]
-    seeds = [int(seed) for seed in os.environ.get("PNEUMARM_MINUTES_SEEDS", "0").split(",")]
-    chosen = os.environ.get("PNEUMARM_MINUTES_MINUTES", "1.7,5,10,20,60,110")
-    minutes = sorted((float(one) for one in chosen.split(",")), reverse=True)
-    movements = int(os.environ.get("PNEUMARM_MINUTES_MOVEMENTS", "500"))
+    folder = environment.folder("PNEUMARM_MINUTES_FOLDER", "runs/minutes")
+    arms = environment.seeds("PNEUMARM_MINUTES_ARMS", HELD_OUT)
+    seeds = environment.seeds("PNEUMARM_MINUTES_SEEDS", "0")
+    minutes = sorted(environment.numbers("PNEUMARM_MINUTES_MINUTES", "1.7,5,10,20,60,110"), reverse=True)
+    movements = environment.whole("PNEUMARM_MINUTES_MOVEMENTS", 500)
     rows = Rows(folder / "rows.jsonl", "arm", "seed", "asked", "movements")
     for arm in arms:
         for seed in seeds:

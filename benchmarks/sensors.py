@@ -20,7 +20,6 @@ Differences to no further sensors are taken arm by arm, means over the seeds; th
 """
 
 import math
-import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from benchmarks import _environment as environment
 from benchmarks._trials import SEED_OF_MOVEMENTS, Rows
 from pneumarm.arm import open_arm
 from pneumarm.arm.seam import SensorKind
@@ -51,12 +51,13 @@ HEADER = (
 
 
 def measure() -> Iterator[str]:
-    folder = Path(os.environ.get("PNEUMARM_SENSORS_FOLDER", "runs/sensors"))
-    folder.mkdir(parents=True, exist_ok=True)
-    arms, seeds = (_numbers(name, usual) for name, usual in (("ARMS", "1,2,3,4,5"), ("SEEDS", "0,1")))
-    (transitions,), (movements,) = (_numbers(*one) for one in (("TRANSITIONS", "20000"), ("MOVEMENTS", "150")))
+    folder = environment.folder("PNEUMARM_SENSORS_FOLDER", "runs/sensors")
+    arms = environment.seeds("PNEUMARM_SENSORS_ARMS", "1,2,3,4,5")
+    seeds = environment.seeds("PNEUMARM_SENSORS_SEEDS", "0,1")
+    transitions = environment.whole("PNEUMARM_SENSORS_TRANSITIONS", 20_000)
+    movements = environment.whole("PNEUMARM_SENSORS_MOVEMENTS", 150)
     each_alone = ["velocity", "acceleration", "temperature"]
-    sets = os.environ.get("PNEUMARM_SENSORS_SETS", ",".join([NONE, *each_alone, "+".join(each_alone)])).split(",")
+    sets = environment.words("PNEUMARM_SENSORS_SETS", ",".join([NONE, *each_alone, "+".join(each_alone)]))
     rows = Rows(folder / "rows.jsonl", "arm", "seed", "sensors", "transitions", "movements")
     for seed in seeds:
         for arm in arms:
@@ -152,10 +153,6 @@ def line(sensors: str, each: list[dict[str, Any]], without: list[dict[str, Any]]
         f"{difference('warm'):>15}{mean('night'):8.2f}{difference('night'):>15}{lowest:8.2f}{mean('success'):9.4f}"
         f"{mean('derived'):9.4f}{mean('fit_seconds'):6.1f}s{mean('train_seconds'):6.1f}s"
     )
-
-
-def _numbers(name: str, usual: str) -> list[int]:
-    return [int(one) for one in os.environ.get(f"PNEUMARM_SENSORS_{name}", usual).split(",")]
 
 
 def _row(rows: Rows, *key: Any) -> dict[str, Any]:

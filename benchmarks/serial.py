@@ -31,6 +31,7 @@ import numpy as np
 from tests.firmware.build import missing
 from tests.firmware.figures import pseudo_terminal
 
+from benchmarks import _environment as environment
 from benchmarks.minutes import half_width
 from pneumarm.arm import ControlCycle, guarded, open_arm
 from pneumarm.control import TransferSettings
@@ -43,12 +44,11 @@ RATES = (30, 100)
 
 
 def measure() -> Iterator[str]:
-    yield from loops(float(os.environ.get("PNEUMARM_SERIAL_SECONDS", "10")))
-    seeds = [int(seed) for seed in os.environ.get("PNEUMARM_SERIAL_SEEDS", "1,2,3,4,5").split(",")]
-    transitions = int(os.environ.get("PNEUMARM_SERIAL_TRANSITIONS", "20000"))
-    movements = int(os.environ.get("PNEUMARM_SERIAL_MOVEMENTS", "100"))
-    folder = Path(os.environ.get("PNEUMARM_SERIAL_FOLDER", "runs/serial"))
-    folder.mkdir(parents=True, exist_ok=True)
+    yield from loops(environment.number("PNEUMARM_SERIAL_SECONDS", 10.0))
+    seeds = environment.seeds("PNEUMARM_SERIAL_SEEDS", "1,2,3,4,5")
+    transitions = environment.whole("PNEUMARM_SERIAL_TRANSITIONS", 20_000)
+    movements = environment.whole("PNEUMARM_SERIAL_MOVEMENTS", 100)
+    folder = environment.folder("PNEUMARM_SERIAL_FOLDER", "runs/serial")
     rewards: dict[str, list[float]] = {"virtual": [], "emulated:virtual": []}
     successes = dict.fromkeys(rewards, 0)
     for seed in seeds:

@@ -12,13 +12,13 @@ PNEUMARM_SOUND_CASES         cases of each fault on each kind of arm, 20; 0 for 
 PNEUMARM_SOUND_FOLDER        where rows are kept; a temporary folder by default
 """
 
-import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks import _environment as environment
 from benchmarks._trials import Rows
 from benchmarks.faults import KINDS, LATER, Kind, judged, play
 from pneumarm.arm import open_arm
@@ -33,13 +33,11 @@ _WITHOUT_A_SIMULATION = [kind for kind in KINDS if kind.within <= 2.0]
 
 
 def measure() -> Iterator[str]:
-    wide = _seeds(os.environ.get("PNEUMARM_SOUND_ARMS", "6000-6019"))
-    standard = _seeds(os.environ.get("PNEUMARM_SOUND_STANDARD", "1-20"))
-    transitions = int(os.environ.get("PNEUMARM_SOUND_TRANSITIONS", "6000"))
-    cases = int(os.environ.get("PNEUMARM_SOUND_CASES", "20"))
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(os.environ.get("PNEUMARM_SOUND_FOLDER", temporary))
-        folder.mkdir(exist_ok=True)
+    wide = environment.seeds("PNEUMARM_SOUND_ARMS", "6000-6019")
+    standard = environment.seeds("PNEUMARM_SOUND_STANDARD", "1-20")
+    transitions = environment.whole("PNEUMARM_SOUND_TRANSITIONS", 6000)
+    cases = environment.whole("PNEUMARM_SOUND_CASES", 20, least=0)
+    with environment.kept_folder("PNEUMARM_SOUND_FOLDER") as folder:
         kept = Rows(folder / "collected.jsonl", "arm", "transitions")
         collected = [kept.get(arm, transitions) or kept.add(collect_soundly(arm, transitions)) for arm in wide]
         yield from collecting_lines(collected)
@@ -54,11 +52,6 @@ def measure() -> Iterator[str]:
                     for case in range(cases)
                 ]
                 yield fault_line(kind.name, draw, found)
-
-
-def _seeds(text: str) -> list[int]:
-    first, _, last = text.partition("-")
-    return list(range(int(first), int(last or first) + 1))
 
 
 def collect_soundly(arm: int, transitions: int) -> dict[str, object]:

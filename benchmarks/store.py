@@ -4,7 +4,6 @@ python -m benchmarks store                                   a million transitio
 PNEUMARM_BENCHMARK_TRANSITIONS=10000000 python -m benchmarks store
 """
 
-import os
 import resource
 import tempfile
 import time
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import _environment as environment
 from pneumarm.arm import ArmSpec
 from pneumarm.simulation import FitSettings, fit_store
 from pneumarm.transitions import Recorded, Store, Window, filter_transitions
@@ -23,7 +23,7 @@ EPOCHS = 15
 
 def measure() -> Iterator[str]:
     """Yield lines of figures on synthetic rows in a temporary store."""
-    wanted = int(os.environ.get("PNEUMARM_BENCHMARK_TRANSITIONS", "1000000"))
+    wanted = environment.whole("PNEUMARM_BENCHMARK_TRANSITIONS", 1_000_000)
     for joints in (1, 2):
         count = wanted // ACTIONS if joints == 1 else wanted // (10 * ACTIONS)
         with tempfile.TemporaryDirectory() as folder:

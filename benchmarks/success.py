@@ -15,7 +15,6 @@ PNEUMARM_SUCCESS_FOLDER     where agents and rows are kept; a call with the same
 A failed movement is kept as a row of ``failures.jsonl`` there, with its number, goal and all that was read and set.
 """
 
-import os
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
@@ -26,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import _environment as environment
 from benchmarks._trials import HELD_OUT, Rows, collected, fitted, greedy_movements
 from benchmarks.agents import kind
 from pneumarm.learning import load_agent, train
@@ -43,14 +43,13 @@ HEADER = f"{'arm':8}{'movements':>10}{'failed':>8}{'success':>28}{'reward':>17}{
 
 
 def measure() -> Iterator[str]:
-    folder = Path(os.environ.get("PNEUMARM_SUCCESS_FOLDER", "runs/success"))
-    folder.mkdir(parents=True, exist_ok=True)
-    arms = [int(arm) for arm in os.environ.get("PNEUMARM_SUCCESS_ARMS", HELD_OUT).split(",")]
-    blocks = -(-int(os.environ.get("PNEUMARM_SUCCESS_MOVEMENTS", "5000")) // BLOCK)
+    folder = environment.folder("PNEUMARM_SUCCESS_FOLDER", "runs/success")
+    arms = environment.seeds("PNEUMARM_SUCCESS_ARMS", HELD_OUT)
+    blocks = -(-environment.whole("PNEUMARM_SUCCESS_MOVEMENTS", 5000) // BLOCK)
+    processes = environment.whole("PNEUMARM_SUCCESS_PROCESSES", 1)
     rows = Rows(folder / "blocks.jsonl", "arm", "block")
     failures = Rows(folder / "failures.jsonl", "arm", "number")
     yield HEADER
-    processes = int(os.environ.get("PNEUMARM_SUCCESS_PROCESSES", "1"))
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         for arm in arms:
             prepare(folder, arm)

@@ -14,7 +14,6 @@ PNEUMARM_WIDE_FOLDER     where rows are kept; runs/wide_arms by default
 PNEUMARM_WIDE_PROCESSES  2
 """
 
-import os
 from collections.abc import Iterator
 from typing import Any
 
@@ -44,7 +43,7 @@ COLUMNS = {
 
 
 def measure() -> Iterator[str]:
-    arms = names_of(os.environ.get("PNEUMARM_WIDE_ARMS", "6000-6009"))
+    arms = names_of(environment.text("PNEUMARM_WIDE_ARMS", "6000-6009"))
     goals = environment.whole("PNEUMARM_WIDE_GOALS", 40)
     processes = environment.whole("PNEUMARM_WIDE_PROCESSES", 2)
     rows = Rows(environment.folder("PNEUMARM_WIDE_FOLDER", "runs/wide_arms") / "rows.jsonl", "arm", "goals")

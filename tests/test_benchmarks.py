@@ -1,6 +1,7 @@
 """What long benchmarks rely on: rows that outlast a kill, the same movements for all, failures told apart."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from pneumarm.transitions import Recorded
         ("PNEUMARM_FEW_ARMS", "5-3", "expected seeds such as 1,2,3 or 5000-5009, got '5-3'"),
         ("PNEUMARM_FEW_GOALS", "0", "expected a whole number, 1 or more, got '0'"),
         ("PNEUMARM_FEW_FOLDER", __file__, "expected a folder"),
+        ("PNEUMARM_MINUTES_MINUTES", "5,0", "expected numbers above 0 divided by commas, got '5,0'"),
     ],
 )
 def test_what_the_environment_says_wrong_is_told_in_a_line(
@@ -36,10 +38,27 @@ def test_what_the_environment_says_wrong_is_told_in_a_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(variable, value)
-    assert main(["few_sensors"]) == 2
+    assert main(["minutes" if "MINUTES" in variable else "few_sensors"]) == 2
     told = capsys.readouterr().err
     assert told.startswith(f"pneumarm: {variable}: {said}")
     assert told.count("\n") == 1
+
+
+def test_only_one_file_reads_the_environment() -> None:
+    """What comes from it is checked there, and what is wrong is told in a line."""
+    folder = Path(environment.__file__).parent
+    reading = [file for file in folder.rglob("*.py") if re.search(r"\bos\.(environ|getenv)", file.read_text())]
+    assert reading == [Path(environment.__file__)]
+
+
+def test_a_folder_is_kept_where_one_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with environment.kept_folder("PNEUMARM_KEPT") as folder:
+        assert folder.is_dir()
+    assert not folder.exists()
+    monkeypatch.setenv("PNEUMARM_KEPT", str(tmp_path / "a" / "b"))
+    with environment.kept_folder("PNEUMARM_KEPT") as folder:
+        assert folder == tmp_path / "a" / "b"
+    assert folder.is_dir()
 
 
 def test_a_benchmark_that_there_is_not_is_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from children import python
-from pneumarm.kernels import kernel, sources_hash
+from pneumarm.kernels import kernel, part, sources_hash
 
 LEFT = """
 from pneumarm.kernels import kernel
@@ -122,6 +122,19 @@ def test_the_hash_is_of_kernel_sources_only(package):
     assert sources_hash(package) == before
     (package / "more.py").write_text("from pneumarm.kernels import kernel\n")
     assert sources_hash(package) != before
+
+
+def test_a_kernel_may_make_arrays_also_where_a_part_is_the_first_to_call_it():
+    @kernel
+    def total(x):
+        return np.empty_like(x).size + x.sum()
+
+    @part
+    def inside(x):
+        return total(x) + 1.0
+
+    outer = kernel(lambda x: inside(x))
+    assert outer(np.ones(3)) == 7.0
 
 
 def test_division_follows_numpy():

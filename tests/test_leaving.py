@@ -3,14 +3,18 @@
 import os
 import signal
 import sys
+from collections.abc import Collection
 from contextlib import AbstractContextManager
+from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from subprocess import Popen
 from time import sleep
 
 import pytest
 
-from children import child, end, wait_until
+from children import child, end, python, wait_until
+from pneumarm import cli
 from pneumarm.transitions import Store
 
 TESTS = Path(__file__).parent
@@ -73,9 +77,50 @@ def test_a_signal_closes_the_valves_and_loses_nothing(
         _, told = end(process, number)  # an impatient person
     assert process.returncode == 128 + number
     assert told.count("\n") == 1
-    assert f"interrupted ({number.name}); the arm is closed" in told
+    assert told == f"pneumarm: interrupted ({number.name}); the arm is closed. Call {command} again to continue\n"
     check_closed(log)
     assert acknowledged(store_of(command, out)) >= before
+
+
+INTERRUPTED = """
+import os, signal, sys
+import pneumarm.commands.{file} as command
+command.{doing} = lambda *_, **__: os.kill(os.getpid(), signal.SIGINT)
+from pneumarm.cli import main
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize(
+    ("file", "doing", "words"),
+    [
+        ("fit_", "fit_store", "fit {run}/transitions.db --out {out}"),
+        ("train_", "train", "train {run}/simulation.safetensors {run}/transitions.db --out {out}"),
+        ("test_", "test_agent", "test {run}/agent.safetensors {run}/simulation.safetensors {run}/transitions.db"),
+        ("bound_", "measure_bound", "bound --arm virtual --sim {run}/simulation.safetensors"),
+    ],
+)
+def test_without_an_arm_none_is_said_to_be_closed(
+    file: str, doing: str, words: str, small_run: Path, tmp_path: Path
+) -> None:
+    script = INTERRUPTED.format(file=file, doing=doing)
+    done = python("-c", script, *words.format(run=small_run, out=tmp_path / "out").split(), "--log", "warning")
+    assert done.stderr == "pneumarm: interrupted (SIGINT)\n"
+    assert done.returncode == 128 + signal.SIGINT
+
+
+def test_every_command_that_opens_anybodys_arm_says_that_it_is_closed() -> None:
+    told = {name: cli._interrupted([*name.split(), "word"], "") for name in cli.COMMANDS}
+    arms = {name for name in cli.COMMANDS if "arm" in parameters(name) or name == "run"}
+    virtual = {"bound", "arm emulate"}
+    assert {name for name, said in told.items() if "the arm is closed" in said} == arms - virtual
+    assert told["experiment"] == "interrupted. Call experiment again to continue"
+
+
+def parameters(command: str) -> Collection[str]:
+    file, _, part = command.partition(" ")
+    module = import_module(f"pneumarm.commands.{file}_")
+    return signature(getattr(module, f"{part or file}_")).parameters
 
 
 PARENT = """

@@ -1,6 +1,9 @@
 """What is rehearsed beside a run: every stage, on made-up data, of arms of any kind; once for each cache."""
 
+import signal
+import sys
 from pathlib import Path
+from time import monotonic
 
 import pytest
 
@@ -38,6 +41,44 @@ def test_a_rehearsal_is_waited_for_and_ended(marker: Path) -> None:
         beside.wait_for("bound")
         assert beside._done == {*STAGES, "bound"}
     assert beside.memory > 100
+
+
+@pytest.mark.parametrize("says", ["echo simulation", "true"])
+def test_a_rehearsal_that_hangs_is_ended_and_not_begun_again(
+    says: str, marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It does after it has named a stage, or before."""
+    hanging = tmp_path / "python"
+    hanging.write_text(f"#!/bin/sh\n{says}\ntrap '' TERM\nsleep 20 & wait\n")  # sleep keeps the pipe open
+    hanging.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(hanging))
+    with open_arm("virtual:seed=2") as arm:
+        piece = Piece(arm.spec, FitSettings(), SMALL, None)
+    began = monotonic()
+    with Rehearsal(patience=1.0) as beside:
+        beside.begin(piece)
+        process = beside._process
+        assert process is not None
+        beside.wait_for("simulation")
+        beside.wait_for("training")
+        assert process.returncode == -signal.SIGKILL
+        assert ("simulation" in beside._done) == (says != "true")
+        beside.wait_for("test")  # nothing is waited for any more
+    assert 1.0 <= monotonic() - began < 10.0
+    assert marker.exists()
+
+
+def test_a_rehearsal_that_fails_is_not_waited_for(
+    marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failing = tmp_path / "python"
+    failing.write_text("#!/bin/sh\nexit 1\n")
+    failing.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(failing))
+    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
+        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        beside.wait_for("simulation")
+    assert not marker.exists()
 
 
 def test_a_second_run_needs_none(marker: Path) -> None:

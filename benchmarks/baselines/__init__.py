@@ -35,6 +35,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import _environment as environment
+from benchmarks._trials import HELD_OUT
 from benchmarks.agents import Timed, prepared
 from benchmarks.baselines.learning import OURS, PLANNING, STABLE, learn
 from benchmarks.baselines.table import HEADER, Row, curves, floor, line, pooled, write_page
@@ -55,10 +57,6 @@ SEED = 0
 """Of begin states, goals and the arm's noise, the same for all."""
 
 
-def asked(name: str, default: str) -> str:
-    return os.environ.get(f"PNEUMARM_BASELINES_{name}", default)
-
-
 @dataclass(frozen=True)
 class Wanted:
     """How much is measured; rows that were measured otherwise are left aside."""
@@ -70,11 +68,14 @@ class Wanted:
 
 def measure() -> Iterator[str]:
     began = time.perf_counter()
-    wanted = Wanted(*(int(asked(*pair)) for pair in (("MOVEMENTS", "500"), ("TESTS", "10000"), ("STEPS", "450000"))))
-    arms = [int(arm) for arm in asked("ARMS", ",".join(str(seed) for seed in range(1001, 1011))).split(",")]
-    folder = Path(asked("FOLDER", "runs/baselines"))
-    folder.mkdir(parents=True, exist_ok=True)
-    methods = dict(each(asked("METHODS", ",".join(METHODS) + ":1")))
+    wanted = Wanted(
+        environment.whole("PNEUMARM_BASELINES_MOVEMENTS", 500),
+        environment.whole("PNEUMARM_BASELINES_TESTS", 10_000),
+        environment.whole("PNEUMARM_BASELINES_STEPS", 450_000),
+    )
+    arms = environment.seeds("PNEUMARM_BASELINES_ARMS", HELD_OUT)
+    folder = environment.folder("PNEUMARM_BASELINES_FOLDER", "runs/baselines")
+    methods = dict(each(environment.text("PNEUMARM_BASELINES_METHODS", ",".join(METHODS) + ":1")))
     if missing := unavailable(methods):
         yield missing
         methods = {name: seeds for name, seeds in methods.items() if name not in STABLE}
@@ -106,7 +107,7 @@ def each(methods: str) -> Iterator[tuple[str, int]]:
         name, _, seeds = entry.strip().partition(":")
         if name not in METHODS:
             raise UnusableInput(f"no method is called {name!r}; there are {', '.join(METHODS)}")
-        yield name, int(seeds or asked("SEEDS", "3")) if name in (*OURS, *STABLE) else 1
+        yield name, int(seeds or environment.whole("PNEUMARM_BASELINES_SEEDS", 3)) if name in (*OURS, *STABLE) else 1
 
 
 def unavailable(methods: dict[str, int]) -> str:

@@ -137,7 +137,7 @@ def train(
         require_folder(Path(out))
     learn, trained_in = settings or LearnSettings(), _simulation(simulation)
     with Store.open(Path(db)) as store:
-        begin = begin_states(store, trained_in.window, trained_in.scaling)
+        begin = begin_states(store, trained_in.window, trained_in.scaling, trained_in.spec)
     with progress("training") as report:
         training = train(
             trained_in,
@@ -171,7 +171,7 @@ def test(
 
     tested_in = _simulation(simulation)
     with Store.open(Path(db)) as store:
-        begin = begin_states(store, tested_in.window, tested_in.scaling)
+        begin = begin_states(store, tested_in.window, tested_in.scaling, tested_in.spec)
     return test(_agent(agent), tested_in, begin, episodes, seed)
 
 

@@ -137,6 +137,14 @@ COMMANDS = {
 }
 """Every command with its one-line help and an example."""
 
+MOVING = (
+    "run", "collect", "transfer", "move", "track", "live", "tune",
+    "arm check", "arm calibrate", "arm sensors", "arm valves",
+)  # fmt: skip
+"""Commands that leave an arm, which may be anybody's, closed."""
+RESUMED = ("run", "collect", "transfer", "experiment")
+"""Commands that go on, when they are called again, where they were interrupted."""
+
 _NO_BUG = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 """Of errors of the operating system: disks that are full, read-only or broken, and what is not allowed."""
 
@@ -187,10 +195,7 @@ def _run(arguments: list[str]) -> int:
         complain(error)
         return error.exit_code
     except KeyboardInterrupt as error:
-        reason = f" ({error})" if str(error) else ""
-        complain(
-            f"interrupted{reason}; the arm is closed. Call run, collect, transfer or experiment again to continue"
-        )
+        complain(_interrupted(arguments, str(error)))
         return getattr(error, "exit_code", 128 + signal.SIGINT)
     except BrokenPipeError:
         sys.stderr.close()
@@ -206,6 +211,14 @@ def _run(arguments: list[str]) -> int:
             complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
         return 1
     return 0
+
+
+def _interrupted(arguments: list[str], reason: str) -> str:
+    """Return what is said to whoever interrupted the command of ``arguments``."""
+    called = [name for name in COMMANDS if arguments[: len(name.split())] == name.split()]
+    closed = "; the arm is closed" if any(name in MOVING for name in called) else ""
+    again = "".join(f". Call {name} again to continue" for name in called if name in RESUMED)
+    return f"interrupted{f' ({reason})' if reason else ''}{closed}{again}"
 
 
 @contextmanager

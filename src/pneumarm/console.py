@@ -105,4 +105,6 @@ def jsonable(value: Any) -> Any:
 def _short(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
+    if isinstance(value, list):
+        return ", ".join(map(_short, value))
     return str(value)

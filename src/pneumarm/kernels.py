@@ -124,7 +124,8 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
     """
 
     def compile_(f: _Function) -> Any:
-        settings = {"nogil": True, "error_model": "numpy", **options}
+        # What is not said of counting references (_nrt) is as in the caller that happens to be compiled first.
+        settings = {"nogil": True, "error_model": "numpy", "_nrt": True, **options}
         dispatcher = numba.njit(**settings)(f)
         if not getattr(numba_config, "DISABLE_JIT", 0) and settings.get("inline", "never") == "never":
             dispatcher._cache = _ForgivingCache(dispatcher.py_func)

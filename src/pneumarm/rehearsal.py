@@ -13,8 +13,11 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
-from typing import Self
+from threading import Thread
+from time import monotonic
+from typing import IO, Self
 
 import msgspec
 import numpy as np
@@ -36,6 +39,11 @@ from pneumarm.transitions.rows import Recorded
 _REHEARSED = CACHE_FOLDER / "rehearsed"
 _SEQUENCE = 100  # rows of a made-up sequence
 _PLANNED = 4  # movements
+_PATIENCE = 600.0
+"""For so long [s] a stage may be rehearsed before it is taken to hang: eight times what the longest takes (80 s on a
+machine of 2 cores)."""
+_ENDING = 10.0
+"""For so long [s] a process that was killed is waited for; the system keeps one that hangs in a disk."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +58,16 @@ class Piece:
 
 
 class Rehearsal:
-    """A rehearsal in a process of its own, where none has been before; ended with the block it is in."""
+    """A rehearsal in a process of its own, where none has been before; ended with the block it is in.
 
-    def __init__(self) -> None:
+    A process that is silent for ``patience`` [s] is ended when it is waited for, and the run compiles for itself.
+    """
+
+    def __init__(self, patience: float = _PATIENCE) -> None:
+        self._patience = patience
         self._process: subprocess.Popen[str] | None = None
+        self._said = SimpleQueue[tuple[str, float]]()
+        self._heard = 0.0
         self._done: set[str] = set()
         self.memory = 0.0
         """The most that the process has held [MB]; told when it has ended."""
@@ -65,27 +79,51 @@ class Rehearsal:
         command = [sys.executable, "-m", "pneumarm.rehearsal"]
         errors = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # it is no part of the run
         with suppress(OSError):
-            self._process = subprocess.Popen(
+            self._process = process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True
             )
-            assert self._process.stdin is not None
-            self._process.stdin.write(json.dumps(asdict(piece)))
-            self._process.stdin.close()
+            assert process.stdin is not None
+            assert process.stdout is not None
+            self._heard = monotonic()
+            # Daemonic, for a pipe may stay open where its process has gone.
+            Thread(target=_listen, args=(process.stdout, self._said), name="rehearsal", daemon=True).start()
+            process.stdin.write(json.dumps(asdict(piece)))
+            process.stdin.close()
 
     def wait_for(self, stage: str) -> None:
         """Return when the kernels of ``stage`` are in the cache, or will not be."""
-        if self._process is not None and self._process.stdout is not None:
-            while stage not in self._done and (line := self._process.stdout.readline()):
-                self._done.add(line.strip())
+        while self._process is not None and stage not in self._done:
+            try:
+                line, self._heard = self._said.get(timeout=max(self._heard + self._patience - monotonic(), 0.0))
+            except Empty:
+                with suppress(OSError):
+                    _REHEARSED.touch()  # or it would hang in every run
+                line = ""
+            if not line:
+                self._end()
+            self._done.add(line)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._process is not None:
-            with self._process as process:
-                process.kill()
+        self._end()
+
+    def _end(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(_ENDING)
             self.memory = peak_memory(children=True)
+
+
+def _listen(lines: IO[str], said: SimpleQueue[tuple[str, float]]) -> None:
+    """Put each of ``lines`` with its time, and at their end an empty one, into ``said``."""
+    with lines:
+        for line in lines:
+            said.put((line.strip(), monotonic()))
+    said.put(("", monotonic()))
 
 
 def rehearse(piece: Piece, folder: Path) -> Iterator[str]:
@@ -93,7 +131,7 @@ def rehearse(piece: Piece, folder: Path) -> Iterator[str]:
     with Store.create(folder / "made-up.db", piece.spec) as store:
         store.append_all(_made_up(piece.spec))
         simulation = fit_store(store, replace(piece.fit, epochs=1)).simulation
-        begin = begin_states(store, simulation.window, simulation.scaling)
+        begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
         yield "simulation"
         agent = train(simulation, begin, replace(piece.servo, agents=1, updates=1, validation_movements=8)).agent
         yield "training"

@@ -343,7 +343,7 @@ class Run:
     def _begin_states(self, simulation: Simulation) -> BeginStates:
         with Store.open(self.store) as store:
             # Collected sequences only: those of the transfer come later, and a resumed run must see the same.
-            return begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+            return begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec)
 
 
 def open_arm_checked(settings: RunSettings) -> Arm:

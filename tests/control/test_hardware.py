@@ -118,7 +118,7 @@ def policy(small_run: Path) -> AnyAgent:
     )
     simulation = Simulation.load(small_run / "simulation.safetensors")
     with Store.open(small_run / "transitions.db") as store:
-        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec)
     return train(simulation, begin, settings).agent
 
 

@@ -67,7 +67,7 @@ SMALL_ONES = {
 def small_material(small_run: Path) -> Material:
     simulation = Simulation.load(small_run / "simulation.safetensors")
     with Store.open(small_run / "transitions.db") as store:
-        begin = begin_states(store, simulation.window, simulation.scaling)
+        begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
     return Material(SMALL.arm, Simulated(simulation, begin))
 
 

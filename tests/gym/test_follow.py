@@ -16,17 +16,16 @@ from pneumarm.arm import ControlCycle, guarded
 from pneumarm.arm.cycle import BeginState
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import UnusableInput
-from pneumarm.gym import ENVIRONMENT, FOLLOW, ArmFollow, follow
-from pneumarm.gym.spaces import nominal_goals, nominal_scaling
-from pneumarm.transitions.window import Window
+from pneumarm.gym import ENVIRONMENT, FOLLOW, ArmFollow, FollowSettings, follow
+from pneumarm.gym.spaces import nominal_scaling, nominal_view
 
 QUICK = BeginState(deflate=0.2, inflate=0.3, settle=0.2)
 
 
 def on_arm(reference: str | None = None, seconds: float = 1.0, joints: int = 1) -> ArmFollow:
     arm = VirtualArm(draw_parameters(2, joints), seed=2)
-    parts = {"seconds": seconds, "tolerance": 1.0, "change": 0.1, "preview": (0.034, 0.1), "begin": QUICK}
-    return ArmFollow(arm, Window(joints), nominal_scaling(arm.spec), nominal_goals(arm.spec), reference, **parts)
+    settings = FollowSettings(seconds, change=0.1, preview=(0.034, 0.1))
+    return ArmFollow(arm, nominal_view(arm.spec), reference, settings, QUICK)
 
 
 @pytest.fixture
@@ -124,8 +123,8 @@ def test_mistakes_are_told(env: ArmFollow) -> None:
     with pytest.raises(UnusableInput, match="expected sine"):
         env.reset(options={"reference": "sinus"})
     for arguments, words in (
-        ({"seconds": 0}, "seconds= is out"),
-        ({"preview": (20.0,)}, "preview= is out"),
+        ({"seconds": 0}, "seconds cannot be 0; expected above 0"),
+        ({"preview": (20.0,)}, r"preview cannot be \(20.0,\)"),
         ({"reference": "sine:1Hz,60deg"}, "asks joint 1"),
         ({"render_mode": "ascii"}, "render_mode"),
     ):

@@ -20,7 +20,7 @@ from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.control import move
 from pneumarm.errors import UnusableInput
 from pneumarm.gym import ENVIRONMENT, ArmPointToPoint, PointToPointVector
-from pneumarm.gym.spaces import nominal_goals, nominal_scaling
+from pneumarm.gym.spaces import nominal_goals, nominal_scaling, nominal_view
 from pneumarm.simulation import NoiseSettings
 from pneumarm.task import Reward, StateTracker
 from pneumarm.transitions.window import Window
@@ -41,7 +41,7 @@ def vector(n: int, joints: int = 1, **arguments) -> PointToPointVector:  # type:
 
 def on_arm(seed: int = 2) -> ArmPointToPoint:
     arm = VirtualArm(draw_parameters(seed), seed=seed)
-    return ArmPointToPoint(arm, Window(), nominal_scaling(arm.spec), nominal_goals(arm.spec), begin=QUICK)
+    return ArmPointToPoint(arm, nominal_view(arm.spec), begin=QUICK)
 
 
 @pytest.mark.parametrize("joints", [1, 2])

@@ -71,4 +71,6 @@ def resting_rows(joints: int = 1, sequences: int = 1500, seed: int = 0) -> Rows:
 
 
 def synthetic_begin_states(simulation: Simulation) -> BeginStates:
-    return begin_states(resting_rows(simulation.window.joints), simulation.window, simulation.scaling)
+    return begin_states(
+        resting_rows(simulation.window.joints), simulation.window, simulation.scaling, simulation.spec
+    )

@@ -117,11 +117,39 @@ def _moving(n: int = 30) -> Rows:
 
 
 def test_standing_still_within_a_sequence(simulation: Simulation) -> None:
-    found = begin_states(_moving(), simulation.window, simulation.scaling)
+    found = begin_states(_moving(), simulation.window, simulation.scaling, simulation.spec)
     # Rows 9..22 have one angle, and the valves close after row 9; a state needs its three rows and one more for the
     # oldest velocity, with closed valves in between: 13..22.
     assert (found.angle == 500).all()
     assert len(found) == 10
+
+
+@pytest.mark.parametrize("unit", [0.2, 1.0, 40.0])
+def test_what_is_at_rest_is_so_whatever_a_count_is(simulation: Simulation, unit: float) -> None:
+    """An arm whose readings differ by 0.09 degrees and 0.006 bar is at rest, by three times as much it is not."""
+    spec = replace(
+        simulation.spec,
+        counts_per_degree=unit * simulation.spec.counts_per_degree,
+        counts_per_bar=unit * simulation.spec.counts_per_bar,
+    )
+    rows, flicker = _moving(), (np.arange(30) % 2).astype(float)
+    for angle, pressure, found in ((1.0, 1.0, 10), (max(3.0, 1.1 / unit), 0.0, 0), (0.0, max(3.0, 1.1 / unit), 0)):
+        here = replace(
+            rows,
+            angle=unit * (rows.angle + angle * flicker[:, None]),
+            pressure=unit * (rows.pressure + pressure * flicker[:, None, None]),
+        )
+        if found:
+            assert len(begin_states(here, simulation.window, simulation.scaling, spec)) == found
+        else:
+            with pytest.raises(UnusableInput, match="at rest"):
+                begin_states(here, simulation.window, simulation.scaling, spec)
+
+
+def test_a_coarse_sensor_may_waver_by_a_count(simulation: Simulation) -> None:
+    spec = replace(simulation.spec, counts_per_degree=1.0)
+    rows = replace(_moving(), angle=np.round(_moving().angle / 10) + (np.arange(30) % 2)[:, None])
+    assert len(begin_states(rows, simulation.window, simulation.scaling, spec)) >= 10
 
 
 @pytest.mark.parametrize("change", ["creeping angle", "pressure", "open valve", "gap", "sequence"])
@@ -138,12 +166,12 @@ def test_what_is_not_at_rest(simulation: Simulation, change: str) -> None:
     else:
         rows = replace(rows, sequence=np.arange(30) // 3)
     with pytest.raises(UnusableInput, match="at rest"):
-        begin_states(rows, simulation.window, simulation.scaling)
+        begin_states(rows, simulation.window, simulation.scaling, simulation.spec)
 
 
 def test_blocks_are_one_stream(simulation: Simulation, begin: BeginStates) -> None:
     blocks = [resting_rows(sequences=700, seed=seed) for seed in (1, 2)]
-    together = begin_states(iter(blocks), simulation.window, simulation.scaling)
+    together = begin_states(iter(blocks), simulation.window, simulation.scaling, simulation.spec)
     assert len(together) == 1400
     with pytest.raises(UnusableInput, match="at rest"):
-        begin_states(iter([]), simulation.window, simulation.scaling)
+        begin_states(iter([]), simulation.window, simulation.scaling, simulation.spec)

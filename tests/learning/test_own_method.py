@@ -141,7 +141,7 @@ def test_it_goes_all_the_way(done: Path) -> None:
 def test_it_goes_into_an_experiment(done: Path) -> None:
     simulation = Simulation.load(done / "simulation.safetensors")
     with Store.open(done / "transitions.db") as store:
-        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec)
     material = Prepared("virtual:seed=3", Recipe(), done, simulation, begin, {})
     laboratory = LaboratorySettings(test_episodes=4)
     found = train_and_move(material, PushSettings(trials=2), 1, laboratory, method=MINE)

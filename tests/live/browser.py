@@ -39,6 +39,7 @@ def emptiness(page: Page, name: str) -> list[float]:
     for number, sheet in enumerate(pypdfium2.PdfDocument(page.pdf(format="A4", prefer_css_page_size=True))):
         drawn = sheet.render(scale=1).to_pil().convert("L")
         if folder := os.environ.get("PNEUMARM_SCREENSHOTS"):
+            Path(folder).mkdir(parents=True, exist_ok=True)
             sheet.render(scale=1.2).to_pil().save(Path(folder) / f"{name}-print-{number + 1}.png")
         box = drawn.point(lambda ink: 255 * (ink < 200)).getbbox()
         left.append(1.0 if box is None else 1 - box[3] / drawn.height)

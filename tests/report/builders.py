@@ -21,6 +21,7 @@ from pneumarm.report import (
     TransferData,
 )
 from pneumarm.report.figures import Baseline
+from pneumarm.report.style import of_joint
 from pneumarm.statistics import Estimate
 from pneumarm.task import Movements
 from pneumarm.transitions.window import QUANTITIES, Window
@@ -66,7 +67,8 @@ def quality(n=12_000, joints=1, seed=0, steps=30, continuous=False):
     k = np.arange(1, steps + 1).reshape(-1, 1, 1)
     window = Window(joints=joints)
     names = window.input_names()
-    weights = random.laplace(0, 0.15, (len(names), 3))
+    outputs = [f"{QUANTITIES[i]}{of_joint(j, joints)}" for j in range(joints) for i in (0, 2, 3)]
+    weights = random.laplace(0, 0.15, (len(names), len(outputs)))
     return QualityData(
         observation=now,
         target=target,
@@ -76,7 +78,7 @@ def quality(n=12_000, joints=1, seed=0, steps=30, continuous=False):
         propagation=np.array([3.4, 0.15, 1.4, 1.2]) * np.repeat(k, joints, axis=1) ** 0.62,
         weights=weights,
         inputs=names,
-        outputs=[QUANTITIES[i].replace("_", " ") for i in (0, 2, 3)],
+        outputs=outputs,
     )
 
 

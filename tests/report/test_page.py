@@ -25,9 +25,10 @@ from pneumarm.report import (
     save_spec,
     write_report,
 )
+from pneumarm.report.data import MovingData
 from pneumarm.report.ledger import beside_thesis, ledger
 from pneumarm.report.run_report import TEST
-from pneumarm.report.sections import adapted, overview
+from pneumarm.report.sections import adapted, moving, overview
 from pneumarm.task import Movements, read_episodes, write_episodes
 from pneumarm.task.movements import COLUMNS, movements
 
@@ -117,8 +118,9 @@ def test_page_of_two_joints_shows_both_and_stays_small():
 def test_ledger_shows_means_and_intervals_of_every_phase():
     run = builders.run()
     table = ledger(run.test, run.transfer)
-    assert [row[0] for row in table.rows] == ["in the simulation", "on arrival", "while learning", "after adaptation"]
-    for row, episodes in zip(table.rows, (run.test, *run.transfer.phases.values()), strict=True):
+    assert table.header == ("", "in the simulation", "on arrival", "while learning", "after adaptation")
+    columns = list(zip(table.header, *table.rows, strict=True))[1:]
+    for row, episodes in zip(columns, (run.test, *run.transfer.phases.values()), strict=True):
         mean, low, high = (
             float(w.replace("−", "-").strip("()")) for w in row[2].replace("\u00a0to\u00a0", " ").split()
         )
@@ -126,7 +128,24 @@ def test_ledger_shows_means_and_intervals_of_every_phase():
         assert (low + high) / 2 == pytest.approx(mean, abs=0.011)
         assert row[3].startswith(f"{episodes.success.mean():.1%} (")
         assert float(row[5].split()[0]) == pytest.approx(episodes.actions[episodes.success].mean(), abs=0.051)
-    assert table.rows[2][-1] == "1.8 h"
+    assert columns[2][-1] == "1.8 h"
+
+
+def test_figures_of_joints_are_told_apart():
+    run = replace(builders.run(joints=2, small=True), training=None, marked=None)
+    moved = {"track": [{"frequency_hz": 0.5, "amplitude_deg": 20.0, "rms_error_deg": [1.9, 0.68]}]}
+    time = np.linspace(0, 1, 31)
+    angle = np.stack([np.full(31, 500.0), np.full(31, 500.5)], axis=1)
+    section = moving(MovingData(time, angle, angle), moved, run.spec)
+    assert section.tables[0].header == ("sinusoid", "RMS error of joint 1 [°]", "RMS error of joint 2 [°]")
+    assert section.tables[0].rows == [("0.5 Hz, 20°", "1.90", "0.68")]
+    names = dict(re.findall(r'y="([\d.]+)">(joint \d)<', str(section.figures[0].figure)))
+    assert sorted(names.values()) == ["joint 1", "joint 2"]
+    first, second = sorted(map(float, names))
+    assert second - first >= 13  # px, of letters
+    rows = {row[0]: row[1] for row in beside_thesis(run.results, run.quality, run.test, run.transfer, run.spec).rows}
+    both = r"[\d.]+, [\d.]+"
+    assert re.fullmatch(f"{both} measured; {both} by eq. 3.7", rows["std of error after 1 s, angle [counts]"])
 
 
 def test_comparison_names_ours_and_the_thesis():

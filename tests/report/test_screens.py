@@ -4,7 +4,9 @@
 """
 
 import io
+import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import builders
@@ -22,8 +24,9 @@ from pneumarm.checkup import diagnose, measure
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import Row, sorted_rows
 from pneumarm.experiments.results import write_page
-from pneumarm.report import run_page
+from pneumarm.report import RunData, run_page
 from pneumarm.report.checkup import checkup_page
+from pneumarm.task import Movements
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 ROOT = Path(__file__).parents[2]
@@ -31,7 +34,7 @@ READABLE = 11.0  # px
 LETTERS = 733.0  # px, of a figure of 7.4 inch whose smallest letters, of 8 points, are to be READABLE
 MOST_EMPTY = 0.5
 """Of a printed page that is not the last."""
-PAGES = ("report", "check-up", "experiment", "site")
+PAGES = ("report", "report of two joints", "check-up", "experiment", "site")
 
 FIGURES = ("reward", "actions", "switches", "episodes", "success_rate", "gain", "met", "learning success_rate")
 """Of a row of an experiment."""
@@ -42,6 +45,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return a page of each kind; the site only where what builds it is installed."""
     folder = tmp_path_factory.mktemp("screens")
     (folder / "report.html").write_text(run_page(builders.run(small=True)), encoding="utf-8")
+    (folder / "two.html").write_text(run_page(two_joints()), encoding="utf-8")
     arm = open_arm("virtual:seed=3", 3)
     arm.faults = (Leak(joint=1, muscle=2, factor=30),)  # type: ignore[attr-defined]
     checkup = measure(arm)
@@ -62,12 +66,32 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             rows.append(Row("virtual:seed=1", trial, run, {name: random.uniform(0.5, 1) for name in names}, 0.0))
     table = sorted_rows(rows)
     experiment = write_page(ALL_GOALS, folder, ALL_GOALS.analyse(table), table.runs, table.arms)
-    found = {"report": folder / "report.html", "check-up": folder / "checkup.html", "experiment": experiment}
+    reports = {"report": folder / "report.html", "report of two joints": folder / "two.html"}
+    found = {**reports, "check-up": folder / "checkup.html", "experiment": experiment}
     if (done := python("-m", "mkdocs", "build", "--site-dir", folder / "site", cwd=ROOT)).returncode == 0:
         found["site"] = folder / "site" / "index.html"
     else:
         assert "No module named" in done.stderr, done.stderr
     return found
+
+
+def two_joints() -> RunData:
+    """Return a run of an arm of two joints whose figures are as long as they get."""
+    run = builders.run(joints=2, small=True)
+    assert run.test is not None
+
+    def worse(episodes: Movements) -> Movements:
+        return episodes._replace(reward=20 * episodes.reward - 300, switches=9 * episodes.switches)
+
+    transfer = builders.transfer(2, (60, 60, 60))
+    phases = {name: worse(phase) for name, phase in transfer.phases.items()}
+    bound = json.loads(json.dumps(run.results["bound"]))
+    for planner in ("open_loop", "closed_loop"):
+        for figures in (bound[planner], bound[planner]["intervals"]):
+            figures["switches"] = [figures["switches"], figures["switches"]]
+    return replace(
+        run, test=worse(run.test), transfer=replace(transfer, **phases), results={**run.results, "bound": bound}
+    )
 
 
 def page_named(pages: dict[str, Path], name: str) -> Path:
@@ -111,6 +135,17 @@ def test_a_page_fits_and_can_be_read(
         assert len(widths) >= 3
         assert min(widths) >= LETTERS
     assert background(page) > 250 if scheme == "light" else background(page) < 60
+    page.close()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_on_a_desk_nothing_on_a_page_scrolls_sideways(browser: Browser, pages: dict[str, Path], name: str) -> None:
+    page = shown(browser, page_named(pages, name), 1280)
+    hidden = page.evaluate(
+        "[...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth)"
+        ".map((one) => one.textContent.trim().slice(0, 80))"
+    )
+    assert hidden == []
     page.close()
 
 

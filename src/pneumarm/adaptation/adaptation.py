@@ -184,7 +184,7 @@ class Adaptation:
             return False
         if found.better:
             simulation = found.simulation
-            begin = begin_states(rows, simulation.window, simulation.scaling)
+            begin = begin_states(rows, simulation.window, simulation.scaling, simulation.spec)
             tuned = self._settings
             self.agent = self.agent.adapted(
                 simulation, begin, tuned.updates, tuned.warm_up, tuned.learning_rate, self._seed + self.movements

@@ -42,7 +42,7 @@ def experiment_(
     runs
         How often every trial is done, each time from other weights; by default as often as in the thesis.
     workers
-        TrialRows computed at once; by default as many as there are cores.
+        Rows computed at once; by default as many as there are cores.
     dask
         Address of the scheduler of a dask cluster, such as tcp://127.0.0.1:8786, to compute there.
     """

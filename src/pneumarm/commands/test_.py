@@ -49,7 +49,7 @@ def test_(
     """
     trained, simulation = open_agent(agent, method), Simulation.load(sim)
     with Store.open(db) as store:
-        begin = begin_states(store, simulation.window, simulation.scaling)
+        begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
     with progress("testing"):
         tested = test_agent(trained, simulation, begin, episodes, seed)
         ahead = test_ahead(trained, simulation, begin, min(episodes, LOOKING_AHEAD), seed)

@@ -51,7 +51,7 @@ def train_(
     chosen = settings.chosen if agents is None else with_agents(settings.chosen, agents)
     simulation = Simulation.load(sim)
     with Store.open(db) as store:
-        begin = begin_states(store, simulation.window, simulation.scaling)
+        begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
     with progress("training") as report, nullcontext() if tensorboard is None else Scalars(tensorboard) as scalars:
 
         def tell(now: Progress) -> None:

@@ -48,7 +48,7 @@ def simulated(arm: str, folder: Path, settings: LaboratorySettings, progress: Re
             fit_store(store, FitSettings(seed=settings.seed)).simulation.save(folder / SIMULATION)
     simulation = Simulation.load(folder / SIMULATION)
     with Store.open(folder / STORE) as store:
-        return Simulated(simulation, begin_states(store, simulation.window, simulation.scaling))
+        return Simulated(simulation, begin_states(store, simulation.window, simulation.scaling, simulation.spec))
 
 
 def claim(folder: Path, wanted: object) -> None:

@@ -121,7 +121,7 @@ def fitted(path: Path, settings: FitSettings) -> tuple[StoreFit, BeginStates]:
     with Store.open(path) as store:
         made = fit_store(store, settings)
         window, scaling = made.simulation.window, made.simulation.scaling
-        return made, begin_states(store.blocks(kinds=KINDS), window, scaling)
+        return made, begin_states(store.blocks(kinds=KINDS), window, scaling, store.spec)
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
         write_json(folder / _FIGURES, figures)
     simulation = Simulation.load(folder / SIMULATION)
     with Store.open(folder / STORE) as store:
-        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling)
+        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec)
     found = json.loads((folder / _FIGURES).read_text(encoding="utf-8"))
     return Prepared(arm, recipe, folder, simulation, begin, found)
 

@@ -19,10 +19,11 @@ try:
 except ImportError as error:
     raise UnusableInput("pneumarm.gym needs Gymnasium: pip install 'pneumarm[gym]'") from error
 
-from pneumarm.gym.follow import ArmFollow
+from pneumarm.gym.follow import ArmFollow, FollowSettings
 from pneumarm.gym.make import follow, point_to_point, point_to_point_vector
 from pneumarm.gym.on_arm import ArmPointToPoint
 from pneumarm.gym.simulated import SimulatedPointToPoint
+from pneumarm.gym.spaces import View
 from pneumarm.gym.vector import PointToPointVector
 
 __all__ = [
@@ -30,8 +31,10 @@ __all__ = [
     "FOLLOW",
     "ArmFollow",
     "ArmPointToPoint",
+    "FollowSettings",
     "PointToPointVector",
     "SimulatedPointToPoint",
+    "View",
     "follow",
     "point_to_point",
     "point_to_point_vector",

@@ -1,5 +1,7 @@
 """Following a reference on an arm, holding a goal being the case of one that stays."""
 
+import math
+from dataclasses import dataclass
 from typing import Any, cast
 
 import gymnasium
@@ -12,15 +14,16 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, BeginState, Reading
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.spaces import following_space, sensor_ranges
+from pneumarm.gym.spaces import View, following_space, sensor_ranges
 from pneumarm.gym.turns import Turns
 from pneumarm.learning.servo.references import draw_references
+from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.moving.movement import valve_changes
-from pneumarm.simulation.simulation import Scaling
+from pneumarm.settings import Settings, Valid
 from pneumarm.task.goals import goal_in_counts
 from pneumarm.task.reference import check_reachable, parse_reference
 from pneumarm.task.tracker import StateTracker, scaled_goal
-from pneumarm.transitions.window import QUANTITIES, Window
+from pneumarm.transitions.window import QUANTITIES
 
 Observation = NDArray[np.float32]
 
@@ -28,19 +31,36 @@ _FASTEST = 4.0
 """Highest speed of a drawn reference, in scaled velocities, as a servo learns from."""
 
 
+@dataclass(frozen=True)
+class FollowSettings(Settings):
+    """What is asked in an episode of following."""
+
+    seconds: float = 5.0
+    """Length of an episode [s]."""
+    tolerance: float = 1.0
+    """What an error is measured in [degrees]."""
+    change: float = 0.05
+    """Price of a valve change."""
+    preview: tuple[float, ...] = ServoSettings().preview
+    """How far ahead the reference is seen [s]."""
+
+    def _valid(self) -> Valid:
+        return {
+            "seconds": 0 < self.seconds <= 3600 or "above 0 and up to 3600",
+            "tolerance": 0 < self.tolerance < 360 or "above 0 and below 360",
+            "change": 0 <= self.change < math.inf or "0 or more",
+            "preview": all(0 < ahead <= 10 for ahead in self.preview) or "times above 0 and up to 10",
+        }
+
+
 class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
     """The task of :func:`pneumarm.gym.follow` on an arm.
 
     Args:
         arm: is closed with the environment.
-        window: which readings and commands are in a state.
-        scaling: of the state.
-        goals: in which references are drawn and to which they are held, shape (joints, 2) [counts].
+        view: its goals are where references are drawn and to which they are held.
         reference: what is to be followed; drawn anew for every episode where it is None.
-        seconds: length of an episode [s].
-        tolerance: what an error is measured in [degrees].
-        change: price of a valve change.
-        preview: how far ahead the reference is seen [s].
+        settings: what is asked.
         begin: how the arm is brought to where an episode begins.
 
     """
@@ -50,22 +70,18 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
     def __init__(
         self,
         arm: Arm,
-        window: Window,
-        scaling: Scaling,
-        goals: NDArray[np.float64],
-        reference: str | Reference | None,
-        *,
-        seconds: float,
-        tolerance: float,
-        change: float,
-        preview: tuple[float, ...],
+        view: View,
+        reference: str | Reference | None = None,
+        settings: FollowSettings = FollowSettings(),
         begin: BeginState = BeginState(),
     ) -> None:
+        window, scaling, goals = view
         self._spec, self._goals, self._scaling = arm.spec, goals, scaling
-        self._steps = max(1, round(seconds / arm.spec.period))
-        self._ahead = np.array([0, *sorted({max(1, round(ahead / arm.spec.period)) for ahead in preview})])
+        self._steps = max(1, round(settings.seconds / arm.spec.period))
+        ahead = {max(1, round(seconds / arm.spec.period)) for seconds in settings.preview}
+        self._ahead = np.array([0, *sorted(ahead)])
         self._given = self._checked(reference)
-        self._tolerance, self._change = tolerance * arm.spec.counts_per_degree, change
+        self._tolerance, self._change = settings.tolerance * arm.spec.counts_per_degree, settings.change
         self._turns = Turns(arm, begin)
         self.arm = self._turns.arm
         self._tracker = StateTracker(window, scaling)

@@ -1,6 +1,5 @@
 """Make environments by the name of an arm."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +12,11 @@ from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.drawing import Angles, Drawing, Pose, drawn
-from pneumarm.gym.follow import ArmFollow
+from pneumarm.gym.follow import ArmFollow, FollowSettings
 from pneumarm.gym.on_arm import ArmPointToPoint
 from pneumarm.gym.simulated import SimulatedPointToPoint
-from pneumarm.gym.spaces import nominal_goals, nominal_scaling
+from pneumarm.gym.spaces import View, nominal_view
 from pneumarm.gym.vector import PointToPointVector
-from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.begin import BeginStates, begin_states
@@ -118,21 +116,21 @@ def point_to_point(
         return drawn(within, _pose_with_goal(simulation.scaling), simulation.spec, render_mode)
     if transitions is not None:
         raise UnusableInput("transitions= is for simulations; an arm is brought to its begin states")
-    opened, window, scaling, range_ = _opened(arm, seed, like)
+    opened, view = _opened(arm, seed, like)
     if goals is not None:
-        range_ = _goals(goals, window.joints)
-    on_arm = ArmPointToPoint(opened, window, scaling, range_, TaskSettings(reward, cutoff))
-    return drawn(on_arm, _pose_with_goal(scaling), opened.spec, render_mode)
+        view = view._replace(goals=_goals(goals, view.window.joints))
+    on_arm = ArmPointToPoint(opened, view, TaskSettings(reward, cutoff))
+    return drawn(on_arm, _pose_with_goal(view.scaling), opened.spec, render_mode)
 
 
 def follow(
     arm: str | Arm = "virtual",
     reference: str | Reference | None = None,
     like: str | Path | Simulation | None = None,
-    seconds: float = 5.0,
-    tolerance: float = 1.0,
-    change: float = 0.05,
-    preview: tuple[float, ...] = ServoSettings().preview,
+    seconds: float = FollowSettings.seconds,
+    tolerance: float = FollowSettings.tolerance,
+    change: float = FollowSettings.change,
+    preview: tuple[float, ...] = FollowSettings.preview,
     seed: int = 0,
     render_mode: str | None = None,
 ) -> gymnasium.Env[Any, Any]:
@@ -186,40 +184,23 @@ def follow(
         UnusableInput: no such arm or file, a reference that leaves the range of goals, or a number out of its range.
 
     """
-    numbers = {"seconds": 0 < seconds <= 3600, "tolerance": 0 < tolerance < 360, "change": 0 <= change < math.inf}
-    numbers["preview"] = all(0 < ahead <= 10 for ahead in preview)
-    if wrong := [name for name, is_valid in numbers.items() if not is_valid]:
-        raise UnusableInput(
-            f"{wrong[0]}= is out of its range; seconds and tolerance are above 0, previews up to 10 s"
-        )
+    settings = FollowSettings(seconds, tolerance, change, preview)
     if like is None and isinstance(arm, str) and arm.startswith(_SIMULATION):
         like = arm.removeprefix(_SIMULATION)
-    opened, window, scaling, range_ = _opened(arm, seed, like)
+    opened, view = _opened(arm, seed, like)
     try:
-        env = ArmFollow(
-            opened,
-            window,
-            scaling,
-            range_,
-            reference,
-            seconds=seconds,
-            tolerance=tolerance,
-            change=change,
-            preview=tuple(preview),
-        )
+        env = ArmFollow(opened, view, reference, settings)
     except UnusableInput:
         opened.close()
         raise
-    return drawn(env, _pose_with_distance(window, scaling), opened.spec, render_mode)
+    return drawn(env, _pose_with_distance(view.window, view.scaling), opened.spec, render_mode)
 
 
-def _opened(
-    arm: str | Arm | Simulation, seed: int, like: str | Path | Simulation | None
-) -> tuple[Arm, Window, Scaling, NDArray[np.float64]]:
-    """Return an arm, and the window, the scaling and the goals (joints, 2) [counts] for it: those of ``like``."""
+def _opened(arm: str | Arm | Simulation, seed: int, like: str | Path | Simulation | None) -> tuple[Arm, View]:
+    """Return an arm and the view of it: that of ``like``."""
     opened = arm if isinstance(arm, Arm) else open_arm(str(arm), seed)
     if like is None:
-        return opened, Window(opened.spec.joints), nominal_scaling(opened.spec), nominal_goals(opened.spec)
+        return opened, nominal_view(opened.spec)
     try:
         model = like if isinstance(like, Simulation) else Simulation.load(Path(like))
         if model.window.joints != opened.spec.joints:
@@ -228,7 +209,7 @@ def _opened(
     except UnusableInput:
         opened.close()
         raise
-    return opened, model.window, model.scaling, model.goal_range
+    return opened, View(model.window, model.scaling, model.goal_range)
 
 
 def _pose_with_goal(scaling: Scaling) -> Pose:
@@ -317,7 +298,7 @@ def _begin(simulation: Simulation, transitions: str | Path | BeginStates | None)
             "a simulation knows no begin states: give transitions=, the store of the recordings that it was fitted to"
         )
     with Store.open(Path(transitions)) as store:
-        return begin_states(store.blocks(), simulation.window, simulation.scaling)
+        return begin_states(store.blocks(), simulation.window, simulation.scaling, simulation.spec)
 
 
 def _goals(goals: ArrayLike, joints: int) -> Any:

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, BeginState, Reading
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.spaces import action_space, numbered, observation_space, sensor_ranges
+from pneumarm.gym.spaces import View, action_space, numbered, observation_space, sensor_ranges
 from pneumarm.gym.turns import Turns
-from pneumarm.simulation.simulation import Scaling
 from pneumarm.task.settings import TaskSettings
 from pneumarm.task.tally import Tally
 from pneumarm.task.tracker import StateTracker, scaled_goal
-from pneumarm.transitions.window import Window
 
 Observation = NDArray[np.float32]
 
@@ -35,13 +33,12 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
     def __init__(
         self,
         arm: Arm,
-        window: Window,
-        scaling: Scaling,
-        goals: NDArray[np.float64],
+        view: View,
         task: TaskSettings = TaskSettings(),
         begin: BeginState = BeginState(),
     ) -> None:
-        """Move ``arm`` to goals within ``goals`` (joints, 2) [counts]; it is closed with the environment."""
+        """Move ``arm`` to goals of the ``view``; it is closed with the environment."""
+        window, scaling, goals = view
         self._turns = Turns(arm, begin)
         self.arm = self._turns.arm
         self._goals, self._task = goals, task

@@ -1,5 +1,7 @@
 """Spaces of observations and actions: the state window of thesis eq. 4.12, scaled, and the actions of every joint."""
 
+from typing import NamedTuple
+
 import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +20,17 @@ _ROUNDING = 1e-3  # of the scaled unit; observations are float32
 _EDGE = 0.1  # of the angle's range, on either side, where no goals lie on an arm of which nothing is recorded
 
 
+class View(NamedTuple):
+    """How an agent sees an arm, and where it is sent. Made by :func:`nominal_view`, or of a simulation."""
+
+    window: Window
+    """Which readings and commands are in a state."""
+    scaling: Scaling
+    """Of the state."""
+    goals: Array
+    """Lowest and highest, shape (joints, 2) [counts]."""
+
+
 def action_space(spec: ArmSpec) -> Discrete | MultiDiscrete:
     """Return the valve settings of each joint: nine, or three where it has one muscle."""
     count = len(numbered(spec))
@@ -27,6 +40,11 @@ def action_space(spec: ArmSpec) -> Discrete | MultiDiscrete:
 def numbered(spec: ArmSpec) -> NDArray[np.int64]:
     """Return the actions 0..8 of a joint that the numbers of its action space stand for."""
     return np.flatnonzero(possible_actions(spec.muscles))
+
+
+def nominal_view(spec: ArmSpec) -> View:
+    """Return a view by the sensors' ranges, for an arm of which nothing is recorded."""
+    return View(Window(spec.joints), nominal_scaling(spec), nominal_goals(spec))
 
 
 def nominal_scaling(spec: ArmSpec) -> Scaling:

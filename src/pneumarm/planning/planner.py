@@ -43,7 +43,7 @@ _OWN_SUPPLY = 0
 
 
 _STILL = 2.0
-"""Readings of an arm that stands still differ by so much [counts]."""
+"""Readings of an arm that stands still differ by so much [counts of the thesis' sensors]."""
 
 
 _PATIENCE = 3
@@ -234,8 +234,9 @@ class Planner:
         return valves
 
     def _read(self) -> NDArray[np.float64]:
-        """Return angles and pressures where the model is [counts]."""
-        return np.concatenate([self.model.states.angle[0], self.model.states.pressure[0].ravel()])
+        """Return angles and pressures where the model is [counts of the thesis' sensors]."""
+        states, spec = self.model.states, self.model.spec
+        return np.concatenate([states.angle[0] / spec.angle_unit, states.pressure[0].ravel() / spec.pressure_unit])
 
     def _is_stuck(self) -> bool:
         """Return whether the last action has had no effect for some turns: neither angles nor pressures changed."""

@@ -16,6 +16,17 @@ from pneumarm.task import Movements
 
 MISSING = "–"
 _PHASES = {"before": "on arrival", "learning": "while learning", "after": "after adaptation"}
+_FIGURES = (
+    "",
+    "episodes",
+    "reward",
+    "success",
+    "actions",
+    "… of successes",
+    "switches",
+    "… of successes",
+    "arm time",
+)
 _PLANNERS = {"open_loop": "open loop", "closed_loop": "closed loop"}
 
 
@@ -24,26 +35,17 @@ def ledger(
 ) -> Table:
     """Return reward, success, actions and switches in the simulation and on the arm, with 95% intervals.
 
-    ``lookahead`` holds the figures of a test in the simulation in which the controller looked ahead.
+    A column a phase: intervals are wide, and beside each other there is room for five. ``lookahead`` holds the
+    figures of a test in the simulation in which the controller looked ahead.
     """
-    rows = [_ledger_row("in the simulation", test, on_arm=False)] if test is not None else []
+    columns = [_ledger_column("in the simulation", test, on_arm=False)] if test is not None else []
     if lookahead:
         reward, success, actions, switches = _summarised(lookahead)
         count = f"{lookahead['episodes']:,}"
-        rows.append(["… looking ahead", count, reward, success, actions, MISSING, switches, MISSING, MISSING])
+        columns.append(["… looking ahead", count, reward, success, actions, MISSING, switches, MISSING, MISSING])
     if transfer is not None:
-        rows += [_ledger_row(_PHASES[name], phase, on_arm=True) for name, phase in transfer.phases.items()]
-    header = (
-        "",
-        "episodes",
-        "reward",
-        "success",
-        "actions",
-        "… of successes",
-        "switches",
-        "… of successes",
-        "arm time",
-    )
+        columns += [_ledger_column(_PHASES[name], phase, on_arm=True) for name, phase in transfer.phases.items()]
+    header, *rows = zip(_FIGURES, *columns, strict=True)
     return Table(
         header,
         rows,
@@ -55,7 +57,7 @@ def ledger(
     )
 
 
-def _ledger_row(name: str, episodes: Movements, *, on_arm: bool) -> list[str]:
+def _ledger_column(name: str, episodes: Movements, *, on_arm: bool) -> list[str]:
     won = episodes.success
     return [
         name,
@@ -115,7 +117,7 @@ def bound_table(bound: Mapping[str, Any]) -> Table:
             "reward",
             "success",
             "actions",
-            "switches",
+            "switches, joint by joint" if np.ndim(bound["open_loop"]["switches"]) else "switches",
             *(f"controller below, {_PHASES[phase]}" for phase in phases),
         ),
         rows,
@@ -130,9 +132,14 @@ def with_interval(estimate: Estimate, form: str) -> str:
     """Return an estimate for people: mean and, where there is one, its interval."""
     if math.isnan(estimate.mean):
         return MISSING
-    mean, low, high = (form.format(value).replace("-", "−") for value in estimate[:3])
+    mean, low, high = (written(value, form) for value in estimate[:3])
     # The interval stays together when a narrow column breaks the line.
     return mean if math.isnan(estimate.low) else f"{mean} ({low}\u00a0to\u00a0{high})"
+
+
+def written(value: float, form: str) -> str:
+    """Return ``value`` for people: with a minus, which is longer than a hyphen."""
+    return form.format(value).replace("-", "−")
 
 
 def duration(seconds: float) -> str:
@@ -161,7 +168,8 @@ def beside_thesis(
         rows,
         "Our figures beside the thesis' figures. Its arm is another one, with other muscles and a "
         "worn angle sensor, so "
-        "that the comparison is one of magnitude.",
+        "that the comparison is one of magnitude."
+        + (" Of ours, figures with commas between them are those of the joints." if spec.joints > 1 else ""),
         words=True,
     )
 
@@ -194,7 +202,7 @@ def _simulated(results: Mapping[str, Any], quality: QualityData | None, spec: Ar
         rows.append(
             [
                 f"std of error after {seconds:.2g} s, {name.replace('pressure_', f'{spec.pressure_word} ')} [counts]",
-                f"{_decimals(measured)} measured, {_decimals(expected)} by eq. 3.7",
+                f"{_decimals(measured)} measured; {_decimals(expected)} by eq. 3.7",
                 f"{thesis.SECOND_STD[name]:.2f} by eq. 3.7",
                 "table 5.2",
             ]
@@ -257,7 +265,7 @@ def _on_the_arm(test: Movements | None, transfer: TransferData | None) -> list[l
 
 def _mean(values: Any, less: Any = (0.0,)) -> str:
     """Return the difference of two means, or a mean where there is nothing to take off."""
-    return f"{np.mean(values) - np.mean(less):.1f}" if len(values) and len(less) else MISSING
+    return written(np.mean(values) - np.mean(less), "{:.1f}") if len(values) and len(less) else MISSING
 
 
 def _runs(values: Any) -> str:

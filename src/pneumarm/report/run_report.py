@@ -23,6 +23,7 @@ from pneumarm.report.data import (
     TransferData,
 )
 from pneumarm.report.health import summary_of_health
+from pneumarm.report.ledger import written
 from pneumarm.report.page import render
 from pneumarm.report.sections import RunData, all_sections, collected, moving_words, predicted, propagated
 from pneumarm.task.movements import Movements, movements, read_episodes
@@ -162,11 +163,11 @@ def _summary(run: RunData) -> list[str]:
         text.append(
             f"In the simulation the controller reaches {run.test.success.mean():.2%} of its goals "
             "with a mean reward of "
-            f"{run.test.reward.mean():.2f}."
+            f"{written(run.test.reward.mean(), '{:.2f}')}."
         )
     if run.transfer is not None:
         parts = [
-            f"{phase.success.mean():.1%} {words} (mean reward {phase.reward.mean():.2f})"
+            f"{phase.success.mean():.1%} {words} (mean reward {written(phase.reward.mean(), '{:.2f}')})"
             for words, phase in (("on arrival", run.transfer.before), ("after adaptation", run.transfer.after))
             if phase.n
         ]
@@ -176,8 +177,9 @@ def _summary(run: RunData) -> list[str]:
     if "after" in bound.get("distance", {}):
         best = max(bound["distance"]["after"], key=lambda plans: float(bound[plans]["reward"]))
         below = bound["distance"]["after"][best]["reward"]
+        found = written(bound[best]["reward"], "{:.2f}")
         text.append(
-            f"The best that planning with the arm's true physics finds there is {bound[best]['reward']:.2f}; "
+            f"The best that planning with the arm's true physics finds there is {found}; "
             f"the controller is {abs(below):.2f} {'below' if below >= 0 else 'above'} it after adaptation."
         )
     text += summary_of_health(run.results)

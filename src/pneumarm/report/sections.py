@@ -86,11 +86,12 @@ def moving(data: MovingData, results: Mapping[str, Any], spec: ArmSpec) -> Secti
     tracked = [
         (
             f"{one['frequency_hz']:g} Hz, {one['amplitude_deg']:.0f}°",
-            ", ".join(f"{e:.2f}" for e in one["rms_error_deg"]),
+            *(f"{e:.2f}" for e in one["rms_error_deg"]),
         )
         for one in results.get("track", [])
     ]
-    table = Table(("sinusoid", "RMS error [°]"), tracked, "Sinusoids that were followed, the reference known ahead.")
+    errors = (f"RMS error{of_joint(joint, spec.joints)} [°]" for joint in range(spec.joints))
+    table = Table(("sinusoid", *errors), tracked, "Sinusoids that were followed, the reference known ahead.")
     return Section("How it moves", tuple(moving_words(results)), [picture], [table] if tracked else [])
 
 
@@ -210,7 +211,7 @@ def predicted(data: QualityData, spec: ArmSpec) -> Section:
                 "(thesis figure 3.2): "
                 "points are transitions, squares and bars are mean and standard deviation in a class. A trend of the "
                 "means is a bias, a trend of the bars shows where the simulation is unsure. Valves: + in, 0 closed, "
-                "− out.",
+                "−\u00a0out.",
                 figures.residue_by_class_alt(error[:, joint, 0], classes),
             )
         )

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import part
 from pneumarm.random import integer, uniform
@@ -15,7 +16,8 @@ from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import Window, observations
 
-_STILL = 2.0  # counts; readings of an arm at rest differ by so much
+_STILL = 2.0  # counts of the thesis' sensors; readings of an arm at rest differ by so much
+_LEAST = 1.0  # count of any sensor, as which noise is seen where counts are coarse
 _TRIES = 32  # draws until the farthest sub-intervals count as empty
 
 
@@ -33,17 +35,18 @@ class BeginStates:
         return len(self.states)
 
 
-def begin_states(rows: Rows | Iterable[Rows], window: Window, scaling: Scaling) -> BeginStates:
+def begin_states(rows: Rows | Iterable[Rows], window: Window, scaling: Scaling, spec: ArmSpec) -> BeginStates:
     """Return the resting states in ``rows``, one block or a stream of blocks of whole sequences.
 
     At rest are the first rows of sequences that began so, and the windows within sequences in which all valves
-    were closed and neither an angle nor a pressure differed by more than two counts.
+    were closed and neither an angle nor a pressure differed by more than two counts would on the thesis' arm: by
+    0.18 degrees and 0.012 bar, or by one count where that is more.
 
     Raises:
         UnusableInput: there is none.
 
     """
-    found = [_resting(block, window) for block in ([rows] if isinstance(rows, Rows) else rows)]
+    found = [_resting(block, window, spec) for block in ([rows] if isinstance(rows, Rows) else rows)]
     sigma = np.concatenate(found) if found else np.zeros((0, window.state_size))
     if len(sigma) == 0:
         raise UnusableInput(
@@ -55,7 +58,7 @@ def begin_states(rows: Rows | Iterable[Rows], window: Window, scaling: Scaling) 
     return BeginStates(window, scaled_state(sigma, window, scaling), angle)
 
 
-def _resting(rows: Rows, window: Window) -> NDArray[np.float64]:
+def _resting(rows: Rows, window: Window, spec: ArmSpec) -> NDArray[np.float64]:
     """Return the windows (m, state_size) of the resting states in one block, in sensor units."""
     h, observed = window.history, observations(rows, window)
     began = np.flatnonzero(rows.at_rest & (rows.step == 0))
@@ -66,8 +69,11 @@ def _resting(rows: Rows, window: Window) -> NDArray[np.float64]:
         joined = (rows.sequence[lags[:, -1]] == rows.sequence[k]) & (rows.step[k] - rows.step[lags[:, -1]] == h)
         closed = (rows.command[lags[:, 1:]] == 0).all(axis=(1, 2, 3))
         still = np.ones(len(k), bool)
-        for values in (rows.angle, rows.pressure.reshape(len(rows), -1)):
-            still &= (np.ptp(values[lags], axis=1) <= _STILL).all(axis=1)
+        for values, unit in (
+            (rows.angle, spec.angle_unit),
+            (rows.pressure.reshape(len(rows), -1), spec.pressure_unit),
+        ):
+            still &= (np.ptp(values[lags], axis=1) <= max(_STILL * unit, _LEAST)).all(axis=1)
         k = k[joined & closed & still]
         parts.append(_window([observed[k - lag] for lag in range(h)], window))
     return np.concatenate(parts)

@@ -77,7 +77,7 @@ class EnoughData(ThereAndBack):
             with Store.open(whole / STORE) as store:
                 first = [entry.number for entry in store.catalogue()][: found["sequences"]]
                 part = store.blocks(kinds=KINDS, sequences=partial(np.isin, test_elements=first))
-                begin = begin_states(part, simulation.window, simulation.scaling)
+                begin = begin_states(part, simulation.window, simulation.scaling, simulation.spec)
             made.append(Prepared(arm, recipe, whole, simulation, begin, found["figures"]))
         return made
 

@@ -142,7 +142,7 @@ class StateHistory(ThereAndBack):
             for history in self.histories:
                 window = Window(longest.joints, history)
                 scaling = Scaling.of(shortened(kept, longest, history), window, valves=True)
-                begin[history] = begin_states(store.blocks(kinds=KINDS), window, scaling)
+                begin[history] = begin_states(store.blocks(kinds=KINDS), window, scaling, store.spec)
             return HistoryMaterial(base, kept, apart, store.spec, longest, begin)
 
     def measure(self, material: HistoryMaterial, trial: int, run: int, settings: LaboratorySettings) -> Figures:

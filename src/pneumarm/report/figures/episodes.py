@@ -44,7 +44,7 @@ def distributions(reward: Array, actions: Array, switches: Array, success: NDArr
         )  # fmt: skip
         middle = float(np.median(values))
         place.axvline(middle, color=INK, ls="--", lw=1)
-        place.set_title(f"median {middle:g}")
+        place.set_title(f"median {middle:g}".replace("-", "−"))
     if len(reward):
         axes[0, 1].legend(loc="upper right")
     return figure

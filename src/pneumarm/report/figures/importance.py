@@ -35,7 +35,8 @@ def input_importance(weights: Array, inputs: Sequence[str], outputs: Sequence[st
     for axis, name, w in zip(axes.flat, outputs, weights[order].T, strict=True):
         axis.barh(place, w, color=np.where(w >= 0, DARK, MIDDLE), height=0.7)
         axis.axvline(0, color=INK, lw=0.7)
-        axis.set_title(f"change of {readable(name)}")
+        title = f"change of {readable(name)}"
+        axis.set_title(title.replace(" of joint", "\nof joint") if columns > 1 else title)
         axis.set_xlabel("standardised weight [-]")
         axis.set_xlim(-limit, limit)
     for axis in axes[:, 0]:

@@ -1,5 +1,7 @@
 """An arm that moves by itself, as recorded, with the angle that was asked for beside it: a picture that plays."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,8 @@ Array = NDArray[np.float64]
 _WIDTH, _HEIGHT = 720, 300
 _PIVOT, _LINK = (130, 70), 150  # of the arm, all links together
 _LEFT, _RIGHT, _TOP, _BOTTOM = 320, 700, 30, 250  # of the curve
+_NAMES = 52  # beside the curves, for the names of several joints
+_APART = 16.0  # of two names
 _FRAMES_A_SECOND = 15
 
 
@@ -33,14 +37,17 @@ def moving_arm(time: Array, angle: Array, wanted: Array | None, spec: ArmSpec) -
         for values in (angle, asked)
     )
     low, high = min(degrees.min(), goals.min()) - 3, max(degrees.max(), goals.max()) + 3
-    x = _LEFT + (_RIGHT - _LEFT) * grid / seconds
+    joints = degrees.shape[1]
+    right = _RIGHT if joints == 1 else _RIGHT - _NAMES
+    x = _LEFT + (right - _LEFT) * grid / seconds
+
+    def height(values: Array) -> Array:
+        return _BOTTOM - (_BOTTOM - _TOP) * (values - low) / (high - low)
 
     def line(values: Array, style: str) -> str:
-        y = _BOTTOM - (_BOTTOM - _TOP) * (values - low) / (high - low)
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, height(values), strict=True))
         return f'<polyline points="{points}" fill="none" {style}/>'
 
-    joints = degrees.shape[1]
     curves = "".join(
         (line(goals[:, j], f'stroke="{MIDDLE}" stroke-width="2" stroke-dasharray="6 4"') if known else "")
         + line(degrees[:, j], f'stroke="{DARK}" stroke-width="2"')
@@ -48,9 +55,12 @@ def moving_arm(time: Array, angle: Array, wanted: Array | None, spec: ArmSpec) -
     )
     cursor = _animated("x1", x, seconds) + _animated("x2", x, seconds)
     ticks = "".join(
-        f'<text x="{_LEFT - 8}" y="{_BOTTOM - (_BOTTOM - _TOP) * (tick - low) / (high - low) + 4:.1f}" '
-        f'text-anchor="end">{tick:g}°</text>'
-        for tick in _ticks(low, high)
+        f'<text x="{_LEFT - 8}" y="{height(tick) + 4:.1f}" text-anchor="end">{f"{tick:g}°".replace("-", "−")}</text>'
+        for tick in np.array(_ticks(low, high))
+    )
+    names = "".join(
+        f'<text x="{right + 8}" y="{y + 4:.1f}">joint {joint + 1}</text>'
+        for joint, y in enumerate(_spread(height(degrees[-1])) if joints > 1 else ())
     )
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" '
@@ -59,9 +69,9 @@ def moving_arm(time: Array, angle: Array, wanted: Array | None, spec: ArmSpec) -
         f'<path d="M{_PIVOT[0] - 60} {_PIVOT[1] - 8}h120" stroke="{INK}" stroke-width="3"/>'
         f"{_links(goals, seconds, f'stroke={chr(34)}{LIGHT}{chr(34)} stroke-width={chr(34)}14{chr(34)}')}"
         f"{_links(degrees, seconds, f'stroke={chr(34)}{DARK}{chr(34)} stroke-width={chr(34)}7{chr(34)}')}"
-        f'<path d="M{_LEFT} {_TOP}V{_BOTTOM}H{_RIGHT}" fill="none" stroke="{INK}"/>{ticks}{curves}'
+        f'<path d="M{_LEFT} {_TOP}V{_BOTTOM}H{right}" fill="none" stroke="{INK}"/>{ticks}{curves}{names}'
         f'<line y1="{_TOP}" y2="{_BOTTOM}" stroke="{INK}">{cursor}</line>'
-        f'<text x="{_RIGHT}" y="{_BOTTOM + 18}" text-anchor="end">{seconds:.0f} s</text>'
+        f'<text x="{right}" y="{_BOTTOM + 18}" text-anchor="end">{seconds:.0f} s</text>'
         f'<text x="{_LEFT}" y="{_BOTTOM + 36}">{"dashed: asked for; solid: the arm" if known else ""}</text></svg>'
     )
 
@@ -80,6 +90,14 @@ def _links(degrees: Array, seconds: float, style: str) -> str:
         end = f'<g transform="translate(0 {length:.1f})">{inner}</g>' if inner else ""
         inner = f"<g>{turning}{link}{end}</g>"
     return f'<g transform="translate({_PIVOT[0]} {_PIVOT[1]})">{inner}</g>'
+
+
+def _spread(heights: Array) -> Array:
+    """Return the ``heights`` of names, moved down where one would be written over another."""
+    order, spread = np.argsort(heights), heights.copy()
+    for above, below in pairwise(order):
+        spread[below] = max(spread[below], spread[above] + _APART)
+    return spread
 
 
 def _animated(name: str, values: Array, seconds: float) -> str:

@@ -91,7 +91,7 @@ def _limit(of: Mapping[str, tuple[Any, Array]], evaluated: NDArray[np.int64]) ->
         place.set_xlim(0)
         known = np.concatenate([values[agent, : int(rows)] for agent, rows in enumerate(evaluated)] or [np.zeros(0)])
         if name != "reward" and (known >= 0).all():
-            place.set_ylim(0)
+            place.set_ylim(0, 1.05 * float(known.max(initial=0.0)) * LABELS.get(name, ("", 1.0))[1] or None)
         elif name == "reward" and known.size:
             best = float(known.max())
             place.set_ylim(max(float(known.min()), best - _WORST), best + 5)
@@ -139,10 +139,13 @@ def spread_of_agents(reward: Array, success: Array, chosen: int) -> Figure:
         place.plot(rank[picked], values[order][picked], "D", color=DARK, mec=INK, mew=0.6, ms=7, label="chosen")
         place.set_xlim(0.4, len(order) + 0.6)
         place.margins(y=0.15)
+        place.ticklabel_format(axis="y", useOffset=False)
     if len(order):
         axes[0, 0].legend(loc="lower left")
     if len(order):
-        axes[0, 1].set_ylim(top=100.5)  # there is nothing above 100 %, and a mark at it is seen whole
+        # There is nothing above 100 %, and marks at the ends are seen whole.
+        lowest = 100 * float(success.min())
+        axes[0, 1].set_ylim(lowest - 0.05 * max(100.5 - lowest, 1.0), 100.5)
     return figure
 
 

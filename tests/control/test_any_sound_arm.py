@@ -13,6 +13,7 @@ from pneumarm.transitions import Store, collect
 
 PRESSURES = [f"python:tests.plain_arms:{name}" for name in ("linear", "throttled", "hose")]
 PLAIN = [*PRESSURES, "python:tests.plain_arms:angle_alone"]
+STICKING = [f"python:tests.friction_arms:{name}" for name in ("joint_1", "joint_2", "joints_1")]
 
 BREAKS = 200.0
 """When a sound arm breaks [s]; until then it was filled, emptied and watched for two minutes."""
@@ -52,7 +53,7 @@ def dead(pressure):
     return pressure
 
 
-@pytest.mark.parametrize("name", [*PLAIN, *(f"virtual:wide,seed={seed}" for seed in (2, 6, 9))])
+@pytest.mark.parametrize("name", [*PLAIN, *STICKING, *(f"virtual:wide,seed={seed}" for seed in (2, 6, 9))])
 def test_a_sound_arm_is_collected_from_without_a_mark(name, tmp_path):
     arm = open_arm(name)
     watch = Monitor(arm.spec)

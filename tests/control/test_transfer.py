@@ -18,6 +18,7 @@ from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import TransferSettings, put_back, read_history, transfer, transfer_into
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.learning import Agent, AnyAgent, PolicyAgent, PolicySettings, train
+from pneumarm.learning.servo import ServoSettings
 from pneumarm.simulation import Simulation
 from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, Store
@@ -141,6 +142,27 @@ def test_a_policy_that_was_interrupted_while_adapting_goes_on_as_if_nothing_had_
     assert (folder / "adapted.safetensors").read_bytes() != _saved(policy, tmp_path)
     assert (folder / "agents/000.safetensors").read_bytes() == _saved(policy, tmp_path)
     assert transfer_into(folder, policy, VirtualArm(seed=4), POLICY, seed=1) == whole  # there is nothing left to do
+
+
+def test_who_settles_holds_each_goal_and_adapts_to_all_of_that(small_run: Path, tmp_path: Path) -> None:
+    simulation = Simulation.load(small_run / "simulation.safetensors")
+    with Store.open(small_run / "transitions.db") as store:
+        begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec)
+    servo = train(
+        simulation, begin, ServoSettings(agents=1, updates=60, arms=32, hidden=(16,), validation_movements=32)
+    ).agent
+    for hold, folder in ((1.5, tmp_path / "held"), (0.0, tmp_path / "ended")):
+        settings = TransferSettings(episodes=9, test_episodes=2, hold=hold, adaptation=POLICY.adaptation)
+        transfer_into(folder, servo, VirtualArm(seed=4), settings, seed=1)
+        with Store.open(folder / "transitions.db") as store:
+            lasted = [
+                np.ptp(rows.time[rows.sequence == n]) for rows in store.blocks() for n in np.unique(rows.sequence)
+            ]
+        assert len(lasted) == 13
+        if hold:
+            assert lasted == pytest.approx([hold] * 13, abs=0.05)
+        else:
+            assert min(lasted) < 1.4
 
 
 def _watch_of(folder: Path) -> bytes | None:

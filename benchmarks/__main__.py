@@ -8,6 +8,7 @@ import sys
 import benchmarks
 from pneumarm.console import complain
 from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.leaving import Interrupted, leave_by_exceptions
 
 LONG = (
     "adaptation",
@@ -44,11 +45,12 @@ def main(names: list[str]) -> int:
     except PneumarmError as error:
         complain(error)
         return error.exit_code
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         complain("interrupted; a benchmark that keeps what was measured goes on when it is called again")
-        return 128 + signal.SIGINT
+        return error.exit_code if isinstance(error, Interrupted) else 128 + signal.SIGINT
     return 0
 
 
 if __name__ == "__main__":
+    leave_by_exceptions()
     sys.exit(main(sys.argv[1:]))

@@ -65,7 +65,7 @@ class CollectBegin(BeginState):
 _USUAL_RATE = 30.0  # Hz; at higher ones as many seconds as there, at lower ones as many periods
 _LONGEST_PULSES = 4  # most periods in a row in which a muscle gets the same pulse
 _ACTIONS, _HELD = 200, 10  # of a sequence; most periods for which an action is held
-_FULL, _EMPTY = 4 / 3, 2.0  # times of nine tenths of the way in which muscles are full or empty
+_FULL, _EMPTY = 4 / 3, 4.0  # times of nine tenths of the way in which muscles are full or empty
 _SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse sequence
 
 

@@ -38,7 +38,8 @@ def sentences(events: Sequence[Event], quantities: Sequence[str]) -> list[str]:
                 "of the fit)"
             )
         elif event.what == "accepted":
-            before, after = (float(np.exp(np.log(found[name]).mean())) for name in ("before", "after"))
+            told = [np.array(found[name]) for name in ("before", "after")]
+            before, after = (float(np.exp(np.log(one[one > 0]).mean())) for one in told)  # 0: a muscle not there
             lines.append(
                 f"version {event.version} after movement {event.movement}: fitted to {found['movements']} movements, "
                 f"error {after:.2f} instead of {before:.2f} times that of the fit"

@@ -58,7 +58,7 @@ def test_what_is_missing_in_a_row_does_not_count() -> None:
 
     two = TrialRows((row("a", 1, x=1.0), row("a", 2, x=3.0), row("b", 1, x=8.0), row("b", 2)))
     assert mean(two, "x", 1)[::2] == (5.0, 2)
-    assert f"{mean(two, 'x', 1).times(-1):.0f}" == "-5 ± 38"  # half is t(0.975, 1) 12.7 times 3
+    assert f"{mean(two, 'x', 1).times(-1):.0f}" == "−5\u00a0±\u00a038"  # half is t(0.975, 1) 12.7 times 3
     one = TrialRows((row("a", 1, x=1.0), row("a", 2, x=3.0)))
     assert f"{mean(one, 'y', 1):.2f}" == "none"
     assert difference(one, "x", 1, 1).half == 0
@@ -81,9 +81,15 @@ def test_series_of_figures() -> None:
 
 def test_values_and_differences_in_words() -> None:
     found = Interval(1.25, 0.5, 3)
-    assert (f"{found:.1f}", f"{found:+.2f}", f"{found:.0%}") == ("1.2 ± 0.5", "+1.25 ± 0.50", "125 ± 50 %")
-    assert f"{Interval(-1.0, math.inf, 1):+.2f}" == "-1.00"
-    assert f"{found}" == str(found) == "+1.25 ± 0.50"
+    assert (f"{found:.1f}", f"{found:+.2f}", f"{found:.0%}") == (
+        "1.2\u00a0±\u00a00.5",
+        "+1.25\u00a0±\u00a00.50",
+        "125\u00a0±\u00a050\u00a0%",
+    )
+    assert f"{Interval(-12345.6, 1234.5, 3):+.0f}" == "−12,346\u00a0±\u00a01,234"
+    assert f"{Interval(-1.0, math.inf, 1):+.2f}" == "−1.00"
+    assert f"{Interval(-0.004, 0.01, 3):+.2f}" == "+0.00\u00a0±\u00a00.01"
+    assert f"{found}" == str(found) == "+1.25\u00a0±\u00a00.50"
 
 
 def test_within_a_margin() -> None:
@@ -112,9 +118,9 @@ def test_words_are_filled_with_what_was_found_and_claims_judged_by_it() -> None:
     claims = tuple(ClaimWords("it", "says {sure:.1f}", "yes", "{vague:.0f}", rule) for rule in rules)
     words = Words("title", "question", "source", ("{sure:+.2f}",), claims=claims).filled(found)
     made = words.analysis(found, {}, [])
-    assert made.summary == ["question", "+5.00 ± 1.00"]
+    assert made.summary == ["question", "+5.00\u00a0±\u00a01.00"]
     assert [claim.verdict for claim in made.claims] == [verdict for verdict in rules.values() if verdict]
-    assert {(claim.text, claim.ours) for claim in made.claims} == {("says 5.0 ± 1.0", "0 ± 9")}
+    assert {(claim.text, claim.ours) for claim in made.claims} == {("says 5.0\u00a0±\u00a01.0", "0\u00a0±\u00a09")}
     with pytest.raises(ValueError, match="expected a rule"):
         ClaimWords("it", "says", "yes", "no", "sure <> 0").judged(found)
 
@@ -131,7 +137,7 @@ def test_pictures_say_in_words_what_they_draw() -> None:
     drawn = [line.get_xdata()[0] for line in lines.figure.axes[0].lines[:2]]
     assert drawn == [0, found[1].mean]
     course = courses({"x [-]": [Curve("agent", np.arange(12.0).reshape(2, 2, 3))]}, 10, "X.", {15.0: "rest"})
-    assert course.alt.startswith("x [-]: agent from 4.50 ± ")
+    assert course.alt.startswith("x [-]: agent from 4.50\u00a0±\u00a0")
     assert course.figure.axes[0].lines[0].get_xdata().tolist() == [5, 15, 25]
 
 

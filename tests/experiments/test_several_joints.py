@@ -180,6 +180,20 @@ def claims_of(chosen: SeveralJoints, rows: TrialRows) -> Sequence[Claim]:
         return chosen.analyse(rows).claims
 
 
+def test_what_the_thesis_has_is_in_the_unit_of_its_column() -> None:
+    (section,) = JointExploration(**FEW).analyse(made_up(JointExploration(**FEW), {"exploring": {1: 0.76}})).sections
+    header, first = section.tables[0].header, section.tables[0].rows[0]
+    assert header[1:3] == ["at least one explores, at the begin [%]", "thesis"]
+    assert first[1].startswith("76.")
+    assert first[2] == "75.0"
+
+
+def test_trials_of_the_coupling_are_called_by_its_share() -> None:
+    made = Coupling(shares=(0.0, 1.0), **FEW)
+    for section in made.analyse(made_up(made, {})).sections:
+        assert [row[0].replace("\u00a0", " ") for row in section.tables[0].rows] == ["coupling 0", "coupling 1"]
+
+
 def test_flat_and_hierarchical_agents_have_the_same_budget() -> None:
     """All but who acts is alike."""
     lessons = [lesson.learning for lesson in Levels().lessons.values()]

@@ -26,9 +26,9 @@ class Interval(NamedTuple):
 
     def __str__(self) -> str:
         """Return it for people, hundreds without decimals."""
-        known = math.isfinite(self.half)
-        digits = 0 if max(abs(self.mean), self.half if known else 0.0) >= _HUNDREDS else 2
-        return f"{self.mean:+.{digits}f}" + (f" ± {self.half:.{digits}f}" if known else "")
+        half = self.half if math.isfinite(self.half) else 0.0
+        digits = 0 if max(abs(self.mean), half) >= _HUNDREDS else 2
+        return self._written(f"+.{digits}f")
 
     def __format__(self, form: str) -> str:
         """Return it for people, with the form of both numbers: ``.2f``, ``+.2f``, ``.1%``; "none" of no samples."""
@@ -37,8 +37,16 @@ class Interval(NamedTuple):
         if not self.samples:
             return "none"
         if form.endswith("%"):
-            return f"{self.times(100):{form[:-1]}f} %"
-        return f"{self.mean:{form}}" + (f" ± {self.half:{form.lstrip('+')}}" if math.isfinite(self.half) else "")
+            return f"{self.times(100):{form[:-1]}f}\N{NO-BREAK SPACE}%"
+        return self._written(form)
+
+    def _written(self, form: str) -> str:
+        """Return both numbers in ``form``, on one line, with commas between thousands and a minus, none before 0."""
+        sign, places = ("+", form[1:]) if form.startswith("+") else ("", form)
+        said = f"{self.mean:{sign}z,{places}}".replace("-", "\N{MINUS SIGN}")
+        if math.isfinite(self.half):
+            said += f" ± {self.half:,{places}}".replace(" ", "\N{NO-BREAK SPACE}")
+        return said
 
     def times(self, factor: float) -> "Interval":
         """Return the interval of ``factor`` times what is estimated."""

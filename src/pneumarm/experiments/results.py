@@ -1,5 +1,6 @@
 """What an experiment leaves: its page and its results as JSON, drawn from the rows alone."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,6 +9,8 @@ from pneumarm.experiments.experiment import Analysis, Claim, Experiment
 from pneumarm.files import write_json, write_text
 from pneumarm.report.page import Section, Table, render
 
+_HYPHEN = re.compile(r"(?<!\w)-(?=\d)")
+"""In the place of a minus."""
 PAGE = "page.html"
 RESULTS = "results.json"
 
@@ -21,12 +24,12 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     of = {"experiment": experiment.name, "arms": list(arms), "runs": runs}
     write_json(folder / RESULTS, jsonable({**analysis.figures, **of, "claims": claims}))
     of_trials = f"{_many(runs, 'run')} of {_many(len(experiment.trials), 'trial')}"
-    where = f"{experiment.words.source}. {of_trials} on {', '.join(arms)}."
+    where = f"{experiment.words.source}. {of_trials} on {_listed(arms)}."
     sections = [*analysis.sections]
     summary = [where, *analysis.summary]
     if analysis.claims:
         summary.append(_count(analysis.claims))
-        rows = [[c.text, c.thesis, c.ours, c.verdict] for c in analysis.claims]
+        rows = [[_HYPHEN.sub("−", cell) for cell in (c.text, c.thesis, c.ours, c.verdict)] for c in analysis.claims]
         table = Table(
             ["claim", "thesis", "here", "verdict"], rows, "What the thesis found, and what holds here.", words=True
         )
@@ -34,6 +37,10 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     page = folder / PAGE
     write_text(page, render(experiment.words.title, summary, sections))
     return page
+
+
+def _listed(arms: Sequence[str]) -> str:
+    return ("; " if any("," in arm for arm in arms) else ", ").join(arms)
 
 
 def _many(count: int, what: str) -> str:

@@ -15,11 +15,17 @@ def analysis(experiment: Coupling, rows: TrialRows) -> Analysis:
     agents = {trial: called for trial, called in trials.items() if trial > count}
     axis = Axis("share of the coupling [-]", experiment.shares)
     fit, policy, thesis = words.sections
+    shares = ["coupling\N{NO-BREAK SPACE}" + f"{share:g}" for share in experiment.shares]
+    policies_here, agents_here = (dict(zip(which, shares, strict=True)) for which in (policies, agents))
     return words.analysis(
         found,
         numbers(rows, policies, [*fit.columns, *policy.columns])
         | {"agents": numbers(rows, agents, thesis.columns)["ours"]},
-        [section(one, rows, which, axis) for one, which in ((fit, policies), (policy, policies), (thesis, agents))],
+        [
+            section(fit, rows, policies_here, axis),
+            section(policy, rows, policies_here, axis),
+            section(thesis, rows, agents_here, axis),
+        ],
     )
 
 

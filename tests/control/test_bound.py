@@ -99,6 +99,15 @@ def test_only_virtual_arms_have_a_bound(capsys: pytest.CaptureFixture[str], smal
     assert "virtual arm" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("arm", ["virtual:seed=9", "virtual:joints=2,seed=3"])
+def test_few_movements_and_several_joints_have_their_table(arm: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Too few have no interval but of the rate of success, and every joint its own switches."""
+    with pytest.raises(SystemExit) as exit_:
+        main(["bound", "--arm", arm, "--episodes", "2"])
+    assert exit_.value.code == 0
+    assert capsys.readouterr().out.count("(0.") <= 2  # the rate's, of two planners
+
+
 def test_settings_are_checked() -> None:
     with pytest.raises(UnusableInput, match="1 or more"):
         BoundSettings(episodes=0)

@@ -1,7 +1,7 @@
 """``pneumarm bound``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
@@ -68,14 +68,20 @@ def bound_(
         shown = []
         for baseline in planned:
             figures = result[baseline]
-            ranges = [figures["intervals"][name] for name in columns]
-            means = [f"{figures[n]:.3f} ({r[0]:.3f} to {r[1]:.3f})" for n, r in zip(columns, ranges, strict=True)]
+            means = [_with_interval(figures[name], figures["intervals"][name]) for name in columns]
             times = figures["decision_ms"]
             shown.append((baseline.replace("_", " "), *means, times["median"], times["p99"]))
         return shown
 
     header = ("planner", *columns, "decision, median [ms]", "p99 [ms]")
     show(result, json, lambda: [table(header, rows(), f"{arm}, {settings.episodes} movements, 95 % intervals")])
+
+
+def _with_interval(mean: Any, ends: Any) -> str:
+    """Return a mean for people, of each joint where it is a list; too few movements have no interval."""
+    if isinstance(mean, list):
+        return ", ".join(map(_with_interval, mean, ends or [None] * len(mean)))
+    return f"{mean:.3f}" + (f" ({ends[0]:.3f} to {ends[1]:.3f})" if ends else "")
 
 
 def _servo(file: Path) -> ServoAgent:

@@ -1,5 +1,6 @@
 """The monitor: what it finds, how soon, and that it leaves healthy arms alone."""
 
+import json
 from dataclasses import replace
 from functools import cache
 
@@ -312,3 +313,20 @@ def test_a_tight_muscle_that_leaks_half_as_much_again_is_found_within_ten_minute
     assert leaking(healthy, now, test).tolist() == [[True, False]]
     uncorrected = replace(test, compression=0.0)
     assert (leak_test(arm, uncorrected).rate[0, 0] - now.rate[0, 0]) > (now.rate - healthy.rate)[0, 0]
+
+
+def test_what_the_sensors_say_of_an_empty_muscle_changes_nothing():
+    arm = VirtualArm(seed=4)
+    random, valves = np.random.default_rng(4), np.zeros((1, 2), np.int8)
+    as_it_is, shifted = Monitor(arm.spec), Monitor(arm.spec)
+    for period in range(3_000):
+        reading = arm.read()
+        for watch, zero in ((as_it_is, 0.0), (shifted, 200.0)):
+            watch.see(replace(reading, pressure=reading.pressure + zero), valves)
+        arm.set_valves(valves)
+        arm.wait(arm.spec.period)
+        if period % 6 == 0:
+            valves = random.integers(-1, 2, (1, 2)).astype(np.int8)
+    said, and_said = (np.array(json.loads(watch.get_state())["memory"]["score"]) for watch in (as_it_is, shifted))
+    assert said.max() > 0
+    np.testing.assert_allclose(and_said, said, atol=0.02)  # classes of errors turn over

@@ -122,6 +122,28 @@ def test_pulses_are_none_or_as_long_as_the_valve_needs(size: float, shortest: fl
     assert rounded(np.float32(size), np.float32(shortest)) == pytest.approx(pulse)
 
 
+def test_on_the_way_to_a_goal_that_stays_short_pulses_are_none_and_long_ones_whole():
+    agent = replace(learner(synthetic_simulation()).agent(), settings=replace(SMALL, coarse=0.3))
+    actor, random = agent.actor(), np.random.default_rng(1)
+    previews = np.full((len(SMALL.preview), 1), 512.0)
+    states = random.normal(0, 1, (50, agent.window.state_size)).astype(np.float32)
+    fine, coarse = (np.array([actor.pulses(one, previews, underway) for one in states]) for underway in (False, True))
+    assert ((fine != 0) & (np.abs(fine) < 0.3)).any()
+    wanted = np.where(np.abs(fine) < 0.3, 0.0, np.where(np.abs(fine) > 0.7, np.sign(fine), fine))
+    np.testing.assert_allclose(coarse, wanted)
+
+
+def test_pulses_are_as_coarse_as_costs_nothing_in_simulation():
+    simulation = synthetic_simulation()
+
+    def chosen(simulation: Simulation, **settings: float) -> float | None:
+        return learner(simulation, replace(SMALL, **settings)).agent().settings.coarse
+
+    assert chosen(simulation, change=1000.0) == 0.4
+    assert chosen(simulation, coarse=0.1) == 0.1
+    assert chosen(replace(simulation, spec=replace(simulation.spec, pulses=False)), change=1000.0) == 0.0
+
+
 def test_references_stay_in_the_range_of_goals_and_are_no_faster_than_asked():
     simulation = synthetic_simulation(2)
     spec, random = simulation.spec, np.random.default_rng(0)

@@ -131,6 +131,8 @@ class Memory(NamedTuple):
     """Standard deviations of what is known of the others, shape (hypotheses, muscles) [counts]."""
     base: NDArray[np.float64]
     """The pressures that those expected follow on, shape (muscles,) [counts]."""
+    lowest: NDArray[np.float64]
+    """Pressures at which muscles are empty, shape (muscles,) [counts]."""
     full: NDArray[np.float64]
     """Pressures at which muscles are full, shape (muscles,) [counts]."""
     surprise: NDArray[np.float64]
@@ -162,6 +164,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
         std=np.zeros(2 * joints),
         doubt=np.zeros((hypotheses, 2 * joints)),
         base=np.zeros(2 * joints),
+        lowest=np.zeros(2 * joints),
         full=np.zeros(2 * joints),
         surprise=np.zeros((2 * joints, 4)),
         trust=np.ones(2 * joints),
@@ -199,7 +202,8 @@ def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pres
         expect_by_simulation(predictor, readings, memory, memory.expected, memory.angle)
         for m in range(memory.std.shape[0]):
             memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2] * memory.clock[3]
-            memory.base[m], memory.full[m] = memory.observed[0, m // 2, 2 + m % 2], predictor.highest
+            memory.base[m] = memory.observed[0, m // 2, 2 + m % 2]
+            memory.lowest[m], memory.full[m] = predictor.lowest[m], predictor.highest
         weigh_hypotheses(thresholds, readings, memory, time, pressure)
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
@@ -239,11 +243,12 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
         evidence = 0.0
         for m in range(memory.std.shape[0]):
             difference = memory.expected[h, m] - memory.expected[0, m]
-            before, read = memory.base[m], pressure[m // 2, m % 2]
+            read, lowest = pressure[m // 2, m % 2], memory.lowest[m]
             least = thresholds.telling * memory.std[m]
-            if before < thresholds.empty and read < thresholds.empty:
+            if max(memory.base[m], read) - lowest < thresholds.empty:
                 least = max(least, thresholds.clear)
-            full = before > thresholds.full * memory.full[m] and memory.command[0, m] > 0.0
+            fullness = (memory.base[m] - lowest) / (memory.full[m] - lowest)
+            full = fullness > thresholds.full and memory.command[0, m] > 0.0
             telling = abs(difference) > least and not full
             if readings.leak[h, m] > 0.0:
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0

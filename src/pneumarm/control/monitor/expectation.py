@@ -19,6 +19,7 @@ from pneumarm.simulation.kernel import (
 from pneumarm.simulation.simulation import Simulation
 
 _LEAST_STD = 0.5  # counts; below this the converter's rounding is all there is
+_LOW = 0.5  # of the highest pressure; an empty muscle has less
 
 
 class Predictor(NamedTuple):
@@ -36,6 +37,8 @@ class Predictor(NamedTuple):
     """Standard deviation of the error on held-out sequences, shape (joints, 4) [sensor units]."""
     first_command: int
     """Place of the command among the inputs."""
+    lowest: NDArray[np.float64]
+    """Lowest pressures of the muscles, shape (2 joints,) [counts]."""
     highest: float
     """Highest pressure of a muscle [counts]."""
     period: float
@@ -63,6 +66,7 @@ def predictor(simulation: Simulation) -> Predictor:
         command_scale=scaling.command_scale,
         std=_usual_errors(simulation),
         first_command=places(simulation.window).command,
+        lowest=np.minimum(simulation.pressure_range[..., 0].ravel(), _LOW * simulation.spec.max_pressure_counts),
         highest=simulation.spec.max_pressure_counts,
         period=simulation.spec.period,
         measured=np.zeros((window.history, len(window.needs))),
@@ -106,7 +110,8 @@ def expect_by_simulation(predictor, readings, memory, expected, angle):  # type:
         expect_further(predictor, lag)
     for h in range(expected.shape[0]):
         for m in range(muscles):
-            level = memory.observed[0, m // 2, 2 + m % 2] / predictor.highest
+            lowest = predictor.lowest[m]
+            level = (memory.observed[0, m // 2, 2 + m % 2] - lowest) / (predictor.highest - lowest)
             source = readings.source[h, m]
             now = carried_out(readings, h, m, memory.command[0, source], level) / predictor.command_scale[m]
             x[predictor.first_command + m] = np.float32(now)
@@ -123,6 +128,6 @@ def expect_by_simulation(predictor, readings, memory, expected, angle):  # type:
             if q >= 2:
                 m = 2 * j + q - 2
                 lost = predictor.period * readings.leak[h, m]
-                expected[h, m] = following - lost * max(0.0, memory.observed[0, j, q])
+                expected[h, m] = following - lost * max(0.0, memory.observed[0, j, q] - predictor.lowest[m])
             elif q == 0 and h == 0:
                 angle[j] = following

@@ -164,9 +164,11 @@ def shift_slots(known):  # type: ignore[no-untyped-def]
 def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-def]
     """Write the features of muscle ``m`` under hypothesis ``h`` into ``x``; ``angle`` (joints,) is what is read now.
 
-    ``full`` is the pressure at which inlets let no more air in [highest pressures].
+    ``full`` is the pressure at which inlets let no more air in [highest pressures]. It and the pressure of the muscle
+    count from the lowest that was read, since the sensors of an arm may say anything where there is only the air of
+    the room.
     """
-    source, joint, level = readings.source[h, m], m // 2, known.last[m, 0]
+    source, joint, level = readings.source[h, m], m // 2, known.last[m, 0] - known.span[m, 0]
     supply = 1.0
     if readings.supply[h] < math.inf:
         supply = reduced(readings.supply[h], max(level, 0.0) / full)
@@ -241,8 +243,14 @@ def class_of(known, m, angle):  # type: ignore[no-untyped-def]
     turned = abs(angle[joint] - known.angle[joint]) / known.look[3]
     usual = known.turning[joint]
     speed = 0 if turned < _SLOW * usual else 1 if turned < _FAST * usual else 2
-    full = known.last[m, 0] / max(known.span[m, 1], 0.1)
+    full = (known.last[m, 0] - known.span[m, 0]) / highest_level(known, m)
     return side, speed, 0 if full < _EMPTY else 1 if full < _LOW else 2 if full < _FULL else 3
+
+
+@part
+def highest_level(known, m):  # type: ignore[no-untyped-def]
+    """Return the highest pressure of muscle ``m`` that was read, from the lowest on [highest pressures]."""
+    return max(known.span[m, 1] - known.span[m, 0], 0.1)
 
 
 @part
@@ -256,8 +264,8 @@ def filling(known, m, level):  # type: ignore[no-untyped-def]
 
 @part
 def level_of_supply(known, m):  # type: ignore[no-untyped-def]
-    """Return at which pressure the inlet of muscle ``m`` lets no more air in, about [highest pressures]."""
-    top = max(known.span[m, 1], 0.1)
+    """Return at which pressure, from the lowest on, the inlet of ``m`` lets no more air in [highest pressures]."""
+    top = highest_level(known, m)
     half, most = filling(known, m, 0.5 * top), filling(known, m, top)
     if most < _SLOWED * half:
         return top
@@ -283,7 +291,8 @@ def expect_by_identification(known, readings, memory, angle, pressure):  # type:
     for m in range(muscles):
         read = pressure[m // 2, m % 2] / highest
         full = level_of_supply(known, m)
-        memory.full[m] = full * highest
+        memory.lowest[m] = known.span[m, 0] * highest
+        memory.full[m] = memory.lowest[m] + full * highest
         memory.base[m] = known.last[m, 0] * highest
         memory.trust[m] = independence(known, m)
         features(known, readings, 0, m, angle, full, known.x[m])
@@ -298,7 +307,7 @@ def expect_by_identification(known, readings, memory, angle, pressure):  # type:
             memory.expected[h, m], memory.doubt[h, m] = healthy * highest, 0.0
             if readings.leak[h, m] > 0.0:
                 lost = 1.0 - math.exp(-readings.leak[h, m] * known.look[1])
-                memory.expected[h, m] -= lost * max(0.0, memory.base[m])
+                memory.expected[h, m] -= lost * (memory.base[m] - memory.lowest[m])
             elif h > 0 and not readings.as_told[h, m]:
                 features(known, readings, h, m, angle, full, known.x[muscles])
                 other = known.last[m, 0] + predicted(known, m, known.x[muscles])

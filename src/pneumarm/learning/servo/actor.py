@@ -26,6 +26,7 @@ class ServoActor:
         self._x = np.zeros((self.task.simulation.hidden.shape[0], 1), np.float32)
         self._inputs = np.zeros((input_size(self.task.inputs), 1), np.float32)
         self._command, self._slope = (np.zeros((2 * window.joints, 1), np.float32) for _ in range(2))
+        self._underway = np.zeros((window.joints, 1), bool)
         self._no_noise = np.zeros((window.history, 3 * window.joints, 1), np.float32)
         self._offset = window.of_joints(agent.scaling.observation_offset)[:, 0]
         self._scale = window.of_joints(agent.scaling.observation_scale)[:, 0]
@@ -45,11 +46,17 @@ class ServoActor:
         """Go on in ``next_state``."""
         self._state = np.asarray(next_state, np.float32).copy()
 
-    def pulses(self, state: NDArray[np.float32], previews: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the pulses (joints, 2) in ``state``; the reference will be at ``previews`` (previews, joints)."""
+    def pulses(
+        self, state: NDArray[np.float32], previews: NDArray[np.float64], underway: ArrayLike = False
+    ) -> NDArray[np.float64]:
+        """Return the pulses (joints, 2) in ``state``; the reference will be at ``previews`` (previews, joints).
+
+        ``underway`` (joints,) tells which joints are on their way to a goal that stays.
+        """
+        self._underway[:, 0] = underway
         self._x[: state.size, 0] = state
         scaled = ((previews - self._offset) / self._scale).astype(np.float32)[:, :, None]
         write_inputs(self.task.inputs, self._x, self._no_noise, len(self._no_noise) - 1, scaled, self._inputs)
         forward(self._layers, self._inputs, self._units)
-        write_commands(self.task.commands, self._x, self._units[-1], self._slope, self._command)
+        write_commands(self.task.commands, self._x, self._underway, self._units[-1], self._slope, self._command)
         return self._command.astype(np.float64).reshape(-1, 2)

@@ -22,6 +22,9 @@ from pneumarm.simulation.simulation import Simulation
 GAIN = np.float32(1.25)
 _LEAK = 0.05
 _AS_IF = 0.1
+NEAR = 8.0
+"""Tolerances from a goal that stays within which a joint may be nearly at rest."""
+_FAST = 4.5  # tolerances/s; a joint that is faster is not
 WHOLE = np.float32(0.8)
 """Longer pulses last the whole period: that saves changes of valves and costs next to no precision."""
 _ONE, _ZERO = np.float32(1.0), np.float32(0.0)
@@ -38,14 +41,21 @@ class CommandParameters(NamedTuple):
     """Share of the gradient that passes where the command does not change."""
     inlet: NDArray[np.float32]
     """Pressure over which an inlet stays closed, shape (joints, 2) [scaled]."""
+    coarse: float
+    """On the way to a goal that stays: share of the period that a pulse is at least, and is short of the whole."""
+    near: float
+    """Tolerances to the goal, and ..."""
+    slow: float
+    """... tolerances a period, within which a joint is no longer on its way."""
 
 
-def command_parameters(simulation: Simulation, dead: float, shortest: float) -> CommandParameters:
-    """Return the parameters for pulses of at least ``shortest`` periods."""
+def command_parameters(simulation: Simulation, dead: float, shortest: float, coarse: float) -> CommandParameters:
+    """Return the parameters for pulses of at least ``shortest`` periods, or ``coarse`` on the way to a goal."""
     scaling, window, spec = simulation.scaling, simulation.window, simulation.spec
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     inlet = (spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:]
-    return CommandParameters(float(dead), float(shortest), _LEAK, np.ascontiguousarray(inlet, np.float32))
+    inlet, slow = np.ascontiguousarray(inlet, np.float32), _FAST * spec.period
+    return CommandParameters(float(dead), float(shortest), _LEAK, inlet, float(coarse), NEAR, slow)
 
 
 def shortest_share(spec: ArmSpec) -> float:
@@ -66,14 +76,21 @@ def rounded(size, shortest):  # type: ignore[no-untyped-def]
     return max(size, shortest)
 
 
+@part
+def coarsened(pulse, coarse):  # type: ignore[no-untyped-def]
+    """Return none for a ``pulse`` shorter than ``coarse``, and the period for one that is short of it by less."""
+    return _ZERO if pulse < coarse else _ONE if pulse > _ONE - coarse else pulse
+
+
 @kernel(fastmath=FASTMATH)
-def write_commands(parameters, x, said, slope, command):  # type: ignore[no-untyped-def]
+def write_commands(parameters, x, underway, said, slope, command):  # type: ignore[no-untyped-def]
     """Make ``command`` (2 joints, n) of the policy's outputs ``said``, ``slope`` to the derivatives by them.
 
-    ``x`` (size, n) are the states, in which the pressures are read; ``said`` is replaced by its hyperbolic tangent.
+    ``x`` (size, n) are the states, in which the pressures are read; ``underway`` (joints, n) tells which joints are
+    on their way to a goal that stays; ``said`` is replaced by its hyperbolic tangent.
     """
     dead, shortest = np.float32(parameters.dead), np.float32(parameters.shortest)
-    leak = np.float32(parameters.leak)
+    leak, coarse = np.float32(parameters.leak), np.float32(parameters.coarse)
     stretch = _ONE / (_ONE - dead)
     for c in range(command.shape[0]):
         tansig(said[c])
@@ -87,5 +104,7 @@ def write_commands(parameters, x, said, slope, command):  # type: ignore[no-unty
             if v > _ZERO and x[place, e] > limit:
                 size, moves = _ZERO, False
             pulse = rounded(min(max(size, _ZERO), _ONE), shortest)
+            if underway[joint, e]:
+                pulse = coarsened(pulse, coarse)
             command[c, e] = pulse if v > _ZERO else -pulse
             slope[c, e] = GAIN * (_ONE - bent * bent) * stretch * (_ONE if moves else leak)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.errors import UnusableInput
+from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.correction import Correction, features_of
 from pneumarm.task.forecast import Forecast
 from pneumarm.task.tracker import StateTracker
@@ -32,7 +33,6 @@ _MOST = 0.8  # of a period for which a valve is due, for it to open for one
 _FORGOTTEN = 0.8  # share of what is due that is left after a period with closed valves
 _LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest end it
 _BIASED = 8.0  # most tolerances that the integral adds to what is asked for
-_NEAR = 8.0  # tolerances within which an arm can be nearly at rest
 _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving reference are learned from
 _DONE = 0.7  # share of an error that pulses of a joint with one muscle may leave, for the next not to be more
 _SWINGING = 0.6  # s in which an error is added to what is asked for while a joint with one muscle swings
@@ -63,7 +63,7 @@ class ServoController:
         self._tracker = StateTracker(agent.window, agent.scaling)
         tolerance = wanted.tolerance * spec.counts_per_degree * (1.0 if spec.pulses else _COARSE)
         self._tolerance = tolerance
-        self._near, self._still, self._most = _NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
+        self._near, self._still, self._most = NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
         noise = float((wanted.reading_noise * agent.simulation.error_std[:, 0]).max())
         least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)
         self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
@@ -125,8 +125,8 @@ class ServoController:
         features = features_of(path, self._middle)
         self._correction.learn(np.where(moves, path[1] - reading.angle, 0.0), features[0])
         bias = np.where(moves, self._correction.of(features[steps]), [rest.bias for rest in self._rest])
-        command = self._actor.pulses(state, preview + bias)
         calm = np.array([rest.calm for rest in self._rest])
+        command = self._actor.pulses(state, preview + bias, ~moves & ~calm)
         command[calm[:, None] & (command < 0) & (reading.pressure < self._empty)] = 0.0
         self._pulse[acts] = command[acts]
         command[~acts] = 0.0

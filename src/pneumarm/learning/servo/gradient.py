@@ -79,6 +79,8 @@ class Tape(NamedTuple):
     """Derivatives by the policy's inputs, shape (inputs, n)."""
     row: NDArray[np.float32]
     """Workspace, shape (3, n)."""
+    underway: NDArray[np.bool_]
+    """Which joints are on their way to a goal that stays, now, shape (joints, n)."""
 
 
 def tape(task: ServoTask, steps: int, n: int) -> Tape:
@@ -104,6 +106,7 @@ def tape(task: ServoTask, steps: int, n: int) -> Tape:
         sooner=zeros(size),
         seen=zeros(inputs),
         row=zeros(3),
+        underway=np.zeros((joints, n), np.bool_),
     )
 
 
@@ -117,10 +120,25 @@ def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
         x = tape.x[t]
         write_inputs(task.inputs, x, tape.noise, t + simulation.history - 1, tape.preview[t], tape.inputs[t])
         forward(net.layers, tape.inputs[t], net.units)
-        write_commands(task.commands, x, net.units[-1], tape.slope[t], x[first : first + commanded])
+        if task.commands.coarse > 0:
+            note_underway(task, tape, t)
+        write_commands(task.commands, x, tape.underway, net.units[-1], tape.slope[t], x[first : first + commanded])
         step_all(simulation, x, tape.x[t + 1], tape.work)
         tape.hidden[t] = tape.work.hidden
         tape.free[t] = np.maximum(tape.work.free, np.float32(task.past_the_limit))
+
+
+@kernel(fastmath=FASTMATH)
+def note_underway(task, tape, t):  # type: ignore[no-untyped-def]
+    """Note which joints are on their way to a goal that stays, at step ``t``."""
+    lag, commands = task.simulation.history - 1, task.commands
+    near, slow = np.float32(commands.near), np.float32(commands.slow * lag)
+    for joint in range(tape.underway.shape[0]):
+        scale, then = task.inputs.tolerances[joint], lag * task.simulation.observed + 4 * joint
+        for e in range(tape.underway.shape[1]):
+            angle, wanted = tape.x[t, 4 * joint, e], tape.preview[t, 0, joint, e]
+            moves = abs(angle - tape.x[t, then, e]) * scale > slow or abs(angle - wanted) * scale > near
+            tape.underway[joint, e] = moves and wanted == tape.preview[t, -1, joint, e]
 
 
 @kernel(fastmath=FASTMATH)

@@ -52,6 +52,9 @@ class ServoSettings(TaskSettings):
     """Price of the pressure that a muscle is short of that, by the whole range of pressures."""
     dead: float = 0.15
     """Share of the policy's output around 0 that keeps a valve closed."""
+    coarse: float | None = None
+    """On the way to a goal that stays a joint gets no shorter pulse, in periods, and a whole period instead of one
+    that is short of it by less: that wears valves less. By default as much as costs nothing in simulation."""
     known: float = 0.6
     """Share of movements in which the reference is known ahead; in the others it is forecast from its past."""
     reading_noise: float = 0.6
@@ -81,6 +84,7 @@ class ServoSettings(TaskSettings):
             "slack": 0 <= self.slack < math.inf or "0 or more",
             "stiffness": 0 <= self.stiffness <= 1 or "0 to 1",
             "dead": 0 <= self.dead < 1,
+            "coarse": self.coarse is None or 0 <= self.coarse <= 0.5 or "0 to 0.5 periods",
             "known": 0 <= self.known <= 1,
             "reading_noise": 0 <= self.reading_noise < math.inf,
             "quiet": 0 <= self.quiet <= self.alert,

@@ -1,6 +1,7 @@
 """Training servos: several at once from different weights, of which the best is kept."""
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,8 @@ _RENEWED = 0.5  # share of arms that begin anew at rest; the others go on from w
 _FREE = 0.6  # share of the updates in which the price of changes rises to what it is
 _STEEPEST = 10.0  # where derivatives are cut off in the first update, at the usual period
 _STEEPEST_LAST = 40.0, 400.0  # and in the last, by every other agent: which is better depends on the arm
+_COARSE = 0.0, 0.1, 0.2, 0.3, 0.4  # periods that are tried
+_COSTS_NOTHING = 0.005  # share of the price, and of movements that settle, by which coarser commands may cost more
 _FASTEST = 4.0  # highest speed of a reference, in scaled velocities
 
 
@@ -144,7 +147,24 @@ class ServoLearner(Learner[ServoAgent]):
 
     def agent(self) -> ServoAgent:
         """Return the servo as it is now."""
-        return ServoAgent(self.simulation, self.net.flat.copy(), self.settings)
+        settings = replace(self.settings, coarse=self._coarse())
+        return ServoAgent(self.simulation, self.net.flat.copy(), settings)
+
+    def _coarse(self) -> float:
+        """Return how coarse commands may be on the way to a goal that stays, without costing more in simulation."""
+        if self.settings.coarse is not None:
+            return self.settings.coarse
+        if not self.simulation.spec.pulses:
+            return 0.0
+        found = []
+        for coarse in _COARSE:
+            self.task = self.task._replace(commands=self.task.commands._replace(coarse=coarse))
+            made = self.validate(self.settings.validation_movements)
+            found.append((made.reward.mean(), made.success.mean()))
+        self.task = self.task._replace(commands=self.task.commands._replace(coarse=0.0))
+        rewards, settled = np.array(found).T
+        good = (rewards >= rewards.max() * (1 + _COSTS_NOTHING)) & (settled >= settled.max() - _COSTS_NOTHING)
+        return max(coarse for coarse, enough in zip(_COARSE, good, strict=True) if enough) if good.any() else 0.0
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return all that its future depends on, by name."""
@@ -172,6 +192,7 @@ class ServoLearner(Learner[ServoAgent]):
         paid, share = (1.0, 1.0) if self.price_all_along else (min(self.share / _FREE, 1.0), self.share)
         rise = _STEEPEST_LAST[self._number % len(_STEEPEST_LAST)] / _STEEPEST
         return self.task._replace(
+            commands=self.task.commands._replace(coarse=0.0),  # a policy that learns with coarse ones does worse
             prices=self.task.prices._replace(change=paid * self.task.prices.change),
             steepest=_STEEPEST * rise**share * USUAL_PERIOD / self.simulation.spec.period,
         )

@@ -16,6 +16,7 @@ from pneumarm.learning.servo.gradient import learn_once
 from pneumarm.learning.servo.price import (
     PriceParameters,
     price_of_changes,
+    price_of_cocontraction,
     price_of_error,
     price_of_slack,
     prices_of_errors,
@@ -52,23 +53,23 @@ def test_the_gradient_is_that_of_the_price(joints: int, history: int, direct: bo
     assert np.linalg.norm(gradient) > 0.05  # some valves open
     way = gradient / np.linalg.norm(gradient)
     found = []
-    for distance in (1e-4, -1e-4):  # the prices have kinks, which a short way rarely crosses
+    for distance in (1e-5, -1e-5):  # the prices have kinks, which a short way rarely crosses
         weights += np.float32(distance) * way
         found.append(learn_once(task, one.net, one.tape))
         weights -= np.float32(distance) * way
-    assert (found[0] - found[1]) / 2e-4 == pytest.approx(np.linalg.norm(gradient), rel=0.01)
+    assert (found[0] - found[1]) / 2e-5 == pytest.approx(np.linalg.norm(gradient), rel=0.01)
 
 
 def test_an_empty_muscle_is_taught_to_fill_and_slack_is_judged_by_its_price():
     one = learner(synthetic_simulation())
     one._prepare(np.random.default_rng(1), np.ones(SMALL.arms, bool))
     # Near the goal, and with nothing to pay for but slack.
-    prices = one.task.prices._replace(change=0.0, far=0.0, slack=3.0, stiffness=0.9)
+    prices = one.task.prices._replace(change=0.0, far=0.0, slack=3.0, cocontraction=3.0, stiffness=0.5)
     inputs = one.task.inputs._replace(tolerances=one.task.inputs.tolerances / 1000)
     one.task = one.task._replace(prices=prices, inputs=inputs, past_the_limit=0.0)
     price = learn_once(one.task, one.net, one.tape)
     assert price > 0
-    assert price == pytest.approx(one._slack().mean() / len(one.tape.slope), rel=1e-3)
+    assert price == pytest.approx(one._pressures().mean() / len(one.tape.slope), rel=1e-3)
     simulation = one.task.simulation
     simulation.highest[:] = simulation.lowest  # now all predictions are cut off
     for passes in (0.0, 0.2):
@@ -84,11 +85,14 @@ def test_prices_have_the_slopes_that_they_say():
     for e in (3, 17, 30):
         one = [price_of_error(prices, error[e : e + 1] + np.float32(d), slope[:1].copy()) for d in (step, -step)]
         assert (one[0] - one[1]) / (2 * step) == pytest.approx(slope[e], abs=0.02)
-    slack, near, short = prices._replace(slack=2.0, stiffness=0.3), np.float32([0.1]), np.float32([0.2])
-    assert price_of_slack(slack, near, short, slope[:1]) == pytest.approx(0.2, abs=1e-3)
-    assert slope[0] == pytest.approx(-2, abs=1e-2)  # the more pressure the better
-    assert price_of_slack(slack, 100 * near, short, slope[:1]) == pytest.approx(0.04, abs=1e-3)
-    assert price_of_slack(slack, near, 2 * short, slope[:1]) == slope[0] == 0
+    paid, near, short = prices._replace(slack=2.0, cocontraction=6.0, stiffness=0.3), np.float32(0.1), np.float32(0.2)
+    # The more pressure the better.
+    assert price_of_slack(paid, near, short) == (pytest.approx(0.2, abs=1e-3), pytest.approx(-2, abs=1e-2))
+    assert price_of_slack(paid, 100 * near, short)[0] == pytest.approx(0.04, abs=1e-3)
+    assert price_of_slack(paid, near, 2 * short) == (0, 0)
+    for mean, price, slope_of_it in ((0.26, 0.6, -6), (0.37, 0, 0), (0.47, 0, 0), (0.58, 0.6, 6)):
+        found = price_of_cocontraction(paid, np.float32(mean))
+        assert found == (pytest.approx(price, abs=1e-4), pytest.approx(slope_of_it))
     for now, before in ((0.3, 0.9), (0.95, 0.9), (-0.5, 1.0), (-0.9, -0.95), (0.4, 0.0)):
         at, slopes = [], (np.zeros(1, np.float32), np.zeros(1, np.float32))
         for d, b in ((step, 0), (-step, 0), (0, step), (0, -step)):

@@ -76,15 +76,23 @@ def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:
     window, scaling = simulation.window, simulation.scaling
     offset, scale = (window.of_joints(one)[:, 2:] for one in (scaling.observation_offset, scaling.observation_scale))
     lowest, highest = np.moveaxis(simulation.pressure_range, -1, 0)
-    slack = settings.slack if simulation.spec.muscles > 1 else 0.0  # one muscle has the pressure of its angle
+    both = float(simulation.spec.muscles > 1)  # one muscle has the pressure of its angle
     shortest = shortest_share(simulation.spec)
     return ServoTask(
         simulation=simulation_parameters(simulation),
         inputs=seen_parameters(simulation, settings.preview, settings.tolerance),
         commands=command_parameters(simulation, settings.dead, shortest, settings.coarse or 0.0),
-        prices=PriceParameters(settings.precision, settings.far, settings.flat, change, slack, settings.stiffness),
+        prices=PriceParameters(
+            precision=settings.precision,
+            far=settings.far,
+            flat=settings.flat,
+            change=change,
+            slack=both * settings.slack,
+            cocontraction=both * settings.cocontraction,
+            stiffness=settings.stiffness,
+        ),
         lowest=((lowest - offset) / scale).astype(np.float32),
-        full=(scale / np.maximum(highest - lowest, 1e-9)).astype(np.float32),
+        to_share=(scale / np.maximum(highest - lowest, 1e-9)).astype(np.float32),
         past_the_limit=_PAST_THE_LIMIT,
         steepest=1e9,
     )

@@ -17,13 +17,19 @@ from numpy.typing import NDArray
 from pneumarm.kernels import kernel
 from pneumarm.learning.servo.commands import CommandParameters, write_commands
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, inputs_back, write_inputs
-from pneumarm.learning.servo.price import PriceParameters, price_of_changes, price_of_error, price_of_slack
+from pneumarm.learning.servo.price import (
+    PriceParameters,
+    price_of_changes,
+    price_of_cocontraction,
+    price_of_error,
+    price_of_slack,
+)
 from pneumarm.networks.layers import Trainable, backward, forward, through_weights
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
 from pneumarm.simulation.kernel import SimulationParameters
 
-_ZERO, _FULL = np.float32(0.0), np.float32(1.0)
+_ZERO = np.float32(0.0)
 
 
 class ServoTask(NamedTuple):
@@ -35,7 +41,7 @@ class ServoTask(NamedTuple):
     prices: PriceParameters
     lowest: NDArray[np.float32]
     """Lowest pressures, shape (joints, 2) [scaled]."""
-    full: NDArray[np.float32]
+    to_share: NDArray[np.float32]
     """From scaled pressures to shares of the range, shape (joints, 2)."""
     past_the_limit: float
     """Share of the gradient that passes where a prediction was cut off at the limit of its sensor.
@@ -150,6 +156,35 @@ def errors_at(task, tape, t, joint, error):  # type: ignore[no-untyped-def]
 
 
 @kernel(fastmath=FASTMATH)
+def prices_of_pressures(task, tape, t, joint, row):  # type: ignore[no-untyped-def]
+    """Set ``row`` (3, n) to the price of the pressures of ``joint`` at step ``t`` and its slopes by both [scaled]."""
+    first, scale = 4 * joint + 2, task.inputs.tolerances[joint]
+    empty, to_share = task.lowest[joint], task.to_share[joint]
+    for e in range(row.shape[1]):
+        wanted = tape.reference[t, joint, e]
+        one = (tape.x[t, first, e] - empty[0]) * to_share[0]
+        two = (tape.x[t, first + 1, e] - empty[1]) * to_share[1]
+        if wanted == tape.reference[t - 1, joint, e]:
+            error = (tape.x[t, first - 2, e] - wanted) * scale
+            price_one, by_one = price_of_slack(task.prices, error, one)
+            price_two, by_two = price_of_slack(task.prices, error, two)
+            price = price_one + price_two
+        else:
+            price, by_mean = price_of_cocontraction(task.prices, np.float32(0.5) * (one + two))
+            by_one = by_two = np.float32(0.5) * by_mean
+        row[0, e], row[1, e], row[2, e] = price, by_one * to_share[0], by_two * to_share[1]
+
+
+@kernel
+def prices_of_all_pressures(task, tape, total):  # type: ignore[no-untyped-def]
+    """Add to ``total`` (n,) the prices of the pressures in the movements on ``tape``."""
+    for t in range(1, tape.x.shape[0]):
+        for joint in range(tape.reference.shape[1]):
+            prices_of_pressures(task, tape, t, joint, tape.row)
+            total += tape.row[0]
+
+
+@kernel(fastmath=FASTMATH)
 def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost a step to ``net.gradient``, after :func:`move_forward`; return the cost."""
     simulation = task.simulation
@@ -169,14 +204,11 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
             scale = task.inputs.tolerances[joint] * share
             for e in range(n):
                 later[4 * joint, e] += row[1, e] * scale
-            for muscle in range(2):
-                place, lowest, full = 4 * joint + 2 + muscle, task.lowest[joint, muscle], task.full[joint, muscle]
-                for e in range(n):
-                    stays = tape.reference[t + 1, joint, e] == tape.reference[t, joint, e]
-                    row[1, e] = (tape.x[t + 1, place, e] - lowest) * full if stays else _FULL
-                total += price_of_slack(task.prices, row[0], row[1], row[2])
-                for e in range(n):
-                    later[place, e] += row[2, e] * full * share
+            prices_of_pressures(task, tape, t + 1, joint, row)
+            for e in range(n):
+                total += row[0, e]
+                later[4 * joint + 2, e] += row[1, e] * share
+                later[4 * joint + 3, e] += row[2, e] * share
         tape.work.hidden[:] = tape.hidden[t]
         tape.work.free[:] = tape.free[t]
         step_back(simulation, later, sooner, tape.work)

@@ -3,12 +3,14 @@
     error:   log(1 + (max(|e| - flat, 0) / precision)^2) / 2 + far |e|          e in tolerances
     valves:  change (o (1 - o' same) + o (1 - held) + o' (1 - same)(1 - o))
     slack:   slack max(stiffness - q, 0) / (1 + (e / 5)^2)                      of each muscle, of joints that stay
+    mean:    cocontraction max(1.2 stiffness - m, m - 1.6 stiffness, 0)         of joints that move
 
 where o tells whether a valve opens in a period, held whether it is still open at its end, o' held of the period
 before, and same whether it was the same valve. Counts have no slope, so o and held are smooth stand-ins:
 o = 1.1 m / (m + 0.1) and held = max(m - 0.8, 0) / 0.2 of a pulse of m periods. A muscle is slack by what its
 pressure, q of the range, is short of the stiffness that is wanted. That matters less far from the goal; no slope
-goes through this weight, or staying away would pay.
+goes through this weight, or staying away would pay. The mean m of both pressures changes slowly, and does not show in
+the angle within the time that a gradient sees: soft joints swing, and stiff ones take too much air to move.
 """
 
 from typing import NamedTuple
@@ -21,7 +23,8 @@ from pneumarm.networks.tansig import FASTMATH
 
 _ONE, _ZERO = np.float32(1.0), np.float32(0.0)
 _SOFT, _LONG = np.float32(0.1), np.float32(0.8)
-NEAR = np.float32(1 / 5)  # of an error in tolerances
+_NEAR = np.float32(1 / 5)  # of an error in tolerances
+_LOOSE, _TIGHT = np.float32(1.2), np.float32(1.6)  # stiffnesses
 
 
 class PriceParameters(NamedTuple):
@@ -32,6 +35,7 @@ class PriceParameters(NamedTuple):
     flat: float
     change: float
     slack: float = 0.0
+    cocontraction: float = 0.0
     stiffness: float = 0.0
 
 
@@ -57,22 +61,30 @@ def price_of_error(prices, error, slope):  # type: ignore[no-untyped-def]
     return total
 
 
-@kernel(fastmath=FASTMATH)
-def price_of_slack(prices, error, pressure, slope):  # type: ignore[no-untyped-def]
-    """Return the sum of the prices of the slack of a muscle with the ``pressure`` (n,), as a share of the range.
+@part
+def price_of_slack(prices, error, share):  # type: ignore[no-untyped-def]
+    """Return the price of a muscle's pressure, as a ``share`` of the range, and its slope by that.
 
-    ``error`` (n,) is the joint's in tolerances. Sets ``slope`` (n,) to the derivatives by the pressure.
+    ``error`` is the joint's in tolerances.
     """
-    slack, stiffness, total = np.float32(prices.slack), np.float32(prices.stiffness), _ZERO
-    for e in range(pressure.shape[0]):
-        short = stiffness - pressure[e]
-        slope[e] = _ZERO
-        if short > _ZERO:
-            far = NEAR * error[e]
-            price = slack / (_ONE + far * far)
-            total += price * short
-            slope[e] = -price
-    return total
+    short = np.float32(prices.stiffness) - share
+    if short <= _ZERO:
+        return _ZERO, _ZERO
+    far = _NEAR * error
+    price = np.float32(prices.slack) / (_ONE + far * far)
+    return price * short, -price
+
+
+@part
+def price_of_cocontraction(prices, mean):  # type: ignore[no-untyped-def]
+    """Return the price of the ``mean`` pressure of two muscles, as a share of the range, and its slope by that."""
+    price, stiffness = np.float32(prices.cocontraction), np.float32(prices.stiffness)
+    short, beyond = _LOOSE * stiffness - mean, mean - _TIGHT * stiffness
+    if short > _ZERO:
+        return price * short, -price
+    if beyond > _ZERO:
+        return price * beyond, price
+    return _ZERO, _ZERO
 
 
 @part

@@ -44,12 +44,16 @@ class ServoSettings(TaskSettings):
     change: float = 0.15
     """Price of opening or closing a valve, at 30 Hz; at other rates as much in errors times seconds."""
     stiffness: float = 0.25
-    """Share of the range of pressures that both muscles are to keep where a goal stays, as far as its angle allows.
+    """Share of the range of pressures that both muscles are to keep where a goal stays, as far as its angle allows;
+    somewhat more on average while a reference moves.
 
     Pressure in both makes a joint stiff, damps it, and makes a pulse move it less.
     """
     slack: float = 2.0
     """Price of the pressure that a muscle is short of that, by the whole range of pressures."""
+    cocontraction: float = 6.0
+    """Price of the mean pressure of a joint's muscles while its reference moves, as far as it is below 1.2 or above
+    1.6 times that share, by the whole range of pressures."""
     dead: float = 0.15
     """Share of the policy's output around 0 that keeps a valve closed."""
     coarse: float | None = None
@@ -82,6 +86,7 @@ class ServoSettings(TaskSettings):
             "far": 0 <= self.far < math.inf,
             "change": 0 <= self.change < math.inf,
             "slack": 0 <= self.slack < math.inf or "0 or more",
+            "cocontraction": 0 <= self.cocontraction < math.inf or "0 or more",
             "stiffness": 0 <= self.stiffness <= 1 or "0 to 1",
             "dead": 0 <= self.dead < 1,
             "coarse": self.coarse is None or 0 <= self.coarse <= 0.5 or "0 to 0.5 periods",

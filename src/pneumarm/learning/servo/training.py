@@ -8,8 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.learning.servo.agent import ServoAgent, servo_sizes, servo_task
-from pneumarm.learning.servo.gradient import ServoTask, errors_of, learn_once, move_forward, tape
-from pneumarm.learning.servo.price import NEAR, prices_of_errors
+from pneumarm.learning.servo.gradient import (
+    ServoTask,
+    errors_of,
+    learn_once,
+    move_forward,
+    prices_of_all_pressures,
+    tape,
+)
+from pneumarm.learning.servo.price import prices_of_errors
 from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
@@ -140,7 +147,7 @@ class ServoLearner(Learner[ServoAgent]):
             made.actions[:], made.switches[:] = steps, changes.T
             prices = self.task.prices
             cost = prices_of_errors(prices, error).sum(axis=(0, 1))
-            made.reward[:] = -cost - prices.change * changes.sum(axis=0) - self._slack()
+            made.reward[:] = -cost - prices.change * changes.sum(axis=0) - self._pressures()
             made.success[:] = (np.abs(error[-steps // 3 :]) <= 1).all(axis=(0, 1))
             parts.append(made)
         return Movements(*(np.concatenate(columns)[:episodes] for columns in zip(*parts, strict=True)))
@@ -207,16 +214,11 @@ class ServoLearner(Learner[ServoAgent]):
         offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
         return angle * scale[:, :1] + offset[:, :1]
 
-    def _slack(self) -> NDArray[np.float64]:
-        """Return the price of slack muscles in the movements on the tape, shape (n,)."""
-        task, joints = self.task, self.simulation.window.joints
-        observed = self.tape.x[1:, : 4 * joints].reshape(-1, joints, 4, self.settings.arms)
-        pressure = (observed[:, :, 2:] - task.lowest[..., None]) * task.full[..., None]
-        stays = self.tape.reference[1:] == self.tape.reference[:-1]
-        near = stays / (1 + (NEAR * errors_of(task, self.tape)) ** 2)
-        short = np.maximum(task.prices.stiffness - pressure, 0).sum(axis=2)
-        slack: NDArray[np.float64] = task.prices.slack * (near * short).sum(axis=(0, 1))
-        return slack
+    def _pressures(self) -> NDArray[np.float64]:
+        """Return the price of the pressures in the movements on the tape, shape (n,)."""
+        total = np.zeros(self.settings.arms)
+        prices_of_all_pressures(self.task, self.tape, total)
+        return total
 
     def _valve_changes(self) -> NDArray[np.int64]:
         """Return how often valves opened or closed in the movements on the tape, shape (joints, n)."""

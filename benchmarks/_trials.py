@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, open_arm
 from pneumarm.control import AgentController, Monitor
+from pneumarm.control.monitor import Mode
 from pneumarm.control.transfer import monitor_of, transfer
+from pneumarm.errors import ArmFailure
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent, Tracks, goals_of, train
@@ -124,16 +126,17 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adap
 
     Made as ``pneumarm run`` makes them by default: collecting until more would not help, the fit, and a training of
     the default agent and of the one for reaching. The first settles at ``goals`` and follows sinusoids, the second
-    reaches as many. With ``monitor`` the arm is watched while it is recorded; ``marked`` rows are then told.
+    reaches as many. With ``monitor`` the arm is watched while it is recorded, as in a run: ``marked`` rows are then
+    told, and whether the arm was ``refused``, in which case it is recorded again with a monitor that only warns.
     ``adapts``: the first adapts to as many movements as in a run, and settles and follows again.
     """
     with tempfile.TemporaryDirectory() as folder:
         db = Path(folder) / "arm.db"
-        with open_arm(name, seed) as opened, Store.for_arm(db, opened.spec) as store:
-            watch = Monitor(opened.spec, mode="warn") if monitor else None
-            collect_enough(partial(_collected, opened, store, seed, watch), store)
-            minutes, transitions = opened.read().time / 60, store.transitions
-            marked = 0 if watch is None else sum(store.marked_rows(1).values())
+        try:
+            recorded = _recorded(name, db, seed, "stop" if monitor else "off")
+        except ArmFailure:
+            db.unlink()
+            recorded = {**_recorded(name, db, seed, "warn"), "refused": 1}
         made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
     servo, reaching = (
         train(made.simulation, begin, seed=seed, method=find_method(method)).agent for method in ("servo", "policy")
@@ -144,15 +147,27 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adap
     with open_arm(name, seed) as opened:
         reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), seed)
     return {
-        "minutes": minutes,
-        "transitions": transitions,
-        "marked": marked,
+        **recorded,
         "history": made.simulation.window.history,
         **_moving_figures(tried),
         "adapted": None if later is None else _moving_figures(later),
         "success": [int(one.success) for one in reached],
         "reward": [float(one.reward) for one in reached],
     }
+
+
+def _recorded(name: str, db: Path, seed: int, mode: Mode) -> dict[str, Any]:
+    """Collect from an arm until more would not help; return how that went."""
+    with open_arm(name, seed) as opened, Store.for_arm(db, opened.spec) as store:
+        watch = Monitor(opened.spec, mode=mode)
+        collect_enough(partial(_collected, opened, store, seed, watch), store)
+        return {
+            "minutes": opened.read().time / 60,
+            "transitions": store.transitions,
+            "marked": sum(store.marked_rows(1).values()),
+            "refused": 0,
+            "findings": [str(one) for one in watch.findings],
+        }
 
 
 def _moving_figures(tried: dict[str, Any]) -> dict[str, Any]:
@@ -184,5 +199,5 @@ def moved_by(agent: AnyAgent, name: str, settings: MoveTrialSettings, seed: int)
         return try_moving(opened, agent.controller(), goals_of(agent), settings, seed=seed).results()
 
 
-def _collected(arm: Arm, store: Store, seed: int, watch: Watch | None, transitions: int) -> None:
+def _collected(arm: Arm, store: Store, seed: int, watch: Watch, transitions: int) -> None:
     collect(arm, store, transitions, seed, watch=watch)

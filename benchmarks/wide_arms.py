@@ -2,7 +2,7 @@
 
 python -m benchmarks wide_arms
 
-Each arm is recorded until more would not help, watched by a monitor that marks rows and does not stop; then the
+Each arm is recorded until more would not help, watched by a monitor that marks rows and may refuse it; then the
 default agent, trained, settles at goals that the arm was seen to hold and follows sinusoids, on arrival and after it
 has adapted to as many movements as in a run, and the agent for reaching reaches goals. What was measured is kept, so
 an interrupted benchmark goes on. Settings come from the environment:
@@ -26,6 +26,7 @@ from pneumarm.arm import open_arm
 QUANTILES = 0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0
 COLUMNS = {
     "minutes": "min",
+    "refused": "refused",
     "marked": "marked",
     "history": "history",
     "settled": "settled",

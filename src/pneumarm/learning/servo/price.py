@@ -3,7 +3,7 @@
     error:   log(1 + (max(|e| - flat, 0) / precision)^2) / 2 + far |e|          e in tolerances
     valves:  change (o (1 - o' same) + o (1 - held) + o' (1 - same)(1 - o))
     slack:   slack max(stiffness - q, 0) / (1 + (e / 5)^2)                      of each muscle, of joints that stay
-    mean:    cocontraction max(1.2 stiffness - m, m - 1.6 stiffness, 0)         of joints that move
+    mean:    cocontraction max(stiffness - m, m - 1.6 stiffness, 0)             of joints that move
 
 where o tells whether a valve opens in a period, held whether it is still open at its end, o' held of the period
 before, and same whether it was the same valve. Counts have no slope, so o and held are smooth stand-ins:
@@ -24,7 +24,7 @@ from pneumarm.networks.tansig import FASTMATH
 _ONE, _ZERO = np.float32(1.0), np.float32(0.0)
 _SOFT, _LONG = np.float32(0.1), np.float32(0.8)
 _NEAR = np.float32(1 / 5)  # of an error in tolerances
-_LOOSE, _TIGHT = np.float32(1.2), np.float32(1.6)  # stiffnesses
+_TIGHT = np.float32(1.6)  # stiffnesses
 
 
 class PriceParameters(NamedTuple):
@@ -79,7 +79,7 @@ def price_of_slack(prices, error, share):  # type: ignore[no-untyped-def]
 def price_of_cocontraction(prices, mean):  # type: ignore[no-untyped-def]
     """Return the price of the ``mean`` pressure of two muscles, as a share of the range, and its slope by that."""
     price, stiffness = np.float32(prices.cocontraction), np.float32(prices.stiffness)
-    short, beyond = _LOOSE * stiffness - mean, mean - _TIGHT * stiffness
+    short, beyond = stiffness - mean, mean - _TIGHT * stiffness
     if short > _ZERO:
         return price * short, -price
     if beyond > _ZERO:

@@ -45,15 +45,15 @@ class ServoSettings(TaskSettings):
     """Price of opening or closing a valve, at 30 Hz; at other rates as much in errors times seconds."""
     stiffness: float = 0.25
     """Share of the range of pressures that both muscles are to keep where a goal stays, as far as its angle allows;
-    somewhat more on average while a reference moves.
+    on average, or somewhat more, while a reference moves.
 
     Pressure in both makes a joint stiff, damps it, and makes a pulse move it less.
     """
     slack: float = 2.0
     """Price of the pressure that a muscle is short of that, by the whole range of pressures."""
     cocontraction: float = 6.0
-    """Price of the mean pressure of a joint's muscles while its reference moves, as far as it is below 1.2 or above
-    1.6 times that share, by the whole range of pressures."""
+    """Price of the mean pressure of a joint's muscles while its reference moves, as far as it is below that share or
+    above 1.6 times of it, by the whole range of pressures."""
     dead: float = 0.15
     """Share of the policy's output around 0 that keeps a valve closed."""
     coarse: float | None = None

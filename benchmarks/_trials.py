@@ -13,6 +13,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from benchmarks import _environment as environment
 from pneumarm.arm import Arm, open_arm
 from pneumarm.control import AgentController, Monitor
 from pneumarm.control.monitor import Mode
@@ -69,6 +70,21 @@ class Rows:
 
     def _key(self, row: dict[str, Any]) -> tuple[Any, ...]:
         return tuple(row[key] for key in self.keys)
+
+
+def names_of(arms: str, seeded: str) -> list[str]:
+    """Return the names of ``arms``: names divided by blanks, or seeds, each with ``seeded`` before it.
+
+    Raises:
+        UnusableInput: there is no arm of such a name.
+
+    """
+    try:
+        return [f"{seeded}{seed}" for seed in environment.seeds_in(arms)]
+    except ValueError:
+        for name in arms.split():
+            open_arm(name).close()
+        return arms.split()
 
 
 def in_processes(

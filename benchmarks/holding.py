@@ -99,7 +99,7 @@ def faults_for(arm: VirtualArm, what: str, begin: float) -> tuple[Fault, ...]:
     )
 
 
-def measured(plan: Plan, name: str, arm: int, seed: int) -> dict[str, Any]:
+def measured(plan: Plan, name: str, arm: str, seed: int) -> dict[str, Any]:
     row: dict[str, Any] = {"controller": name, "arm": arm, "seed": seed, "minutes": plan.minutes}
     for what, seconds in SECONDS.items():
         controller = adapted(plan, arm, seed, what) if name == "agent+" else prepared(plan, name, arm, seed)
@@ -146,10 +146,9 @@ def times_back(passed: NDArray[np.float64], error: NDArray[np.float64], what: st
     return found
 
 
-def adapted(plan: Plan, arm: int, seed: int, what: str) -> str:
+def adapted(plan: Plan, arm: str, seed: int, what: str) -> str:
     """Return the file of the agent after adaptation on the arm with a leak or more payload; nothing else teaches."""
-    file = plan.folder / f"agent-{arm}-{seed}-{plan.minutes:g}"
-    prepared(plan, "agent", arm, seed)
+    file = Path(prepared(plan, "agent", arm, seed))
     if what in ("calm", "pushes"):
         return str(file)
     changed = file.with_name(f"{file.name}-{what}")

@@ -2,13 +2,14 @@
 
 python -m benchmarks moving
 
-Every controller moves every arm to the same goals within 30 degrees, one after the other, and holds each; then it
+Every controller moves every arm to the same goals, one after the other, and holds each; then it
 follows sinusoids, with their future known and not. Settings come from the environment:
 
 PNEUMARM_MOVING_CONTROLLERS  "agent,pid,pid@200,scheduled,pwm,sliding,sliding@200". ``agent`` is the default agent,
                              ``plan`` plans in its simulation; the others are tuned, at 30 Hz or at that behind @,
                              with pulses, or by whole periods where ``-whole`` is added, such as pid-whole@200
-PNEUMARM_MOVING_ARMS         seeds of virtual arms; the ten held-out arms by default
+PNEUMARM_MOVING_ARMS         seeds of virtual arms, the ten held-out arms by default; or names divided by blanks
+PNEUMARM_MOVING_RANGE        30: goals are within so many degrees of the middle
 PNEUMARM_MOVING_SEEDS        "0,1,2": of collecting, training and tuning, and of goals and noise
 PNEUMARM_MOVING_GOALS        500 for each of them
 PNEUMARM_MOVING_MINUTES      20, of arm time to collect or to tune
@@ -18,7 +19,9 @@ PNEUMARM_MOVING_FOLDER       where controllers and rows are kept; a call with th
                              ended. runs/moving by default
 """
 
+import re
 import tempfile
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,10 +30,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _environment as environment
-from benchmarks._trials import HELD_OUT, Rows, collected, fitted, in_processes
+from benchmarks._trials import HELD_OUT, Rows, fitted, in_processes, names_of
 from pneumarm.arm import open_arm
 from pneumarm.classical import TuneSettings, tune
 from pneumarm.control.named import open_tracking
+from pneumarm.experiments import there_and_back
+from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import train
 from pneumarm.moving import Moved, MoveSettings, move, track
 from pneumarm.moving.movement import valve_changes
@@ -38,8 +43,6 @@ from pneumarm.task.reference import counts_of, parse_reference
 from pneumarm.transitions import CollectSettings
 
 CONTROLLERS = "agent,pid,pid@200,scheduled,pwm,sliding,sliding@200"
-RANGE = 30.0
-"""Goals are drawn uniformly within so many degrees of the middle."""
 HOLD = 2.0
 TOLERANCE = 1.0
 FREQUENCIES = (0.1, 0.25, 0.5, 1.0, 2.0)
@@ -54,6 +57,8 @@ class Plan:
     goals: int
     minutes: float
     seconds: float
+    range: float
+    """Goals are drawn uniformly within so many degrees of the middle."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,7 @@ class Asked:
 
     plan: Plan
     controllers: list[str]
-    arms: list[int]
+    arms: list[str]
     seeds: list[int]
     processes: int
 
@@ -75,9 +80,10 @@ def asked_for(controllers: str = CONTROLLERS, seeds: str = "0,1,2") -> Asked:
             environment.whole("PNEUMARM_MOVING_GOALS", 500),
             environment.number("PNEUMARM_MOVING_MINUTES", 20.0),
             environment.number("PNEUMARM_MOVING_SECONDS", 30.0),
+            environment.number("PNEUMARM_MOVING_RANGE", 30.0),
         ),
         environment.words("PNEUMARM_MOVING_CONTROLLERS", controllers),
-        environment.seeds("PNEUMARM_MOVING_ARMS", HELD_OUT),
+        names_of(environment.text("PNEUMARM_MOVING_ARMS", HELD_OUT), "virtual:seed="),
         environment.seeds("PNEUMARM_MOVING_SEEDS", seeds),
         environment.whole("PNEUMARM_MOVING_PROCESSES", 2),
     )
@@ -86,30 +92,32 @@ def asked_for(controllers: str = CONTROLLERS, seeds: str = "0,1,2") -> Asked:
 def measure() -> Iterator[str]:
     wished = asked_for()
     plan, controllers, arms, seeds = wished.plan, wished.controllers, wished.arms, wished.seeds
-    rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds")
+    rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds", "range")
     asked = [(name, arm, seed) for name in controllers for arm in arms for seed in seeds]
-    wanted = [one for one in asked if rows.get(*one, plan.goals, plan.minutes, plan.seconds) is None]
+    wanted = [one for one in asked if rows.get(*one, plan.goals, plan.minutes, plan.seconds, plan.range) is None]
     for row in in_processes(measured, [(plan, *one) for one in wanted], wished.processes):
         rows.add(row)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in controllers}
     for one in asked:
-        row = rows.get(*one, plan.goals, plan.minutes, plan.seconds)
+        row = rows.get(*one, plan.goals, plan.minutes, plan.seconds, plan.range)
         assert row is not None
         found[one[0]].append(row)
     yield from settling_table(found)
     yield from tracking_table(found)
 
 
-def prepared(plan: Plan, name: str, arm: int, seed: int) -> str:
+def prepared(plan: Plan, name: str, arm: str, seed: int) -> str:
     """Return the name, as on the command line, of a controller for an arm; make it where that is not done yet."""
-    file = plan.folder / f"{name}-{arm}-{seed}-{plan.minutes:g}"
+    ending = f"{re.sub(r'[^0-9a-z]+', '-', arm)}-{seed}-{plan.minutes:g}"
+    file = plan.folder / f"{name}-{ending}"
     if name in ("agent", "plan"):
-        simulation = plan.folder / f"simulation-{arm}-{seed}-{plan.minutes:g}"
-        agent = plan.folder / f"agent-{arm}-{seed}-{plan.minutes:g}"
+        simulation = plan.folder / f"simulation-{ending}"
+        agent = plan.folder / f"agent-{ending}"
         if not agent.exists():
             with tempfile.TemporaryDirectory() as place:
                 db = Path(place) / "arm.db"
-                collected(db, arm, seed, minutes=plan.minutes, pulses=CollectSettings().pulses)
+                recipe = Recipe(minutes=plan.minutes, pulses=CollectSettings().pulses)
+                there_and_back.collected(db, arm, seed, recipe)
                 made, begin = fitted(db, seed)
             made.simulation.save(simulation)
             train(made.simulation, begin, None, seed).agent.save(agent)
@@ -122,21 +130,21 @@ def prepared(plan: Plan, name: str, arm: int, seed: int) -> str:
     return str(file)
 
 
-def arm_for(name: str, arm: int) -> str:
+def arm_for(name: str, arm: str) -> str:
     """Return the name of an arm, controlled at the rate of the controller ``name``."""
     _, _, rate = name.partition("@")
-    return f"virtual:seed={arm},rate={rate}" if rate else f"virtual:seed={arm}"
+    return f"{arm},rate={rate}" if rate else arm
 
 
-def measured(plan: Plan, name: str, arm: int, seed: int) -> dict[str, Any]:
+def measured(plan: Plan, name: str, arm: str, seed: int) -> dict[str, Any]:
     """Return the row of one controller on one arm."""
     controller = prepared(plan, name, arm, seed)
-    random = np.random.default_rng((arm, seed))
+    random = np.random.default_rng((zlib.crc32(arm.encode()), seed))
     row: dict[str, Any] = {"controller": name, "arm": arm, "seed": seed}
-    row |= {"goals": plan.goals, "minutes": plan.minutes, "seconds": plan.seconds}
+    row |= {"goals": plan.goals, "minutes": plan.minutes, "seconds": plan.seconds, "range": plan.range}
     with open_arm(arm_for(name, arm), 1000 + seed) as opened:
         mover, spec, _ = open_tracking(controller, opened, TOLERANCE)
-        goals = counts_of(random.uniform(-RANGE, RANGE, (1 + plan.goals, spec.joints)), spec)
+        goals = counts_of(random.uniform(-plan.range, plan.range, (1 + plan.goals, spec.joints)), spec)
         made = move(opened, mover, goals, MoveSettings(hold=HOLD, tries=1, tolerance=TOLERANCE))
         next(made)  # from a vented arm
         row |= settling([*made])

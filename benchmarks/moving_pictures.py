@@ -42,7 +42,7 @@ def measure() -> Iterator[str]:
     plan, arms, seeds = wished.plan, wished.arms, wished.seeds
     names = [name for name in wished.controllers if name != "plan"][: len(INKS)]
     yield str(save(movements({name: made(plan, name, arms[0]) for name in names}), "moving.svg"))
-    rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds")
+    rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds", "range")
     errors = {
         name: [np.mean([row["tracking"][key(AMPLITUDES[0], f, True)] for row in found]) for f in FREQUENCIES]
         for name in names
@@ -58,12 +58,12 @@ def measure() -> Iterator[str]:
     yield str(save(following(errors, [float(np.mean(one)) for one in zip(*bound, strict=True)]), "following.svg"))
 
 
-def rows_of(rows: Rows, name: str, arm: int) -> list[dict[str, Any]]:
+def rows_of(rows: Rows, name: str, arm: str) -> list[dict[str, Any]]:
     """Return the rows of a controller on an arm."""
     return [row for row in rows if (row["controller"], row["arm"]) == (name, arm)]
 
 
-def made(plan: Plan, name: str, arm: int) -> tuple[Course, Course]:
+def made(plan: Plan, name: str, arm: str) -> tuple[Course, Course]:
     """Return the movements to the goals one after the other, and along the sinusoid."""
     with open_arm(arm_for(name, arm), 1) as opened:
         mover, spec, _ = open_tracking(prepared(plan, name, arm, 0), opened, TOLERANCE)
@@ -82,7 +82,7 @@ def made(plan: Plan, name: str, arm: int) -> tuple[Course, Course]:
         )
 
 
-def bound_of(plan: Plan, arm: int) -> list[float]:
+def bound_of(plan: Plan, arm: str) -> list[float]:
     """Return the error [deg] at each frequency that the true physics of an arm allow."""
     agent = load_agent(Path(prepared(plan, "agent", arm, 0)))
     with open_arm(arm_for("agent", arm), 1) as opened:

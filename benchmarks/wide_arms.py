@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _environment as environment
-from benchmarks._trials import Rows, in_processes, on_arrival, seconds_of
-from pneumarm.arm import open_arm
+from benchmarks._trials import Rows, in_processes, names_of, on_arrival, seconds_of
 
 QUANTILES = 0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0
 COLUMNS = {
@@ -44,7 +43,7 @@ COLUMNS = {
 
 
 def measure() -> Iterator[str]:
-    arms = names_of(environment.text("PNEUMARM_WIDE_ARMS", "6000-6009"))
+    arms = names_of(environment.text("PNEUMARM_WIDE_ARMS", "6000-6009"), "virtual:wide,seed=")
     goals = environment.whole("PNEUMARM_WIDE_GOALS", 40)
     processes = environment.whole("PNEUMARM_WIDE_PROCESSES", 2)
     rows = Rows(environment.folder("PNEUMARM_WIDE_FOLDER", "runs/wide_arms") / "rows.jsonl", "arm", "goals")
@@ -58,21 +57,6 @@ def measure() -> Iterator[str]:
     for quantile in QUANTILES:
         among = {name: float(np.quantile([one[name] for one in table], quantile)) for name in COLUMNS}
         yield line(f"quantile {quantile:g}", among)
-
-
-def names_of(arms: str) -> list[str]:
-    """Return names of arms from the setting.
-
-    Raises:
-        UnusableInput: there is no arm of such a name.
-
-    """
-    try:
-        return [f"virtual:wide,seed={seed}" for seed in environment.seeds_in(arms)]
-    except ValueError:
-        for name in arms.split():
-            open_arm(name).close()
-        return arms.split()
 
 
 def arrived(arm: str, goals: int) -> dict[str, Any]:

@@ -10,8 +10,7 @@ import pytest
 from benchmarks import _environment as environment
 from benchmarks import minutes, success
 from benchmarks.__main__ import main
-from benchmarks._trials import Rows, collected, greedy_movements
-from benchmarks.wide_arms import names_of
+from benchmarks._trials import Rows, collected, greedy_movements, names_of
 
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import load_agent
@@ -69,10 +68,10 @@ def test_a_benchmark_that_there_is_not_is_told(capsys: pytest.CaptureFixture[str
 def test_arms_are_read_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PNEUMARM_ARMS", "3,10-12")
     assert environment.seeds("PNEUMARM_ARMS", "1") == [3, 10, 11, 12]
-    assert names_of("7-8") == ["virtual:wide,seed=7", "virtual:wide,seed=8"]
-    assert names_of("virtual:seed=3 virtual") == ["virtual:seed=3", "virtual"]
+    assert names_of("7-8", "virtual:wide,seed=") == ["virtual:wide,seed=7", "virtual:wide,seed=8"]
+    assert names_of("virtual:seed=3 virtual", "virtual:seed=") == ["virtual:seed=3", "virtual"]
     with pytest.raises(UnusableInput, match="arm 'robot'"):
-        names_of("robot")
+        names_of("robot", "virtual:seed=")
 
 
 def test_rows_outlast_a_kill_in_the_middle_of_a_line(tmp_path: Path) -> None:

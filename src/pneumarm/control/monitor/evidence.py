@@ -27,6 +27,7 @@ from pneumarm.control.monitor.expectation import expect_by_simulation
 from pneumarm.control.monitor.identification import (
     EXPERIENCE,
     expect_by_identification,
+    half_a_filling,
     learn,
     note_answers,
     note_valves,
@@ -114,15 +115,17 @@ class Memory(NamedTuple):
     zone: NDArray[np.float64]
     """By part of the range of an angle: residuals in it, and their mean square, shape (joints, ZONES, 2)."""
     same: NDArray[np.float64]
-    """By joint: readings of the same angle in a row; since when [s]; least and most pressures meanwhile; (j, 6)."""
+    """By joint: readings of the same angle in a row; since when [s]; least and most difference of its two pressures
+    meanwhile [counts]; (j, 4)."""
     rail: NDArray[np.float64]
     """By joint: readings on a rail in a row; since when [s]; whether it jumped there, its last movement; (j, 4)."""
     moved: NDArray[np.float64]
     """By joint: readings; the largest change of a movement from one reading to the next, lowest and highest angle
     [counts]; (j, 4)."""
     stayed: NDArray[np.float64]
-    """By joint, away from the farthest angles and at them: readings there; the largest change of a pressure [counts]
-    during which the angle stayed equal for so long that it might have been frozen, and was not; (j, 2, 2)."""
+    """By joint, away from the farthest angles and at them: readings there; how often the angle stayed equal for long,
+    as if it was frozen, and was not; the largest change of the difference of its pressures meanwhile [counts];
+    (j, 2, 3)."""
     expected: NDArray[np.float64]
     """Pressures expected at the newest reading, shape (hypotheses, muscles) [counts]."""
     std: NDArray[np.float64]
@@ -133,6 +136,8 @@ class Memory(NamedTuple):
     """The pressures that those expected follow on, shape (muscles,) [counts]."""
     lowest: NDArray[np.float64]
     """Pressures at which muscles are empty, shape (muscles,) [counts]."""
+    clear: NDArray[np.float64]
+    """Pressures expected of an empty muscle that differ by less tell nothing, shape (muscles,) [counts]."""
     full: NDArray[np.float64]
     """Pressures at which muscles are full, shape (muscles,) [counts]."""
     surprise: NDArray[np.float64]
@@ -156,15 +161,16 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
         disagreement_since=np.zeros((joints, 3)),
         scatter=np.zeros((joints, 3, 3)),
         zone=np.zeros((joints, ZONES, 2)),
-        same=np.zeros((joints, 6)),
+        same=np.zeros((joints, 4)),
         rail=np.zeros((joints, 4)),
         moved=np.tile([0.0, 0.0, np.inf, -np.inf], (joints, 1)),
-        stayed=np.zeros((joints, 2, 2)),
+        stayed=np.zeros((joints, 2, 3)),
         expected=np.zeros((hypotheses, 2 * joints)),
         std=np.zeros(2 * joints),
         doubt=np.zeros((hypotheses, 2 * joints)),
         base=np.zeros(2 * joints),
         lowest=np.zeros(2 * joints),
+        clear=np.zeros(2 * joints),
         full=np.zeros(2 * joints),
         surprise=np.zeros((2 * joints, 4)),
         trust=np.ones(2 * joints),
@@ -183,6 +189,8 @@ def see_by_identification(known, readings, thresholds, memory, time, angle, pres
     if known.clock[0] >= known.look[0]:
         if known.clock[1] >= 0.0:
             expect_by_identification(known, readings, memory, angle, pressure)
+            for m in range(memory.std.shape[0]):
+                memory.clear[m] = min(thresholds.clear, half_a_filling(known, m))
             if known.clock[2] * known.look[1] >= EXPERIENCE:
                 weigh_hypotheses(thresholds, readings, memory, time, pressure)
             if memory.clock[4] == 0.0:
@@ -204,6 +212,7 @@ def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pres
             memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2] * memory.clock[3]
             memory.base[m] = memory.observed[0, m // 2, 2 + m % 2]
             memory.lowest[m], memory.full[m] = predictor.lowest[m], predictor.highest
+            memory.clear[m] = thresholds.clear
         weigh_hypotheses(thresholds, readings, memory, time, pressure)
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
@@ -246,7 +255,7 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             read, lowest = pressure[m // 2, m % 2], memory.lowest[m]
             least = thresholds.telling * memory.std[m]
             if max(memory.base[m], read) - lowest < thresholds.empty:
-                least = max(least, thresholds.clear)
+                least = max(least, memory.clear[m])
             fullness = (memory.base[m] - lowest) / (memory.full[m] - lowest)
             full = fullness > thresholds.full and memory.command[0, m] > 0.0
             telling = abs(difference) > least and not full
@@ -306,6 +315,7 @@ def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: 
     """Count readings on a rail, and equal readings in a row, with what the pressures did meanwhile."""
     for j in range(angle.shape[0]):
         before, rail, same, moved = memory.observed[0, j, 0], memory.rail[j], memory.same[j], memory.moved[j]
+        turning = pressure[j, 0] - pressure[j, 1]
         fresh = memory.clock[1] < 1.0
         if not (angle[j] <= thresholds.low or angle[j] >= thresholds.high):
             movement = 0.0 if fresh else angle[j] - before
@@ -320,15 +330,12 @@ def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: 
         if same[0] == 0.0 or angle[j] != before or rail[0] > 0.0:
             if same[0] >= 0.5 * thresholds.frozen and rail[0] == 0.0:
                 stayed = memory.stayed[j, at_edge(thresholds, moved, before)]
-                stayed[1] = max(stayed[1], same[4] - same[2], same[5] - same[3])
-            same[0], same[1] = 1.0, time
-            same[2], same[4] = pressure[j, 0], pressure[j, 0]
-            same[3], same[5] = pressure[j, 1], pressure[j, 1]
+                stayed[1] += 1.0
+                stayed[2] = max(stayed[2], same[3] - same[2])
+            same[0], same[1], same[2], same[3] = 1.0, time, turning, turning
         else:
             same[0] += 1.0
-            for side in range(2):
-                same[2 + side] = min(same[2 + side], pressure[j, side])
-                same[4 + side] = max(same[4 + side], pressure[j, side])
+            same[2], same[3] = min(same[2], turning), max(same[3], turning)
         moved[0] += 1.0
         if rail[0] == 0.0:
             moved[2], moved[3] = min(moved[2], angle[j]), max(moved[3], angle[j])

@@ -50,6 +50,7 @@ SIDES, SPEEDS, LEVELS = 3, 3, 4
 """Classes of errors: closed, filling, emptying; slow, usual, fast; empty, low, high, full."""
 _SLOW, _FAST = 0.5, 2.0
 _EMPTY, _LOW, _FULL = 0.12, 0.4, 0.7
+_HIGHEST_EMPTY = 0.3  # highest pressures; no sensor says so much of an empty muscle
 
 
 class Identified(NamedTuple):
@@ -164,14 +165,13 @@ def shift_slots(known):  # type: ignore[no-untyped-def]
 def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-def]
     """Write the features of muscle ``m`` under hypothesis ``h`` into ``x``; ``angle`` (joints,) is what is read now.
 
-    ``full`` is the pressure at which inlets let no more air in [highest pressures]. It and the pressure of the muscle
-    count from the lowest that was read, since the sensors of an arm may say anything where there is only the air of
-    the room.
+    ``full`` is the pressure at which inlets let no more air in [highest pressures].
     """
-    source, joint, level = readings.source[h, m], m // 2, known.last[m, 0] - known.span[m, 0]
+    source, joint, level = readings.source[h, m], m // 2, known.last[m, 0]
+    filled = level - lowest_level(known, m)
     supply = 1.0
     if readings.supply[h] < math.inf:
-        supply = reduced(readings.supply[h], max(level, 0.0) / full)
+        supply = reduced(readings.supply[h], filled / (full - lowest_level(known, m)))
     taken, given, others = 0.0, 0.0, 0.0
     for slot in range(_SLOTS):
         told_in, told_out = known.open[source, slot, 0], known.open[source, slot, 1]
@@ -187,7 +187,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     place = (angle[joint] - known.look[4]) / known.look[3]
     turned = 10.0 * (angle[joint] - known.angle[joint]) / known.look[3]
     x[_CURVES] = taken * level * level
-    x[_CURVES + 1] = given * math.sqrt(max(level, 0.0))
+    x[_CURVES + 1] = given * math.sqrt(filled)
     x[_CURVES + 2] = taken * others
     x[_CURVES + 3] = taken * place
     x[_CURVES + 4] = given * place
@@ -198,7 +198,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     x[_CURVES + 9] = known.last[m, 1]
     x[_CURVES + 10] = known.last[m, 2]
     x[_CURVES + 11] = taken * level * level * level
-    empty = max(0.0, 1.0 - max(level, 0.0) / _EMPTY)
+    empty = max(0.0, 1.0 - filled / _EMPTY)
     x[_CURVES + 12] = turned * place
     x[_CURVES + 13] = turned * level * place
     x[_CURVES + 14] = taken * level * place
@@ -243,14 +243,24 @@ def class_of(known, m, angle):  # type: ignore[no-untyped-def]
     turned = abs(angle[joint] - known.angle[joint]) / known.look[3]
     usual = known.turning[joint]
     speed = 0 if turned < _SLOW * usual else 1 if turned < _FAST * usual else 2
-    full = (known.last[m, 0] - known.span[m, 0]) / highest_level(known, m)
+    low = lowest_level(known, m)
+    full = (known.last[m, 0] - low) / (highest_level(known, m) - low)
     return side, speed, 0 if full < _EMPTY else 1 if full < _LOW else 2 if full < _FULL else 3
 
 
 @part
+def lowest_level(known, m):  # type: ignore[no-untyped-def]
+    """Return what is read of muscle ``m`` when it is empty, as far as is known [highest pressures].
+
+    The sensors of an arm may say anything where there is only the air of the room.
+    """
+    return min(known.span[m, 0], _HIGHEST_EMPTY)
+
+
+@part
 def highest_level(known, m):  # type: ignore[no-untyped-def]
-    """Return the highest pressure of muscle ``m`` that was read, from the lowest on [highest pressures]."""
-    return max(known.span[m, 1] - known.span[m, 0], 0.1)
+    """Return the highest pressure of muscle ``m`` that was read [highest pressures]."""
+    return max(known.span[m, 1], lowest_level(known, m) + 0.1)
 
 
 @part
@@ -263,15 +273,21 @@ def filling(known, m, level):  # type: ignore[no-untyped-def]
 
 
 @part
+def half_a_filling(known, m):  # type: ignore[no-untyped-def]
+    """Return half of what an open inlet fills into muscle ``m`` in a look when it is empty [counts]."""
+    return 0.5 * max(filling(known, m, lowest_level(known, m)), 0.0) * known.look[2]
+
+
+@part
 def level_of_supply(known, m):  # type: ignore[no-untyped-def]
-    """Return at which pressure, from the lowest on, the inlet of ``m`` lets no more air in [highest pressures]."""
-    top = highest_level(known, m)
-    half, most = filling(known, m, 0.5 * top), filling(known, m, top)
+    """Return at which pressure the inlet of muscle ``m`` lets no more air in, about [highest pressures]."""
+    low, top = lowest_level(known, m), highest_level(known, m)
+    half, most = filling(known, m, 0.5 * (low + top)), filling(known, m, top)
     if most < _SLOWED * half:
         return top
     if most >= half:
         return max(_FARTHEST, top)
-    return min(top + 0.5 * top * most / (half - most), max(_FARTHEST, top))
+    return min(top + 0.5 * (top - low) * most / (half - most), max(_FARTHEST, top))
 
 
 @part
@@ -291,8 +307,8 @@ def expect_by_identification(known, readings, memory, angle, pressure):  # type:
     for m in range(muscles):
         read = pressure[m // 2, m % 2] / highest
         full = level_of_supply(known, m)
-        memory.lowest[m] = known.span[m, 0] * highest
-        memory.full[m] = memory.lowest[m] + full * highest
+        memory.lowest[m] = lowest_level(known, m) * highest
+        memory.full[m] = full * highest
         memory.base[m] = known.last[m, 0] * highest
         memory.trust[m] = independence(known, m)
         features(known, readings, 0, m, angle, full, known.x[m])
@@ -367,6 +383,17 @@ def note_answers(known, pressure):  # type: ignore[no-untyped-def]
 
 
 @part
+def doubt_what_counts_from(known, m, fall):  # type: ignore[no-untyped-def]
+    """Trust less what was learned of muscle ``m`` near empty: its lowest pressure is lower by ``fall`` than thought.
+
+    Features that count from there now say something else of the same pressure; their weights are to be learned anew.
+    """
+    part = min(fall / _EMPTY, 1.0) * _BY_CHANGE
+    for i in (_CURVES + 1, _CURVES + 16, _CURVES + 17, _CURVES + 18):
+        known.covariance[m, i, i] += part * part
+
+
+@part
 def remember_look(known, angle, pressure, fresh):  # type: ignore[no-untyped-def]
     """Remember what is read at a look; ``fresh`` says that a sequence begins with it."""
     for m in range(known.last.shape[0]):
@@ -374,8 +401,10 @@ def remember_look(known, angle, pressure, fresh):  # type: ignore[no-untyped-def
         known.last[m, 2] = 0.0 if fresh else known.last[m, 1]
         known.last[m, 1] = 0.0 if fresh else level - known.last[m, 0]
         known.last[m, 0] = level
+        before = lowest_level(known, m)
         known.span[m, 0] = min(known.span[m, 0], level)
         known.span[m, 1] = max(known.span[m, 1], level)
+        doubt_what_counts_from(known, m, before - lowest_level(known, m))
     for j in range(angle.shape[0]):
         if not fresh:
             turned = abs(angle[j] - known.angle[j]) / known.look[3]

@@ -37,7 +37,7 @@ from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
 _LONG = 1 / 3  # s; equal angles for less show nothing
-_BEYOND = 2.5  # times the largest change at an equal angle; a larger one shows something
+_RARE = math.log(1e6)  # of so many equal angles of a sound arm, about one is called frozen
 _FEWEST = 10  # residuals of which a mean square is taken seriously
 
 
@@ -273,26 +273,28 @@ class Monitor:
             count, since, jumped, _ = memory.rail[j]
             if jumped and count >= settings.rail:
                 found["dead-potentiometer", "its reading jumped onto a rail and stays there", j + 1, None] = since
-            count, since, *pressures = memory.same[j]
-            change = max(pressures[2] - pressures[0], pressures[3] - pressures[1])
-            if count >= self._thresholds.frozen and change >= self._acted(j, count):
+            count, since, least, most = memory.same[j]
+            if count >= self._thresholds.frozen and most - least >= self._acted(j, count):
                 found["frozen-potentiometer", "its reading stays the same while valves act", j + 1, None] = since
         return found
 
     def _acted(self, j: int, count: float) -> float:
-        """Return the change of a pressure [counts] during which the angle of joint ``j`` never stays the same.
+        """Return by how much the pressures of joint ``j`` never change apart [counts] while its angle stays the same.
 
         ``count`` equal readings are not asked: before them this arm may have shown the same angle during large
-        changes, with a sensor of few bits, dry friction, or at an end stop.
+        changes, with a sensor of few bits, dry friction, or at an end stop. Of changes whose sizes follow an
+        exponential law the largest of n is about log n times their mean, so one that is k times that is as rare as
+        n to the power of -k.
         """
         memory, limits = self._memory, self._thresholds
         readings, _, low, high = memory.moved[j]
         angle = memory.observed[0, j, 0]
         edge = min(angle - low, high - angle) < limits.edge
-        there, most = memory.stayed[j, int(edge)]
+        there, times, most = memory.stayed[j, int(edge)]
         if readings < limits.experience or there - count < limits.experience / 4:
             return math.inf
-        return max(limits.acted, _BEYOND * float(most))
+        beyond = _RARE / math.log1p(times) if times else 0.0
+        return max(limits.acted, beyond * float(most))
 
     def _judge_valves(self) -> dict[Key, float]:
         """What was found stays until nothing speaks for it, or is renamed where another fault explains more."""

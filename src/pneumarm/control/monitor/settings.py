@@ -72,8 +72,8 @@ class MonitorSettings(Settings):
     """Equal angles in a row, while the pressures change, that show a potentiometer which is frozen; more of them
     where they take less than a third of a second."""
     acted: float = 0.10
-    """Change of a pressure that shows that valves act, as a part of the highest; more on an arm whose angle has
-    stayed the same during larger ones."""
+    """Change of the difference of a joint's pressures that shows that valves act, as a part of the highest; more on
+    an arm whose angle has stayed the same during larger ones."""
     edge: float = 0.02
     """An angle that is nearer to the farthest ones seen, as a part of its range, may be at an end stop."""
 

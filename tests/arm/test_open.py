@@ -1,5 +1,6 @@
 import itertools
 
+import numpy as np
 import pytest
 
 from pneumarm.arm import open_arm
@@ -31,6 +32,9 @@ def test_virtual_arms_by_name():
     assert wide.parameters == draw_wide(7)
     assert (wide.spec.name, wide.spec.period) == ("virtual:wide,seed=7", draw_wide(7).period)
     assert open_arm("virtual:seed=7,rate=50,wide").spec.period == 0.02
+    whole = open_arm("virtual:seed=7,pulses=off")
+    assert whole.parameters == open_arm("virtual:seed=7").parameters
+    assert whole.spec.possible(np.array([[0.6, -0.2]])).tolist() == [[1.0, 0.0]]
     assert open_arm("virtual", seed=1).get_state() != open_arm("virtual", seed=2).get_state()
 
 

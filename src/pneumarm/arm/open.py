@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 _FORMS = (
     "virtual, virtual:seed=7, virtual:wide,seed=7, virtual:preset=A, virtual:seed=7,rate=200, "
     "virtual:joints=2,seed=7,coupling=0.5, virtual:seed=7,sensors=velocity+temperature, "
-    "virtual:seed=7,pressure_sensors=off, virtual:seed=7,muscles=1, "
+    "virtual:seed=7,pressure_sensors=off, virtual:seed=7,pulses=off, virtual:seed=7,muscles=1, "
     "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
     "emulated:ARM or python:module:callable (python:module:callable,every=2), each with ,spec=arm.toml if you like"
 )
 _OPTIONS = (
-    r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|muscles|faults|every|spec)=|wide(?:,|$)"
+    r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|pulses|muscles|faults|every|spec)=|"
+    r"wide(?:,|$)"
 )
 _OPTION = re.compile(rf"[:,](?={_OPTIONS})")
 """Stands before an option; files may have commas in their names."""
@@ -38,7 +39,8 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     or C one of three readings of the thesis (:func:`pneumarm.arm.virtual.preset_parameters`),
     ``virtual:seed=N,sensors=velocity+acceleration+temperature`` one with further sensors, any of these
     (:mod:`pneumarm.arm.virtual.further`), ``virtual:seed=N,pressure_sensors=off`` one that reads angles alone, its
-    supply turned down to what its muscles bear, ``virtual:seed=N,muscles=1`` one with a spring in place of muscle 2
+    supply turned down to what its muscles bear, ``virtual:seed=N,pulses=off`` one whose valves stay as they are for
+    whole control periods, ``virtual:seed=N,muscles=1`` one with a spring in place of muscle 2
     (:mod:`pneumarm.arm.virtual.spring`), ``virtual:seed=N,faults=PLAN.toml`` one with faults
     (:mod:`pneumarm.arm.virtual.faults`), ``virtual:seed=N,rate=200`` or ``period=0.005`` one that is controlled at
     200 Hz, not at the rate that it is made for, ``virtual:joints=2,seed=N`` a chain of several joints, up to 4, and
@@ -160,6 +162,7 @@ def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | N
         velocity_sensor=velocity,
         sensors=sensors,
         pressure_sensors=_on(name, options, "pressure_sensors", spec is None or spec.pressure_sensors),
+        pulses=_on(name, options, "pulses", spec is None or spec.pulses),
         muscles=_muscles(name, options, 2 if spec is None else spec.muscles),
     )
 

@@ -57,6 +57,7 @@ class VirtualArm(Arm):
         velocity_sensor: whether it also reads the velocity, from faster samples of its angle.
         sensors: accelerometers and thermometers that it has besides; see :mod:`pneumarm.arm.virtual.further`.
         pressure_sensors: whether it reads pressures; where not, its supply is turned down to what its muscles bear.
+        pulses: whether its valves may be open for a part of a control period.
         muscles: of each joint; with 1 a spring pulls in place of muscle 2 (:mod:`pneumarm.arm.virtual.spring`).
 
     Raises:
@@ -75,6 +76,7 @@ class VirtualArm(Arm):
         velocity_sensor: bool = False,
         sensors: Sequence[Sensor] = (),
         pressure_sensors: bool = True,
+        pulses: bool = True,
         muscles: int = 2,
     ) -> None:
         self.parameters = parameters if parameters is not None else ArmParameters()
@@ -99,6 +101,7 @@ class VirtualArm(Arm):
             sensors=tuple(sensors),
             pressure_sensors=pressure_sensors,
             safe_supply=not pressure_sensors,
+            pulses=pulses,
         )
         if seed < 0:
             raise UnusableInput(f"the seed of a virtual arm must be 0 or more, got {seed}")
@@ -145,6 +148,7 @@ class VirtualArm(Arm):
             velocity_sensor=spec.velocity_sensor,
             sensors=spec.sensors,
             pressure_sensors=spec.pressure_sensors,
+            pulses=spec.pulses,
             muscles=spec.muscles,
         )
 

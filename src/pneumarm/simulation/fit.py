@@ -31,6 +31,7 @@ from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.history import USUAL, chosen_history
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
+from pneumarm.simulation.spread import spread_over_periods
 from pneumarm.transitions.choice import share_held_out
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
@@ -191,18 +192,20 @@ def fit(
     y = change / spread
     outputs = [window.input_names()[place].removesuffix("[k]") for place in places]
     linear = least_squares(x, y)
-    varied = np.ptp(x, axis=0) > 0
+    # The targets are in units of the change's spread, the simulation's are in those of the observation.
+    factor = spread / scaling.observation_scale[places]
     fits: list[Fit] = []
-    fitted = [linear]
-    if settings.approximator == "network":
-        targets = [y] if settings.one_network else [y[:, [i]] for i in range(len(places))]
-        chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * spec.joints, settings.seed)
-        fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, spec.joints, progress)
-        fitted = [_without(one.network, ~varied) for one in fits]
-    # The targets were in units of the change's spread, the simulation's are in those of the observation.
-    factors = np.split(spread / scaling.observation_scale[places], len(fitted))
-    networks = tuple(_rescaled(network, factor) for network, factor in zip(fitted, factors, strict=True))
-    simulation = replace(simulation, networks=networks)
+    if settings.approximator == "least-squares":
+        simulation = replace(simulation, networks=(_rescaled(linear, factor),))
+    else:
+        rounds = 2 if valves and not spec.pulses else 1
+        simulation, fits = _fitted(simulation, x, y, factor, settings, _part_of(progress, 0, rounds))
+        if rounds > 1:
+            pulses = spread_over_periods(simulation, training, settings.seed)
+            more = pulses.target[:, places].astype(np.float64) - pulses.observation[:, places]
+            x_both = np.concatenate([x, scaling.inputs(pulses.inputs, window).astype(np.float32)])
+            y_both = np.concatenate([y, more / spread])
+            simulation, fits = _fitted(simulation, x_both, y_both, factor, settings, _part_of(progress, 1, rounds))
     seconds = time.perf_counter() - began
     errors = statistics(simulation, held_out)
     return FitResult(
@@ -217,6 +220,37 @@ def fit(
         rows=len(x),
         seconds=seconds,
     )
+
+
+def _part_of(progress: Callable[[int, int], None] | None, number: int, of: int) -> Callable[[int, int], None]:
+    """Return what reports the progress of one of several rounds of fits."""
+
+    def report(done: int, total: int) -> None:
+        if progress is not None:
+            progress(number * total + done, of * total)
+
+    return report
+
+
+def _fitted(
+    simulation: Simulation,
+    x: NDArray[np.float32],
+    y: NDArray[np.float64],
+    factor: NDArray[np.float64],
+    settings: FitSettings,
+    progress: Callable[[int, int], None],
+) -> tuple[Simulation, list[Fit]]:
+    """Return ``simulation`` with networks fitted to ``x`` and ``y``, whose units are ``factor`` of its own."""
+    joints, targets = (
+        simulation.window.joints,
+        [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])],
+    )
+    chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * joints, settings.seed)
+    fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress)
+    still = np.ptp(x, axis=0) == 0
+    factors = np.split(factor, len(fits))
+    networks = [_rescaled(_without(one.network, still), scale) for one, scale in zip(fits, factors, strict=True)]
+    return replace(simulation, networks=tuple(networks)), fits
 
 
 def _unfitted(
@@ -256,7 +290,7 @@ def _fit_networks(
     targets: list[NDArray[np.float64]],
     settings: FitSettings,
     joints: int,
-    progress: Callable[[int, int], None] | None,
+    progress: Callable[[int, int], None],
 ) -> list[Fit]:
     """Fit a network to each of ``targets``, on as many threads as there are cores: the work is in NumPy."""
     solver = LevenbergMarquardt(epochs=settings.epochs, tolerance=settings.tolerance, decay=settings.decay)
@@ -266,8 +300,7 @@ def _fit_networks(
     def one(number: int) -> Fit:
         def report(epoch: int, _: float) -> None:
             done[number] = epoch
-            if progress is not None:
-                progress(sum(done), settings.epochs * len(targets))
+            progress(sum(done), settings.epochs * len(targets))
 
         y = targets[number]
         start = nguyen_widrow(x.shape[1], settings.hidden * joints, y.shape[1], int(seeds[number]))

@@ -44,6 +44,8 @@ _LARGEST_EPOCH = 3e10
 """Rows times weights squared; more than 500,000 rows of one joint, and 48,000 of two."""
 _ROWS_A_WEIGHT = 20
 """Rows that a network is fitted to at least, for each of its weights, where there are so many."""
+_AGAIN = 0.25
+"""Share of the epochs in which the simulation of an arm without pulses is taught what they do on average."""
 _ROWS = 7  # stream of random numbers
 _MARGIN = 0.05
 """Predicted pressures may exceed the recorded ones by this part of their range."""
@@ -198,14 +200,17 @@ def fit(
     if settings.approximator == "least-squares":
         simulation = replace(simulation, networks=(_rescaled(linear, factor),))
     else:
-        rounds = 2 if valves and not spec.pulses else 1
-        simulation, fits = _fitted(simulation, x, y, factor, settings, _part_of(progress, 0, rounds))
-        if rounds > 1:
+        again = max(1, round(_AGAIN * settings.epochs)) if valves and not spec.pulses else 0
+        networks = 1 if settings.one_network else len(places)
+        first, total = networks * settings.epochs, networks * (settings.epochs + again)
+        simulation, fits = _fitted(simulation, x, y, factor, settings, _part_of(progress, 0, total))
+        if again:
             pulses = spread_over_periods(simulation, training, settings.seed)
             more = pulses.target[:, places].astype(np.float64) - pulses.observation[:, places]
             x_both = np.concatenate([x, scaling.inputs(pulses.inputs, window).astype(np.float32)])
-            y_both = np.concatenate([y, more / spread])
-            simulation, fits = _fitted(simulation, x_both, y_both, factor, settings, _part_of(progress, 1, rounds))
+            y_both, shorter = np.concatenate([y, more / spread]), replace(settings, epochs=again)
+            report = _part_of(progress, first, total)
+            simulation, fits = _fitted(simulation, x_both, y_both, factor, shorter, report, fits)
     seconds = time.perf_counter() - began
     errors = statistics(simulation, held_out)
     return FitResult(
@@ -222,12 +227,12 @@ def fit(
     )
 
 
-def _part_of(progress: Callable[[int, int], None] | None, number: int, of: int) -> Callable[[int, int], None]:
-    """Return what reports the progress of one of several rounds of fits."""
+def _part_of(progress: Callable[[int, int], None] | None, before: int, total: int) -> Callable[[int, int], None]:
+    """Return what reports the progress of one of several rounds of fits, which ``before`` epochs come before."""
 
-    def report(done: int, total: int) -> None:
+    def report(done: int, _: int) -> None:
         if progress is not None:
-            progress(number * total + done, of * total)
+            progress(before + done, total)
 
     return report
 
@@ -239,14 +244,18 @@ def _fitted(
     factor: NDArray[np.float64],
     settings: FitSettings,
     progress: Callable[[int, int], None],
+    before: Sequence[Fit] = (),
 ) -> tuple[Simulation, list[Fit]]:
-    """Return ``simulation`` with networks fitted to ``x`` and ``y``, whose units are ``factor`` of its own."""
+    """Return ``simulation`` with networks fitted to ``x`` and ``y``, whose units are ``factor`` of its own.
+
+    They begin as they were ``before``, or at random.
+    """
     joints, targets = (
         simulation.window.joints,
         [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])],
     )
     chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * joints, settings.seed)
-    fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress)
+    fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0
     factors = np.split(factor, len(fits))
     networks = [_rescaled(_without(one.network, still), scale) for one, scale in zip(fits, factors, strict=True)]
@@ -291,6 +300,7 @@ def _fit_networks(
     settings: FitSettings,
     joints: int,
     progress: Callable[[int, int], None],
+    before: Sequence[Fit],
 ) -> list[Fit]:
     """Fit a network to each of ``targets``, on as many threads as there are cores: the work is in NumPy."""
     solver = LevenbergMarquardt(epochs=settings.epochs, tolerance=settings.tolerance, decay=settings.decay)
@@ -303,7 +313,10 @@ def _fit_networks(
             progress(sum(done), settings.epochs * len(targets))
 
         y = targets[number]
-        start = nguyen_widrow(x.shape[1], settings.hidden * joints, y.shape[1], int(seeds[number]))
+        if before:
+            start = before[number].network
+        else:
+            start = nguyen_widrow(x.shape[1], settings.hidden * joints, y.shape[1], int(seeds[number]))
         if not y.any():  # what never changed needs no fit
             start = replace(start, output_weights=np.zeros_like(start.output_weights))
             return Fit(start, np.zeros(1), 0, converged=True)

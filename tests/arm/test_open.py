@@ -85,6 +85,8 @@ def test_options_come_in_any_order(tmp_path):
     [
         ("virtual:seed=7,seed=8", "an option is given twice"),
         ("virtual:seed=7,preset=A", "expected virtual"),
+        ("virtual:seed=7,pulses=maybe", "pulses is on or off, not 'maybe'"),
+        ("python:tests.plain_arms:linear,pulses=off", "only a virtual arm has pulses;"),
         ("virtual:seed=7,sensors=", "expected further sensors of velocity"),
         ("serial:/dev/nowhere,sensors=velocity", "only a virtual arm has sensors;"),
         ("simulation:FILE,faults=plan.toml,seed=3", "only a virtual arm has faults, seed;"),

@@ -32,9 +32,8 @@ def test_a_record_without_pulses_is_learned_from_as_it_is(made):
 
 def error_of(simulation, asked):
     """Return the errors (observation_size,) as a share of what changes."""
-    return (simulation.predict(asked.inputs) - asked.target).std(axis=0) / (asked.target - asked.observation).std(
-        axis=0
-    )
+    error, change = simulation.predict(asked.inputs) - asked.target, asked.target - asked.observation
+    return error.std(axis=0) / change.std(axis=0)
 
 
 def test_on_average_pulses_do_what_whole_periods_do_as_often(made, store):

@@ -117,7 +117,8 @@ class FitResult(NamedTuple):
     """What each curve, and each column of the importance, is a change of."""
     curves: list[NDArray[np.float64]]
     """Mean squared error before and after every epoch in units of the change's standard deviation squared, one
-    curve a network; none for least squares."""
+    curve a network; none for least squares. Of an arm without pulses those of the second round of fits, to what is
+    recorded and to what pulses do on average (:mod:`pneumarm.simulation.spread`)."""
     converged: list[bool]
     """Whether each network's fit ended before its epochs were used up."""
     rows: int
@@ -250,10 +251,8 @@ def _fitted(
 
     They begin as they were ``before``, or at random.
     """
-    joints, targets = (
-        simulation.window.joints,
-        [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])],
-    )
+    joints = simulation.window.joints
+    targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
     chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * joints, settings.seed)
     fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0

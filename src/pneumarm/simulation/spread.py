@@ -20,7 +20,8 @@ _STREAM = 8  # of random numbers
 def spread_over_periods(simulation: Simulation, recorded: Transitions, seed: int) -> Transitions:
     """Return ``recorded`` transitions with pulses for commands, past ones too, and what they do on average.
 
-    That is said by a ``simulation`` fitted to whole periods, asked for nothing else.
+    That is said by a ``simulation`` fitted to whole periods, asked for nothing else. There are as many transitions as
+    were recorded, in sensor units as these; pulses are shares of the control period, -1 to 1.
     """
     window, random = simulation.window, np.random.default_rng([seed, _STREAM])
     first = window.input_size - window.history * window.command_size  # past commands and the newest

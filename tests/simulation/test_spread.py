@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.learning import train
+from pneumarm.learning.servo import ServoSettings
+from pneumarm.moving import MoveSettings, move
 from pneumarm.simulation import FitSettings, fit, fit_store
 from pneumarm.simulation.spread import spread_over_periods
+from pneumarm.task import begin_states
+from pneumarm.task.reference import counts_of
 from pneumarm.transitions import CollectSettings, Store, collect
 
 
@@ -50,3 +55,16 @@ def test_on_average_pulses_do_what_whole_periods_do_as_often(made, store):
     assert (error_of(made.simulation, asked) < 0.3).all()
     assert (error_of(untaught, asked)[pressures] > 2 * error_of(made.simulation, asked)[pressures]).any()
     assert (error_of(made.simulation, known) < 1.2 * error_of(untaught, known)).all()
+
+
+def test_a_servo_of_an_arm_without_pulses_arrives_and_stays(made, store):
+    simulation = made.simulation
+    begin = begin_states(store.blocks(), simulation.window, simulation.scaling, store.spec)
+    agent = train(simulation, begin, ServoSettings(agents=1, updates=400)).agent
+    arm = VirtualArm(seed=4, pulses=False)
+    goals = counts_of(np.random.default_rng(4).uniform(-20, 20, (12, 1)), arm.spec)
+    with arm:
+        made_moves = move(arm, agent.controller(), goals, MoveSettings(hold=2.0, tries=1))
+        rest = np.array([one.rest_error.max() for one in made_moves])
+    assert np.median(rest) < 2.2
+    assert np.mean(rest < 4.0) > 0.8

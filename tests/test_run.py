@@ -61,6 +61,7 @@ def test_the_bound_is_told_for_the_movements_of_the_tests(small_run: Path) -> No
         assert bound[planner]["episodes"] == SMALL.bound_episodes
         lost = bound["distance"]["after"][planner]
         assert lost["reward"] == pytest.approx(bound[planner]["reward"] - paid)
+        assert lost["planned"] - lost["reward"] == pytest.approx(paid)
         assert lost["reward"] > 0  # 30 movements of learning make no planner
     assert "planning with the arm's true physics" in (small_run / "report.html").read_text().replace("&#39;", "'")
 

@@ -72,7 +72,12 @@ def test_command(capsys: pytest.CaptureFixture[str], small_run: Path) -> None:
 def test_the_distance_is_taken_movement_by_movement(planned) -> None:  # type: ignore[no-untyped-def]
     best = planned["open_loop"].made.reward
     lost = np.array([0.0, 3.0, 1.0, 8.0, 0.0])
-    assert planned["open_loop"].distance(best[:5] - lost) == {"episodes": 5, "reward": 2.4, "interval": None}
+    assert planned["open_loop"].distance(best[:5] - lost) == {
+        "episodes": 5,
+        "planned": pytest.approx(best[:5].mean()),
+        "reward": 2.4,
+        "interval": None,
+    }
     more = planned["open_loop"].distance(np.concatenate([best - 1.0, np.zeros(100)]))
     assert (more["episodes"], more["reward"]) == (8, pytest.approx(1.0))
     with pytest.raises(UnusableInput, match="at least 1"):

@@ -171,15 +171,19 @@ def test_what_is_estimated_is_told_from_what_is_measured():
 
 
 @pytest.mark.parametrize(
-    ("closed_loop", "told"), [(39.9, "is 40.20; the controller is 2.10"), (45.0, "is 45.00; the controller is 1.80")]
+    ("closed_loop", "told"),
+    [
+        (39.9, "earns 38.10, planning with the arm's true physics 40.20"),
+        (45.0, "earns 43.20, planning with the arm's true physics 45.00"),
+    ],
 )
 def test_the_summary_names_the_better_of_the_two_bounds(closed_loop, told):
     results = builders.results()
-    results["bound"]["closed_loop"] = builders.tested(closed_loop)
+    results["bound"]["distance"]["after"]["closed_loop"] = builders.below(closed_loop, 1.8)
     page = Page(
         run_page(RunData(ArmSpec(), results, test=movements(0), transfer=builders.transfer(counts=(3, 3, 3))))
     )
-    assert f"true physics finds there {told} below it" in " ".join(page.text)
+    assert f"In the first 150 movements after adaptation the controller {told}." in " ".join(page.text)
 
 
 def test_comparison_of_an_unfinished_run_leaves_out_what_is_not_known():
@@ -316,8 +320,8 @@ def test_success_may_be_written_as_a_word(tmp_path):
 
 def test_the_distance_to_the_bound_is_told_or_why_it_is_not(html):
     text = " ".join(Page(html).text).replace("\u00a0", " ")
-    assert "planning with the arm's true physics finds there is 40.20; the controller is 2.10 below it" in text
-    assert "1.80 (1.30 to 2.30)" in text
+    assert "the controller earns 38.10, planning with the arm's true physics 40.20." in text
+    assert "1.80 (1.30 to 2.30) of 39.90" in text
     assert "37.40 (37.03 to 37.47)" in text  # looking ahead
     unknown = {"bound": {"missing": "mine is no virtual arm: its true physics is not known"}}
     told = overview(RunData(ArmSpec(), unknown))

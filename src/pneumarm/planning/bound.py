@@ -65,6 +65,8 @@ class Planned:
     def distance(self, reward: NDArray[np.float64]) -> dict[str, Any]:
         """Return how far another controller stays below, by its ``reward`` (n,) in the first of the same movements.
 
+        ``reward`` is that distance, ``planned`` what the planner earns in those movements.
+
         The movements are paired, so that easy goals and hard ones do not blur the difference. Their goals are the
         same, and so are the begin states but for the arm's noise: 2.5 counts on arm 1 of the distribution.
 
@@ -79,6 +81,7 @@ class Planned:
         estimate = mean_estimate(lost)
         return {
             "episodes": n,
+            "planned": float(self.made.reward[:n].mean()),
             "reward": estimate.mean,
             "interval": [estimate.low, estimate.high] if n >= FEWEST else None,
         }

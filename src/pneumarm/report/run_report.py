@@ -175,12 +175,13 @@ def _summary(run: RunData) -> list[str]:
             text.append("On the arm it reaches " + " and ".join(parts) + ".")
     bound = run.results.get("bound", {})
     if "after" in bound.get("distance", {}):
-        best = max(bound["distance"]["after"], key=lambda plans: float(bound[plans]["reward"]))
-        below = bound["distance"]["after"][best]["reward"]
-        found = written(bound[best]["reward"], "{:.2f}")
+        best = max(bound["distance"]["after"], key=lambda plans: float(bound["distance"]["after"][plans]["planned"]))
+        distance = bound["distance"]["after"][best]
+        earned = distance["planned"] - distance["reward"]
         text.append(
-            f"The best that planning with the arm's true physics finds there is {found}; "
-            f"the controller is {abs(below):.2f} {'below' if below >= 0 else 'above'} it after adaptation."
+            f"In the first {distance['episodes']} movements after adaptation the controller earns "
+            f"{written(earned, '{:.2f}')}, planning with the arm's true physics "
+            f"{written(distance['planned'], '{:.2f}')}."
         )
     text += summary_of_health(run.results)
     if run.adaptation is not None:

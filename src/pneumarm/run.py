@@ -250,7 +250,9 @@ class Run:
     def _fit(self) -> dict[str, Any]:
         with Store.open(self.store) as store:
             with self.progress("fitting the simulation") as report:
-                fitted = fit_store(store, replace(self.settings.fit, seed=self.settings.seed), progress=report)
+                settles = "settle" in self.settings.found.tasks
+                fit = self.settings.fit if settles else self.settings.fit.of_single_steps()
+                fitted = fit_store(store, replace(fit, seed=self.settings.seed), progress=report)
             with self.progress("measuring its errors"):
                 analysis = analyse(store, fitted.simulation, fitted.filtered)
         fitted.simulation.save(self.simulation)

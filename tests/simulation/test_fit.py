@@ -117,18 +117,23 @@ def test_quantities_by_name() -> None:
 
 
 def test_progress_reaches_the_end_without_going_back(make_rows: Callable[..., Rows]) -> None:
-    known = transitions(make_rows(), Window(1, 3))
+    rows = make_rows()
+    known = transitions(rows, Window(1, 3))
     told: list[tuple[int, int]] = []
     fit(
         known,
         known,
         spec=ArmSpec(),
         goal_range=np.array([[0.0, 1.0]]),
+        recorded=[rows],
         settings=FitSettings(epochs=4, hidden=3, tolerance=0),
         progress=lambda done, total: told.append((done, total)),
     )
-    assert len(told) == 12
-    assert max(told) == (12, 12)
+    done, total = zip(*told, strict=True)
+    assert len(set(total)) == 1
+    assert done[-1] == total[0]
+    assert (np.diff(done[12:]) >= 0).all()  # before, networks are fitted side by side
+    assert max(done[:12]) == 12
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from pneumarm.arm import Arm, ArmSpec, Reading
 from pneumarm.checkup import Checkup, CheckupSettings, diagnose, measure
 from pneumarm.control.monitor import Monitor
 from pneumarm.settings import Settings, Valid
-from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.transitions import WHOLE_PERIODS, Store, collect, enough
 from pneumarm.transitions.choice import joined
 from pneumarm.transitions.rows import Rows
@@ -94,7 +94,7 @@ def run(
     checkup = measure(arm, CLOSELY) if checked else None
     with tempfile.TemporaryDirectory() as folder, Store.for_arm(Path(folder) / "db", arm.spec) as store:
         collect(arm, store, settings.transitions, seed, settings=WHOLE_PERIODS)
-        fitted = fit_store(store, FitSettings(epochs=settings.epochs, seed=seed))
+        fitted = fit_store(store, replace(SINGLE_STEPS, epochs=settings.epochs, seed=seed))
         apart = joined(list(fitted.filtered.stream("held-out")))
         found = findings(store.blocks(), Monitor(arm.spec, before))
     shape = (-1, arm.spec.joints, 4)

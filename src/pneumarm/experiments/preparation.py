@@ -1,14 +1,14 @@
 """What most experiments need of an arm: transitions, a simulation fitted to them, begin states."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pneumarm.arm import open_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings, Report
 from pneumarm.files import write_json, write_text
-from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import WHOLE_PERIODS, Store, collect
 
@@ -45,7 +45,7 @@ def simulated(arm: str, folder: Path, settings: LaboratorySettings, progress: Re
         with open_arm(arm, settings.seed) as opened, Store.for_arm(folder / STORE, opened.spec) as store:
             collect(opened, store, settings.transitions, settings.seed, progress=progress, settings=WHOLE_PERIODS)
         with Store.open(folder / STORE) as store:
-            fit_store(store, FitSettings(seed=settings.seed)).simulation.save(folder / SIMULATION)
+            fit_store(store, replace(SINGLE_STEPS, seed=settings.seed)).simulation.save(folder / SIMULATION)
     simulation = Simulation.load(folder / SIMULATION)
     with Store.open(folder / STORE) as store:
         return Simulated(simulation, begin_states(store, simulation.window, simulation.scaling, simulation.spec))

@@ -7,7 +7,7 @@ What such experiments have in common is :class:`ThereAndBack`.
 import hashlib
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from pneumarm.experiments.experiment import ARMS, Experiment, Figures, Laborator
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
 from pneumarm.files import write_json
 from pneumarm.learning import Acts, Method, TrainSettings, test, train
-from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store
+from pneumarm.simulation import SINGLE_STEPS, FitSettings, Simulation, StoreFit, fit_store
 from pneumarm.simulation.quality import propagation
 from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
@@ -90,7 +90,7 @@ class Recipe:
     """Whether the valves are closed between reading and acting."""
     pulses: float = 0.0
     """Share of the openings that are pulses (thesis: none)."""
-    fit: FitSettings = field(default_factory=FitSettings)
+    fit: FitSettings = SINGLE_STEPS
 
 
 def usual(settings: LaboratorySettings, **varied: Any) -> Recipe:

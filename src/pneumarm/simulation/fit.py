@@ -28,6 +28,7 @@ from pneumarm.networks import (
 )
 from pneumarm.networks import importance as importance_of
 from pneumarm.settings import Settings, Valid
+from pneumarm.simulation.ahead import fitted_ahead, stretches
 from pneumarm.simulation.history import USUAL, chosen_history
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
@@ -37,6 +38,7 @@ from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
 from pneumarm.transitions.goals import held_range, seen_goals
 from pneumarm.transitions.grid import GridSettings
+from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
 
@@ -46,6 +48,9 @@ _ROWS_A_WEIGHT = 20
 """Rows that a network is fitted to at least, for each of its weights, where there are so many."""
 _AGAIN = 0.25
 """Share of the epochs in which the simulation of an arm without pulses is taught what they do on average."""
+_LONGEST_AHEAD = 10.0
+_EPOCHS_AHEAD = 10
+"""Epochs of each network that fitting ahead takes about as long as."""
 _ROWS = 7  # stream of random numbers
 _MARGIN = 0.05
 """Predicted pressures may exceed the recorded ones by this part of their range."""
@@ -67,6 +72,9 @@ class FitSettings(Settings):
     """A fit ends early when three epochs in a row lower its error by less than this part; 0: never."""
     decay: float = 0.0
     """Weight decay (thesis: 0)."""
+    ahead: float = 0.4
+    """How far ahead predictions are fitted [s], after those of single steps; 0: not at all (thesis), which suits
+    agents that are to reach goals."""
     one_network: bool = False
     """One network with all outputs in place of one an output (the alternative in thesis section 3.4)."""
     velocity: Velocity = "derived"
@@ -88,17 +96,26 @@ class FitSettings(Settings):
             "epochs": self.epochs >= 1,
             "tolerance": 0 <= self.tolerance < 1,
             "decay": 0 <= self.decay < float("inf"),
+            "ahead": 0 <= self.ahead <= _LONGEST_AHEAD or f"0 to {_LONGEST_AHEAD:g} s",
             "velocity": self.velocity in ("derived", "network"),
             "sensors": set(self.sensors) <= set(get_args(SensorKind)) and len(set(self.sensors)) == len(self.sensors),
             "held_out": 0 < self.held_out < 1,
             "seed": self.seed >= 0,
         }
 
+    def of_single_steps(self) -> "FitSettings":
+        """Return the settings without fitting ahead, unless something else than usual is asked for."""
+        return replace(self, ahead=0.0) if self.ahead == FitSettings.ahead else self
+
     def of_arm(self, store: Store) -> "FitSettings":
         """Return the settings with the history that suits the arm of ``store`` where none is asked for."""
         if self.history is not None:
             return self
         return replace(self, history=chosen_history(store, store.spec, self.sensors))
+
+
+SINGLE_STEPS = FitSettings(ahead=0.0)
+"""As in the thesis: fitted to one step after the other, each for itself."""
 
 
 class FitResult(NamedTuple):
@@ -156,6 +173,7 @@ def fit(
     goal_range: NDArray[np.float64],
     valves: bool = True,
     generalisation: Transitions | Iterable[Transitions] | None = None,
+    recorded: Iterable[Rows] = (),
     settings: FitSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FitResult:
@@ -169,6 +187,7 @@ def fit(
         goal_range: 1st and 99th percentile of the stored angles, (joints, 2) [counts].
         valves: whether the commands are those of on/off valves.
         generalisation: transitions that the filter left out (section 3.3), at once or in blocks.
+        recorded: rows of whole sequences, those that are not held out being fitted over several steps.
         settings: what a person may choose.
         progress: called as ``progress(epochs done, epochs at most)``, over all networks together.
 
@@ -197,21 +216,43 @@ def fit(
     linear = least_squares(x, y)
     # The targets are in units of the change's spread, the simulation's are in those of the observation.
     factor = spread / scaling.observation_scale[places]
+    factors = [factor] if settings.one_network else np.split(factor, len(factor))
     fits: list[Fit] = []
     if settings.approximator == "least-squares":
         simulation = replace(simulation, networks=(_rescaled(linear, factor),))
     else:
         again = max(1, round(_AGAIN * settings.epochs)) if valves and not spec.pulses else 0
         networks = 1 if settings.one_network else len(places)
-        first, total = networks * settings.epochs, networks * (settings.epochs + again)
-        simulation, fits = _fitted(simulation, x, y, factor, settings, _part_of(progress, 0, total))
+        ahead = round(settings.ahead / spec.period)
+        epochs = (settings.epochs, _EPOCHS_AHEAD if ahead > 1 else 0, again)
+        ends = networks * np.cumsum(epochs)
+
+        def part(number: int) -> Callable[[int, int], None]:
+            return _part_of(progress, int(ends[number]) - networks * epochs[number], int(ends[-1]))
+
+        simulation, fits = _fitted(simulation, x, y, factor, settings, part(0))
+        if ahead > 1:
+            report, units = part(1), networks * _EPOCHS_AHEAD
+            long_enough = stretches(recorded, simulation, ahead)
+            simulation = fitted_ahead(
+                simulation, long_enough, settings.seed, lambda share: report(int(share * units), units)
+            )
+            report(units, units)
         if again:
             pulses = spread_over_periods(simulation, training, settings.seed)
-            more = pulses.target[:, places].astype(np.float64) - pulses.observation[:, places]
-            x_both = np.concatenate([x, scaling.inputs(pulses.inputs, window).astype(np.float32)])
-            y_both, shorter = np.concatenate([y, more / spread]), replace(settings, epochs=again)
-            report = _part_of(progress, first, total)
-            simulation, fits = _fitted(simulation, x_both, y_both, factor, shorter, report, fits)
+            inputs = np.concatenate([training.inputs, pulses.inputs])
+            following = np.concatenate([simulation.predict(training.inputs), pulses.target])
+            more = (following - inputs[:, : window.observation_size])[:, places]
+            before = [_rescaled(one, 1 / each) for one, each in zip(simulation.networks, factors, strict=True)]
+            simulation, fits = _fitted(
+                simulation,
+                scaling.inputs(inputs, window).astype(np.float32),
+                more / spread,
+                factor,
+                replace(settings, epochs=again),
+                part(2),
+                before,
+            )
     seconds = time.perf_counter() - began
     errors = statistics(simulation, held_out)
     return FitResult(
@@ -245,7 +286,7 @@ def _fitted(
     factor: NDArray[np.float64],
     settings: FitSettings,
     progress: Callable[[int, int], None],
-    before: Sequence[Fit] = (),
+    before: Sequence[Network] = (),
 ) -> tuple[Simulation, list[Fit]]:
     """Return ``simulation`` with networks fitted to ``x`` and ``y``, whose units are ``factor`` of its own.
 
@@ -299,7 +340,7 @@ def _fit_networks(
     settings: FitSettings,
     joints: int,
     progress: Callable[[int, int], None],
-    before: Sequence[Fit],
+    before: Sequence[Network],
 ) -> list[Fit]:
     """Fit a network to each of ``targets``, on as many threads as there are cores: the work is in NumPy."""
     solver = LevenbergMarquardt(epochs=settings.epochs, tolerance=settings.tolerance, decay=settings.decay)
@@ -313,7 +354,7 @@ def _fit_networks(
 
         y = targets[number]
         if before:
-            start = before[number].network
+            start = before[number]
         else:
             start = nguyen_widrow(x.shape[1], settings.hidden * joints, y.shape[1], int(seeds[number]))
         if not y.any():  # what never changed needs no fit
@@ -453,6 +494,7 @@ def fit_store(
         goal_range=_goal_range(store),
         valves=store.valves,
         generalisation=filtered.stream("generalisation") if coverage.kept < coverage.seen else None,
+        recorded=store.blocks(),
         settings=settings,
         progress=progress,
     )

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from pneumarm.experiments.there_and_back import (
 )
 from pneumarm.experiments.words import words_of
 from pneumarm.files import write_json
-from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, Store, new_cells
 
@@ -65,7 +65,7 @@ class EnoughData(ThereAndBack):
             if not kept.exists():
                 transitions, took = collected(whole / STORE, arm, seed, recipe, progress)
                 with Store.open(whole / STORE) as store:
-                    fitted = fit_store(store, FitSettings(seed=seed))
+                    fitted = fit_store(store, replace(SINGLE_STEPS, seed=seed))
                     found = new_cells(store, fitted.simulation.window)
                     sequences = store.sequences
                     judged = quality(fitted)

@@ -32,7 +32,7 @@ from pneumarm.transitions import KINDS, QUANTITIES, Store, Transitions, Window, 
 from pneumarm.transitions.choice import joined, share_held_out
 
 _HISTORIES = (1, 2, 3, 4)
-_FIT = FitSettings(epochs=30)
+_FIT = FitSettings(epochs=30, ahead=0.0)
 _RUNS = 500  # free runs that the error after a second is measured by
 
 

@@ -142,7 +142,7 @@ def _fitted(origin: Simulation, known: Transitions, settings: RefitSettings, see
     first = replace(origin, networks=_outputs_fitted(origin, known, settings.ridge))
     count = max(settings.fewest_rehearsed, round(settings.rehearsed * len(known.inputs)))
     rehearsed = rehearse(first, known, count, np.random.default_rng([seed, len(known.inputs)]))
-    if not origin.spec.pulses:  # what the arm does says nothing of pulses, and they are not to be forgotten
+    if origin.spread:  # what was recorded says nothing of pulses, and they are not to be forgotten
         rehearsed = spread_over_periods(first, rehearsed, seed)
     x, y = (np.concatenate(pair) for pair in zip(_scaled(first, known), _scaled(first, rehearsed), strict=True))
     return replace(first, networks=_all_fitted(first, x, y, settings))

@@ -27,13 +27,13 @@ from pneumarm.experiments.there_and_back import (
     train_and_move,
 )
 from pneumarm.learning import PolicySettings, TrainSettings, find_method
-from pneumarm.simulation import FitSettings
+from pneumarm.simulation import SINGLE_STEPS
 
 ARMS = tuple(f"virtual:joints=2,seed={number}" for number in range(1, 6))
 """Five arms of two joints to develop on; those to judge on are ``virtual:joints=2,seed=1001`` to ``1005``."""
 TRANSITIONS = 12_000
 """Transitions of a simulation, at most as many as the laboratory's: 7 minutes on the arm."""
-FIT = FitSettings(epochs=30, ahead=0.0)
+FIT = replace(SINGLE_STEPS, epochs=30)
 """Of a simulation: twice the thesis' epochs; twice as many again take 5 % off its errors."""
 THESIS = TrainSettings(agents=1, validation_episodes=100, max_episodes=100_000)
 """Thesis' agents, one a joint, with as many episodes as it needed for a single goal (section 6.1.4)."""

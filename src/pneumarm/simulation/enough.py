@@ -7,7 +7,7 @@ Where all of a recording does hardly better than half of it, as much again will 
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.settings import Settings, Valid
-from pneumarm.simulation.fit import FitResult, FitSettings, fit
+from pneumarm.simulation.fit import SINGLE_STEPS, FitResult, fit
 from pneumarm.transitions.choice import share_held_out
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import filter_transitions
@@ -28,7 +28,7 @@ _LEFT = 0.1
 """So is an error of the networks alone, without the sensors' noise, of this part of how the arm changes in a step."""
 _HELD_OUT = 0.25
 """Share of the sequences that the errors are measured on."""
-_SETTINGS = FitSettings(epochs=15, ahead=0.0)
+_SETTINGS = replace(SINGLE_STEPS, epochs=15)
 """Of both fits: further epochs change both alike."""
 _FEWEST_SEQUENCES = 8
 _PURPOSE = "enough"

@@ -47,7 +47,7 @@ _LARGEST_EPOCH = 3e10
 _ROWS_A_WEIGHT = 20
 """Rows that a network is fitted to at least, for each of its weights, where there are so many."""
 _AGAIN = 0.25
-"""Share of the epochs in which the simulation of an arm without pulses is taught what they do on average."""
+"""Share of the epochs in which it is taught what pulses do on average where none were recorded."""
 _LONGEST_AHEAD = 10.0
 _EPOCHS_AHEAD = 10
 """Epochs of each network that fitting ahead takes about as long as."""
@@ -75,6 +75,9 @@ class FitSettings(Settings):
     ahead: float = 0.4
     """How far ahead predictions are fitted [s], after those of single steps; 0: not at all (thesis), which suits
     agents that are to reach goals."""
+    spread: bool = True
+    """Whether, where valves were recorded for whole periods alone, it is taught what pulses would do on average: the
+    default agent learns by pulses. Agents that are to reach goals need none."""
     one_network: bool = False
     """One network with all outputs in place of one an output (the alternative in thesis section 3.4)."""
     velocity: Velocity = "derived"
@@ -104,8 +107,9 @@ class FitSettings(Settings):
         }
 
     def of_single_steps(self) -> "FitSettings":
-        """Return the settings without fitting ahead, unless something else than usual is asked for."""
-        return replace(self, ahead=0.0) if self.ahead == FitSettings.ahead else self
+        """Return the settings for agents that are to reach goals, unless something else than usual is asked for."""
+        usual = (self.ahead, self.spread) == (FitSettings.ahead, FitSettings.spread)
+        return replace(self, ahead=0.0, spread=False) if usual else self
 
     def of_arm(self, store: Store) -> "FitSettings":
         """Return the settings with the history that suits the arm of ``store`` where none is asked for."""
@@ -114,8 +118,8 @@ class FitSettings(Settings):
         return replace(self, history=chosen_history(store, store.spec, self.sensors))
 
 
-SINGLE_STEPS = FitSettings(ahead=0.0)
-"""As in the thesis: fitted to one step after the other, each for itself."""
+SINGLE_STEPS = FitSettings().of_single_steps()
+"""As in the thesis: fitted to one step after the other, each for itself, and to what was recorded alone."""
 
 
 class FitResult(NamedTuple):
@@ -134,8 +138,8 @@ class FitResult(NamedTuple):
     """What each curve, and each column of the importance, is a change of."""
     curves: list[NDArray[np.float64]]
     """Mean squared error before and after every epoch in units of the change's standard deviation squared, one
-    curve a network; none for least squares. Of an arm without pulses those of the second round of fits, to what is
-    recorded and to what pulses do on average (:mod:`pneumarm.simulation.spread`)."""
+    curve a network; none for least squares. Where no pulses were recorded those of the second round of fits, to what
+    they do on average too (:mod:`pneumarm.simulation.spread`)."""
     converged: list[bool]
     """Whether each network's fit ended before its epochs were used up."""
     rows: int
@@ -221,7 +225,8 @@ def fit(
     if settings.approximator == "least-squares":
         simulation = replace(simulation, networks=(_rescaled(linear, factor),))
     else:
-        again = max(1, round(_AGAIN * settings.epochs)) if valves and not spec.pulses else 0
+        spreads = settings.spread and simulation.commands == "valves"
+        again = max(1, round(_AGAIN * settings.epochs)) if spreads else 0
         networks = 1 if settings.one_network else len(places)
         ahead = round(settings.ahead / spec.period)
         epochs = (settings.epochs, _EPOCHS_AHEAD if ahead > 1 else 0, again)
@@ -253,6 +258,7 @@ def fit(
                 part(2),
                 before,
             )
+            simulation = replace(simulation, spread=True)
     seconds = time.perf_counter() - began
     errors = statistics(simulation, held_out)
     return FitResult(

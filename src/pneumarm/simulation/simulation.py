@@ -98,6 +98,8 @@ class Simulation:
     """Lowest and highest pressure that it predicts, shape (joints, 2 muscles, 2) [counts]."""
     commands: Commands = "valves"
     """What commands it was fitted to; with continuous ones no agent of ours can be trained."""
+    spread: bool = False
+    """Whether it was taught what pulses do on average, none being recorded (:mod:`pneumarm.simulation.spread`)."""
     held_out: float = 0.0
     """Share of the sequences that were kept out of the fit, chosen by :func:`pneumarm.transitions.held_out`."""
     seed: int = 0
@@ -205,7 +207,9 @@ class Simulation:
     def parts(self) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
         """Return what a file has to hold: settings for its header, and arrays."""
         direct = [network.direct is not None for network in self.networks]
-        header = _Header(self.spec, self.window, self.velocity, self.commands, self.held_out, self.seed, direct)
+        header = _Header(
+            self.spec, self.window, self.velocity, self.commands, self.held_out, self.seed, direct, self.spread
+        )
         names = (*_ARRAYS, *(_FURTHER if self.window.further else ()), *(_LIMITS if len(self.goal_ways) else ()))
         arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in names}
         arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
@@ -248,6 +252,7 @@ class Simulation:
             networks=networks,
             velocity=header.velocity,
             commands=header.commands,
+            spread=header.spread,
             held_out=header.held_out,
             seed=header.seed,
             **rest,
@@ -273,6 +278,7 @@ class _Header:
     seed: int
     direct: list[bool]
     """For each network whether it has direct connections."""
+    spread: bool = False
 
 
 def _floats(name: str, array: NDArray[np.generic]) -> NDArray[np.float64]:

@@ -24,7 +24,7 @@ from pneumarm.experiments.there_and_back import (
 )
 from pneumarm.experiments.words import words_of
 from pneumarm.networks import LevenbergMarquardt, levenberg_marquardt, nguyen_widrow
-from pneumarm.simulation import FitSettings, fit
+from pneumarm.simulation import SINGLE_STEPS, FitSettings, fit
 from pneumarm.simulation.quality import propagation
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.task import BeginStates, begin_states
@@ -32,7 +32,7 @@ from pneumarm.transitions import KINDS, QUANTITIES, Store, Transitions, Window, 
 from pneumarm.transitions.choice import joined, share_held_out
 
 _HISTORIES = (1, 2, 3, 4)
-_FIT = FitSettings(epochs=30, ahead=0.0)
+_FIT = replace(SINGLE_STEPS, epochs=30)
 _RUNS = 500  # free runs that the error after a second is measured by
 
 

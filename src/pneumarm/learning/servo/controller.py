@@ -35,7 +35,7 @@ _LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest e
 _BIASED = 8.0  # most tolerances that the integral adds to what is asked for
 _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving reference are learned from
 _DONE = 0.7  # share of an error that pulses of a joint with one muscle may leave, for the next not to be more
-_SWINGING = 0.6  # s in which an error is added to what is asked for while a joint with one muscle swings
+_SWINGING = 0.6  # s in which an error is added to what is asked for while a joint swings near its goal
 _CLOSE, _KEPT = 2.5, 1.2  # tolerances of an error, for that, and most that is then added
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
@@ -51,8 +51,10 @@ class ServoController:
     that goes on swinging about its goal is being kept swinging, by a model with less lag than the arm: its valves
     stay closed until it is at rest, by its own damping.
 
+    Integral action goes on while a joint swings near its goal, unless valves stay as they are for whole periods.
+
     A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next
-    look, twice as many each time that those before did little, and integral action goes on while it swings.
+    look, twice as many each time that those before did little.
     """
 
     def __init__(self, agent: ServoAgent) -> None:
@@ -69,10 +71,10 @@ class ServoController:
         self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
         single = spec.muscles == 1
         self._most_pulses = self._look if single else 1
-        self._kept, self._close = (_KEPT * tolerance, _CLOSE * tolerance) if single else (0.0, 0.0)
-        # Whole periods move an arm by more than a tolerance: without pulses it is to swing.
-        fine = spec.pulses and agent.simulation.commands == "pulses"
-        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if fine else math.inf
+        # Whole periods move an arm by more than a tolerance: without pulses it is to swing, and not to be pushed.
+        pushed = single or spec.pulses
+        self._kept, self._close = (_KEPT * tolerance, _CLOSE * tolerance) if pushed else (0.0, 0.0)
+        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if spec.pulses else math.inf
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)

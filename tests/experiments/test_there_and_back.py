@@ -25,11 +25,11 @@ from pneumarm.experiments.there_and_back import Prepared, Recipe, opened, over_j
 from pneumarm.experiments.valves_closed import ValvesClosed
 from pneumarm.experiments.valves_closed.inflation import inflation
 from pneumarm.learning import TrainSettings
-from pneumarm.simulation import FitSettings, fit
+from pneumarm.simulation import SINGLE_STEPS, fit
 from pneumarm.transitions import Store, Transitions, Window, transitions
 
 ARM = "virtual:seed=3"
-QUICK = FitSettings(epochs=4)
+QUICK = replace(SINGLE_STEPS, epochs=4)
 SMALL = LaboratorySettings(transitions=2400, test_episodes=4, max_episodes=20)
 EXPERIMENTS: list[Experiment] = [
     ControlFrequency(frequencies=(20.0, 30.0, 40.0)),

@@ -55,7 +55,7 @@ def make_fit() -> Callable[..., tuple[FitResult, Transitions]]:
     """Return a function that fits a simulation to the small arm; gives the result and the held-out transitions."""
 
     def make(joints: int = 1, **settings: object) -> tuple[FitResult, Transitions]:
-        chosen = FitSettings(**{"epochs": 15, "hidden": 6, **settings})  # type: ignore[arg-type]
+        chosen = FitSettings(**{"epochs": 15, "hidden": 6, "spread": False, **settings})  # type: ignore[arg-type]
         window = Window(joints, chosen.history or USUAL)
         training = transitions(recorded(joints, seed=1), window)
         held_out = transitions(recorded(joints, sequences=6, seed=2), window)

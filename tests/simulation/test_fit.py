@@ -94,7 +94,7 @@ def test_blocks_of_held_out_transitions_are_as_good_as_one(fitted: Fitted, make_
         iter(halves),
         spec=result.simulation.spec,
         goal_range=result.simulation.goal_range,
-        settings=FitSettings(epochs=15, hidden=6),
+        settings=FitSettings(epochs=15, hidden=6, spread=False),
     )
     np.testing.assert_allclose(again.held_out.std, result.held_out.std, rtol=1e-9)
 
@@ -269,3 +269,11 @@ def test_a_part_of_the_rows_is_enough_for_large_networks() -> None:
     assert isinstance(chosen, np.ndarray)
     assert 40_000 < len(chosen) < 60_000
     assert len(np.unique(chosen)) == len(chosen)
+
+
+def test_agents_that_reach_are_fitted_to_single_steps_unless_something_else_is_asked_for() -> None:
+    assert FitSettings(epochs=7).of_single_steps() == FitSettings(epochs=7, ahead=0.0, spread=False)
+    for asked in (FitSettings(ahead=0.2), FitSettings(spread=False)):
+        assert asked.of_single_steps() == asked
+    with pytest.raises(UnusableInput, match="ahead"):
+        FitSettings(ahead=-0.1)

@@ -47,14 +47,29 @@ def test_on_average_pulses_do_what_whole_periods_do_as_often(made, store):
     untaught = fit(
         known,
         made.filtered.stream("held-out"),
-        spec=replace(store.spec, pulses=True),
+        spec=store.spec,
         goal_range=made.simulation.goal_range,
-        settings=FitSettings(history=2),
+        settings=FitSettings(history=2, spread=False),
     ).simulation
+    assert made.simulation.spread
+    assert not untaught.spread
     pressures = slice(2, None)
     assert (error_of(made.simulation, asked) < 0.3).all()
     assert (error_of(untaught, asked)[pressures] > 2 * error_of(made.simulation, asked)[pressures]).any()
     assert (error_of(made.simulation, known) < 1.2 * error_of(untaught, known)).all()
+
+
+def test_an_arm_with_pulses_that_was_recorded_without_any_is_taught_them_too(made, store):
+    known, apart = made.filtered.transitions, made.filtered.stream("held-out")
+    taught = fit(
+        known,
+        apart,
+        spec=replace(store.spec, pulses=True),
+        goal_range=made.simulation.goal_range,
+        settings=FitSettings(history=2, epochs=4),
+    ).simulation
+    assert taught.spread
+    assert taught.commands == "valves"
 
 
 def test_a_servo_of_an_arm_without_pulses_arrives_and_stays(made, store):

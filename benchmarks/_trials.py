@@ -5,6 +5,7 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,10 @@ from pneumarm.control.transfer import monitor_of, transfer
 from pneumarm.errors import ArmFailure
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
-from pneumarm.learning import AnyAgent, Tracks, goals_of, train
-from pneumarm.learning.methods import find_method
+from pneumarm.learning import AnyAgent, PolicySettings, Tracks, goals_of, train
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.run import RunTransferSettings
-from pneumarm.simulation import FitSettings, StoreFit
+from pneumarm.simulation import SINGLE_STEPS, FitSettings, StoreFit
 from pneumarm.simulation.enough import collect_enough
 from pneumarm.task import BeginStates, Movement
 from pneumarm.transitions import Store, collect
@@ -110,8 +110,8 @@ def collected(
 
 
 def fitted(path: Path, seed: int) -> tuple[StoreFit, BeginStates]:
-    """Return the simulation fitted to a store, and its begin states."""
-    return there_and_back.fitted(path, FitSettings(seed=seed))
+    """Return the simulation fitted to a store for agents that reach goals, and its begin states."""
+    return there_and_back.fitted(path, replace(SINGLE_STEPS, seed=seed))
 
 
 def greedy_movements(
@@ -154,9 +154,9 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adap
             db.unlink()
             recorded = {**_recorded(name, db, seed, "warn"), "refused": 1}
         made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
-    servo, reaching = (
-        train(made.simulation, begin, seed=seed, method=find_method(method)).agent for method in ("servo", "policy")
-    )
+        single, _ = fitted(db, seed)
+    servo = train(made.simulation, begin, seed=seed).agent
+    reaching = train(single.simulation, begin, PolicySettings(), seed).agent
     settings = MoveTrialSettings(goals=goals)
     tried = moved_by(servo, name, settings, seed)
     later = moved_by(adapted(servo, name, seed), name, settings, seed) if adapts else None

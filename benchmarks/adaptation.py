@@ -47,9 +47,9 @@ from pneumarm.arm.virtual import ArmParameters, VirtualArm, draw_parameters
 from pneumarm.arm.virtual.parameters import JointParameters, MuscleParameters
 from pneumarm.control import BEGIN, TransferSettings, transfer
 from pneumarm.files import write_json
-from pneumarm.learning import PolicyAgent, train
+from pneumarm.learning import PolicyAgent, PolicySettings, train
 from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, key, legend_below, panels, styled
-from pneumarm.simulation import FitSettings, fit_store
+from pneumarm.simulation import SINGLE_STEPS, fit_store
 from pneumarm.statistics import moving_mean
 from pneumarm.task import begin_states
 from pneumarm.task.movements import joined
@@ -183,7 +183,7 @@ class Bench:
         file = self.folder / (f"{seed}.agent" if change is None else f"{change}-{seed}-{self.collected}.agent")
         if not file.exists():
             simulation, begin = prepared(self.folder, seed) if change is None else self.prepared_anew(seed, change)
-            train(simulation, begin, None, 1).agent.save(file)
+            train(simulation, begin, PolicySettings(), 1).agent.save(file)
         return PolicyAgent.load(file)
 
     def prepared_anew(self, seed: int, change: str) -> tuple[Any, Any]:
@@ -191,7 +191,7 @@ class Bench:
             arm = changed_arm(change, seed, 3000 + seed)
             with Store.for_arm(Path(place) / "db", arm.spec) as store:
                 collect(arm, store, self.collected, seed, settings=WHOLE_PERIODS)
-                simulation = fit_store(store, FitSettings(seed=seed)).simulation
+                simulation = fit_store(store, replace(SINGLE_STEPS, seed=seed)).simulation
                 return simulation, begin_states(
                     store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec
                 )

@@ -14,6 +14,7 @@ Seconds of training are wall time with validation; decision times are processor 
 import time
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from benchmarks import _environment as environment
 from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
 from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.learning import AnyAgent, LearnSettings, PolicySettings, Training, test, train
-from pneumarm.simulation import FitSettings, Simulation, fit_store
+from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
 from pneumarm.transitions import KINDS, WHOLE_PERIODS, Store, collect
@@ -69,7 +70,7 @@ def prepared(folder: Path, arm: int) -> tuple[Simulation, BeginStates]:
             collect(opened, store, TRANSITIONS, arm, settings=WHOLE_PERIODS)
     with Store.open(db) as store:
         if not file.exists():
-            fit_store(store, FitSettings(seed=arm)).simulation.save(file)
+            fit_store(store, replace(SINGLE_STEPS, seed=arm)).simulation.save(file)
         simulation = Simulation.load(file)
         return simulation, begin_states(
             store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec

@@ -3,9 +3,9 @@
 python -m benchmarks minutes
 
 For each arm a collection is cut short after some minutes, those between its sequences included, and a simulation is
-fitted and an agent trained from nothing else, by the defaults. The movements are the same for all agents of an arm:
-begin states by their numbers, goals within the range of the angles of the longest collection. Nothing is learned on
-the arm. Settings come from the environment:
+fitted and an agent for reaching trained from nothing else, by the defaults. The movements are the same for all agents
+of an arm: begin states by their numbers, goals within the range of the angles of the longest collection. Nothing is
+learned on the arm. Settings come from the environment:
 
 PNEUMARM_MINUTES_ARMS       seeds of virtual arms; the ten held-out arms by default
 PNEUMARM_MINUTES_SEEDS      of collecting, fitting and training, "0"
@@ -30,7 +30,7 @@ from scipy.stats import t as student
 
 from benchmarks import _environment as environment
 from benchmarks._trials import HELD_OUT, Rows, collected, fitted, greedy_movements
-from pneumarm.learning import test, train
+from pneumarm.learning import PolicySettings, test, train
 from pneumarm.report.style import DARK, GREY, MIDDLE, key, legend_below, panels, styled
 from pneumarm.statistics import rate_estimate
 from pneumarm.transitions import Store
@@ -82,7 +82,7 @@ def trial(
     """Return what an agent reaches that was made from so many minutes on the arm."""
     transitions, took = collected(db, arm, seed, minutes=minutes)
     made, begin = fitted(db, seed)
-    trained = train(made.simulation, begin, None, seed)
+    trained = train(made.simulation, begin, PolicySettings(), seed)
     simulated = test(trained.agent, made.simulation, begin, 2_000, seed)
     on_arm = greedy_movements(trained.agent, arm, goals, range(movements), seed)
     return {

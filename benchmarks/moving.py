@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _environment as environment
-from benchmarks._trials import HELD_OUT, Rows, fitted, in_processes, names_of
+from benchmarks._trials import HELD_OUT, Rows, in_processes, names_of
 from pneumarm.arm import open_arm
 from pneumarm.classical import TuneSettings, tune
 from pneumarm.control.named import open_tracking
@@ -39,6 +39,7 @@ from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import train
 from pneumarm.moving import Moved, MoveSettings, move, track
 from pneumarm.moving.movement import valve_changes
+from pneumarm.simulation import FitSettings
 from pneumarm.task.reference import counts_of, parse_reference
 from pneumarm.transitions import CollectSettings
 
@@ -118,7 +119,7 @@ def prepared(plan: Plan, name: str, arm: str, seed: int) -> str:
                 db = Path(place) / "arm.db"
                 recipe = Recipe(minutes=plan.minutes, pulses=CollectSettings().pulses)
                 there_and_back.collected(db, arm, seed, recipe)
-                made, begin = fitted(db, seed)
+                made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
             made.simulation.save(simulation)
             train(made.simulation, begin, None, seed).agent.save(agent)
         return f"plan:{simulation}" if name == "plan" else str(agent)

@@ -22,6 +22,7 @@ Differences to no further sensors are taken arm by arm, means over the seeds; th
 import math
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast, get_args
 
@@ -36,8 +37,8 @@ from pneumarm.arm.seam import SensorKind
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
-from pneumarm.learning import AnyAgent, test, train
-from pneumarm.simulation import FitSettings
+from pneumarm.learning import AnyAgent, PolicySettings, test, train
+from pneumarm.simulation import SINGLE_STEPS
 from pneumarm.task import Movement
 from pneumarm.transitions import Store
 
@@ -84,8 +85,8 @@ def name_of(arm: int) -> str:
 def trial(db: Path, arm: int, seed: int, sensors: str, transitions: int, movements: int) -> dict[str, Any]:
     """Return what an agent reaches with these ``sensors`` in its state."""
     kinds = () if sensors == NONE else cast(tuple[SensorKind, ...], tuple(sensors.split("+")))
-    made, begin = there_and_back.fitted(db, FitSettings(seed=seed, sensors=kinds))
-    trained = train(made.simulation, begin, None, seed)
+    made, begin = there_and_back.fitted(db, replace(SINGLE_STEPS, seed=seed, sensors=kinds))
+    trained = train(made.simulation, begin, PolicySettings(), seed)
     simulated = test(trained.agent, made.simulation, begin, 2_000, seed)
     with Store.open(db) as store:
         goals, state = store.percentiles(), store.state("arm")

@@ -1,4 +1,4 @@
-"""How surely the default agent reaches its goals after transfer: many movements on each arm, every failure kept.
+"""How surely the agent for reaching reaches its goals after transfer: many movements on each arm, every failure kept.
 
 python -m benchmarks success
 
@@ -28,7 +28,7 @@ import numpy as np
 from benchmarks import _environment as environment
 from benchmarks._trials import HELD_OUT, Rows, collected, fitted, greedy_movements
 from benchmarks.agents import kind
-from pneumarm.learning import load_agent, train
+from pneumarm.learning import PolicySettings, load_agent, train
 from pneumarm.statistics import mean_estimate, rate_estimate
 from pneumarm.task import Movement
 
@@ -72,7 +72,7 @@ def prepare(folder: Path, arm: int) -> Path:
             db = Path(place) / "arm.db"
             collected(db, arm, SEED, TRANSITIONS)
             made, begin = fitted(db, SEED)
-        train(made.simulation, begin, None, SEED).agent.save(file)
+        train(made.simulation, begin, PolicySettings(), SEED).agent.save(file)
     return file
 
 

@@ -57,6 +57,9 @@ SETTINGS = "settings.json"
 Progress = Callable[[str], AbstractContextManager[Report]]
 
 
+_PLANNED = 40  # movements, by default
+
+
 @contextmanager
 def silent(title: str) -> Iterator[Report]:
     """Show no progress."""
@@ -89,9 +92,10 @@ class RunSettings(LearnSettings):
     """When more would not help."""
     test_episodes: int = 10_000
     """Movements of the test in simulation (thesis section 5.2)."""
-    bound_episodes: int = 40
-    """Movements planned with the true physics, which say what can be achieved; 0 for none. Virtual arms only; for
-    each joint more an eighth of them, because a plan for two takes ten times as long."""
+    bound_episodes: int | None = None
+    """Movements to reach goals that are planned with the true physics, which say what can be achieved; 0 for none. By
+    default 40 for agents that are to reach goals, else none. Virtual arms only; for each joint more an eighth of
+    them, because a plan for two takes ten times as long."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     transfer: RunTransferSettings = field(default_factory=RunTransferSettings)
@@ -108,8 +112,19 @@ class RunSettings(LearnSettings):
         return {
             "transitions": self.transitions is None or enough(self.transitions),
             "test_episodes": self.test_episodes >= 1 or "1 or more",
-            "bound_episodes": self.bound_episodes >= 0 or "0 or more",
+            "bound_episodes": self.bound_episodes is None or self.bound_episodes >= 0 or "0 or more",
         }
+
+    @property
+    def settles(self) -> bool:
+        """Whether the agent is to settle at goals, hold them and follow references, and not to reach goals alone."""
+        return "settle" in self.found.tasks
+
+    @property
+    def planned(self) -> int:
+        """Movements of one joint that are planned."""
+        usual = 0 if self.settles else _PLANNED
+        return usual if self.bound_episodes is None else self.bound_episodes
 
 
 class Run:
@@ -244,14 +259,13 @@ class Run:
         """Have the kernels of the later stages compiled while ``arm`` is moved."""
         wanted = self.settings
         if isinstance(wanted.chosen, ServoSettings):
-            physics = wanted.arm if isinstance(arm, VirtualArm) and wanted.bound_episodes else None
+            physics = wanted.arm if isinstance(arm, VirtualArm) and wanted.planned else None
             self._rehearsal.begin(Piece(arm.spec, wanted.fit, wanted.chosen, physics))
 
     def _fit(self) -> dict[str, Any]:
         with Store.open(self.store) as store:
             with self.progress("fitting the simulation") as report:
-                settles = "settle" in self.settings.found.tasks
-                fit = self.settings.fit if settles else self.settings.fit.of_single_steps()
+                fit = self.settings.fit if self.settings.settles else self.settings.fit.of_single_steps()
                 fitted = fit_store(store, replace(fit, seed=self.settings.seed), progress=report)
             with self.progress("measuring its errors"):
                 analysis = analyse(store, fitted.simulation, fitted.filtered)
@@ -328,11 +342,13 @@ class Run:
     def _bound(self) -> dict[str, Any]:
         """Say what could be achieved in the first movements of the tests on the arm (thesis section 5.5.1)."""
         wanted = self.settings
-        if wanted.bound_episodes == 0:
-            return {"bound": {"missing": "it was not asked for"}}
+        if wanted.planned == 0:
+            return {
+                "bound": {"missing": "it is planned for agents that are to reach goals, or where it is asked for"}
+            }
         agent, made = load_agent(self.agent), read_episodes(self.episodes)
         rewards = {phase: made[phase].reward for phase in ("before", "after")}
-        episodes = max(min(wanted.bound_episodes, FEWEST), wanted.bound_episodes // 8 ** (agent.spec.joints - 1))
+        episodes = max(min(wanted.planned, FEWEST), wanted.planned // 8 ** (agent.spec.joints - 1))
         settings = BoundSettings(episodes, PlanSettings(cutoff=agent.settings.cutoff))
         with self.progress("planning with the true physics") as report, open_arm_checked(wanted) as arm:
             return {

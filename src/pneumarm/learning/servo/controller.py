@@ -72,9 +72,10 @@ class ServoController:
         single = spec.muscles == 1
         self._most_pulses = self._look if single else 1
         # Whole periods move an arm by more than a tolerance: without pulses it is to swing, and not to be pushed.
-        pushed = single or spec.pulses
+        fine = spec.pulses and (agent.simulation.commands == "pulses" or agent.simulation.spread)
+        pushed = single or fine
         self._kept, self._close = (_KEPT * tolerance, _CLOSE * tolerance) if pushed else (0.0, 0.0)
-        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if spec.pulses else math.inf
+        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if fine else math.inf
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)

@@ -46,6 +46,8 @@ class Section:
     text: Sequence[str] = ()
     figures: Sequence[Picture] = ()
     tables: Sequence[Table] = field(default=())
+    opens: bool = False
+    """Whether the page opens with it, before its contents."""
 
     @property
     def anchor(self) -> str:
@@ -85,6 +87,7 @@ def _numbered(sections: Sequence[Section]) -> Iterator[dict[str, Any]]:
         figures, tables = figures + len(section.figures), tables + len(section.tables)
         yield {
             "section": section,
+            "opens": section.opens,
             "figures": list(enumerate(section.figures, first_figure)),
             "tables": list(enumerate(section.tables, first_table)),
         }

@@ -23,9 +23,16 @@ from pneumarm.report.data import (
     TransferData,
 )
 from pneumarm.report.health import summary_of_health
-from pneumarm.report.ledger import written
 from pneumarm.report.page import render
-from pneumarm.report.sections import RunData, all_sections, collected, moving_words, predicted, propagated
+from pneumarm.report.sections import (
+    RunData,
+    all_sections,
+    collected,
+    moving_words,
+    predicted,
+    propagated,
+    reached_words,
+)
 from pneumarm.task.movements import Movements, movements, read_episodes
 
 REPORT = "report.html"
@@ -154,35 +161,8 @@ def _summary(run: RunData) -> list[str]:
         )
     moves = moving_words(run.results)
     text = [*moves, *text]
-    if moves:
-        text.append(
-            "What follows is the thesis' measure: a goal is reached once it is touched slowly enough, and each "
-            "change of valves costs 8 of the reward. This agent stays at goals instead, and does not save changes."
-        )
-    if run.test is not None and run.test.n:
-        text.append(
-            f"In the simulation the controller reaches {run.test.success.mean():.2%} of its goals "
-            "with a mean reward of "
-            f"{written(run.test.reward.mean(), '{:.2f}')}."
-        )
-    if run.transfer is not None:
-        parts = [
-            f"{phase.success.mean():.1%} {words} (mean reward {written(phase.reward.mean(), '{:.2f}')})"
-            for words, phase in (("on arrival", run.transfer.before), ("after adaptation", run.transfer.after))
-            if phase.n
-        ]
-        if parts:
-            text.append("On the arm it reaches " + " and ".join(parts) + ".")
-    bound = run.results.get("bound", {})
-    if "after" in bound.get("distance", {}):
-        best = max(bound["distance"]["after"], key=lambda plans: float(bound["distance"]["after"][plans]["planned"]))
-        distance = bound["distance"]["after"][best]
-        earned = distance["planned"] - distance["reward"]
-        text.append(
-            f"In the first {distance['episodes']} movements after adaptation the controller earns "
-            f"{written(earned, '{:.2f}')}, planning with the arm's true physics "
-            f"{written(distance['planned'], '{:.2f}')}."
-        )
+    if not moves:
+        text += reached_words(run)
     text += summary_of_health(run.results)
     if run.adaptation is not None:
         text += [f"{line[0].upper()}{line[1:]}." for line in run.adaptation.sentences]

@@ -24,7 +24,7 @@ from pneumarm.report.data import (
 )
 from pneumarm.report.figures import Classification, CurveMark, Phase
 from pneumarm.report.health import health, tells_of_health
-from pneumarm.report.ledger import beside_thesis, bound_table, ledger
+from pneumarm.report.ledger import beside_thesis, bound_table, ledger, written
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.style import of_joint, quantities
 from pneumarm.task import Movements, running_time
@@ -92,7 +92,7 @@ def moving(data: MovingData, results: Mapping[str, Any], spec: ArmSpec) -> Secti
     ]
     errors = (f"RMS error{of_joint(joint, spec.joints)} [°]" for joint in range(spec.joints))
     table = Table(("sinusoid", *errors), tracked, "Sinusoids that were followed, the reference known ahead.")
-    return Section("How it moves", tuple(moving_words(results)), [picture], [table] if tracked else [])
+    return Section("How it moves", (), [picture], [table] if tracked else [], opens=True)
 
 
 def moving_words(results: Mapping[str, Any]) -> list[str]:
@@ -111,10 +111,46 @@ def moving_words(results: Mapping[str, Any]) -> list[str]:
     return [words + (f" and {air:.2f} normal litres of air a movement." if air is not None else ".")]
 
 
+def reached_words(run: RunData) -> list[str]:
+    """Return how an agent reaches goals, in the thesis' measure, as sentences."""
+    text = []
+    if run.test is not None and run.test.n:
+        text.append(
+            f"In the simulation the controller reaches {run.test.success.mean():.2%} of its goals "
+            "with a mean reward of "
+            f"{written(run.test.reward.mean(), '{:.2f}')}."
+        )
+    if run.transfer is not None:
+        parts = [
+            f"{phase.success.mean():.1%} {words} (mean reward {written(phase.reward.mean(), '{:.2f}')})"
+            for words, phase in (("on arrival", run.transfer.before), ("after adaptation", run.transfer.after))
+            if phase.n
+        ]
+        if parts:
+            text.append("On the arm it reaches " + " and ".join(parts) + ".")
+    bound = run.results.get("bound", {})
+    if "after" in bound.get("distance", {}):
+        best = max(bound["distance"]["after"], key=lambda plans: float(bound["distance"]["after"][plans]["planned"]))
+        distance = bound["distance"]["after"][best]
+        earned = distance["planned"] - distance["reward"]
+        text.append(
+            f"In the first {distance['episodes']} movements after adaptation the controller earns "
+            f"{written(earned, '{:.2f}')}, planning with the arm's true physics "
+            f"{written(distance['planned'], '{:.2f}')}."
+        )
+    return text
+
+
 def overview(run: RunData) -> Section:
     """Return the ledger and the comparison with the thesis."""
-    bound = run.results.get("bound", {})
-    text = [
+    bound, text = run.results.get("bound", {}), []
+    if moving_words(run.results):
+        text = [
+            "What follows is the thesis' measure: a goal is reached once it is touched slowly enough, and each "
+            "change of valves costs 8 of the reward. This agent stays at goals instead, and does not save changes.",
+            " ".join(reached_words(run)),
+        ]
+    text += [
         "The first table is what counts: how well the controller moves in the simulation it was trained in, on the "
         "arm as it arrives there, and after it went on learning on the arm. The last table puts our figures beside "
         "those of the thesis."

@@ -11,7 +11,7 @@ import pytest
 
 from children import child, end, python, wait_until
 from pneumarm.errors import UnusableInput
-from pneumarm.run import Run
+from pneumarm.run import Run, RunSettings
 from pneumarm.transitions import Store
 from small import SMALL
 
@@ -159,3 +159,10 @@ def test_a_run_killed_in_every_stage_ends_as_if_nothing_had_happened(small_run: 
     assert (folder / "episodes.csv").read_text() == (small_run / "episodes.csv").read_text()
     for name in ("agent.safetensors", "adapted.safetensors", "simulation.safetensors"):
         assert (folder / name).read_bytes() == (small_run / name).read_bytes()
+
+
+def test_movements_are_planned_for_agents_that_reach_or_where_it_is_asked_for() -> None:
+    assert RunSettings().planned == 0
+    assert RunSettings(task="reach").planned == 40
+    assert RunSettings(bound_episodes=3).planned == 3
+    assert RunSettings(task="reach", bound_episodes=0).planned == 0

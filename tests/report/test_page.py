@@ -148,6 +148,23 @@ def test_figures_of_joints_are_told_apart():
     assert re.fullmatch(f"{both} measured; {both} by eq. 3.7", rows["std of error after 1 s, angle [counts]"])
 
 
+def test_a_run_that_settles_opens_with_the_arm_as_it_moves():
+    run = builders.run(small=True)
+    time = np.linspace(0, 1, 31)
+    angle = np.full((31, 1), 500.0)
+    settle = {"tolerance_deg": 1.0, "settled": 1.0, "movements": 40, "median_seconds": 0.4, "rest_error_deg": 0.1}
+    settle |= {"valve_changes_per_second": 7.0, "air_litres_per_movement": None}
+    moved = replace(run, moving=MovingData(time, angle, angle), results={**run.results, "settle": settle})
+    made = run_page(moved)
+    places = [
+        made.index(part)
+        for part in ("settles within", 'id="figure-1"', "<nav", "the thesis' measure".replace("'", "&#39;"))
+    ]
+    assert places == sorted(places)
+    assert made.count("settles within") == 1
+    assert made.count('id="figure-1"') == 1
+
+
 def test_comparison_names_ours_and_the_thesis():
     run = builders.run()
     rows = {row[0]: row for row in beside_thesis(run.results, run.quality, run.test, run.transfer, run.spec).rows}

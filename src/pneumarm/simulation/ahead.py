@@ -5,11 +5,11 @@ the networks see less in them than there is, and small errors that all point one
 a second where joints stick. So the networks that were fitted to single steps make several of their own, each from
 what the one before said, and the error of every step counts:
 
-    cost = sum_k sum_i clip((o_k,i - predicted_k,i) / e_k,i)^2        e_k,i: such errors as the fit before leaves
+    cost = sum_k sum_i huber((o_k,i - predicted_k,i) / e_k,i)        e_k,i: such errors as the fit before leaves
 
-Its gradient goes back through all the steps (back-propagation through time), and Adam follows it. In system
-identification this is an output error in place of an equation error (L. Ljung, "System Identification", 1999,
-section 4.2).
+(quadratic, and linear beyond 4, where something happened that cannot be predicted). Its gradient goes back through all
+the steps (back-propagation through time), and Adam follows it. In system identification this is an output error in
+place of an equation error (L. Ljung, "System Identification", 1999, section 4.2).
 """
 
 from collections.abc import Callable, Iterable
@@ -36,7 +36,7 @@ _AT_ONCE = 256  # stretches
 _RATE = 5e-4  # of Adam at the start; falls linearly to 0
 _LONGEST_GRADIENT = 1.0
 _MOST = 20_000  # stretches that are kept; 20 MB of one joint
-_CLIP = 4.0  # errors beyond are of what cannot be predicted, such as the moment in which a joint breaks loose
+_CLIP = 4.0  # errors beyond, such as of the moment in which a joint breaks loose, count linearly
 _OF_MEDIAN = 0.674  # standard deviations, is the median of the size of a normal deviate
 _LEAST = 1e-4  # scaled error; what has less never changes
 _DRAWN = 9  # stream of random numbers

@@ -7,9 +7,9 @@ what the one before said, and the error of every step counts:
 
     cost = sum_k sum_i huber((o_k,i - predicted_k,i) / e_k,i)        e_k,i: such errors as the fit before leaves
 
-(quadratic, and linear beyond 4, where something happened that cannot be predicted). Its gradient goes back through all
-the steps (back-propagation through time), and Adam follows it. In system identification this is an output error in
-place of an equation error (L. Ljung, "System Identification", 1999, section 4.2).
+(quadratic, and linear beyond 4, where something happened that cannot be predicted). Its gradient goes back through
+all the steps (back-propagation through time), and Adam follows it. In system identification this is an output error
+in place of an equation error (L. Ljung, "System Identification", 1999, section 4.2).
 """
 
 from collections.abc import Callable, Iterable

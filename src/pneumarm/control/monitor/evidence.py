@@ -188,7 +188,7 @@ def see_by_identification(known, readings, thresholds, memory, time, angle, pres
         known.clock[0] += 1.0
     if known.clock[0] >= known.look[0]:
         if known.clock[1] >= 0.0:
-            expect_by_identification(known, readings, memory, angle, pressure)
+            expect_by_identification(known, readings, memory, angle, pressure, thresholds.empty)
             for m in range(memory.std.shape[0]):
                 memory.clear[m] = min(thresholds.clear, half_a_filling(known, m))
             if known.clock[2] * known.look[1] >= EXPERIENCE:
@@ -257,7 +257,7 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             if max(memory.base[m], read) - lowest < thresholds.empty:
                 least = max(least, memory.clear[m])
             fullness = (memory.base[m] - lowest) / (memory.full[m] - lowest)
-            full = fullness > thresholds.full and memory.command[0, m] > 0.0
+            full = fullness > thresholds.full and max(memory.command[0, m], memory.command[1, m]) > 0.0
             telling = abs(difference) > least and not full
             if readings.leak[h, m] > 0.0:
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0

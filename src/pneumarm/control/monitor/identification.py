@@ -218,6 +218,15 @@ def predicted(known, m, x):  # type: ignore[no-untyped-def]
 
 
 @part
+def takes_air(x):  # type: ignore[no-untyped-def]
+    """Return whether a muscle with the features ``x`` takes air, or still may."""
+    for slot in range(_SLOTS):
+        if x[slot] != 0.0:
+            return True
+    return False
+
+
+@part
 def uncertainty(known, m, x, gain):  # type: ignore[no-untyped-def]
     """Return the variance of what is expected by ``x``, and write covariance times ``x`` into ``gain``."""
     gain[:] = 0.0
@@ -298,21 +307,24 @@ def independence(known, m):  # type: ignore[no-untyped-def]
 
 
 @part
-def expect_by_identification(known, readings, memory, angle, pressure):  # type: ignore[no-untyped-def]
+def expect_by_identification(known, readings, memory, angle, pressure, empty):  # type: ignore[no-untyped-def]
     """Set in ``memory`` what pressures are expected under every hypothesis [counts], and how uncertain that is.
 
-    Of the hypotheses only those are asked how uncertain they are that are nearer to the ``pressure`` (joints, 2).
+    Of the hypotheses only those are asked how uncertain they are that are nearer to the ``pressure`` (joints, 2). A
+    muscle below ``empty`` [counts above the lowest] has no air to give: there only what takes air differs.
     """
     muscles, highest = memory.std.shape[0], known.look[2]
     for m in range(muscles):
         read = pressure[m // 2, m % 2] / highest
         full = level_of_supply(known, m)
         memory.lowest[m] = lowest_level(known, m) * highest
-        memory.full[m] = full * highest
+        memory.full[m] = highest_level(known, m) * highest
         memory.base[m] = known.last[m, 0] * highest
         memory.trust[m] = independence(known, m)
         features(known, readings, 0, m, angle, full, known.x[m])
         healthy = known.last[m, 0] + predicted(known, m, known.x[m])
+        healthy = max(healthy, min(lowest_level(known, m), read))
+        is_empty = (max(known.last[m, 0], read) - lowest_level(known, m)) * highest < empty
         variance = uncertainty(known, m, known.x[m], known.gain[m])
         known.variance[m] = variance
         side, speed, level = class_of(known, m, angle)
@@ -326,6 +338,8 @@ def expect_by_identification(known, readings, memory, angle, pressure):  # type:
                 memory.expected[h, m] -= lost * (memory.base[m] - memory.lowest[m])
             elif h > 0 and not readings.as_told[h, m]:
                 features(known, readings, h, m, angle, full, known.x[muscles])
+                if is_empty and not takes_air(known.x[m]) and not takes_air(known.x[muscles]):
+                    continue
                 other = known.last[m, 0] + predicted(known, m, known.x[muscles])
                 other = max(other, min(known.span[m, 0], healthy))
                 memory.expected[h, m] = other * highest

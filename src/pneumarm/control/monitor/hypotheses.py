@@ -21,7 +21,9 @@ HALF_SUPPLY = 0.5
 """A low supply as a part of the usual one; the other one is gone."""
 _WHOLE = math.inf  # the supply of a healthy arm
 _NEAR, _BACK = 0.35, 0.35  # of the usual supply, over which the flow ceases; part of it that runs back above
-_TOLD = (-1.0, 0.0, 1.0)
+_NEVER, _ALWAYS = (0, 0, 0), (1, 1, 1)
+_FILLING, _EMPTYING = (0, 0, 1), (1, 0, 0)
+_TOLD = (_FILLING, _EMPTYING)  # inlet and outlet: whether each is open when told to empty, to close, to fill
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,8 @@ class Readings(NamedTuple):
 
     source: NDArray[np.int64]
     """Whose command a muscle follows, shape (n, m)."""
-    table: NDArray[np.float64]
-    """What is carried out for out, closed, in; shape (n, m, 3)."""
+    open: NDArray[np.int64]
+    """Whether inlet and outlet are open when told to empty, to close, to fill; shape (n, m, 2, 3)."""
     leak: NDArray[np.float64]
     """Rate at which a muscle loses its pressure besides, shape (n, m) [1/s]."""
     supply: NDArray[np.float64]
@@ -54,7 +56,7 @@ class Readings(NamedTuple):
 
     def first(self, n: int) -> "Readings":
         """Return the first ``n``."""
-        return Readings(self.source[:n], self.table[:n], self.leak[:n], self.supply[:n], self.as_told[:n])
+        return Readings(self.source[:n], self.open[:n], self.leak[:n], self.supply[:n], self.as_told[:n])
 
 
 def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Readings]:
@@ -65,25 +67,25 @@ def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Reading
     muscles = 2 * joints
     there = [m for m in range(muscles) if m % 2 < of_each]
     found: list[Hypothesis] = []
-    sources, tables, leaks, supplies = [], [], [], []
+    sources, opens, leaks, supplies = [], [], [], []
 
     def add(
         hypothesis: Hypothesis,
-        change: dict[int, tuple[float, float, float]] | None = None,
+        change: tuple[int, tuple[tuple[int, int, int], tuple[int, int, int]]] | None = None,
         swap: tuple[int, int] | None = None,
         leaking: int | None = None,
         supply: float = _WHOLE,
     ) -> None:
-        source, table, leak = np.arange(muscles), np.tile(_TOLD, (muscles, 1)), np.zeros(muscles)
-        for muscle, carried_out in (change or {}).items():
-            table[muscle] = carried_out
+        source, valves, leak = np.arange(muscles), np.tile(_TOLD, (muscles, 1, 1)), np.zeros(muscles)
+        if change is not None:
+            valves[change[0]] = change[1]
         if swap is not None:
             source[list(swap)] = swap[::-1]
         if leaking is not None:
             leak[leaking] = LEAKING
         found.append(hypothesis)
         sources.append(source)
-        tables.append(table)
+        opens.append(valves)
         leaks.append(leak)
         supplies.append(supply)
 
@@ -92,22 +94,21 @@ def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Reading
     add(Hypothesis("low-supply", "the supply is gone"), supply=0.0)
     for m in there:
         joint, muscle = m // 2 + 1, m % 2 + 1
-        for detail, carried_out in (
-            ("the inlet is stuck closed", (-1.0, 0.0, 0.0)),
-            ("the outlet is stuck closed", (0.0, 0.0, 1.0)),
-            # With both open the outlet, which is wider, wins.
-            ("the inlet is stuck open", (-1.0, 1.0, 1.0)),
-            ("the outlet is stuck open", (-1.0, -1.0, -1.0)),
+        for detail, inlet, outlet in (
+            ("the inlet is stuck closed", _NEVER, _EMPTYING),
+            ("the outlet is stuck closed", _FILLING, _NEVER),
+            ("the inlet is stuck open", _ALWAYS, _EMPTYING),
+            ("the outlet is stuck open", _FILLING, _ALWAYS),
         ):
-            add(Hypothesis("stuck-valve", detail, joint, muscle), {m: carried_out})
-        add(Hypothesis("swapped-valves", "inlet and outlet are swapped", joint, muscle), {m: (1.0, 0.0, -1.0)})
+            add(Hypothesis("stuck-valve", detail, joint, muscle), (m, (inlet, outlet)))
+        add(Hypothesis("swapped-valves", "inlet and outlet are swapped", joint, muscle), (m, _TOLD[::-1]))
         add(Hypothesis("leak", "a large leak", joint, muscle), leaking=m)
     for first, second in combinations(there, 2):
         other = f"the valves are those of joint {second // 2 + 1}, muscle {second % 2 + 1}"
         add(Hypothesis("swapped-muscles", other, first // 2 + 1, first % 2 + 1), swap=(first, second))
-    source, table, leak, low = map(np.array, (sources, tables, leaks, supplies))
-    as_told = (source == np.arange(muscles)) & (table == _TOLD).all(axis=2) & np.isinf(low)[:, None]
-    return found, Readings(source, table, leak, low, as_told)
+    source, valves, leak, low = map(np.array, (sources, opens, leaks, supplies))
+    as_told = (source == np.arange(muscles)) & (valves == _TOLD).all(axis=(2, 3)) & np.isinf(low)[:, None]
+    return found, Readings(source, valves, leak, low, as_told)
 
 
 @part
@@ -117,10 +118,20 @@ def carried_out(readings, h, m, told, level):  # type: ignore[no-untyped-def]
     During a pulse it does what it does when told to open, in the rest of the period what it does when told to close.
     """
     share = abs(told)
-    done = share * readings.table[h, m, 2 if told > 0.0 else 0] + (1.0 - share) * readings.table[h, m, 1]
+    done = share * position(readings, h, m, 2 if told > 0.0 else 0) + (1.0 - share) * position(readings, h, m, 1)
     if done > 0.0 and readings.supply[h] < math.inf:
         done *= supplied(readings.supply[h], level)
     return done
+
+
+@part
+def position(readings, h, m, told):  # type: ignore[no-untyped-def]
+    """Return as a command what the valves of muscle ``m`` do when ``told`` to empty, to close, to fill (0, 1, 2).
+
+    No command says that both are open; the outlet, which is wider, then wins.
+    """
+    valves = readings.open[h, m]
+    return -1.0 if valves[1, told] else 1.0 if valves[0, told] else 0.0
 
 
 @part
@@ -146,16 +157,10 @@ def reached(supply, level):  # type: ignore[no-untyped-def]
 
 
 @part
-def inflow(readings, h, m, told_in, told_out):  # type: ignore[no-untyped-def]
-    """Return for which part of a time muscle ``m`` takes air under hypothesis ``h``, told to for ``told_in``."""
-    table = readings.table[h, m]
-    closed = max(0.0, 1.0 - told_in - told_out)
-    return told_in * max(table[2], 0.0) + told_out * max(table[0], 0.0) + closed * max(table[1], 0.0)
+def time_open(readings, h, m, valve, told_in, told_out):  # type: ignore[no-untyped-def]
+    """Return for which part of a time the inlet (0) or the outlet (1) of muscle ``m`` is open under hypothesis ``h``.
 
-
-@part
-def outflow(readings, h, m, told_in, told_out):  # type: ignore[no-untyped-def]
-    """Return for which part of a time muscle ``m`` gives air under hypothesis ``h``; as :func:`inflow`."""
-    table = readings.table[h, m]
-    closed = max(0.0, 1.0 - told_in - told_out)
-    return -(told_in * min(table[2], 0.0) + told_out * min(table[0], 0.0) + closed * min(table[1], 0.0))
+    It was told to fill for ``told_in`` of the time and to empty for ``told_out``.
+    """
+    states = readings.open[h, m, valve]
+    return told_out * states[0] + max(0.0, 1.0 - told_in - told_out) * states[1] + told_in * states[2]

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.control.monitor.hypotheses import inflow, outflow, reduced
+from pneumarm.control.monitor.hypotheses import reduced, time_open
 from pneumarm.kernels import part
 
 LOOK = 1 / 30
@@ -175,8 +175,8 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     taken, given, others = 0.0, 0.0, 0.0
     for slot in range(_SLOTS):
         told_in, told_out = known.open[source, slot, 0], known.open[source, slot, 1]
-        taking = inflow(readings, h, m, told_in, told_out) * supply
-        giving = outflow(readings, h, m, told_in, told_out)
+        taking = time_open(readings, h, m, 0, told_in, told_out) * supply
+        giving = time_open(readings, h, m, 1, told_in, told_out)
         x[slot], x[_SLOTS + slot] = taking, taking * level
         x[2 * _SLOTS + slot], x[3 * _SLOTS + slot] = giving, giving * level
         taken += taking / _SLOTS

@@ -258,7 +258,7 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
                 least = max(least, memory.clear[m])
             fullness = (memory.base[m] - lowest) / (memory.full[m] - lowest)
             full = fullness > thresholds.full and max(memory.command[0, m], memory.command[1, m]) > 0.0
-            telling = abs(difference) > least and not full
+            telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
             if readings.leak[h, m] > 0.0:
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
             if telling:

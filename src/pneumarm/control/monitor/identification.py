@@ -42,6 +42,7 @@ _ERROR = 0.02  # standard deviation of an error before any is known, in highest 
 _KNOWN = 10.0  # errors that this is worth
 _FORGOTTEN = 3000.0  # errors of a class after which earlier ones count less
 _LEAST = 0.4  # counts; below this the converter's rounding is all there is
+_LOST = 0.25  # of what comes in while both valves are open, standard deviation
 _CUT = 4.0  # standard deviations of an error that counts in the mean
 _RECENT = 20.0  # s
 _FARTHEST = 4.0  # highest pressures; a supply beyond this never shows
@@ -165,18 +166,21 @@ def shift_slots(known):  # type: ignore[no-untyped-def]
 def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-def]
     """Write the features of muscle ``m`` under hypothesis ``h`` into ``x``; ``angle`` (joints,) is what is read now.
 
-    ``full`` is the pressure at which inlets let no more air in [highest pressures].
+    ``full`` is the pressure at which inlets let no more air in [highest pressures]. Where both valves are open, as in
+    no sound arm, some of what comes in leaves at once. Returned is how uncertain that is [highest pressures].
     """
     source, joint, level = readings.source[h, m], m // 2, known.last[m, 0]
     filled = level - lowest_level(known, m)
     supply = 1.0
     if readings.supply[h] < math.inf:
         supply = reduced(readings.supply[h], filled / (full - lowest_level(known, m)))
-    taken, given, others = 0.0, 0.0, 0.0
+    taken, given, others, lost = 0.0, 0.0, 0.0, 0.0
     for slot in range(_SLOTS):
         told_in, told_out = known.open[source, slot, 0], known.open[source, slot, 1]
         taking = time_open(readings, h, m, 0, told_in, told_out) * supply
         giving = time_open(readings, h, m, 1, told_in, told_out)
+        both = supply * max(taking + giving - 1.0, 0.0)
+        lost += _LOST * both * (known.weight[m, slot] + level * known.weight[m, _SLOTS + slot])
         x[slot], x[_SLOTS + slot] = taking, taking * level
         x[2 * _SLOTS + slot], x[3 * _SLOTS + slot] = giving, giving * level
         taken += taking / _SLOTS
@@ -206,6 +210,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     x[_CURVES + 16] = empty * turned
     x[_CURVES + 17] = empty * taken
     x[_CURVES + 18] = empty * given
+    return abs(lost)
 
 
 @part
@@ -284,7 +289,8 @@ def filling(known, m, level):  # type: ignore[no-untyped-def]
 @part
 def half_a_filling(known, m):  # type: ignore[no-untyped-def]
     """Return half of what an open inlet fills into muscle ``m`` in a look when it is empty [counts]."""
-    return 0.5 * max(filling(known, m, lowest_level(known, m)), 0.0) * known.look[2]
+    rate = filling(known, m, lowest_level(known, m)) + known.weight[m, _CURVES + 17]
+    return 0.5 * max(rate, 0.0) * known.look[2]
 
 
 @part
@@ -337,15 +343,15 @@ def expect_by_identification(known, readings, memory, angle, pressure, empty):  
                 lost = 1.0 - math.exp(-readings.leak[h, m] * known.look[1])
                 memory.expected[h, m] -= lost * (memory.base[m] - memory.lowest[m])
             elif h > 0 and not readings.as_told[h, m]:
-                features(known, readings, h, m, angle, full, known.x[muscles])
+                lost = features(known, readings, h, m, angle, full, known.x[muscles])
                 if is_empty and not takes_air(known.x[m]) and not takes_air(known.x[muscles]):
                     continue
                 other = known.last[m, 0] + predicted(known, m, known.x[muscles])
                 other = max(other, min(known.span[m, 0], healthy))
-                memory.expected[h, m] = other * highest
+                memory.expected[h, m], memory.doubt[h, m] = other * highest, lost * highest
                 if abs(other - read) < abs(healthy - read):
                     doubt = uncertainty(known, m, known.x[muscles], known.gain[muscles])
-                    memory.doubt[h, m] = math.sqrt(doubt) * highest
+                    memory.doubt[h, m] = math.sqrt(doubt + lost * lost) * highest
 
 
 @part

@@ -148,11 +148,7 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adap
     """
     with tempfile.TemporaryDirectory() as folder:
         db = Path(folder) / "arm.db"
-        try:
-            recorded = _recorded(name, db, seed, "stop" if monitor else "off")
-        except ArmFailure:
-            db.unlink()
-            recorded = {**_recorded(name, db, seed, "warn"), "refused": 1}
+        how = recorded(name, db, seed) if monitor else _recorded(name, db, seed, "off")
         made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
         single, _ = fitted(db, seed)
     servo = train(made.simulation, begin, seed=seed).agent
@@ -163,13 +159,22 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adap
     with open_arm(name, seed) as opened:
         reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), seed)
     return {
-        **recorded,
+        **how,
         "history": made.simulation.window.history,
         **_moving_figures(tried),
         "adapted": None if later is None else _moving_figures(later),
         "success": [int(one.success) for one in reached],
         "reward": [float(one.reward) for one in reached],
     }
+
+
+def recorded(name: str, db: Path, seed: int) -> dict[str, Any]:
+    """Record an arm as in a default run, and with a monitor that only warns where it is ``refused``; return how."""
+    try:
+        return _recorded(name, db, seed, "stop")
+    except ArmFailure:
+        db.unlink()
+        return {**_recorded(name, db, seed, "warn"), "refused": 1}
 
 
 def _recorded(name: str, db: Path, seed: int, mode: Mode) -> dict[str, Any]:

@@ -32,6 +32,11 @@ from pneumarm.transitions import KINDS, WHOLE_PERIODS, Store, collect
 
 TRANSITIONS = 200_000
 SEED_OF_MOVEMENTS = 0
+STILL, NEAR = 0.2, 4.0
+"""Degrees within which an arm stands still, and within which it is near its goal."""
+KINDS_OF_FAILURE = tuple(
+    f"{how} {where} the goal" for how in ("stands still", "moves about") for where in ("near", "far from")
+)
 HEADER = (
     f"{'arm':6}{'seed':>5} {'method':14}{'train':>7}{'in simulation':>15}{'on the arm':>17}{'success':>22}"
     f"{'actions':>9}{'switches':>9}{'p99':>9}"
@@ -49,6 +54,7 @@ def measure() -> Iterator[str]:
     with environment.kept_folder("PNEUMARM_AGENTS_FOLDER") as folder:
         for arm in arms:
             simulation, begin = prepared(folder, arm)
+            degrees = simulation.spec.degrees
             for seed in seeds:
                 for method in methods:
                     trained = train_by(method, simulation, begin, seed)
@@ -56,7 +62,9 @@ def measure() -> Iterator[str]:
                     made, p99 = greedy_movements(trained.agent, arm, movements)
                     figures = of_rows(one.row() for one in made).results()
                     found[method].append((figures, trained))
-                    failures[method].update(kind(one) for one in made if not one.success)
+                    failures[method].update(
+                        kind(degrees(one.recorded.angle), degrees(one.goal)) for one in made if not one.success
+                    )
                     yield row(arm, seed, method, trained, simulated, figures, p99)
     for method, each in found.items():
         yield total(method, each, failures[method])
@@ -109,14 +117,11 @@ def greedy_movements(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Mo
     return made, 1e3 * float(np.quantile(controller.seconds[1:], 0.99))
 
 
-def kind(movement: Movement) -> str:
-    """Return how a movement failed, by its last twenty readings."""
-    last = movement.recorded.angle[-20:]
-    away = np.abs(last[-1] - movement.goal).max()
-    spread = np.ptp(last, axis=0).max()
-    if spread <= 5:
-        return "stands still near the goal" if away <= 100 else "stands still far from the goal"
-    return "moves about near the goal" if away <= 100 else "moves about far from the goal"
+def kind(angle: NDArray[np.float64], goal: NDArray[np.float64]) -> str:
+    """Return how a movement failed, by its last twenty angles (n, joints) and its goal (joints,), both in degrees."""
+    last = angle[-20:]
+    how = "stands still" if np.ptp(last, axis=0).max() <= STILL else "moves about"
+    return f"{how} {'near' if np.abs(last[-1] - goal).max() <= NEAR else 'far from'} the goal"
 
 
 def row(

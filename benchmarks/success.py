@@ -1,142 +1,202 @@
-"""How surely the agent for reaching reaches its goals after transfer: many movements on each arm, every failure kept.
+"""How surely goals are reached and settled at, on arms of any kind: many movements, every failure kept.
 
 python -m benchmarks success
 
-The agent is made as ``pneumarm run`` makes it, by its defaults; it moves greedily and learns nothing. Movements are
-made in blocks, each on the arm as it is when newly opened, so that they can be made at once and in any order; the
-begin state and the goal of a movement depend on its number alone. Settings come from the environment:
+Each arm is recorded, its simulations are fitted and its agents trained as in a default run. Then it is moved, and
+nothing is learned: by the default agent, which is to settle at a goal within a degree in two seconds and stay, and by
+the agent for reaching, from begin states that are drawn as in the thesis. Goals are those that the agent knows to be
+within reach. What fails is tried again after two seconds with closed valves (thesis section 5.6.1). Movements are
+made in blocks, each on the arm as it is when newly opened, so that they can be made at once and in any order; what a
+block is depends on its number alone. Settings come from the environment:
 
-PNEUMARM_SUCCESS_ARMS       seeds of virtual arms; the ten held-out arms by default
-PNEUMARM_SUCCESS_MOVEMENTS  on each arm, 5000
-PNEUMARM_SUCCESS_PROCESSES  1
+PNEUMARM_SUCCESS_ARMS       names of arms divided by blanks, or seeds of wide arms, such as the default, 5000-5099
+PNEUMARM_SUCCESS_SETTLE     movements of the default agent on each arm, 500; 0 for none
+PNEUMARM_SUCCESS_REACH      movements of the agent for reaching on each arm, 10000; 0 for none
+PNEUMARM_SUCCESS_PROCESSES  2
 PNEUMARM_SUCCESS_FOLDER     where agents and rows are kept; a call with the same folder goes on where another ended.
                             runs/success by default
 
-A failed movement is kept as a row of ``failures.jsonl`` there, with its number, goal and all that was read and set.
+A failed movement is kept as a row of ``failures.jsonl`` there: its first try with all that was read and set.
 """
 
+import re
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks import _environment as environment
-from benchmarks._trials import HELD_OUT, Rows, collected, fitted, greedy_movements
-from benchmarks.agents import kind
-from pneumarm.learning import PolicySettings, load_agent, train
-from pneumarm.statistics import mean_estimate, rate_estimate
-from pneumarm.task import Movement
+from benchmarks._trials import Rows, fitted, in_processes, names_of, recorded
+from benchmarks.agents import KINDS_OF_FAILURE, kind
+from pneumarm.arm import ArmSpec, ControlCycle, guarded, open_arm
+from pneumarm.control import AgentController, drawn
+from pneumarm.control.movement import BEGIN, move
+from pneumarm.experiments import there_and_back
+from pneumarm.learning import AnyAgent, PolicySettings, Tracks, goals_of, load_agent, train
+from pneumarm.moving.movement import MoveSettings
+from pneumarm.moving.movement import move as move_and_hold
+from pneumarm.simulation import FitSettings
+from pneumarm.statistics import wilson
+from pneumarm.transitions.rows import Recorded
 
 SEED = 0
 """Of everything but the arm, as ``pneumarm run`` has it."""
-TRANSITIONS = 200_000
 BLOCK = 500
-KINDS_OF_FAILURE = tuple(
-    f"{how} {where} the goal" for how in ("stands still", "moves about") for where in ("near", "far from")
-)
-HEADER = f"{'arm':8}{'movements':>10}{'failed':>8}{'success':>28}{'reward':>17}{'actions':>9}{'switches':>10}"
+TASKS = "settle", "reach"
+PAUSE = MoveSettings().pause
+"""Before a second try [s]."""
+SHOWN = 20
+"""Failures that are told of one by one."""
+HEADER = f"{'':34}{'movements':>10}" + "".join(f"{name:>14}{'of 100,000':>26}" for name in ("failed", "failed twice"))
 
 
 def measure() -> Iterator[str]:
     folder = environment.folder("PNEUMARM_SUCCESS_FOLDER", "runs/success")
-    arms = environment.seeds("PNEUMARM_SUCCESS_ARMS", HELD_OUT)
-    blocks = -(-environment.whole("PNEUMARM_SUCCESS_MOVEMENTS", 5000) // BLOCK)
-    processes = environment.whole("PNEUMARM_SUCCESS_PROCESSES", 1)
-    rows = Rows(folder / "blocks.jsonl", "arm", "block")
-    failures = Rows(folder / "failures.jsonl", "arm", "number")
-    yield HEADER
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        for arm in arms:
-            prepare(folder, arm)
-            wanted = [block for block in range(blocks) if rows.get(arm, block) is None]
-            for row, failed in pool.map(make_block, [folder] * len(wanted), [arm] * len(wanted), wanted):
-                for failure in failed:  # before the row that counts them
-                    failures.add(failure)
-                rows.add(row)
-            yield line(str(arm), [row for row in rows if row["arm"] == arm and row["block"] < blocks])
-    chosen = [row for row in rows if row["arm"] in arms and row["block"] < blocks]
-    yield line("all", chosen)
-    yield from table(arms, [one for one in failures if one["arm"] in arms and one["number"] < blocks * BLOCK])
-
-
-def prepare(folder: Path, arm: int) -> Path:
-    """Return the file of the agent for an arm; collect, fit and train where that is not done yet."""
-    file = folder / f"{arm}.agent"
-    if not file.exists():
-        with tempfile.TemporaryDirectory() as place:
-            db = Path(place) / "arm.db"
-            collected(db, arm, SEED, TRANSITIONS)
-            made, begin = fitted(db, SEED)
-        train(made.simulation, begin, PolicySettings(), SEED).agent.save(file)
-    return file
-
-
-def make_block(folder: Path, arm: int, block: int) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return the row of a block of movements, and one of each that failed."""
-    agent = load_agent(folder / f"{arm}.agent")
-    numbers = range(block * BLOCK, (block + 1) * BLOCK)
-    made = greedy_movements(agent, arm, agent.goal_range, numbers, seed=block)
-    row = {
-        "arm": arm,
-        "block": block,
-        "reward": [float(one.reward) for one in made],
-        "success": [int(one.success) for one in made],
-        "actions": [one.actions for one in made],
-        "switches": [int(one.switches.sum()) for one in made],
+    arms = names_of(environment.text("PNEUMARM_SUCCESS_ARMS", "5000-5099"), "virtual:wide,seed=")
+    wanted = {
+        "settle": environment.whole("PNEUMARM_SUCCESS_SETTLE", 500, least=0),
+        "reach": environment.whole("PNEUMARM_SUCCESS_REACH", 10_000, least=0),
     }
-    failed = [failure(arm, number, one) for number, one in zip(numbers, made, strict=True) if not one.success]
-    return row, failed
+    processes = environment.whole("PNEUMARM_SUCCESS_PROCESSES", 2)
+    tasks = [task for task in TASKS if wanted[task]]
+    for _ in in_processes(prepare, [(folder, arm, task) for arm in arms for task in tasks], processes):
+        pass
+    rows = Rows(folder / "blocks.jsonl", "arm", "task", "block")
+    failures = Rows(folder / "failures.jsonl", "arm", "task", "number")
+    blocks = [
+        (arm, task, block, min(BLOCK, wanted[task] - block * BLOCK))
+        for task in tasks
+        for block in range(-(-wanted[task] // BLOCK))
+        for arm in arms
+    ]
+    made = {block: rows.get(*block[:3]) for block in blocks}
+    missing = [(folder, *block) for block, row in made.items() if row is None or row["movements"] != block[3]]
+    for row in in_processes(make_block, missing, processes):
+        for failure in row.pop("failures"):  # before the row that counts them
+            failures.add(failure)
+        rows.add(row)
+    yield HEADER
+    for task in tasks:
+        chosen = [row for block in blocks if block[1] == task and (row := rows.get(*block[:3])) is not None]
+        for arm in arms:
+            if any(row["failed"] for row in chosen if row["arm"] == arm):
+                yield line(f"{task} {arm}", [row for row in chosen if row["arm"] == arm])
+        yield line(f"{task}, {len(arms)} arms", chosen)
+        yield from table([one for one in failures if one["task"] == task and one["arm"] in arms])
 
 
-def failure(arm: int, number: int, movement: Movement) -> dict[str, Any]:
-    """Return all there is to know of a movement that failed."""
-    recorded = movement.recorded
+def place(folder: Path, arm: str, task: str) -> Path:
+    """Return the file of the agent of an arm for a task."""
+    return folder / f"{re.sub('[^0-9a-zA-Z]+', '-', arm)}.{task}.agent"
+
+
+def prepare(folder: Path, arm: str, task: str) -> dict[str, Any]:
+    """Record an arm, fit and train, where that is not done yet."""
+    file = place(folder, arm, task)
+    if not file.exists():
+        with tempfile.TemporaryDirectory() as temporary:
+            db = Path(temporary) / "arm.db"
+            recorded(arm, db, SEED)
+            if task == "settle":
+                made, begin = there_and_back.fitted(db, FitSettings(seed=SEED))
+                agent: AnyAgent = train(made.simulation, begin, seed=SEED).agent
+            else:
+                made, begin = fitted(db, SEED)
+                agent = train(made.simulation, begin, PolicySettings(), SEED).agent
+        agent.save(file)
+    return {}
+
+
+def make_block(folder: Path, arm: str, task: str, block: int, movements: int) -> dict[str, Any]:
+    """Return the row of a block of movements, with a row of each that failed in ``failures``."""
+    agent = load_agent(place(folder, arm, task))
+    first = block * BLOCK
+    make = settle if task == "settle" else reach
+    failures = [
+        {"arm": arm, "task": task, "number": number, **failed}
+        for number, failed in make(agent, arm, range(first, first + movements), block)
+    ]
     return {
         "arm": arm,
-        "number": number,
-        "block": number // BLOCK,
-        "kind": kind(movement),
-        "goal": movement.goal.tolist(),
-        "actions": movement.actions,
-        "switches": movement.switches.tolist(),
-        "time": np.round(recorded.time, 4).tolist(),
-        "angle": recorded.angle.tolist(),
-        "pressure": recorded.pressure.tolist(),
-        "command": recorded.command.tolist(),
+        "task": task,
+        "block": block,
+        "movements": movements,
+        "failed": len(failures),
+        "failed_twice": sum(one["twice"] for one in failures),
+        "failures": failures,
+    }
+
+
+def settle(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the number of each movement that did not settle at once, and what there is to know of it."""
+    assert isinstance(agent, Tracks)
+    goals = goals_of(agent).draw(np.random.default_rng([SEED, seed]), len(numbers))
+    once, controller = MoveSettings(tries=1), agent.controller()
+    with open_arm(arm, seed) as opened:
+        guard = guarded(opened)
+        for number, goal in zip(numbers, goals, strict=True):
+            (moved,) = move_and_hold(guard, controller, [goal], once)
+            if not moved.success:
+                guard.wait(PAUSE)
+                (again,) = move_and_hold(guard, controller, [goal], once)
+                yield number, failure(moved.recorded, moved.spec, goal, not again.success)
+
+
+def reach(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the number of each movement that did not reach its goal at once, and what there is to know of it."""
+    controller, settings = AgentController(agent), agent.settings
+    with open_arm(arm, seed) as opened:
+        cycle = ControlCycle(guarded(opened))
+        for number, draw in zip(numbers, drawn(goals_of(agent), SEED, numbers), strict=True):
+            BEGIN.reach(cycle.arm, draw.random)
+            made = move(cycle, controller, draw.goal, settings, velocity=agent.window.velocity)
+            if not made.success:
+                cycle.arm.wait(PAUSE)
+                again = move(cycle, controller, draw.goal, settings, velocity=agent.window.velocity)
+                yield number, failure(made.recorded, opened.spec, made.goal, not again.success)
+
+
+def failure(recorded: Recorded, spec: ArmSpec, goal: NDArray[np.float64], twice: bool) -> dict[str, Any]:
+    """Return all there is to know of a movement that failed, angles in degrees, pressures in bar."""
+    angle, target = spec.degrees(recorded.angle), spec.degrees(goal)
+    return {
+        "kind": kind(angle, target),
+        "twice": twice,
+        "goal": target.round(2).tolist(),
+        "time": (recorded.time - recorded.time[0]).round(3).tolist(),
+        "angle": angle.round(2).tolist(),
+        "pressure": spec.bar(recorded.pressure).round(4).tolist(),
+        "command": recorded.command.round(3).tolist(),
     }
 
 
 def line(name: str, rows: list[dict[str, Any]]) -> str:
     """Return the figures of ``rows`` as a line of the table."""
-    reward, success, actions, switches = (
-        np.concatenate([row[key] for row in rows]) for key in ("reward", "success", "actions", "switches")
-    )
-    rate, mean = rate_estimate(success.astype(bool)), mean_estimate(reward)
-    return (
-        f"{name:8}{len(success):10,}{int((success == 0).sum()):8}"
-        f"{f'{rate.mean:.5f} ({rate.low:.5f}..{rate.high:.5f})':>28}"
-        f"{f'{mean.mean:.2f} ± {mean.high - mean.mean:.2f}':>17}{actions.mean():9.2f}{switches.mean():10.3f}"
-    )
+    movements, failed, twice = (sum(row[key] for row in rows) for key in ("movements", "failed", "failed_twice"))
+    return f"{name:34}{movements:>10,}" + "".join(f"{n:>14,}{rate(n, movements):>26}" for n in (failed, twice))
 
 
-def table(arms: list[int], failures: list[dict[str, Any]]) -> Iterator[str]:
-    """Yield how many failures there are of each kind, and on which arms."""
-    if not failures:
-        yield "no movement failed"
-        return
+def rate(failed: int, movements: int) -> str:
+    """Return a rate of failures with the upper end of its interval."""
+    low, _ = wilson(movements - failed, movements)
+    return f"{1e5 * failed / movements:.1f} (at most {1e5 * (1 - float(low)):.1f})"
+
+
+def table(failures: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield how many failures there are of each kind and on which arms, and each of the first."""
     for name in KINDS_OF_FAILURE:
         found = Counter(one["arm"] for one in failures if one["kind"] == name)
-        where = ", ".join(f"{found[arm]} on {arm}" for arm in arms if found[arm])
-        yield f"{name:28}{sum(found.values()):6}  {where}"
-    for one in failures:
+        where = ", ".join(f"{count} on {arm}" for arm, count in found.most_common(5))
+        if found:
+            yield f"  {name:28}{found.total():6}, most: {where}"
+    for one in failures[:SHOWN]:
         angle, goal = np.array(one["angle"]), np.array(one["goal"])
-        nearest = np.abs(angle[1:] - goal).max(axis=1).min()
+        off = np.abs(angle - goal).max(axis=1)
         yield (
-            f"  arm {one['arm']}, movement {one['number']}: {one['kind']}; goal {goal.round()}, from {angle[0]} to "
-            f"{angle[-1]}, at the nearest {nearest:.0f} counts off, {sum(one['switches'])} switches"
+            f"  {one['arm']}, movement {one['number']}: {one['kind']}; goal {goal}, from {angle[0]} to {angle[-1]} "
+            f"degrees, at the nearest {off.min():.1f} off; second try {'failed' if one['twice'] else 'succeeded'}"
         )

@@ -225,10 +225,10 @@ def predicted(known, m, x):  # type: ignore[no-untyped-def]
 @part
 def takes_air(x):  # type: ignore[no-untyped-def]
     """Return whether a muscle with the features ``x`` takes air, or still may."""
+    taken = 0.0
     for slot in range(_SLOTS):
-        if x[slot] != 0.0:
-            return True
-    return False
+        taken += abs(x[slot])
+    return taken > 0.0
 
 
 @part

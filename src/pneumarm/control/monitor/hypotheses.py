@@ -164,3 +164,13 @@ def time_open(readings, h, m, valve, told_in, told_out):  # type: ignore[no-unty
     """
     states = readings.open[h, m, valve]
     return told_out * states[0] + max(0.0, 1.0 - told_in - told_out) * states[1] + told_in * states[2]
+
+
+@part
+def times_opened(readings, h, m, valve, fills, empties):  # type: ignore[no-untyped-def]
+    """Return how often the inlet (0) or the outlet (1) of muscle ``m`` opened under hypothesis ``h``.
+
+    It was told so many times to begin to fill and to empty.
+    """
+    states = readings.open[h, m, valve]
+    return 0.0 if states[1] else fills * states[2] + empties * states[0]

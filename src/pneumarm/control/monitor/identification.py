@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.control.monitor.hypotheses import reduced, time_open
+from pneumarm.control.monitor.hypotheses import reduced, time_open, times_opened
 from pneumarm.kernels import part
 
 LOOK = 1 / 30
@@ -34,7 +34,7 @@ EXPERIENCE = 20.0
 """An arm is not judged before it has been watched for so long [s]."""
 _SLOTS = SLOTS * LOOKS
 _CURVES = 4 * _SLOTS  # the first feature after those of the slots
-FEATURES = _CURVES + 19
+FEATURES = _CURVES + 23
 _BY_SLOT, _BY_CHANGE = 0.1, 0.3  # standard deviations of the weights before anything is known
 _FREEDOM = 4.0  # degrees of freedom of the Student distribution that weighs a reading
 _DRIFT = 3e-9  # variance that a weight gains in a second: air, rubber and supply change with the day
@@ -69,6 +69,10 @@ class Identified(NamedTuple):
     open: NDArray[np.float64]
     """Part of each slot, newest first, in which the valves were told to be open, shape (m, slots, inlet and
     outlet)."""
+    opened: NDArray[np.float64]
+    """How often the valves were told to open in this look and the one before, shape (m, 2, inlet and outlet)."""
+    held: NDArray[np.float64]
+    """Which valve is told to stay open at the end of the last period: 1 inlet, -1 outlet, 0 none; shape (m,)."""
     last: NDArray[np.float64]
     """Pressures at the last look and the last two changes that led to them, shape (m, 3) [highest pressures]."""
     angle: NDArray[np.float64]
@@ -112,6 +116,8 @@ def identified(spec: ArmSpec) -> Identified:
         error=error,
         lasting=np.tile([1.0, 0.0, 0.0], (muscles, 1)),
         open=np.zeros((muscles, _SLOTS, 2)),
+        opened=np.zeros((muscles, 2, 2)),
+        held=np.zeros(muscles),
         last=np.zeros((muscles, 3)),
         angle=np.zeros(spec.joints),
         turning=np.zeros(spec.joints),
@@ -128,14 +134,6 @@ def identified(spec: ArmSpec) -> Identified:
 
 
 @part
-def begin_sequence(known, at_rest):  # type: ignore[no-untyped-def]
-    """Begin a new sequence; ``at_rest`` says that all valves were closed before it."""
-    known.clock[0] = 0.0
-    known.clock[1] = 0.0 if at_rest else -float(LOOKS)
-    known.open[...] = 0.0
-
-
-@part
 def note_valves(known, command):  # type: ignore[no-untyped-def]
     """Note for which parts of the slots the valves were told to be open by the last period's ``command`` (m,)."""
     periods = known.look[0]
@@ -145,12 +143,15 @@ def note_valves(known, command):  # type: ignore[no-untyped-def]
             begin = known.clock[0] / periods * SLOTS
             end = begin + share / periods * SLOTS
             side = 0 if command[m] > 0.0 else 1
+            if known.held[m] * command[m] <= 0.0:
+                known.opened[m, 0, side] += 1.0
             if side == 0:
                 known.answer[m, 0] += share * known.look[1] / periods
             for slot in range(SLOTS):
                 overlap = min(end, slot + 1.0) - max(begin, float(slot))
                 if overlap > 0.0:
                     known.open[m, SLOTS - 1 - slot, side] += overlap
+        known.held[m] = 0.0 if share < 1.0 else 1.0 if command[m] > 0.0 else -1.0
 
 
 @part
@@ -160,6 +161,8 @@ def shift_slots(known):  # type: ignore[no-untyped-def]
         for slot in range(_SLOTS - 1, -1, -1):
             for side in range(2):
                 known.open[m, slot, side] = known.open[m, slot - SLOTS, side] if slot >= SLOTS else 0.0
+        for side in range(2):
+            known.opened[m, 1, side], known.opened[m, 0, side] = known.opened[m, 0, side], 0.0
 
 
 @part
@@ -210,6 +213,10 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     x[_CURVES + 16] = empty * turned
     x[_CURVES + 17] = empty * taken
     x[_CURVES + 18] = empty * given
+    for look in range(2):  # a valve takes a while to open, and another one to close
+        fills, empties = known.opened[source, look, 0], known.opened[source, look, 1]
+        x[_CURVES + 19 + look] = 0.1 * supply * times_opened(readings, h, m, 0, fills, empties)
+        x[_CURVES + 21 + look] = 0.1 * level * times_opened(readings, h, m, 1, fills, empties)
     return abs(lost)
 
 
@@ -436,7 +443,7 @@ def remember_look(known, angle, pressure, fresh):  # type: ignore[no-untyped-def
         known.clock[2] += 1.0
 
 
-OBEYS, DISOBEYS, CROSSWISE = 0.1, -0.2, 0.4
+OBEYS, DISOBEYS, CROSSWISE = 0.25, -0.2, 0.4
 """Correlations of what a muscle is told with how a pressure changes: of one that does what another one is told it is
 below the first and, with the other's, over the third; of one that does the opposite it is below the second."""
 _TOLD = 0.02  # mean square of what is told, below which nothing can be said

@@ -163,7 +163,7 @@ class Monitor:
 
     def _begin_identifying(self, known: Identified, at_rest: bool) -> None:
         """Begin a sequence with what has been learned of the arm so far, and look for what no sound arm does."""
-        known.open[...] = 0.0
+        known.open[...] = known.opened[...] = known.held[...] = 0.0
         known.clock[:2] = 0.0, 0.0 if at_rest else -LOOKS
         since = float(self._memory.clock[0])
         found = wrong_from_the_start(known)
@@ -234,7 +234,9 @@ class Monitor:
         """Open findings for what has enough evidence, and close those that have none left."""
         memory = self._memory
         holding = self._judge_potentiometers()
-        if holding:  # what follows from a wrong angle proves nothing
+        if (
+            holding or self._from_the_start
+        ):  # what follows from a wrong angle, or was learned of a wrong arm, proves nothing
             memory.score[...] = 0.0
         holding |= self._judge_valves()
         if any(key[0] not in CHANGES for key in holding):  # what a fault explains says nothing of the arm

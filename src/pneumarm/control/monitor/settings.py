@@ -74,7 +74,7 @@ class MonitorSettings(Settings):
     acted: float = 0.10
     """Change of the difference of a joint's pressures that shows that valves act, as a part of the highest; more on
     an arm whose angle has stayed the same during larger ones."""
-    edge: float = 0.02
+    edge: float = 0.04
     """An angle that is nearer to the farthest ones seen, as a part of its range, may be at an end stop."""
 
     def _valid(self) -> Valid:

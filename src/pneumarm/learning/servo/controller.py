@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
 _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
-_SWINGS = 3  # from one side of the goal to the other, after which valves stay closed until the joint is at rest
-_SWING = 0.5  # tolerances to either side that count as one, where noise is no larger
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
+_WAITED = 0.35  # s in which readings hardly differ, for a joint to come to rest: half a swing of a heavy one
+_STEADY, _NOISY = 0.3, 1.5  # by tolerances (standard deviation), besides so many times the variance of the noise
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
 _MOST = 0.8  # of a period for which a valve is due, for it to open for one
@@ -35,8 +35,8 @@ _LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest e
 _BIASED = 8.0  # most tolerances that the integral adds to what is asked for
 _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving reference are learned from
 _DONE = 0.7  # share of an error that pulses of a joint with one muscle may leave, for the next not to be more
-_SWINGING = 0.6  # s in which an error is added to what is asked for while a joint swings near its goal
-_CLOSE, _KEPT = 2.5, 1.2  # tolerances of an error, for that, and most that is then added
+_SWINGING = 0.6  # s in which an error is added to what is asked for while a joint moves near its goal
+_COUNTED, _KEPT = 2.0, 4.0  # most tolerances of an error that are, and most that is then added
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
@@ -47,11 +47,10 @@ class ServoController:
     what each did before the next, unless a valve is to be open for whole periods; what is left of the error is added
     to what is asked for (integral action), so that no bias of the simulation remains. Where the mean of the readings
     is off by less than ``quiet`` tolerances its valves stay closed, until it is off by more than ``alert``: closed
-    muscles are springs of air that hold the joint, nothing wears, and no noise of the sensors is answered. A joint
-    that goes on swinging about its goal is being kept swinging, by a model with less lag than the arm: its valves
-    stay closed until it is at rest, by its own damping.
+    muscles are springs of air that hold the joint, nothing wears, and no noise of the sensors is answered.
 
-    Integral action goes on while a joint swings near its goal, unless valves stay as they are for whole periods.
+    Where there are pulses a joint has come to rest once its readings hardly differ for half a swing of a heavy one.
+    Until then it is damped by what the agent does in every period, and integral action goes on, too.
 
     A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next
     look, twice as many each time that those before did little.
@@ -73,16 +72,17 @@ class ServoController:
         self._most_pulses = self._look if single else 1
         # Whole periods move an arm by more than a tolerance: without pulses it is to swing, and not to be pushed.
         fine = spec.pulses and (agent.simulation.commands == "pulses" or agent.simulation.spread)
-        pushed = single or fine
-        self._kept, self._close = (_KEPT * tolerance, _CLOSE * tolerance) if pushed else (0.0, 0.0)
-        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if fine else math.inf
+        self._counted, self._kept = _COUNTED * tolerance, _KEPT * tolerance if fine or single else 0.0
+        self._steady = _NOISY * noise**2 + (_STEADY * tolerance) ** 2 if fine else math.inf
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)
         lowest, highest = np.moveaxis(agent.simulation.pressure_range, -1, 0)
         self._empty = lowest + _EMPTY * (highest - lowest)
-        longest = max(self._look, round(_SLOWLY / spec.period))
-        self._angles: deque[NDArray[np.float64]] = deque(maxlen=longest)
+        self._slowly, self._waited = (
+            max(self._look, round(time / spec.period)) for time in (_SLOWLY, _WAITED if fine else 0.0)
+        )
+        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(self._slowly, self._waited))
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
@@ -156,22 +156,22 @@ class ServoController:
 
         ``now`` is what is asked for, ``stays`` whether that will stay as it is, both (joints,).
         """
-        longer = np.array(self._angles)
-        read = longer[-self._look :]
+        readings = np.array(self._angles)
+        read, longer = readings[-self._look :], readings[-self._slowly :]
         error, half = now - read.mean(axis=0), self._look // 2
         drift = np.abs(read[-half:].mean(axis=0) - read[:half].mean(axis=0))
-        slow = (len(longer) == self._angles.maxlen) & (np.ptp(longer, axis=0) < self._still + _EASY * np.abs(error))
+        slow = (len(longer) == self._slowly) & (np.ptp(longer, axis=0) < self._still + _EASY * np.abs(error))
+        waited = readings[-self._waited :]
+        steady = (len(waited) == self._waited) & (waited.var(axis=0) < self._steady)
         acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
             if len(read) < self._look or not stays[j] or abs(error[j]) > far * self._near:
                 rest.leave()
                 continue
-            rest.see(now[j] - read[-1, j], self._swing)
-            if drift[j] > fast * self._still and not slow[j]:
-                close = abs(error[j]) < self._close
-                rest.stir(self._kept, error[j] * self.spec.period / _SWINGING if close else 0.0)
-                acts[j] = rest.swings < _SWINGS
+            if not (rest.calm or steady[j]) or (drift[j] > fast * self._still and not slow[j]):
+                missing = min(max(error[j], -self._counted), self._counted)
+                rest.stir(self._kept, missing * self.spec.period / _SWINGING)
                 continue
             rest.calm = True
             rest.quiet = abs(error[j]) < (self._alert_above if rest.quiet else self._quiet_below)
@@ -214,7 +214,6 @@ class _Rest:
 
     def leave(self) -> None:
         """Note that it is far from what is asked for, or that this moves."""
-        self.swings, self._side = 0, 0.0
         self.bias = 0.0
         self.stir(0.0, 0.0)
 
@@ -222,18 +221,10 @@ class _Rest:
         """Note that it is near, but moves: its bias, with what is ``added``, is ``kept`` at most."""
         self.calm, self.quiet, self.look = False, False, 0
         self.left, self._pulses, self._error = 0, 1, 0.0
-        if self.swings < _SWINGS:
-            self.bias = min(max(self.bias + added, -kept), kept)
+        self.bias = min(max(self.bias + added, -kept), kept)
 
     def begin(self, error: float, most: int) -> None:
         """Note that a pulse is due for the ``error``; where those before did little, several in a row, ``most``."""
         done = error * self._error <= 0 or abs(error) < _DONE * abs(self._error)
         self._pulses, self._error = 1 if done else min(2 * self._pulses, most), error
         self.left = self._pulses
-
-    def see(self, error: float, swing: float) -> None:
-        """Count how often the ``error`` went from one side of the goal to the other, further than ``swing``."""
-        if abs(error) > swing:
-            side = math.copysign(1.0, error)
-            self.swings += side == -self._side
-            self._side = side

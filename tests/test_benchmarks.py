@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,9 @@ from benchmarks import minutes, success
 from benchmarks.__main__ import main
 from benchmarks._trials import Rows, collected, greedy_movements, names_of
 
+from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import load_agent
-from pneumarm.task import Movement
 from pneumarm.transitions import Recorded
 
 
@@ -104,13 +105,6 @@ def test_collecting_ends_with_the_first_sequence_after_the_minutes(tmp_path: Pat
     assert (more, longer > took) == (transitions + 200, True)
 
 
-def movement(angle: list[float], goal: float) -> Movement:
-    n = len(angle)
-    column = np.array(angle, np.float64)[:, None]
-    recorded = Recorded(np.arange(n) / 30, column, np.zeros((n, 1, 2)), np.zeros((n, 1, 2)), np.arange(n))
-    return Movement(np.array([goal]), n - 1, np.zeros(1, np.int64), -100.0, False, np.zeros(1), recorded)
-
-
 @pytest.mark.parametrize(
     ("angle", "goal", "kind"),
     [
@@ -121,13 +115,37 @@ def movement(angle: list[float], goal: float) -> Movement:
     ],
 )
 def test_failures_are_told_apart_and_counted(angle: list[float], goal: float, kind: str) -> None:
-    row = success.failure(7, 1203, movement(angle, goal))
-    assert (row["kind"], row["block"], row["goal"], row["angle"]) == (kind, 2, [goal], [[a] for a in angle])
-    lines = list(success.table([3, 7], [json.loads(json.dumps(row))]))
-    counted = [line for line in lines if line.startswith(kind)]
-    assert len(counted) == 1
-    assert counted[0].split() == [*kind.split(), "1", "1", "on", "7"]
+    n, spec = len(angle), VirtualArm().spec
+    column, muscles = np.array(angle, np.float64)[:, None], np.zeros((n, 1, 2))
+    recorded = Recorded(np.arange(n) / 30, column, muscles, muscles, np.arange(n))
+    failed = success.failure(recorded, spec, np.array([goal]), twice=True)
+    row = json.loads(json.dumps({"arm": "virtual:seed=7", "task": "reach", "number": 1203, **failed}))
+    assert row["kind"] == kind
+    assert row["goal"] == pytest.approx([spec.degrees(goal)], abs=0.01)
+    lines = list(success.table([row]))
+    assert lines[0].split() == [*kind.split(), "1,", "most:", "1", "on", "virtual:seed=7"]
     assert "movement 1203" in lines[-1]
+    assert "second try failed" in lines[-1]
+
+
+def test_movements_of_success_are_made_in_blocks_and_go_on(
+    small_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    agent = small_run / "agent.safetensors"
+    shutil.copy(agent, success.place(tmp_path, "virtual", "reach"))
+    for name, value in {
+        "ARMS": "virtual",
+        "SETTLE": "0",
+        "REACH": "3",
+        "PROCESSES": "1",
+        "FOLDER": str(tmp_path),
+    }.items():
+        monkeypatch.setenv(f"PNEUMARM_SUCCESS_{name}", value)
+    first = list(success.measure())
+    kept = (tmp_path / "blocks.jsonl").read_bytes()
+    assert json.loads(kept)["movements"] == 3
+    assert list(success.measure()) == first
+    assert (tmp_path / "blocks.jsonl").read_bytes() == kept
 
 
 def test_movements_depend_on_their_numbers_alone(small_run: Path) -> None:

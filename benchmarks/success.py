@@ -16,7 +16,7 @@ PNEUMARM_SUCCESS_PROCESSES  2
 PNEUMARM_SUCCESS_FOLDER     where agents and rows are kept; a call with the same folder goes on where another ended.
                             runs/success by default
 
-A failed movement is kept as a row of ``failures.jsonl`` there: its first try with all that was read and set.
+A failed movement is kept as a row of ``failed.jsonl`` there: its first try with all that was read and set.
 """
 
 import re
@@ -65,8 +65,8 @@ def measure() -> Iterator[str]:
     tasks = [task for task in TASKS if wanted[task]]
     for _ in in_processes(prepare, [(folder, arm, task) for arm in arms for task in tasks], processes):
         pass
-    rows = Rows(folder / "blocks.jsonl", "arm", "task", "block")
-    failures = Rows(folder / "failures.jsonl", "arm", "task", "number")
+    rows = Rows(folder / "movements.jsonl", "arm", "task", "block")
+    failures = Rows(folder / "failed.jsonl", "arm", "task", "number")
     blocks = [
         (arm, task, block, min(BLOCK, wanted[task] - block * BLOCK))
         for task in tasks
@@ -86,7 +86,9 @@ def measure() -> Iterator[str]:
             if any(row["failed"] for row in chosen if row["arm"] == arm):
                 yield line(f"{task} {arm}", [row for row in chosen if row["arm"] == arm])
         yield line(f"{task}, {len(arms)} arms", chosen)
-        yield from table([one for one in failures if one["task"] == task and one["arm"] in arms])
+        yield from table(
+            [one for one in failures if one["task"] == task and one["arm"] in arms and one["number"] < wanted[task]]
+        )
 
 
 def place(folder: Path, arm: str, task: str) -> Path:
@@ -134,7 +136,7 @@ def make_block(folder: Path, arm: str, task: str, block: int, movements: int) ->
 def settle(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the number of each movement that did not settle at once, and what there is to know of it."""
     assert isinstance(agent, Tracks)
-    goals = goals_of(agent).draw(np.random.default_rng([SEED, seed]), len(numbers))
+    goals = goals_of(agent).draw(np.random.default_rng([SEED, seed]), BLOCK)[: len(numbers)]
     once, controller = MoveSettings(tries=1), agent.controller()
     with open_arm(arm, seed) as opened:
         guard = guarded(opened)

@@ -142,10 +142,10 @@ def test_movements_of_success_are_made_in_blocks_and_go_on(
     }.items():
         monkeypatch.setenv(f"PNEUMARM_SUCCESS_{name}", value)
     first = list(success.measure())
-    kept = (tmp_path / "blocks.jsonl").read_bytes()
+    kept = (tmp_path / "movements.jsonl").read_bytes()
     assert json.loads(kept)["movements"] == 3
     assert list(success.measure()) == first
-    assert (tmp_path / "blocks.jsonl").read_bytes() == kept
+    assert (tmp_path / "movements.jsonl").read_bytes() == kept
 
 
 def test_movements_depend_on_their_numbers_alone(small_run: Path) -> None:

@@ -59,7 +59,7 @@ class Thresholds(NamedTuple):
     inflation: float
     """Standard deviations of the simulation's error on held-out sequences that count as one here."""
     full: float
-    """In a muscle that is so full an open inlet tells nothing, as a part of ``Memory.full``."""
+    """In a muscle that is so full an open inlet tells of its outlet alone, as a part of ``Memory.full``."""
     empty: float
     """A muscle below this is empty; how much air it takes until its pressure rises is uncertain [counts]."""
     clear: float
@@ -257,6 +257,7 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             if max(memory.base[m], read) - lowest < thresholds.empty:
                 least = max(least, memory.clear[m])
             fullness = (memory.base[m] - lowest) / (memory.full[m] - lowest)
+            # A full muscle takes little, whatever is wrong; but it empties if its outlet is open.
             full = fullness > thresholds.full and max(memory.command[0, m], memory.command[1, m]) > 0.0
             telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
             if readings.leak[h, m] > 0.0:

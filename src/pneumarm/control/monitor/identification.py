@@ -170,7 +170,8 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     """Write the features of muscle ``m`` under hypothesis ``h`` into ``x``; ``angle`` (joints,) is what is read now.
 
     ``full`` is the pressure at which inlets let no more air in [highest pressures]. Where both valves are open, as in
-    no sound arm, some of what comes in leaves at once. Returned is how uncertain that is [highest pressures].
+    no sound arm, some of what comes in leaves at once. Returned is the standard deviation of what stays [highest
+    pressures].
     """
     source, joint, level = readings.source[h, m], m // 2, known.last[m, 0]
     filled = level - lowest_level(known, m)
@@ -182,7 +183,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
         told_in, told_out = known.open[source, slot, 0], known.open[source, slot, 1]
         taking = time_open(readings, h, m, 0, told_in, told_out) * supply
         giving = time_open(readings, h, m, 1, told_in, told_out)
-        both = supply * max(taking + giving - 1.0, 0.0)
+        both = max(taking + giving - 1.0, 0.0)
         lost += _LOST * both * (known.weight[m, slot] + level * known.weight[m, _SLOTS + slot])
         x[slot], x[_SLOTS + slot] = taking, taking * level
         x[2 * _SLOTS + slot], x[3 * _SLOTS + slot] = giving, giving * level
@@ -336,7 +337,7 @@ def expect_by_identification(known, readings, memory, angle, pressure, empty):  
         memory.trust[m] = independence(known, m)
         features(known, readings, 0, m, angle, full, known.x[m])
         healthy = known.last[m, 0] + predicted(known, m, known.x[m])
-        healthy = max(healthy, min(lowest_level(known, m), read))
+        healthy = max(healthy, min(lowest_level(known, m), read))  # the line goes on below empty, no pressure does
         is_empty = (max(known.last[m, 0], read) - lowest_level(known, m)) * highest < empty
         variance = uncertainty(known, m, known.x[m], known.gain[m])
         known.variance[m] = variance
@@ -350,15 +351,15 @@ def expect_by_identification(known, readings, memory, angle, pressure, empty):  
                 lost = 1.0 - math.exp(-readings.leak[h, m] * known.look[1])
                 memory.expected[h, m] -= lost * (memory.base[m] - memory.lowest[m])
             elif h > 0 and not readings.as_told[h, m]:
-                lost = features(known, readings, h, m, angle, full, known.x[muscles])
+                leaving = features(known, readings, h, m, angle, full, known.x[muscles])
                 if is_empty and not takes_air(known.x[m]) and not takes_air(known.x[muscles]):
                     continue
                 other = known.last[m, 0] + predicted(known, m, known.x[muscles])
                 other = max(other, min(known.span[m, 0], healthy))
-                memory.expected[h, m], memory.doubt[h, m] = other * highest, lost * highest
+                memory.expected[h, m], memory.doubt[h, m] = other * highest, leaving * highest
                 if abs(other - read) < abs(healthy - read):
                     doubt = uncertainty(known, m, known.x[muscles], known.gain[muscles])
-                    memory.doubt[h, m] = math.sqrt(doubt + lost * lost) * highest
+                    memory.doubt[h, m] = math.sqrt(doubt + leaving * leaving) * highest
 
 
 @part

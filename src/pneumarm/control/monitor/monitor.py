@@ -234,9 +234,8 @@ class Monitor:
         """Open findings for what has enough evidence, and close those that have none left."""
         memory = self._memory
         holding = self._judge_potentiometers()
-        if (
-            holding or self._from_the_start
-        ):  # what follows from a wrong angle, or was learned of a wrong arm, proves nothing
+        crosswise = any(key[0].startswith("swapped") for key in self._from_the_start)
+        if holding or crosswise:  # what follows from a wrong angle, or was learned of a wrong arm, proves nothing
             memory.score[...] = 0.0
         holding |= self._judge_valves()
         if any(key[0] not in CHANGES for key in holding):  # what a fault explains says nothing of the arm
@@ -432,7 +431,9 @@ class Monitor:
                 raise ValueError("it has other sizes")
             known = _identified_of(saved["identified"], self._expects) if "identified" in saved else None
         except (ValueError, TypeError, KeyError, AttributeError) as error:
-            raise UnusableInput(f"the state of the monitor is damaged or of another arm ({error})") from error
+            raise UnusableInput(
+                f"the state of the monitor is damaged, of another arm or of an earlier version ({error})"
+            ) from error
         for mine, values in zip(self._memory, memory, strict=True):
             mine[...] = values
         if known is not None:

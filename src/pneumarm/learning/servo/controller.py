@@ -25,9 +25,11 @@ _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
-_WAITED = 0.35  # s in which readings hardly differ, for a joint to come to rest: half a swing of a heavy one
-_STEADY, _NOISY = 0.3, 1.5  # by tolerances (standard deviation), besides so many times the variance of the noise
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
+_WAITED = (
+    0.35  # s in which readings hardly differ, for a joint to come to rest: longer than half a swing of a heavy one
+)
+_STEADY, _NOISY = 0.3, 1.5  # their standard deviation in tolerances, besides so many times the variance of the noise
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
 _MOST = 0.8  # of a period for which a valve is due, for it to open for one
 _FORGOTTEN = 0.8  # share of what is due that is left after a period with closed valves
@@ -36,7 +38,7 @@ _BIASED = 8.0  # most tolerances that the integral adds to what is asked for
 _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving reference are learned from
 _DONE = 0.7  # share of an error that pulses of a joint with one muscle may leave, for the next not to be more
 _SWINGING = 0.6  # s in which an error is added to what is asked for while a joint moves near its goal
-_COUNTED, _KEPT = 2.0, 4.0  # most tolerances of an error that are, and most that is then added
+_COUNTED, _KEPT = 2.0, 4.0  # most tolerances of an error that count there, and most that may be added in all
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
@@ -49,7 +51,7 @@ class ServoController:
     is off by less than ``quiet`` tolerances its valves stay closed, until it is off by more than ``alert``: closed
     muscles are springs of air that hold the joint, nothing wears, and no noise of the sensors is answered.
 
-    Where there are pulses a joint has come to rest once its readings hardly differ for half a swing of a heavy one.
+    Where there are pulses a joint has come to rest once its readings hardly differ for longer than half a swing.
     Until then it is damped by what the agent does in every period, and integral action goes on, too.
 
     A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next
@@ -70,9 +72,11 @@ class ServoController:
         self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
         single = spec.muscles == 1
         self._most_pulses = self._look if single else 1
-        # Whole periods move an arm by more than a tolerance: without pulses it is to swing, and not to be pushed.
+        # Whole periods move an arm by more than a tolerance: without pulses it is to swing, and not to be pushed, but
+        # for a joint with one muscle, which would stay below its goal.
         fine = spec.pulses and (agent.simulation.commands == "pulses" or agent.simulation.spread)
-        self._counted, self._kept = _COUNTED * tolerance, _KEPT * tolerance if fine or single else 0.0
+        degrees = wanted.tolerance * spec.counts_per_degree
+        self._counted, self._kept = _COUNTED * degrees, _KEPT * degrees if fine or single else 0.0
         self._steady = _NOISY * noise**2 + (_STEADY * tolerance) ** 2 if fine else math.inf
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
 _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
+_SWINGS = 3  # from one side of the goal to the other, after which valves stay closed until the joint is at rest
+_SWING = 4.0  # tolerances to either side that count as one, where noise is no larger
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
@@ -83,6 +85,7 @@ class ServoController:
         self._alert_above = max(wanted.alert * tolerance, left)
         lowest, highest = np.moveaxis(agent.simulation.pressure_range, -1, 0)
         self._empty = lowest + _EMPTY * (highest - lowest)
+        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if fine else math.inf
         self._slowly, self._waited = (
             max(self._look, round(time / spec.period)) for time in (_SLOWLY, _WAITED if fine else 0.0)
         )
@@ -173,9 +176,11 @@ class ServoController:
             if len(read) < self._look or not stays[j] or abs(error[j]) > far * self._near:
                 rest.leave()
                 continue
+            rest.see(now[j] - read[-1, j], self._swing)
             if not (rest.calm or steady[j]) or (drift[j] > fast * self._still and not slow[j]):
                 missing = min(max(error[j], -self._counted), self._counted)
                 rest.stir(self._kept, missing * self.spec.period / _SWINGING)
+                acts[j] = rest.swings < _SWINGS
                 continue
             rest.calm = True
             rest.quiet = abs(error[j]) < (self._alert_above if rest.quiet else self._quiet_below)
@@ -218,6 +223,7 @@ class _Rest:
 
     def leave(self) -> None:
         """Note that it is far from what is asked for, or that this moves."""
+        self.swings, self._side = 0, 0.0
         self.bias = 0.0
         self.stir(0.0, 0.0)
 
@@ -225,10 +231,18 @@ class _Rest:
         """Note that it is near, but moves: its bias, with what is ``added``, is ``kept`` at most."""
         self.calm, self.quiet, self.look = False, False, 0
         self.left, self._pulses, self._error = 0, 1, 0.0
-        self.bias = min(max(self.bias + added, -kept), kept)
+        if self.swings < _SWINGS:
+            self.bias = min(max(self.bias + added, -kept), kept)
 
     def begin(self, error: float, most: int) -> None:
         """Note that a pulse is due for the ``error``; where those before did little, several in a row, ``most``."""
         done = error * self._error <= 0 or abs(error) < _DONE * abs(self._error)
         self._pulses, self._error = 1 if done else min(2 * self._pulses, most), error
         self.left = self._pulses
+
+    def see(self, error: float, swing: float) -> None:
+        """Count how often the ``error`` went from one side of the goal to the other, further than ``swing``."""
+        if abs(error) > swing:
+            side = math.copysign(1.0, error)
+            self.swings += side == -self._side
+            self._side = side

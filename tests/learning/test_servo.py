@@ -230,11 +230,12 @@ def test_near_its_goal_only_a_pulse_shorter_than_the_period_is_looked_at(
     assert opened.mean() == 1 if goes_on else opened.mean() < 0.4
 
 
-@pytest.mark.parametrize(("degrees", "acts", "most"), [(0.1, 0.4, 8.0), (1.5, 1.0, 8.0), (5.5, 0.5, 4.0)])
-def test_a_joint_that_swings_a_little_is_damped_in_every_period_and_one_that_is_pumped_is_left_alone(
+@pytest.mark.parametrize(("degrees", "acts", "most"), [(1.5, 1.0, 8.0), (5.5, 0.5, 4.0)])
+def test_with_one_muscle_a_joint_that_swings_a_little_is_damped_and_one_that_is_pumped_is_left_alone(
     trained: ServoAgent, monkeypatch: pytest.MonkeyPatch, degrees: float, acts: float, most: float
 ):
-    simulation = replace(trained.simulation, spread=True, error_std=trained.simulation.error_std / 4)
+    spec = replace(trained.spec, muscles=1)
+    simulation = replace(trained.simulation, spec=spec, spread=True, error_std=trained.simulation.error_std / 4)
     controller = replace(trained, simulation=simulation).controller()
     asked = []
 

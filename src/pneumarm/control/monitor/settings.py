@@ -21,8 +21,8 @@ class Weighing(Settings):
     telling: float = 1.5
     """Pressures expected with and without a fault that differ by fewer standard deviations tell nothing."""
     full: float = 0.75
-    """Part of the highest pressure over which an open inlet tells only whether the outlet is open, too: the supply may
-    be near."""
+    """Part of the highest pressure over which an open inlet tells only whether the outlet is open, too: the supply
+    may be near."""
     empty: float = 0.04
     """A muscle below this part of the highest pressure is empty, and how much air it takes until its pressure rises
     is uncertain ..."""

@@ -24,13 +24,11 @@ _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly
 _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
 _SWINGS = 3  # from one side of the goal to the other, after which valves stay closed until the joint is at rest
-_SWING = 4.0  # tolerances to either side that count as one, where noise is no larger
+_SWING, _FAR_SWING = 0.5, 4.0  # tolerances to either side that count as one, where noise is no larger; one muscle
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
-_WAITED = (
-    0.35  # s in which readings hardly differ, for a joint to come to rest: longer than half a swing of a heavy one
-)
+_WAITED = 0.35  # s in which the readings of a joint with one muscle hardly differ, for it to come to rest
 _STEADY, _NOISY = 0.3, 1.5  # their standard deviation in tolerances, besides so many times the variance of the noise
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
 _MOST = 0.8  # of a period for which a valve is due, for it to open for one
@@ -39,8 +37,9 @@ _LEAVING = 1.5, 2.5  # as many times the error and the drift of coming to rest e
 _BIASED = 8.0  # most tolerances that the integral adds to what is asked for
 _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving reference are learned from
 _DONE = 0.7  # share of an error that pulses of a joint with one muscle may leave, for the next not to be more
-_SWINGING = 0.6  # s in which an error is added to what is asked for while a joint moves near its goal
-_COUNTED, _KEPT = 2.0, 4.0  # most tolerances of an error that count there, and most that may be added in all
+_SWINGING = 0.6  # s in which an error is added to what is asked for while a joint swings near its goal
+_CLOSE, _KEPT = 2.5, 1.2  # tolerances of an error, for that, and most that is then added
+_COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an error that count, most that is added
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
@@ -53,11 +52,14 @@ class ServoController:
     is off by less than ``quiet`` tolerances its valves stay closed, until it is off by more than ``alert``: closed
     muscles are springs of air that hold the joint, nothing wears, and no noise of the sensors is answered.
 
-    Where there are pulses a joint has come to rest once its readings hardly differ for longer than half a swing.
-    Until then it is damped by what the agent does in every period, and integral action goes on, too.
+    A joint that goes on swinging about its goal is being kept swinging, by a model with less lag than the arm: its
+    valves stay closed until it is at rest, by its own damping. Integral action goes on while a joint swings near its
+    goal, unless valves stay as they are for whole periods.
 
     A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next
-    look, twice as many each time that those before did little.
+    look, twice as many each time that those before did little. It has come to rest only once its readings hardly
+    differ for a while; until then it is damped by what the agent does in every period, and integral action goes
+    further.
     """
 
     def __init__(self, agent: ServoAgent) -> None:
@@ -74,22 +76,23 @@ class ServoController:
         self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
         single = spec.muscles == 1
         self._most_pulses = self._look if single else 1
-        # Whole periods move an arm by more than a tolerance: without pulses it is to swing, and not to be pushed, but
-        # for a joint with one muscle, which would stay below its goal.
+        # Whole periods move an arm by more than a tolerance: without pulses it is to swing, and not to be pushed.
         fine = spec.pulses and (agent.simulation.commands == "pulses" or agent.simulation.spread)
-        degrees = wanted.tolerance * spec.counts_per_degree
-        self._counted, self._kept = _COUNTED * degrees, _KEPT * degrees if fine or single else 0.0
-        self._steady = _NOISY * noise**2 + (_STEADY * tolerance) ** 2 if fine else math.inf
+        self._counted, self._close, self._kept, self._steady, waited = math.inf, 0.0, 0.0, math.inf, 0.0
+        if single and fine:
+            self._counted, self._close, self._kept = _COUNTED * tolerance, math.inf, _MORE * tolerance
+            self._steady, waited = _NOISY * noise**2 + (_STEADY * tolerance) ** 2, _WAITED
+        elif single or fine:
+            self._close, self._kept = _CLOSE * tolerance, _KEPT * tolerance
+        swing = _FAR_SWING if single else _SWING
+        self._swing = max(swing * tolerance, _ANSWERED * noise) if fine else math.inf
+        self._slowly, self._waited = (max(self._look, round(time / spec.period)) for time in (_SLOWLY, waited))
+        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(self._slowly, self._waited))
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)
         lowest, highest = np.moveaxis(agent.simulation.pressure_range, -1, 0)
         self._empty = lowest + _EMPTY * (highest - lowest)
-        self._swing = max(_SWING * tolerance, _ANSWERED * noise) if fine else math.inf
-        self._slowly, self._waited = (
-            max(self._look, round(time / spec.period)) for time in (_SLOWLY, _WAITED if fine else 0.0)
-        )
-        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(self._slowly, self._waited))
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
@@ -178,8 +181,8 @@ class ServoController:
                 continue
             rest.see(now[j] - read[-1, j], self._swing)
             if not (rest.calm or steady[j]) or (drift[j] > fast * self._still and not slow[j]):
-                missing = min(max(error[j], -self._counted), self._counted)
-                rest.stir(self._kept, missing * self.spec.period / _SWINGING)
+                counted = min(max(error[j], -self._counted), self._counted) if abs(error[j]) < self._close else 0.0
+                rest.stir(self._kept, counted * self.spec.period / _SWINGING)
                 acts[j] = rest.swings < _SWINGS
                 continue
             rest.calm = True

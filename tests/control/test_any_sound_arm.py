@@ -8,6 +8,7 @@ import pytest
 from pneumarm.arm import Arm, guarded, open_arm
 from pneumarm.arm.virtual import SwappedMuscles, SwappedValves, VirtualArm, draw_wide
 from pneumarm.control import Monitor
+from pneumarm.control.monitor.hypotheses import hypotheses, time_open, times_opened
 from pneumarm.errors import ArmFailure
 from pneumarm.transitions import Store, collect
 
@@ -53,7 +54,7 @@ def dead(pressure):
     return pressure
 
 
-@pytest.mark.parametrize("name", [*PLAIN, *STICKING, *(f"virtual:wide,seed={seed}" for seed in (2, 6, 9))])
+@pytest.mark.parametrize("name", [*PLAIN, *STICKING, *(f"virtual:wide,seed={seed}" for seed in (2, 6, 9, 6228))])
 def test_a_sound_arm_is_collected_from_without_a_mark(name, tmp_path):
     arm = open_arm(name)
     watch = Monitor(arm.spec)
@@ -89,6 +90,21 @@ def test_what_no_sound_arm_does_is_wrong_from_the_start(make, said, tmp_path):
     arm = make()
     with Store.for_arm(tmp_path / "db", arm.spec) as store, pytest.raises(ArmFailure, match=said):
         collect(arm, store, 10_000, 1, watch=Monitor(arm.spec))
+
+
+def test_a_valve_that_is_stuck_open_is_open_beside_the_other_and_never_opens():
+    found, readings = hypotheses(1)
+    by_detail = {(one.detail, one.muscle): h for h, one in enumerate(found)}
+    stuck_open = by_detail["the outlet is stuck open", 1]
+    filling, emptying = (1.0, 0.0), (0.0, 1.0)
+    assert [time_open(readings, stuck_open, 0, valve, *filling) for valve in (0, 1)] == [1.0, 1.0]
+    assert time_open(readings, stuck_open, 0, 1, 0.0, 0.0) == 1.0
+    assert times_opened(readings, stuck_open, 0, 1, 2, 3) == 0.0
+    assert times_opened(readings, stuck_open, 0, 0, 2, 3) == 2.0
+    assert time_open(readings, stuck_open, 1, 1, *filling) == 0.0  # the other muscle is sound
+    swapped = by_detail["inlet and outlet are swapped", 1]
+    assert [time_open(readings, swapped, 0, valve, *emptying) for valve in (0, 1)] == [1.0, 0.0]
+    assert times_opened(readings, swapped, 0, 0, 2, 3) == 3.0
 
 
 @pytest.mark.parametrize("mode", ["warn", "off"])

@@ -34,6 +34,7 @@ from benchmarks._trials import Rows, fitted, in_processes, names_of, recorded
 from benchmarks.agents import KINDS_OF_FAILURE, kind
 from pneumarm.arm import ArmSpec, ControlCycle, guarded, open_arm
 from pneumarm.control import AgentController, drawn
+from pneumarm.control.agent import warm_up
 from pneumarm.control.movement import BEGIN, move
 from pneumarm.experiments import there_and_back
 from pneumarm.learning import AnyAgent, PolicySettings, Tracks, goals_of, load_agent, train
@@ -151,6 +152,7 @@ def settle(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tup
 def reach(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the number of each movement that did not reach its goal at once, and what there is to know of it."""
     controller, settings = AgentController(agent), agent.settings
+    warm_up(agent)
     with open_arm(arm, seed) as opened:
         cycle = ControlCycle(guarded(opened))
         for number, draw in zip(numbers, drawn(goals_of(agent), SEED, numbers), strict=True):

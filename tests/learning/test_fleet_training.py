@@ -25,7 +25,7 @@ from pneumarm.learning import (
     train,
 )
 from pneumarm.learning.policy.agent import KIND
-from pneumarm.learning.policy.training import PolicyLearner
+from pneumarm.learning.policy.training import PolicyLearner, patient
 from pneumarm.learning.training import CHECKPOINT
 from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.simulation import Simulation
@@ -48,6 +48,14 @@ def trained(simulation: Simulation, begin: BeginStates) -> dict[str, Training]:
 @pytest.fixture(scope="module")
 def agent(trained: dict[str, Training]) -> PolicyAgent:
     return trained["policy"].agent
+
+
+def test_slow_muscles_have_more_actions_until_a_movement_is_cut_off(simulation: Simulation) -> None:
+    needed = [patient(PolicySettings(cutoff=10, passages=passages), simulation).cutoff for passages in (1, 2, 4)]
+    assert needed[0] > 10
+    np.testing.assert_allclose(needed, needed[0] * np.array([1, 2, 4]), atol=3)
+    assert patient(PolicySettings(), simulation).cutoff == max(100, needed[1])
+    assert patient(PolicySettings(cutoff=10, passages=0), simulation).cutoff == 10
 
 
 @pytest.mark.parametrize("method", SETTINGS)

@@ -1,10 +1,12 @@
 """Training a policy in many simulated arms, and going on with it when an arm has changed."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.guard import guarded
 from pneumarm.learning.fleet import FleetLearner, train_fleet
 from pneumarm.learning.policy.agent import PolicyAgent, mind, policy_sizes
 from pneumarm.learning.policy.proximal import Rule, batch, collect, improve
@@ -14,11 +16,13 @@ from pneumarm.learning.possible import leave_out
 from pneumarm.learning.training import Training
 from pneumarm.networks.layers import initial_weights, trainable
 from pneumarm.random import random_state, random_states
+from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import Environment
 from pneumarm.task.fleet import begin_all, fleet
 from pneumarm.task.movements import Movements
+from pneumarm.transitions.fill_times import find_fill_times
 
 _WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
 _FIRST_OUTPUT = 0.01  # the first policy chooses by its bonus for holding alone
@@ -32,7 +36,21 @@ def train_policy(
     simulation: Simulation, begin_states: BeginStates, settings: PolicySettings, seed: int = 0, **how: Any
 ) -> Training[PolicyAgent]:
     """Train policies and return the best; ``how`` as of :func:`~pneumarm.learning.fleet.train_fleet`."""
+    settings = patient(settings, simulation)
     return train_fleet(lambda n: PolicyLearner(simulation, begin_states, settings, seed, n), settings, seed, **how)
+
+
+def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
+    """Return ``settings`` with as many actions until a movement is cut off as this arm may need.
+
+    Valves can be so small that the joint is still on its way after 100 actions; how slow muscles are is found by
+    filling and emptying those of the simulation.
+    """
+    if settings.passages == 0:
+        return settings
+    with guarded(SimulationArm(simulation)) as arm:
+        longest = settings.passages * sum(find_fill_times(arm))
+    return replace(settings, cutoff=max(settings.cutoff, round(longest / simulation.spec.period)))
 
 
 class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):

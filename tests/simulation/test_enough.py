@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.simulation import enough
 from pneumarm.simulation.enough import Enough, EnoughSettings, collect_enough, enough_data
-from pneumarm.transitions import Store, collect
+from pneumarm.transitions import CollectResult, Store, collect
 
 
 @pytest.fixture(scope="module")
@@ -55,13 +57,15 @@ def test_an_interrupted_collecting_ends_at_the_same_place(tmp_path: Path) -> Non
         for limit in (*limits, 10**9):
             with VirtualArm(seed=3) as arm, Store.for_arm(tmp_path / name, arm.spec) as store:
 
-                def record(wanted: int, arm: VirtualArm = arm, store: Store = store, limit: int = limit) -> None:
+                def record(
+                    wanted: int, arm: VirtualArm = arm, store: Store = store, limit: int = limit
+                ) -> CollectResult:
                     if wanted > limit:
                         raise InterruptedError
-                    collect(arm, store, wanted, 1)
+                    return collect(arm, store, wanted, 1)
 
                 with suppress(InterruptedError):
-                    found = collect_enough(record, store, EnoughSettings(growth=1.1, most=150))
+                    found = collect_enough(record, store, EnoughSettings(growth=1.1, most=260))
                     assert store.transitions >= found["transitions"][-1]
         return found
 
@@ -69,3 +73,15 @@ def test_an_interrupted_collecting_ends_at_the_same_place(tmp_path: Path) -> Non
     assert at_once["transitions"][0] == 4000
     assert ended("interrupted.db", 4000, 4100) == at_once
     assert ended("interrupted.db") == at_once
+
+
+def test_it_ends_in_time_however_slow_the_arm_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A person waits by the clock, and slow muscles take most of it between the sequences."""
+    monkeypatch.setattr(enough, "enough_data", lambda store: Enough(0.5, 0.5))
+    with open_arm("virtual:wide,seed=6008", 0) as arm, Store.for_arm(tmp_path / "slow.db", arm.spec) as store:
+        found = collect_enough(lambda wanted: collect(arm, store, wanted, 1), store, EnoughSettings(most=400.0))
+        recorded = collect(arm, store, 2_000, 1)
+    assert 370 < recorded.seconds < 430
+    assert found["transitions"][-1] <= recorded.transitions
+    assert "it ended at 7 minutes" in found["verdict"]
+    assert found["gain"] == [0.5] * len(found["transitions"])

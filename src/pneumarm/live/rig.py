@@ -145,7 +145,7 @@ class Rig:
             choices=[[one.name, one.version] for one in choices],
             in_use=self._in_use(),
             can_learn=self._can_learn(),
-            minutes=round((self.settings.transitions or EnoughSettings().sizes(spec.period)[1]) * spec.period / 60),
+            minutes=round((self.settings.transitions or 0) * spec.period / 60 or EnoughSettings().most_of(spec) / 60),
             learning=None,
         )
         return Session(guarded(paced), mover, watch, self.screen, lambda: self.desk.silence)

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.seam import ArmSpec
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.fit import SINGLE_STEPS, FitResult, fit
 from pneumarm.transitions.choice import share_held_out
-from pneumarm.transitions.collect import FEWEST_TRANSITIONS
+from pneumarm.transitions.collect import FEWEST_TRANSITIONS, CollectResult
 from pneumarm.transitions.filtering import filter_transitions
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import Window
@@ -30,6 +31,8 @@ _HELD_OUT = 0.25
 """Share of the sequences that the errors are measured on."""
 _SETTINGS = replace(SINGLE_STEPS, epochs=15)
 """Of both fits: further epochs change both alike."""
+_WORTH = 1.05
+"""A record that may grow by less, until the time for it is over, is not judged again."""
 _FEWEST_SEQUENCES = 8
 _PURPOSE = "enough"
 """The purpose of the runs that note a judgement in a store; no sequence belongs to them."""
@@ -76,14 +79,16 @@ class Enough:
 
 @dataclass(frozen=True)
 class EnoughSettings(Settings):
-    """When collecting ends by itself; in seconds of sequences, because an arm that is read oftener moves no more."""
+    """When collecting ends by itself."""
 
     first: float = 2 * FEWEST_TRANSITIONS / 30
-    """After which it is first judged whether they are enough [s]; no fewer transitions than can be judged."""
+    """Seconds of sequences after which it is first judged whether they are enough, because an arm that is read
+    oftener moves no more; no fewer transitions than can be judged."""
     growth: float = 1.5
     """Factor by which the record grows from then on until it is judged again."""
-    most: float = 2000.0
-    """At which collecting ends all the same [s]."""
+    most: float = 600.0
+    """At which collecting ends all the same, for each joint, in seconds on the arm's clock; those between sequences
+    count, too."""
 
     def _valid(self) -> Valid:
         return {
@@ -92,14 +97,17 @@ class EnoughSettings(Settings):
             "most": self.most < math.inf or "a number of seconds",
         }
 
-    def sizes(self, period: float) -> tuple[int, int]:
-        """Return after how many transitions it is judged first, and at how many it ends, for a control period [s]."""
-        first, most = (max(round(one / period), 2 * FEWEST_TRANSITIONS) for one in (self.first, self.most))
-        return first, most
+    def first_of(self, spec: ArmSpec) -> int:
+        """Return after how many transitions of an arm it is first judged."""
+        return max(round(self.first / spec.period), 2 * FEWEST_TRANSITIONS)
+
+    def most_of(self, spec: ArmSpec) -> float:
+        """Return after which time on an arm's clock collecting ends [s]."""
+        return self.most * spec.joints
 
 
 def collect_enough(
-    record: Callable[[int], object], store: Store, settings: EnoughSettings = EnoughSettings()
+    record: Callable[[int], CollectResult], store: Store, settings: EnoughSettings = EnoughSettings()
 ) -> dict[str, Any]:
     """Have ``record`` fill ``store`` up to a number of transitions, again and again, until they are enough.
 
@@ -112,22 +120,31 @@ def collect_enough(
     """
     note = asdict(settings)
     runs = [run["settings"] for run in store.runs().values() if run["purpose"] == _PURPOSE]
-    noted = {run["transitions"]: run["judged"] for run in runs if all(run.get(name) == note[name] for name in note)}
-    wanted, most = settings.sizes(store.spec.period)
+    noted = {run["transitions"]: run for run in runs if all(run.get(name) == note[name] for name in note)}
+    wanted, most = settings.first_of(store.spec), settings.most_of(store.spec)
     sizes, gains = list[int](), list[float | None]()
     while True:
-        record(wanted)
+        recorded = record(wanted)
         if wanted not in noted:
             judged = enough_data(store)
-            noted[wanted] = None if judged is None else asdict(judged)
-            store.begin_run(_PURPOSE, {**note, "transitions": wanted, "judged": noted[wanted]})
-        found = None if noted[wanted] is None else Enough(**noted[wanted])
+            noted[wanted] = {
+                "transitions": wanted,
+                "judged": None if judged is None else asdict(judged),
+                "share": recorded.seconds / most,
+            }
+            store.begin_run(_PURPOSE, note | noted[wanted])
+        judgement, share = noted[wanted]["judged"], noted[wanted]["share"]
+        found = None if judgement is None else Enough(**judgement)
         sizes.append(wanted)
         gains.append(None if found is None else found.gain)
-        if wanted >= most or (found is not None and found.enough):
+        next_size = round(wanted * min(settings.growth, 1 / share))
+        if next_size < _WORTH * wanted or (found is not None and found.enough):
             verdict = TOO_LITTLE if found is None else found.verdict
+            if found is None or not found.enough:
+                minutes = f"{most / 60:.0f} minutes of the arm's time"
+                verdict += f" (it ended at {minutes}; --enough.most SECONDS allows more)"
             return {"transitions": sizes, "gain": gains, "verdict": verdict}
-        wanted = min(round(settings.growth * wanted), most)
+        wanted = next_size
 
 
 def enough_data(store: Store) -> Enough | None:

@@ -8,6 +8,7 @@ import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.arm import Reading
+from pneumarm.arm.valves import CLOSED
 from pneumarm.control import AgentController
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
@@ -131,6 +132,27 @@ def test_a_policy_and_its_file(agent: PolicyAgent, tmp_path: Path) -> None:
         one_actor = one.actor()
         one_actor.begin(state, goal)
         assert one_actor.act() == agent_actions(agent, state, goal)
+
+
+@pytest.mark.parametrize("passes", [0, 4])
+def test_a_joint_that_swings_about_its_goal_is_left_alone_until_it_rests(agent: PolicyAgent, passes: int) -> None:
+    agent = replace(agent, settings=replace(agent.settings, passes=passes, rest=0.5))
+    goal, scale = agent.window.of_joints(agent.scaling.observation_offset)[:, 0], agent.scaling.observation_scale[0]
+    actor, state = agent.actor(), np.zeros(agent.window.state_size)
+    swing = 3 * agent.settings.reward.angle_tolerance * agent.spec.angle_unit / scale
+    state[0] = swing
+    actor.begin(state, goal)
+    closed = []
+    for k in range(40):
+        state[0] = swing * (1 if k % 4 < 2 else -1)  # a pass every other turn, after the second and so on
+        closed.append(actor.act()[0] == CLOSED)
+        actor.follow(state)
+    begun = 9  # four passes later
+    resting = range(begun, begun + round(0.5 / agent.spec.period))
+    assert all(closed[k] for k in resting) == bool(passes)
+    assert not all(closed[k] for k in range(40) if k not in resting)
+    actor.begin(state, goal)  # another movement knows nothing of it
+    assert (actor.act() == agent_actions(agent, state, list(goal))).all()
 
 
 def agent_actions(agent: PolicyAgent, state: np.ndarray, goal: list[float]) -> np.ndarray:

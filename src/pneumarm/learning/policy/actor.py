@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.arm.valves import CLOSED
 from pneumarm.errors import PneumarmError
 from pneumarm.kernels import kernel
 from pneumarm.learning.policy.acting import Mind, decide, lanes
@@ -15,11 +16,13 @@ from pneumarm.task.reward import is_switch
 class PolicyActor:
     """A policy acting greedily, looking ahead where its settings say so; see :class:`~.OnlineLearner` for its use.
 
-    It does not learn.
+    It does not learn. A joint that passes its goal again and again is one that its policy keeps swinging, as on an arm
+    whose pressures are read late: its valves stay closed until it has come to rest, and it goes on from there.
     """
 
-    def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings) -> None:
+    def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings, period: float) -> None:
         self._mind, self._horizon, self._clear = mind, settings.horizon, settings.clear
+        self._most_passes, self._rest = settings.passes, round(settings.rest / period)
         self._single = lanes(mind, sizes, random_states(0, 1))
         self._lanes = lanes(mind, sizes, np.zeros((settings.lookahead, 4), np.uint64))
         self._samples = np.zeros(settings.lookahead, np.int64)
@@ -35,6 +38,7 @@ class PolicyActor:
         arm.actions[...] = -1
         arm.still[...] = 0
         arm.x[: self._state_size, 0] = self._checked(state)
+        self._side, self._passes, self._resting = self._sides(), np.zeros(goal.size, int), np.zeros(goal.size, int)
         self._decided = False
 
     def act(self) -> NDArray[np.int64]:
@@ -42,6 +46,7 @@ class PolicyActor:
         single = self._single
         if not self._decided:
             decide(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
+            single.actions[0, self._resting > 0] = CLOSED
             arm = single.fleet
             for joint, action in enumerate(single.actions[0]):
                 arm.switched[0, joint] = is_switch.py_func(arm.actions[0, joint], action)
@@ -54,7 +59,24 @@ class PolicyActor:
         if not self._decided:
             raise PneumarmError("begin an episode and act before going on")
         _follow(self._mind, self._single, self._checked(next_state))
+        self._note_passes()
         self._decided = False
+
+    def _note_passes(self) -> None:
+        """Count the passes of each joint, and let one that swings rest."""
+        side = self._sides()
+        self._resting = np.maximum(self._resting - 1, 0)
+        self._passes = np.where(self._resting > 0, 0, self._passes + (side * self._side < 0))
+        self._side = np.where(side == 0, self._side, side)
+        if self._most_passes:
+            self._resting[self._passes >= self._most_passes] = self._rest
+
+    def _sides(self) -> NDArray[np.int64]:
+        """Return on which side of its goal each joint is, shape (joints,): -1, 1, or 0 within the tolerance."""
+        x, limits = self._single.fleet.x[:, 0], self._mind.limits
+        goal = limits.goal_place + np.arange(limits.tolerance.size)
+        beyond = x[4 * np.arange(limits.tolerance.size)] - x[goal]
+        return np.where(np.abs(beyond) > limits.tolerance, np.sign(beyond), 0).astype(np.int64)
 
     def _checked(self, state: ArrayLike) -> NDArray[np.float32]:
         checked = np.asarray(state, np.float32)

@@ -25,6 +25,11 @@ class PolicySettings(FleetSettings):
     """Changes of angle and pressures up to this count as none [counts of the thesis' sensors]."""
     patience: int = 2
     """Steps without change, off the goal, after which another action must be taken; 0: never."""
+    passes: int = 6
+    """Times that a joint may pass its goal in a movement on the arm; then it swings, and its valves stay closed for
+    ``rest``; 0: any number."""
+    rest: float = 1.0
+    """How long they stay closed [s]."""
     lookahead: int = 192
     """Simulated movements by which a decision that is not clear is made on the arm; 0: as the policy says."""
     horizon: int = 25
@@ -44,6 +49,8 @@ class PolicySettings(FleetSettings):
             "squash": len(self.squash) <= 16 and all(0 < error < math.inf for error in self.squash),
             "still": 0 <= self.still < math.inf,
             "patience": self.patience >= 0,
+            "passes": self.passes >= 0,
+            "rest": 0 <= self.rest <= 60 or "0 to 60 s",
             "lookahead": 0 <= self.lookahead <= 65_536,
             "horizon": self.horizon >= 1,
             "clear": 0 <= self.clear < 1,

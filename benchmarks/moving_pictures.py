@@ -9,7 +9,6 @@ of the first three (:mod:`pneumarm.planning.moving_bound`).
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -33,6 +32,13 @@ GOALS = (-20.0, 20.0, 15.0)
 HOLD = 1.5
 SINE = "sine:1Hz,20deg"
 BOUNDED = 3
+WORDS = {
+    "agent": "the default agent",
+    "pid": "PID in cascade",
+    "scheduled": "scheduled PID",
+    "pwm": "PID, pulse width",
+    "sliding": "sliding mode",
+}
 Course = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Times, angles and what was asked for."""
 
@@ -58,9 +64,10 @@ def measure() -> Iterator[str]:
     yield str(save(following(errors, [float(np.mean(one)) for one in zip(*bound, strict=True)]), "following.svg"))
 
 
-def rows_of(rows: Rows, name: str, arm: str) -> list[dict[str, Any]]:
-    """Return the rows of a controller on an arm."""
-    return [row for row in rows if (row["controller"], row["arm"]) == (name, arm)]
+def words_of(name: str) -> str:
+    """Return what people call the controller ``name``."""
+    kind, _, rate = name.partition("@")
+    return WORDS[kind.removesuffix("-whole")] + (f", {rate} Hz" if rate else "")
 
 
 def made(plan: Plan, name: str, arm: str) -> tuple[Course, Course]:
@@ -100,7 +107,7 @@ def movements(courses: dict[str, tuple[Course, Course]]) -> Figure:
             times, angles, asked = course[number]
             if color == INKS[0]:
                 place.plot(times, asked, color=INK, lw=0.8, label="asked for")
-            place.plot(times, angles, style, color=color, label=name)
+            place.plot(times, angles, style, color=color, label=words_of(name))
         place.set_ylabel("angle [°]")
         place.set_title(title)
     figure.axes[0].legend(loc="best")
@@ -113,7 +120,7 @@ def following(errors: dict[str, list[float]], bound: list[float]) -> Figure:
     figure = Figure((7.4, 3.4), layout="constrained")
     place = figure.subplots()
     for (name, found), color, style in zip(errors.items(), INKS, STYLES, strict=False):
-        place.loglog(FREQUENCIES, found, style, marker="o", color=color, label=name)
+        place.loglog(FREQUENCIES, found, style, marker="o", color=color, label=words_of(name))
     place.loglog(FREQUENCIES, bound, ":", marker="x", color=INK, label="possible with the true physics")
     place.set_xticks(FREQUENCIES, [f"{frequency:g}" for frequency in FREQUENCIES])
     place.set_yticks([0.1, 0.3, 1, 3], ["0.1", "0.3", "1", "3"])

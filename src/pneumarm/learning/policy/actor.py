@@ -16,8 +16,8 @@ from pneumarm.task.reward import is_switch
 class PolicyActor:
     """A policy acting greedily, looking ahead where its settings say so; see :class:`~.OnlineLearner` for its use.
 
-    It does not learn. A joint that passes its goal again and again is one that its policy keeps swinging, as on an arm
-    whose pressures are read late: its valves stay closed until it has come to rest, and it goes on from there.
+    It does not learn. A joint that passes its goal again and again is one that its policy keeps swinging: its valves
+    stay closed until it has come to rest, and it goes on from there.
     """
 
     def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings, period: float) -> None:

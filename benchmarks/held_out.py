@@ -67,6 +67,6 @@ def rows(arm: str, results: dict[str, Any]) -> Iterator[str]:
             best = max(planned.values(), key=lambda one: float(one["planned"]))
             low, high = best["interval"]
             yield (
-                f"{'':28}{name:12}{best['reward']:8.2f} ({low:.2f} to {high:.2f}) below the {best['planned']:.2f} that "
-                f"are possible in {best['episodes']} of its movements"
+                f"{'':28}{name:12}{best['reward']:8.2f} ({low:.2f} to {high:.2f}) below {best['planned']:.2f}, "
+                f"which is possible, in {best['episodes']} of its movements"
             )

@@ -28,7 +28,7 @@ from pneumarm.run import RunTransferSettings
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, StoreFit
 from pneumarm.simulation.enough import collect_enough
 from pneumarm.task import BeginStates, Movement
-from pneumarm.transitions import Store, collect
+from pneumarm.transitions import CollectResult, Store, collect
 from pneumarm.transitions.watch import Watch
 
 HELD_OUT = ",".join(str(seed) for seed in range(1001, 1011))
@@ -220,5 +220,5 @@ def moved_by(agent: AnyAgent, name: str, settings: MoveTrialSettings, seed: int)
         return try_moving(opened, agent.controller(), goals_of(agent), settings, seed=seed).results()
 
 
-def _collected(arm: Arm, store: Store, seed: int, watch: Watch, transitions: int) -> None:
-    collect(arm, store, transitions, seed, watch=watch)
+def _collected(arm: Arm, store: Store, seed: int, watch: Watch, transitions: int) -> CollectResult:
+    return collect(arm, store, transitions, seed, watch=watch)

@@ -11,7 +11,7 @@ import pytest
 from benchmarks import _environment as environment
 from benchmarks import minutes, success
 from benchmarks.__main__ import main
-from benchmarks._trials import Rows, collected, greedy_movements, names_of
+from benchmarks._trials import Rows, collected, greedy_movements, names_of, recorded
 
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import UnusableInput
@@ -103,6 +103,13 @@ def test_collecting_ends_with_the_first_sequence_after_the_minutes(tmp_path: Pat
     assert again == (transitions, took)
     more, longer = collected(tmp_path / "db", arm=3, seed=0, transitions=transitions + 1)
     assert (more, longer > took) == (transitions + 200, True)
+
+
+def test_arms_are_recorded_as_in_a_default_run(tmp_path: Path) -> None:
+    how = recorded("virtual:seed=3", tmp_path / "arm.db", 0)
+    assert 4_000 <= how["transitions"] <= 20_000
+    assert 3 < how["minutes"] < 11
+    assert how["refused"] == how["marked"] == 0
 
 
 @pytest.mark.parametrize(

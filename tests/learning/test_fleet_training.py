@@ -52,11 +52,11 @@ def agent(trained: dict[str, Training]) -> PolicyAgent:
 
 
 def test_slow_muscles_have_more_actions_until_a_movement_is_cut_off(simulation: Simulation) -> None:
-    needed = [patient(PolicySettings(cutoff=10, passages=passages), simulation).cutoff for passages in (1, 2, 4)]
+    needed = [patient(PolicySettings(cutoff=10, fillings=fillings), simulation).cutoff for fillings in (1, 2, 4)]
     assert needed[0] > 10
     np.testing.assert_allclose(needed, needed[0] * np.array([1, 2, 4]), atol=3)
     assert patient(PolicySettings(), simulation).cutoff == max(100, needed[1])
-    assert patient(PolicySettings(cutoff=10, passages=0), simulation).cutoff == 10
+    assert patient(PolicySettings(cutoff=10, fillings=0), simulation).cutoff == 10
 
 
 @pytest.mark.parametrize("method", SETTINGS)

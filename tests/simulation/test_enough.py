@@ -83,5 +83,5 @@ def test_it_ends_in_time_however_slow_the_arm_is(tmp_path: Path, monkeypatch: py
         recorded = collect(arm, store, 2_000, 1)
     assert 370 < recorded.seconds < 430
     assert found["transitions"][-1] <= recorded.transitions
-    assert "it ended at 7 minutes" in found["verdict"]
+    assert "it ended after 7 minutes" in found["verdict"]
     assert found["gain"] == [0.5] * len(found["transitions"])

@@ -141,8 +141,8 @@ def collect_enough(
         if next_size < _WORTH * wanted or (found is not None and found.enough):
             verdict = TOO_LITTLE if found is None else found.verdict
             if found is None or not found.enough:
-                minutes = f"{most / 60:.0f} minutes of the arm's time"
-                verdict += f" (it ended at {minutes}; --enough.most SECONDS allows more)"
+                minutes = f"{share * most / 60:.0f} minutes of the arm's time"
+                verdict += f" (it ended after {minutes}; --enough.most SECONDS allows more)"
             return {"transitions": sizes, "gain": gains, "verdict": verdict}
         wanted = next_size
 

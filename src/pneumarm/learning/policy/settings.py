@@ -36,7 +36,7 @@ class PolicySettings(FleetSettings):
     """Longest of these movements [steps]."""
     clear: float = 0.001
     """Actions less probable than this are not looked at; where only one is left the decision is clear."""
-    passages: float = 2.0
+    fillings: float = 2.0
     """A movement may last for so many times what the muscles take to fill and then to empty, where that is longer
     than ``cutoff`` actions; 0 for ``cutoff`` actions on any arm."""
 
@@ -54,5 +54,5 @@ class PolicySettings(FleetSettings):
             "lookahead": 0 <= self.lookahead <= 65_536,
             "horizon": self.horizon >= 1,
             "clear": 0 <= self.clear < 1,
-            "passages": 0 <= self.passages <= 100 or "0 to 100",
+            "fillings": 0 <= self.fillings <= 100 or "0 to 100",
         }

@@ -46,10 +46,10 @@ def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     Valves can be so small that the joint is still on its way after 100 actions; how slow muscles are is found by
     filling and emptying those of the simulation.
     """
-    if settings.passages == 0:
+    if settings.fillings == 0:
         return settings
     with guarded(SimulationArm(simulation)) as arm:
-        longest = settings.passages * sum(find_fill_times(arm))
+        longest = settings.fillings * sum(find_fill_times(arm))
     return replace(settings, cutoff=max(settings.cutoff, round(longest / simulation.spec.period)))
 
 

@@ -131,6 +131,16 @@ def test_ledger_shows_means_and_intervals_of_every_phase():
     assert columns[2][-1] == "1.8 h"
 
 
+def test_switches_of_several_joints_stand_beside_each_other_as_sums():
+    ahead = builders.tested(20.0)
+    ahead["switches"], ahead["intervals"]["switches"] = [0.94, 1.04], [[0.8, 1.0], [0.9, 1.1]]
+    run = builders.run(joints=2, small=True)
+    table = ledger(run.test, run.transfer, ahead)
+    switches = dict(zip(table.header, table.rows[5], strict=True))
+    assert switches[""] == "switches"
+    assert switches["… looking ahead"] == "1.98"
+
+
 def test_figures_of_joints_are_told_apart():
     run = replace(builders.run(joints=2, small=True), training=None, marked=None)
     moved = {"track": [{"frequency_hz": 0.5, "amplitude_deg": 20.0, "rms_error_deg": [1.9, 0.68]}]}

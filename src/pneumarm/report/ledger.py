@@ -41,6 +41,8 @@ def ledger(
     columns = [_ledger_column("in the simulation", test, on_arm=False)] if test is not None else []
     if lookahead:
         reward, success, actions, switches = _summarised(lookahead)
+        if np.ndim(lookahead["switches"]):  # of all joints together, as beside it; how these vary was not kept
+            switches = f"{np.sum(lookahead['switches']):.2f}"
         count = f"{lookahead['episodes']:,}"
         columns.append(["… looking ahead", count, reward, success, actions, MISSING, switches, MISSING, MISSING])
     if transfer is not None:

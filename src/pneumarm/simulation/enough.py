@@ -92,9 +92,10 @@ class EnoughSettings(Settings):
 
     def _valid(self) -> Valid:
         return {
-            "first": 0 < self.first <= self.most or "above 0, and no more than most",
+            "first": self.first > 0 or "above 0",
             "growth": 1.1 <= self.growth <= 10 or "1.1 to 10",
-            "most": self.most < math.inf or "a number of seconds",
+            "most": self.first <= self.most < math.inf
+            or f"{self.first:.0f} s or more, after which it is judged first",
         }
 
     def first_of(self, spec: ArmSpec) -> int:

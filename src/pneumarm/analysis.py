@@ -59,7 +59,7 @@ def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = No
     """
     if store.valves != simulation.valves:
         raise UnusableInput(
-            f"{store.path}: holds {_commands(store.valves)}, the simulation is of {_commands(simulation.valves)}"
+            f"{store.address}: holds {_commands(store.valves)}, the simulation is of {_commands(simulation.valves)}"
         )
     filtered = filtered or refiltered(store, simulation)
     apart = _in_order(filtered)

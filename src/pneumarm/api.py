@@ -4,6 +4,9 @@ An arm is its name, as on the command line (``virtual:seed=7``, ``serial:/dev/tt
 here, or an :class:`~pneumarm.arm.Arm` of yours, which is left open. What one function returns is given to the next as
 it is, or as the file it was saved in. Where stderr is a terminal, a bar shows how far it is; elsewhere the logger
 ``pneumarm`` is told.
+
+A store is a path, or the address of a database on a server: ``postgresql://user@host/database`` or
+``mysql://user@host/database``.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 if TYPE_CHECKING:  # what these need is imported when they are called
     from numpy.typing import ArrayLike
 
+    from pneumarm.address import StoreAddress
     from pneumarm.arm import Arm
     from pneumarm.arm.controller import TrackingController
     from pneumarm.arm.reference import Reference
@@ -44,7 +48,7 @@ def open_arm(name: str, seed: int = 0) -> "Arm":
 
 def collect(
     arm: "Arm | str",
-    db: str | Path,
+    db: "StoreAddress",
     transitions: int | None = None,
     seed: int = 0,
     settings: "CollectSettings | None" = None,
@@ -72,7 +76,7 @@ def collect(
         require_enough(transitions)
     with (
         _opened(arm, seed) as opened,
-        Store.for_arm(Path(db), opened.spec) as store,
+        Store.for_arm(db, opened.spec) as store,
         progress("collecting") as report,
     ):
         watch = Monitor(opened.spec, mode=monitor)
@@ -88,7 +92,7 @@ def collect(
     return result
 
 
-def fit(db: str | Path, out: str | Path | None = None, settings: "FitSettings | None" = None) -> "StoreFit":
+def fit(db: "StoreAddress", out: str | Path | None = None, settings: "FitSettings | None" = None) -> "StoreFit":
     """Fit a simulation to the store ``db``; write it to ``out``, if given.
 
     ``.simulation`` of what it returns is the simulation, ``.results()`` says how good that is.
@@ -104,7 +108,7 @@ def fit(db: str | Path, out: str | Path | None = None, settings: "FitSettings | 
 
     if out is not None:
         require_folder(Path(out))
-    with Store.open(Path(db)) as store, progress("fitting") as report:
+    with Store.open(db) as store, progress("fitting") as report:
         fitted = fit_store(store, settings, progress=report)
     if out is not None:
         fitted.simulation.save(out)
@@ -113,7 +117,7 @@ def fit(db: str | Path, out: str | Path | None = None, settings: "FitSettings | 
 
 def train(
     simulation: "Simulation | StoreFit | str | Path",
-    db: str | Path,
+    db: "StoreAddress",
     out: str | Path | None = None,
     seed: int = 0,
     settings: "LearnSettings | None" = None,
@@ -136,7 +140,7 @@ def train(
     if out is not None:
         require_folder(Path(out))
     learn, trained_in = settings or LearnSettings(), _simulation(simulation)
-    with Store.open(Path(db)) as store:
+    with Store.open(db) as store:
         begin = begin_states(store, trained_in.window, trained_in.scaling, trained_in.spec)
     with progress("training") as report:
         training = train(
@@ -155,7 +159,7 @@ def train(
 def test(
     agent: "AnyAgent | str | Path",
     simulation: "Simulation | StoreFit | str | Path",
-    db: str | Path,
+    db: "StoreAddress",
     episodes: int = 10_000,  # noqa: PT028 - this is no test case
     seed: int = 0,  # noqa: PT028
 ) -> "Movements":
@@ -170,7 +174,7 @@ def test(
     from pneumarm.transitions import Store
 
     tested_in = _simulation(simulation)
-    with Store.open(Path(db)) as store:
+    with Store.open(db) as store:
         begin = begin_states(store, tested_in.window, tested_in.scaling, tested_in.spec)
     return test(_agent(agent), tested_in, begin, episodes, seed)
 

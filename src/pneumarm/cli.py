@@ -34,6 +34,10 @@ COMMANDS = {
         "Export a recording (CSV, Parquet, LeRobot, Minari) or an agent (ONNX, C).",
         "pneumarm export arm.agent --out agent.c",
     ),
+    "copy": (
+        "Copy a store to another place: from a file to a server, or back.",
+        "pneumarm copy arm.db postgresql://lab@server/rig1",
+    ),
     "coverage": (
         "Say how much of the state space a store covers, and whether that is enough.",
         "pneumarm coverage arm.db",

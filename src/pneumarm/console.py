@@ -12,6 +12,8 @@ from rich.console import Console
 from rich.status import Status
 from rich.table import Table
 
+from pneumarm.address import masked
+
 if TYPE_CHECKING:  # the command line answers before these are imported
     import numpy as np
     from numpy.typing import NDArray
@@ -51,8 +53,8 @@ def say(text: str) -> None:
 
 
 def complain(error: BaseException | str) -> None:
-    """Print an error as one line on stderr."""
-    print(f"pneumarm: {' '.join(str(error).split())}", file=sys.stderr)
+    """Print an error as one line on stderr, without the passwords of addresses that were given."""
+    print(f"pneumarm: {masked(' '.join(str(error).split()))}", file=sys.stderr)
 
 
 def show(result: Mapping[str, Any], as_json: bool, table: Callable[[], Sequence[Table | str]]) -> None:

@@ -161,13 +161,13 @@ def test_a_full_disk_is_told_and_rolled_back(tmp_path, recorded):
     with Store.create(path, ArmSpec()) as store:
         store.append(recorded(1))
         pages = store._one("PRAGMA page_count")
-        store._connection.execute(f"PRAGMA max_page_count = {pages + 2}")
+        store.database.connection.execute(f"PRAGMA max_page_count = {pages + 2}")
         with pytest.raises(PneumarmError, match="the disk is full; free some space") as failure:
             all(store.append(recorded(2 + i)) for i in range(1000))
         assert failure.value.exit_code == 1
         kept = store.sequences
         store.check()
-        store._connection.execute("PRAGMA max_page_count = 1000000")
+        store.database.connection.execute("PRAGMA max_page_count = 1000000")
         assert store.append(recorded(9)) == kept + 1  # and on it goes
 
 
@@ -202,7 +202,7 @@ def test_a_read_only_disk_is_told_and_closes_the_arm(tmp_path):
     with Store.create(tmp_path / "s.db", arm.spec) as store:
 
         def then_read_only(done, total):
-            store._connection.execute("PRAGMA query_only = ON")
+            store.database.connection.execute("PRAGMA query_only = ON")
 
         with pytest.raises(PneumarmError, match="read-only") as failure:
             collect(arm, store, 2000, settings=CollectSettings(actions=20), progress=then_read_only)

@@ -153,7 +153,7 @@ def test_state_is_written_with_the_sequence_or_not_at_all(path, recorded):
         with pytest.raises(UnusableInput):
             store.append(recorded(2, time=np.zeros(21)), {"arm": b"two"})
         with pytest.raises(sqlite3.Error):
-            store._connection.execute("not SQL")
+            store.database.connection.execute("not SQL")
         assert (store.state(), store.state("other")) == (b"one", b"\x00\xff")
         store.append(recorded(2), {"arm": b"two"})
     with Store.open(path) as store:
@@ -234,7 +234,7 @@ def test_the_writer_syncs_every_commit_and_only_it_can_checkpoint(path, recorded
             log = path.with_name(path.name + "-wal")
             before = (path.read_bytes(), log.read_bytes())
             with suppress(sqlite3.OperationalError):
-                reader._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+                reader.database.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
             assert (path.read_bytes(), log.read_bytes()) == before
 
 
@@ -282,7 +282,7 @@ def test_names_that_mean_something_in_a_uri_are_just_names(tmp_path, recorded):
     with Store.open(path) as store:
         assert store.sequences == 1
         with pytest.raises(sqlite3.OperationalError):
-            store._connection.execute("DELETE FROM rows")
+            store.database.connection.execute("DELETE FROM rows")
 
 
 def test_from_steps_takes_the_valves_as_applied_and_counts_periods(recorded):

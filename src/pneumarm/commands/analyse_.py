@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from pneumarm.analysis import analyse
-from pneumarm.commands.common import Json
+from pneumarm.commands.common import AnyStore, Json
 from pneumarm.console import say, show, table
 from pneumarm.files import require_folder
 from pneumarm.progress import progress
@@ -12,7 +12,7 @@ from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
 
 
-def analyse_(db: Path, sim: Path, /, *, out: Path, json: Json = False) -> None:
+def analyse_(db: AnyStore, sim: Path, /, *, out: Path, json: Json = False) -> None:
     """Draw how good a simulation is: coverage, residues, isoplots, error propagation (thesis section 3.3).
 
     Parameters

@@ -1,10 +1,9 @@
 """``pneumarm collect``."""
 
-from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import ArmSpec, open_arm
-from pneumarm.commands.common import Json, Monitoring, OwnMethod, Settings
+from pneumarm.commands.common import AnyStore, Json, Monitoring, OwnMethod, Settings
 from pneumarm.console import say, show, table
 from pneumarm.control import Monitor, open_controller
 from pneumarm.control.condition import LINK, collected_results, complaints
@@ -15,7 +14,7 @@ from pneumarm.transitions import FEWEST_TRANSITIONS, CollectResult, CollectSetti
 
 def collect_(
     arm: str,
-    db: Path,
+    db: AnyStore,
     /,
     *,
     transitions: int | None = None,
@@ -34,7 +33,8 @@ def collect_(
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     db
-        The store; created if it does not exist.
+        The store; created if it does not exist. A file, or postgresql://user@host/database or
+        mysql://user@host/database.
     transitions
         How many to record in all (thesis section 3.2.2: 200,000, two hours); by default it goes on until more would
         not make a simulation better.

@@ -1,15 +1,25 @@
 """What the commands share."""
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
+from pneumarm.address import Address, address_of
 from pneumarm.control.monitor.settings import Mode
 
 Json = Annotated[
     bool, Parameter(name="--json", negative="", help="Print one JSON object on stdout and nothing else there.")
 ]
 """The flag that every command has."""
+
+
+def _place(_: Any, tokens: Sequence[Token]) -> Address:
+    return address_of(tokens[0].value)
+
+
+AnyStore = Annotated[Address, Parameter(converter=_place, n_tokens=1, accepts_keys=False)]
+"""Where a store is: a path, or the address of a database on a server."""
 Settings = Parameter(name="*")
 """Marks a dataclass of settings whose fields become options."""
 OwnMethod = Annotated[str | None, Parameter(name="--method")]

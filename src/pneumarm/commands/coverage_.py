@@ -1,15 +1,13 @@
 """``pneumarm coverage``."""
 
-from pathlib import Path
-
-from pneumarm.commands.common import Json
+from pneumarm.commands.common import AnyStore, Json
 from pneumarm.console import show, table
 from pneumarm.progress import progress
 from pneumarm.simulation.enough import TOO_LITTLE, enough_data
 from pneumarm.transitions import Store, Window, new_cells
 
 
-def coverage_(db: Path, /, *, json: Json = False) -> None:
+def coverage_(db: AnyStore, /, *, json: Json = False) -> None:
     """Say how much of the state space a store covers, and whether more would make a simulation of it better.
 
     Two simulations are fitted, to the first half and to all of it, and compared on sequences that neither knows.

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from pneumarm.commands.common import Json, OwnMethod
+from pneumarm.address import ServerAddress
+from pneumarm.commands.common import AnyStore, Json, OwnMethod
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
 from pneumarm.errors import UnusableInput
@@ -16,7 +17,7 @@ from pneumarm.transitions import Store
 from pneumarm.transitions.export import FORMATS, export_recording
 
 
-def export_(file: Path, /, *, out: Path, method: OwnMethod = None, json: Json = False) -> None:
+def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Json = False) -> None:
     """Export a recording (CSV, Parquet, LeRobot, Minari) or an agent (ONNX, C) for other programs.
 
     Parameters
@@ -36,6 +37,8 @@ def export_(file: Path, /, *, out: Path, method: OwnMethod = None, json: Json = 
         with Store.open(file) as store:
             result = export_recording(store, out)._asdict()
     elif out.suffix in (".c", ".onnx"):
+        if isinstance(file, ServerAddress):
+            raise UnusableInput(f"{file}: expected the file of an agent; of a store export {', '.join(FORMATS)}")
         agent = open_agent(file, method)
         if not isinstance(agent, NetworkAgent):
             raise UnusableInput(f"{file}: only agents of the methods servo and policy can be exported")

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm.seam import unit_of
-from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.common import AnyStore, Json, Settings
 from pneumarm.console import show, table
 from pneumarm.files import require_folder
 from pneumarm.progress import progress
@@ -14,7 +14,7 @@ from pneumarm.transitions import Store
 
 
 def fit_(
-    db: Path, /, *, out: Path, settings: Annotated[FitSettings, Settings] = FitSettings(), json: Json = False
+    db: AnyStore, /, *, out: Path, settings: Annotated[FitSettings, Settings] = FitSettings(), json: Json = False
 ) -> None:
     """Fit a simulation to a store and say how well it predicts sequences that it was not fitted to.
 

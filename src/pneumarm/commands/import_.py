@@ -3,12 +3,12 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from pneumarm.commands.common import Json
+from pneumarm.commands.common import AnyStore, Json
 from pneumarm.console import show, table
 from pneumarm.transitions import import_recording
 
 
-def import_(recording: Path, db: Path, /, *, mapping: Path, json: Json = False) -> None:
+def import_(recording: Path, db: AnyStore, /, *, mapping: Path, json: Json = False) -> None:
     """Import a recording made elsewhere; a mapping file says what its columns are.
 
     Parameters

@@ -1,12 +1,11 @@
 """``pneumarm move``."""
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import Json, OwnMethod, Settings
+from pneumarm.commands.common import AnyStore, Json, OwnMethod, Settings
 from pneumarm.commands.goals import read_goals
 from pneumarm.commands.recorder import recorder
 from pneumarm.console import live, say, show, table
@@ -21,7 +20,7 @@ def move_(
     *goals: Annotated[str, Parameter(allow_leading_hyphen=True)],
     arm: str,
     seed: int = 0,
-    record: Path | None = None,
+    record: AnyStore | None = None,
     method: OwnMethod = None,
     settings: Annotated[MoveSettings, Settings] = MoveSettings(),
     json: Json = False,

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+from pneumarm.address import Address
 from pneumarm.arm import ArmSpec
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded
@@ -14,17 +14,17 @@ Keep = Callable[[Recorded, Mapping[str, Any]], None]
 
 
 @contextmanager
-def recorder(path: Path | None, spec: ArmSpec) -> Iterator[Keep]:
-    """Give what adds a movement, and what was asked for in it, to the store at ``path``; to nothing without one.
+def recorder(address: Address | None, spec: ArmSpec) -> Iterator[Keep]:
+    """Give what adds a movement, and what was asked for in it, to the store at ``address``; to nothing without one.
 
     Raises:
         UnusableInput: the store is one of another arm, or cannot be written.
 
     """
-    if path is None:
+    if address is None:
         yield lambda recorded, info: None
         return
-    with Store.for_arm(path, spec) as store:
+    with Store.for_arm(address, spec) as store:
         store.check_arm(spec)
         store.begin_run("move", {})
         yield lambda recorded, info: _add(store, recorded, info)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pneumarm.commands.common import COLUMNS, Json, OwnMethod
+from pneumarm.commands.common import COLUMNS, AnyStore, Json, OwnMethod
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
 from pneumarm.learning import LOOKING_AHEAD, results_with_lookahead, test_ahead
@@ -16,7 +16,7 @@ from pneumarm.transitions import Store
 def test_(
     agent: Path,
     sim: Path,
-    db: Path,
+    db: AnyStore,
     /,
     *,
     episodes: int = 10_000,

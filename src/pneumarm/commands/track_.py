@@ -1,9 +1,7 @@
 """``pneumarm track``."""
 
-from pathlib import Path
-
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import Json, OwnMethod
+from pneumarm.commands.common import AnyStore, Json, OwnMethod
 from pneumarm.commands.recorder import recorder
 from pneumarm.console import live, show, table
 from pneumarm.control.named import open_tracking
@@ -20,7 +18,7 @@ def track_(
     seconds: float | None = None,
     unforeseen: bool = False,
     seed: int = 0,
-    record: Path | None = None,
+    record: AnyStore | None = None,
     method: OwnMethod = None,
     json: Json = False,
 ) -> None:

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pneumarm.commands.common import COLUMNS, Json, Settings
+from pneumarm.commands.common import COLUMNS, AnyStore, Json, Settings
 from pneumarm.console import show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder
@@ -20,7 +20,7 @@ from pneumarm.transitions import Store
 
 def train_(
     sim: Path,
-    db: Path,
+    db: AnyStore,
     /,
     *,
     out: Path,

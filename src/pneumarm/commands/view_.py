@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from pneumarm.commands.common import Json
+from pneumarm.address import Address, ServerAddress
+from pneumarm.commands.common import AnyStore, Json
 from pneumarm.console import show, table
 from pneumarm.progress import progress
 from pneumarm.report.shown import read_shown
@@ -10,7 +11,7 @@ from pneumarm.report.viewing import check_view, write_view
 
 
 def view_(
-    file: Path,
+    file: AnyStore,
     /,
     *,
     out: Path | None = None,
@@ -36,7 +37,7 @@ def view_(
     seconds
         For how long.
     """
-    target = out if out is not None else Path(f"{file.resolve().stem}.gif")
+    target = out if out is not None else Path(f"{_stem(file)}.gif")
     check_view(target)
     shown = read_shown(file, sequence, begin, seconds)
     with progress("drawing"):
@@ -44,3 +45,7 @@ def view_(
     lasting = float(shown.time[-1])
     result = {"file": str(target), "seconds": lasting, "joints": shown.spec.joints}
     show(result, json, lambda: [table(("file", "shows [s]"), [(str(target), lasting)])])
+
+
+def _stem(file: Address) -> str:
+    return file.database if isinstance(file, ServerAddress) else file.resolve().stem

@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.address import StoreAddress
 from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
@@ -30,7 +31,7 @@ _SIMULATION = "simulation:"
 
 def point_to_point(
     arm: str | Arm | Simulation = "virtual",
-    transitions: str | Path | BeginStates | None = None,
+    transitions: StoreAddress | BeginStates | None = None,
     like: str | Path | Simulation | None = None,
     goals: ArrayLike | None = None,
     reward: Reward = Reward(),
@@ -247,7 +248,7 @@ for _maker in (point_to_point, follow):
 
 def point_to_point_vector(
     arm: str | Simulation,
-    transitions: str | Path | BeginStates,
+    transitions: StoreAddress | BeginStates,
     num_envs: int = 1,
     goals: ArrayLike | None = None,
     reward: Reward = Reward(),
@@ -290,14 +291,14 @@ def _simulation(arm: str | Arm | Simulation) -> Simulation | None:
     return None
 
 
-def _begin(simulation: Simulation, transitions: str | Path | BeginStates | None) -> BeginStates:
+def _begin(simulation: Simulation, transitions: StoreAddress | BeginStates | None) -> BeginStates:
     if isinstance(transitions, BeginStates):
         return transitions
     if transitions is None:
         raise UnusableInput(
             "a simulation knows no begin states: give transitions=, the store of the recordings that it was fitted to"
         )
-    with Store.open(Path(transitions)) as store:
+    with Store.open(transitions) as store:
         return begin_states(store.blocks(), simulation.window, simulation.scaling, simulation.spec)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.address import Address
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.report.data import Demonstration, MovingData
@@ -40,7 +41,7 @@ class Shown:
     """In force from each reading to the next, shape (n, joints, 2)."""
 
 
-def read_shown(path: Path, sequence: int | None = None, begin: float = 0.0, seconds: float = 20.0) -> Shown:
+def read_shown(path: Address, sequence: int | None = None, begin: float = 0.0, seconds: float = 20.0) -> Shown:
     """Return what ``path`` holds, from ``begin`` [s] on for up to ``seconds``.
 
     Args:
@@ -53,9 +54,9 @@ def read_shown(path: Path, sequence: int | None = None, begin: float = 0.0, seco
         UnusableInput: it holds no movement.
 
     """
-    if path.is_dir():
+    if isinstance(path, Path) and path.is_dir():
         path = _in_folder(path)
-    if path.suffix == ".safetensors":
+    if isinstance(path, Path) and path.suffix == ".safetensors":
         found = _of_record(path)
     else:
         with Store.open(path) as store:
@@ -85,10 +86,10 @@ def _of_record(path: Path) -> Shown:
 def _of_store(store: Store, sequence: int | None, seconds: float) -> Shown:
     entries = {one.number: one for one in store.catalogue()}
     if not entries:
-        raise UnusableInput(f"{store.path}: holds no sequence yet")
+        raise UnusableInput(f"{store.address}: holds no sequence yet")
     if sequence is not None and sequence not in entries:
         raise UnusableInput(
-            f"{store.path}: there is no sequence {sequence}; there are {min(entries)} to {max(entries)}"
+            f"{store.address}: there is no sequence {sequence}; there are {min(entries)} to {max(entries)}"
         )
     numbers = [sequence] if sequence is not None else list(entries)
     parts: list[Rows] = []
@@ -126,7 +127,7 @@ def _wanted(entry: SequenceEntry, rows: Rows, spec: ArmSpec) -> Array:
     return np.full(rows.angle.shape, np.nan)
 
 
-def _part(shown: Shown, begin: float, seconds: float, path: Path) -> Shown:
+def _part(shown: Shown, begin: float, seconds: float, path: Address) -> Shown:
     time = shown.time - shown.time[0]
     kept = (time >= begin) & (time <= begin + seconds)
     if kept.sum() < 2:

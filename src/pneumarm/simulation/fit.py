@@ -486,7 +486,7 @@ def fit_store(
             f"{store.transitions} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}"
         )
     window = Window.of(store.spec, 1, settings.sensors)
-    window.require(store.further, str(store.path))
+    window.require(store.further, str(store.address))
     settings = settings.of_arm(store)
     window = _window(store.spec, settings)
     sequences = [entry.number for entry in store.catalogue()]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.transitions.database import damaged, pages, row_columns
 from pneumarm.transitions.possible import are_possible
 from pneumarm.transitions.rows import Rows, unmarked
-from pneumarm.transitions.schema import LONGEST_SEQUENCE, damaged, row_columns, translated
 
 if TYPE_CHECKING:
     from pneumarm.transitions.store import Store
@@ -40,13 +40,10 @@ class Blocks:
 
     def _chosen(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
         """Return number, rows and at_rest of the sequences to read."""
-        query = "SELECT number, rows, at_rest FROM sequences"
-        kinds = list(self._kinds) if self._kinds is not None else []
-        if self._kinds is not None:
-            query += f" WHERE kind IN ({', '.join('?' * len(kinds))})"
-        with translated(self._store.path):
-            found = self._store._connection.execute(query + " ORDER BY number", kinds)
-            table = np.fromiter(chain.from_iterable(found), np.int64).reshape(-1, 3)
+        kinds = {f"kind_{k}": kind for k, kind in enumerate(self._kinds or ())}
+        where = "" if self._kinds is None else f"kind IN ({', '.join(f':{name}' for name in kinds) or 'NULL'})"
+        found = pages(self._store.database, "sequences", ('"rows"', "at_rest"), where=where, values=kinds)
+        table = np.fromiter(chain.from_iterable(found), np.int64).reshape(-1, 3)
         if self._sequences is not None:
             table = table[self._sequences(table[:, 0])]
         return table[:, 0], table[:, 1], table[:, 2].astype(bool)
@@ -54,15 +51,20 @@ class Blocks:
     def _read(self, number: NDArray[np.int64], length: NDArray[np.int64], at_rest: NDArray[np.bool_]) -> Rows:
         store, joints = self._store, self._store.joints
         columns = ["step", *row_columns(joints, store.further)]
-        query = f"SELECT {', '.join(columns)} FROM rows WHERE sequence = ? ORDER BY step LIMIT {LONGEST_SEQUENCE + 1}"
-        execute = store._connection.execute
         total = int(length.sum())
-        with translated(store.path):
-            values = chain.from_iterable(chain.from_iterable(execute(query, (n,)) for n in number.tolist()))
+        query = (
+            f'SELECT {", ".join(columns)} FROM "rows" WHERE sequence BETWEEN :first AND :last '
+            "ORDER BY sequence, step LIMIT :most"
+        )
+        execute = store.database.execute
+        stretches = np.split(number, np.flatnonzero(np.diff(number) != 1) + 1)
+        ends = [{"first": int(one[0]), "last": int(one[-1]), "most": total + 1} for one in stretches]
+        with store.database.translated():
+            values = chain.from_iterable(chain.from_iterable(execute(query, one) for one in ends))
             try:
                 table = np.fromiter(values, np.float64, count=total * len(columns)).reshape(total, -1)
             except (ValueError, TypeError) as error:
-                raise damaged(store.path, f"rows are missing or not numbers: {error}") from error
+                raise damaged(store.address, f"rows are missing or not numbers: {error}") from error
             surplus = next(values, None) is not None
         per_joint = table[:, 2 : 2 + 5 * joints].reshape(total, joints, 5)
         rows = Rows(
@@ -77,13 +79,13 @@ class Blocks:
         )
         first = np.concatenate([[0], np.cumsum(length)[:-1]])
         if surplus or not are_possible(rows, first, store.spec, store.valves):
-            raise damaged(store.path, f"impossible values in sequences {number[0]} to {number[-1]}")
+            raise damaged(store.address, f"impossible values in sequences {number[0]} to {number[-1]}")
         return rows if self._marked else self._without_marked(rows)
 
     def _without_marked(self, rows: Rows) -> Rows:
         """Return the rows that are not marked."""
         first, last = int(rows.sequence[0]), int(rows.sequence[-1])
-        marks = self._store._marks("sequence BETWEEN ? AND ?", (first, last))
+        marks = self._store._marks(first, last)
         if not marks:
             return rows
         kept = np.ones(len(rows), bool)

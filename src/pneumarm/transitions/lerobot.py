@@ -48,7 +48,7 @@ def export_lerobot(store: Store, folder: Path, mapping: str) -> dict[str, int]:
     rate = round(1 / store.spec.period)
     if abs(rate * store.spec.period - 1) > 1e-6:
         raise UnusableInput(
-            f"{store.path}: LeRobot knows whole numbers of frames a second only, this arm has "
+            f"{store.address}: LeRobot knows whole numbers of frames a second only, this arm has "
             f"{1 / store.spec.period:g}; export .parquet"
         )
     with folder_written_whole(folder) as temporary:
@@ -91,7 +91,7 @@ class _Writer:
             if self._data is not None:
                 self._data.close()
         if not rows:
-            raise UnusableInput(f"{self._store.path}: holds nothing that could be exported")
+            raise UnusableInput(f"{self._store.address}: holds nothing that could be exported")
         self._write_meta(rows, frames, total)
         return {"rows": frames, "sequences": len(rows)}
 

@@ -67,7 +67,7 @@ def export_minari(store: Store, folder: Path) -> dict[str, int]:
         )
         storage.update_episodes(buffers())
         if not counts["sequences"]:
-            raise UnusableInput(f"{store.path}: holds nothing that could be exported")
+            raise UnusableInput(f"{store.address}: holds nothing that could be exported")
     return counts
 
 

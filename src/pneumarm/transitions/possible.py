@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
-from pneumarm.transitions.rows import Recorded, Rows
-from pneumarm.transitions.schema import LONGEST_SEQUENCE
+from pneumarm.transitions.database import LONGEST_SEQUENCE
+from pneumarm.transitions.rows import Recorded, Rows, values_of
 
 _BEYOND = 10  # highest pressures of a muscle that no supply has
 
@@ -77,14 +77,8 @@ def row_values(one: Recorded, spec: ArmSpec, further: Sequence[str], valves: boo
     wanted = _wrong_commands(one.command[:-1], spec, valves)
     if wanted or not np.isnan(one.command[-1]).all():
         raise UnusableInput(f"a sequence's commands must be {wanted or 'NaN after the last reading'}")
-    per_joint = np.concatenate([one.angle[:, :, None], one.pressure, one.command], axis=2)
-    values = np.concatenate([one.time[:, None], per_joint.reshape(n, -1)], axis=1)
-    return np.concatenate([values, *(_further_values(one, name) for name in further)], axis=1)
-
-
-def _further_values(one: Recorded, name: str) -> NDArray[np.float64]:
-    """Return what the sensor ``name`` said (n, 1), checked."""
-    values = one.measured.get(name)
-    if values is None or values.shape != (len(one),) or not np.isfinite(values).all():
-        raise UnusableInput(f"a sequence of this arm needs {len(one)} finite readings of its sensor {name}")
-    return values[:, None]
+    for name in further:
+        said = one.measured.get(name)
+        if said is None or said.shape != (n,) or not np.isfinite(said).all():
+            raise UnusableInput(f"a sequence of this arm needs {n} finite readings of its sensor {name}")
+    return values_of(one, further)

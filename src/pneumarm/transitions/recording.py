@@ -40,13 +40,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.address import StoreAddress
 from pneumarm.arm.fill import filled
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
-from pneumarm.files import written_whole
 from pneumarm.transitions.parquet import is_parquet, lines_of
 from pneumarm.transitions.rows import Recorded, steps_of
-from pneumarm.transitions.store import Store, lock_vacant
+from pneumarm.transitions.store import Store
 
 # A key of n dotted parts takes tomllib n**2 memory, hence both of these.
 _LONGEST_MAPPING = 16 << 10  # bytes
@@ -150,7 +150,7 @@ class _Column:
     whole: bool = False
 
 
-def import_recording(recording: Path | str, mapping: Path | str, store: Path | str) -> ImportResult:
+def import_recording(recording: Path | str, mapping: Path | str, store: StoreAddress) -> ImportResult:
     """Import ``recording`` into a new store, which is made whole or not at all, in bounded memory.
 
     Imported sequences do not begin at rest: windows begin within them. Rows further apart than one and a half
@@ -161,23 +161,16 @@ def import_recording(recording: Path | str, mapping: Path | str, store: Path | s
             store already.
 
     """
-    recording, mapping, store = Path(recording), Path(mapping), Path(store)
+    recording, mapping = Path(recording), Path(mapping)
     chosen, spec = read_mapping(mapping)
     columns = _columns(chosen, spec)
-    lock = lock_vacant(store)
-    try:
-        with (
-            written_whole(store) as temporary,
-            Store.create(temporary, spec, chosen.commands != "continuous") as made,
-        ):
-            made.begin_run("import", {"recording": recording.name, "mapping": mapping.name})
-            reader = _Reader(recording, chosen, columns, spec.period)
-            made.append_all(_sequences(reader, spec))
-            if not made.sequences:
-                raise UnusableInput(f"{recording}: holds no sequence of two rows or more")
-            return ImportResult(made.transitions, made.sequences, reader.rows, reader.single)
-    finally:
-        lock.release()
+    with Store.made_whole(store, spec, chosen.commands != "continuous") as made:
+        made.begin_run("import", {"recording": recording.name, "mapping": mapping.name})
+        reader = _Reader(recording, chosen, columns, spec.period)
+        made.append_all(_sequences(reader, spec))
+        if not made.sequences:
+            raise UnusableInput(f"{recording}: holds no sequence of two rows or more")
+        return ImportResult(made.transitions, made.sequences, reader.rows, reader.single)
 
 
 def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:

@@ -199,6 +199,14 @@ def rows_of(recorded: Recorded, sequence: int = 0) -> Rows:
     )
 
 
+def values_of(recorded: "Recorded | Rows", further: Sequence[str]) -> NDArray[np.float64]:
+    """Return all that was read and done, shape (n, columns), as a store keeps it; of ``further`` sensors these."""
+    n = len(recorded)
+    per_joint = np.concatenate([recorded.angle[:, :, None], recorded.pressure, recorded.command], axis=2)
+    measured = [recorded.measured[name][:, None] for name in further]
+    return np.concatenate([recorded.time[:, None], per_joint.reshape(n, -1), *measured], axis=1)
+
+
 def joinable(step: NDArray[np.int64], marks: Iterable[Mark]) -> int:
     """Return how many of the steps (n,) of a sequence are followed by the next one, both unmarked."""
     return int((np.diff(step[unmarked(step, marks)]) == 1).sum())

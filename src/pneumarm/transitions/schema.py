@@ -1,40 +1,196 @@
-"""The tables of a store, and what is checked before a file is taken for one."""
+"""A store in an SQLite file: its tables, and what is checked before a file is taken for one.
 
-import json
+One connection writes and does all the checkpoints; any number read at the same time, which SQLite makes sure never
+check-point (two that do can corrupt the file in SQLite 3.7.0 to 3.51.2).
+"""
+
+import os
 import sqlite3
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
-
-import msgspec
+from typing import Self
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.files import written_whole
+from pneumarm.transitions.database import (
+    EXPECTED,
+    VERSION,
+    Database,
+    Line,
+    Values,
+    as_settings,
+    check_joints,
+    check_version,
+    damaged,
+    further_columns,
+    read_settings,
+    row_columns,
+)
+from pneumarm.transitions.lock import WriterLock
 
 APPLICATION = 0x706E6575
 """SQLite's application id of a store: "pneu"."""
-VERSION = 3
-"""Version of the tables below. Version 1 had no marks; it is read, and made version 2 by the first writer. Version 3
-has the readings of further sensors; of an arm without any a store is of version 2, which earlier programs read."""
-LONGEST_SEQUENCE = 100_000
-"""Most rows of a sequence, so that a block of whole sequences is bounded in memory."""
-MOST_JOINTS = 64
-"""Most joints of an arm, so that the tables have no more columns than SQLite can hold: 9 a joint with all sensors."""
 
 _LONGEST_VALUE = 16 << 20  # bytes of a text or a blob: far over any state of an arm, far under what hurts
 
 
-def row_columns(joints: int, further: Sequence[str] = ()) -> list[str]:
-    """Return the names of the columns of a row after its sequence and step; ``further`` sensors come last."""
-    names = ["angle", "pressure_1", "pressure_2", "command_1", "command_2"]
-    return ["time", *(f"joint_{j}_{name}" for j in range(1, joints + 1) for name in names), *further]
+class SqliteFile(Database):
+    """A store in a file."""
+
+    def __init__(self, path: Path, connection: sqlite3.Connection, lock: WriterLock | None) -> None:
+        self.address = self._path = path
+        self.connection = connection
+        self._lock = lock
+        self.writer = lock is not None
+        with self.translated():
+            if self.writer and self.version == 1:
+                self.settings()  # these are the tables that it says they are
+                connection.executescript(f"BEGIN IMMEDIATE; {_MARKS}; PRAGMA user_version = 2; COMMIT;")
+
+    @classmethod
+    def is_there(cls, address: Path) -> bool:
+        """Return whether there is something at the path, a store or not."""
+        return address.exists()
+
+    @classmethod
+    def opened(cls, address: Path, *, writer: bool) -> Self:
+        """Return the file of a store."""
+        if not writer:
+            return cls._opened(address, None)
+        if not address.parent.is_dir():
+            raise UnusableInput(f"{address}: the folder {address.parent} does not exist")
+        return cls._opened(address, WriterLock(address))
+
+    @classmethod
+    def created(cls, address: Path, spec: ArmSpec, valves: bool) -> Self:
+        """Make the file of an empty store and return it for writing."""
+        lock = lock_vacant(address)
+        try:
+            with written_whole(address) as temporary:
+                create_tables(temporary, spec, valves)
+        except BaseException:
+            lock.release()
+            raise
+        return cls._opened(address, lock)
+
+    @classmethod
+    @contextmanager
+    def made_whole(cls, address: Path, spec: ArmSpec, valves: bool) -> Iterator[Self]:
+        """Give the file of an empty store to be filled, beside its place; it is put there when it is."""
+        lock = lock_vacant(address)
+        try:
+            with written_whole(address) as temporary:
+                made = cls.created(temporary, spec, valves)
+                try:
+                    yield made
+                finally:
+                    made.close()
+        finally:
+            lock.release()
+
+    @classmethod
+    def _opened(cls, path: Path, lock: WriterLock | None) -> Self:
+        try:
+            connection = connect(path, writer=lock is not None)
+            try:
+                return cls(path, connection, lock)
+            except BaseException:
+                connection.close()
+                raise
+        except BaseException:
+            if lock is not None:
+                lock.release()
+            raise
+
+    @property
+    def version(self) -> int:
+        """Version of the tables."""
+        return int(self.connection.execute("PRAGMA user_version").fetchone()[0])
+
+    def settings(self) -> tuple[ArmSpec, bool]:
+        """Return the arm and whether commands are valves, after checking that the tables are ours to the letter.
+
+        Nothing else may be in the file: a view or a trigger in place of a table could do anything.
+        """
+        kept = dict(self.connection.execute("SELECT name, value FROM store LIMIT 10"))
+        spec, valves = read_settings(kept, self._path)
+        found = self.connection.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 100")
+        if dict(found) != tables(spec, self.version):
+            raise damaged(self._path, "its tables are not those of a store")
+        return spec, valves
+
+    def execute(self, query: str, values: Values | None = None) -> Iterator[Line]:
+        """Execute a query and return the lines of its answer."""
+        return self.connection.execute(query, values or {})
+
+    def insert(self, table: str, columns: Sequence[str], lines: Sequence[Line]) -> None:
+        """Add ``lines`` to a ``table``."""
+        places = ", ".join("?" * len(columns))
+        self.connection.executemany(f'INSERT INTO "{table}" ({", ".join(columns)}) VALUES ({places})', lines)
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """Write what is written within at once: the log is synced at the end."""
+        with self._within("BEGIN IMMEDIATE"):
+            yield
+
+    @contextmanager
+    def snapshot(self) -> Iterator[None]:
+        """Read what is read within as it was at one moment: that of the first reading."""
+        with self._within("BEGIN"):
+            yield
+
+    @contextmanager
+    def _within(self, begin: str) -> Iterator[None]:
+        connection = self.connection
+        with self.translated():
+            connection.execute(begin)
+            try:
+                yield
+                connection.execute("COMMIT")
+            except BaseException:
+                if connection.in_transaction:
+                    connection.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def translated(self) -> Iterator[None]:
+        """Turn SQLite's errors into ours."""
+        with translated(self._path):
+            yield
+
+    def check(self) -> None:
+        """Raise UnusableInput where SQLite finds something wrong."""
+        found = self.connection.execute("PRAGMA integrity_check(1)").fetchone()[0]
+        if found != "ok":
+            raise damaged(self._path, str(found))
+
+    def close(self) -> None:
+        """Close the file and let go of the lock."""
+        self.connection.close()
+        if self._lock is not None:
+            self._lock.release()
 
 
-def further_columns(spec: ArmSpec, version: int) -> tuple[str, ...]:
-    """Return the columns of further sensors in a store of a ``version``; before the third there were none."""
-    return spec.further if version >= 3 else ()
+def lock_vacant(path: Path) -> WriterLock:
+    """Return the lock of a place for a store where there is none yet.
+
+    Raises:
+        UnusableInput: there is something at ``path`` already, or its folder is missing or cannot be written.
+
+    """
+    if not path.parent.is_dir():
+        raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
+    lock = WriterLock(path)
+    if os.path.lexists(path):
+        lock.release()
+        raise UnusableInput(f"{path}: exists already; remove it or give another name")
+    for suffix in ("-wal", "-shm"):  # SQLite would replay a log that outlived the store it belonged to
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
+    return lock
 
 
 _MARKS = (
@@ -65,8 +221,7 @@ def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, str]:
 
 def create_tables(path: Path, spec: ArmSpec, valves: bool) -> None:
     """Make an empty store of the file ``path``, which does not exist yet."""
-    if spec.joints > MOST_JOINTS:
-        raise UnusableInput(f"{path}: a store has room for {MOST_JOINTS} joints, this arm has {spec.joints}")
+    check_joints(spec, path)
     connection = sqlite3.connect(path, isolation_level=None)
     try:
         with translated(path):
@@ -76,8 +231,7 @@ def create_tables(path: Path, spec: ArmSpec, valves: bool) -> None:
             connection.execute(f"PRAGMA user_version = {version}")
             for statement in tables(spec, version).values():
                 connection.execute(statement)
-            settings = {"spec": json.dumps(asdict(spec)), "valves": json.dumps(valves)}
-            connection.executemany("INSERT INTO store VALUES (?, ?)", settings.items())
+            connection.executemany("INSERT INTO store VALUES (?, ?)", as_settings(spec, valves).items())
     finally:
         connection.close()
 
@@ -120,61 +274,21 @@ def _connect(uri: str) -> sqlite3.Connection:
 
 def _check_header(path: Path) -> None:
     """Refuse what is plainly no store before SQLite, which would wait for or repair it, gets to see it."""
-    expected = "expected a store written by `pneumarm collect` or `pneumarm import`"
     if not path.exists():
-        raise UnusableInput(f"{path}: no such file; {expected}")
+        raise UnusableInput(f"{path}: no such file; {EXPECTED}")
     if not path.is_file():
-        raise UnusableInput(f"{path}: {expected}, this is not a file")
+        raise UnusableInput(f"{path}: {EXPECTED}, this is not a file")
     try:
         with open(path, "rb") as file:
             header = file.read(100)
     except OSError as error:
         raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
     if len(header) < 100 or not header.startswith(b"SQLite format 3\0"):
-        raise UnusableInput(f"{path}: {expected}, this is something else")
+        raise UnusableInput(f"{path}: {EXPECTED}, this is something else")
     version, application = struct.unpack(">I4xI", header[60:72])
     if application != APPLICATION:
-        raise UnusableInput(f"{path}: {expected}, this is another program's database")
-    if not 1 <= version <= VERSION:
-        raise UnusableInput(
-            f"{path}: a store of version {version}, this pneumarm reads versions 1 to {VERSION}; "
-            "use the one that wrote it"
-        )
-
-
-def read_settings(connection: sqlite3.Connection, path: Path) -> tuple[ArmSpec, bool]:
-    """Return the arm and whether commands are valves, after checking that the tables are ours to the letter.
-
-    Nothing else may be in the file: a view or a trigger in place of a table could do anything.
-    """
-    settings = dict(connection.execute("SELECT name, value FROM store LIMIT 10"))
-    try:
-        spec = msgspec.json.decode(settings["spec"], type=ArmSpec, strict=True)
-        valves = msgspec.json.decode(settings["valves"], type=bool)
-    except (KeyError, msgspec.MsgspecError, UnusableInput, TypeError) as error:
-        raise damaged(path, f"its arm cannot be read: {error}") from error
-    if spec.joints > MOST_JOINTS:
-        raise damaged(path, f"an arm of {spec.joints} joints")
-    found = connection.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 100")
-    if dict(found) != tables(spec, version_of(connection)):
-        raise damaged(path, "its tables are not those of a store")
-    return spec, valves
-
-
-def version_of(connection: sqlite3.Connection) -> int:
-    """Return the version of the tables."""
-    return int(connection.execute("PRAGMA user_version").fetchone()[0])
-
-
-def upgrade(connection: sqlite3.Connection) -> None:
-    """Make a store of version 1, whose tables were checked, one of version 2."""
-    if version_of(connection) == 1:
-        connection.executescript(f"BEGIN IMMEDIATE; {_MARKS}; PRAGMA user_version = 2; COMMIT;")
-
-
-def damaged(path: Path, what: str) -> UnusableInput:
-    """Return the error for a store that cannot be trusted."""
-    return UnusableInput(f"{path}: the store is damaged ({what}); use a copy of it or collect again")
+        raise UnusableInput(f"{path}: {EXPECTED}, this is another program's database")
+    check_version(version, path)
 
 
 _MESSAGES = {

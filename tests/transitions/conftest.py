@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))  # for the stand-ins, here and in processes of their own
 
+from servers import MySQL, PostgreSQL, Served  # noqa: E402
 from stand_ins import make_recorded  # noqa: E402
 
 import children  # noqa: E402
@@ -19,6 +21,41 @@ from pneumarm.transitions import CollectSettings, Mark, Store, collect  # noqa: 
 @pytest.fixture
 def recorded():
     return make_recorded
+
+
+@pytest.fixture(scope="session")
+def postgresql() -> Iterator[PostgreSQL]:
+    server = PostgreSQL()
+    yield server
+    server.close()
+
+
+@pytest.fixture(scope="session")
+def mysql() -> Iterator[MySQL]:
+    server = MySQL()
+    yield server
+    server.close()
+
+
+@pytest.fixture(params=["postgresql", "mysql"])
+def served(request: pytest.FixtureRequest) -> Served:
+    """Return a server, of one kind after the other."""
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(params=["file", "postgresql", "mysql"])
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[], Path | str]:
+    """Return what gives addresses at which there is nothing yet: of files, or on a server."""
+    if request.param == "file":
+        return lambda: tmp_path / f"{len(list(tmp_path.iterdir()))}.db"
+    served: Served = request.getfixturevalue(request.param)
+    return served.new
+
+
+@pytest.fixture
+def address(place: Callable[[], Path | str]) -> Path | str:
+    """Return where a store can be made."""
+    return place()
 
 
 @pytest.fixture

@@ -26,8 +26,8 @@ def recorded(marks=(), n=10, begin=0.0):
     )
 
 
-def test_marked_rows_are_left_out_and_no_transition_spans_them(tmp_path):
-    with Store.create(tmp_path / "db", ArmSpec()) as store:
+def test_marked_rows_are_left_out_and_no_transition_spans_them(address):
+    with Store.create(address, ArmSpec()) as store:
         store.append(recorded([Mark(4, 5, "a stuck valve")]))
         store.append(recorded())
         assert store.transitions == 3 + 3 + 9
@@ -42,8 +42,8 @@ def test_marked_rows_are_left_out_and_no_transition_spans_them(tmp_path):
         store.check()
 
 
-def test_rows_can_be_marked_later(tmp_path):
-    with Store.create(tmp_path / "db", ArmSpec()) as store:
+def test_rows_can_be_marked_later(address):
+    with Store.create(address, ArmSpec()) as store:
         run = store.begin_run("test", {})
         for begin in (0.0, 1.0):
             store.append(recorded(begin=begin))

@@ -176,14 +176,13 @@ def pages(
     They are asked for a ``page`` at a time, because servers send their answers whole. ``where`` is a condition on
     them, with its ``values``.
     """
-    query = (
-        f'SELECT {", ".join([key, *columns])} FROM "{table}" WHERE {key} > :after{where and f" AND {where}"} '
-        f"ORDER BY {key} LIMIT {page}"
-    )
-    after: Any = "" if key == "name" else 0
+    known, conditions = dict(values or {}), [where] if where else []
     found: list[Line] = [()] * page
     while len(found) == page:
+        chosen = f" WHERE {' AND '.join(conditions)}" if conditions else ""
+        query = f'SELECT {", ".join([key, *columns])} FROM "{table}"{chosen} ORDER BY {key} LIMIT {page}'
         with database.translated():
-            found = list(database.execute(query, {**(values or {}), "after": after}))
+            found = list(database.execute(query, known))
         yield from found
-        after = found[-1][0] if found else after
+        if found:
+            known["after"], conditions = found[-1][0], [*filter(None, [where]), f"{key} > :after"]

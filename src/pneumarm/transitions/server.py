@@ -439,15 +439,15 @@ _READ_ONLY = {"25006", 1290, 1836}
 
 def _told(address: ServerAddress, error: DBAPIError) -> PneumarmError:
     """Return what to tell people of an ``error`` of the server's or its driver's."""
-    driven, reason = error.orig, _reason(error)
-    code = getattr(driven, "sqlstate", None) or next(iter(getattr(driven, "args", ())), None)
+    reason = _reason(error)
+    codes = {getattr(error.orig, "sqlstate", None), *getattr(error.orig, "args", ())[:1]}
     if error.connection_invalidated:
         return PneumarmError(f"{address}: the connection to the server was lost ({reason}); {_AGAIN}")
-    if code in _NO_RIGHTS:
+    if codes & _NO_RIGHTS:
         return UnusableInput(f"{address}: its user lacks rights ({reason}); grant all of them on this database")
-    if code in _FULL:
+    if codes & _FULL:
         return PneumarmError(f"{address}: the server's disk is full ({reason}); free some space; {_AGAIN}")
-    if code in _READ_ONLY:
+    if codes & _READ_ONLY:
         return PneumarmError(f"{address}: the server takes no changes ({reason}); make it writable; {_AGAIN}")
     return PneumarmError(f"{address}: the server failed ({reason}); {_AGAIN}")
 

@@ -33,6 +33,9 @@ class Served(Protocol):
     def execute(self, statement: str, address: str = "") -> list[Any]:
         """Execute a statement as the administrator, in the database of ``address``, and return its answer."""
 
+    def look_only(self, name: str) -> list[str]:
+        """Return the statements that leave the user lab nothing but to look into a database or schema."""
+
     def stop(self) -> None: ...
 
     def start(self) -> None: ...
@@ -76,6 +79,9 @@ class PostgreSQL:
         url = f"postgresql+psycopg://postgres@/{database}?{settings or self._at}"
         return executed(url, statement)
 
+    def look_only(self, name: str) -> list[str]:
+        return [f"ALTER SCHEMA {name} OWNER TO postgres", f"GRANT USAGE ON SCHEMA {name} TO lab"]
+
     def stop(self) -> None:
         self._server.stop()
 
@@ -113,7 +119,6 @@ class MySQL:
         try:
             self.start()
             self.execute(f"CREATE USER lab@'%' IDENTIFIED BY '{PASSWORD}'")
-            self.execute("GRANT ALL ON `rig%`.* TO lab@'%'")
         except BaseException:
             self.close()
             raise
@@ -121,6 +126,7 @@ class MySQL:
     def new(self, password: str | None = PASSWORD) -> str:
         self._made += 1
         self.execute(f"CREATE DATABASE rig{self._made}")
+        self.execute(f"GRANT ALL ON rig{self._made}.* TO lab@'%'")
         return self.database(f"rig{self._made}", password)
 
     def database(self, name: str, password: str | None = PASSWORD) -> str:
@@ -131,6 +137,9 @@ class MySQL:
             f"mysql+pymysql://root@127.0.0.1:{self._port}/{address.rpartition('/')[2]}?sql_mode=ANSI_QUOTES",
             statement,
         )
+
+    def look_only(self, name: str) -> list[str]:
+        return [f"REVOKE ALL ON {name}.* FROM lab@'%'", f"GRANT SELECT ON {name}.* TO lab@'%'"]
 
     def stop(self) -> None:
         self._process.terminate()

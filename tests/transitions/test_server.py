@@ -253,19 +253,16 @@ def test_a_database_of_somebody_elses_is_refused_and_left_as_it_is(served):
         assert len(served.execute(f"SELECT * FROM information_schema.tables WHERE table_schema = '{where}'")) <= 1
 
 
-def test_missing_rights_are_told(postgresql, mysql):
-    address = postgresql.new()
+def test_missing_rights_are_told(served):
+    address = served.new()
     where = re.search(r"rig\d+", address)[0]
-    postgresql.execute(f"REVOKE ALL ON SCHEMA {where} FROM lab; ALTER SCHEMA {where} OWNER TO postgres", "lab")
-    postgresql.execute(f"GRANT USAGE ON SCHEMA {where} TO lab", "lab")
-    mysql.execute("CREATE DATABASE looked_at")
-    mysql.execute("GRANT SELECT ON looked_at.* TO lab@'%'")
-    for one in (address, mysql.database("looked_at")):
-        with pytest.raises(UnusableInput, match=r"its user lacks rights .* grant all of them"):
-            Store.create(one, ArmSpec())
+    for statement in served.look_only(where):
+        served.execute(statement, address)
+    with pytest.raises(UnusableInput, match=r"its user lacks rights .* grant all of them"):
+        Store.create(address, ArmSpec())
 
 
-def test_a_server_that_may_lose_what_it_acknowledged_gets_no_writer(postgresql, mysql):
+def test_a_mysql_that_may_lose_what_it_acknowledged_gets_no_writer(mysql):
     address = mysql.new()
     Store.create(address, ArmSpec()).close()
     mysql.execute("SET GLOBAL innodb_flush_log_at_trx_commit = 2")
@@ -275,12 +272,17 @@ def test_a_server_that_may_lose_what_it_acknowledged_gets_no_writer(postgresql, 
         Store.open(address).close()
     finally:
         mysql.execute("SET GLOBAL innodb_flush_log_at_trx_commit = 1")
+
+
+def test_postgresql_syncs_what_a_writer_commits(postgresql):
     address = postgresql.new()
     Store.create(address, ArmSpec()).close()
     postgresql.execute("ALTER ROLE lab SET synchronous_commit = off")
     try:
         with Store.append_to(address) as store:
             assert store._one("SHOW synchronous_commit") == "on"
+        with Store.open(address) as store:
+            assert store._one("SHOW synchronous_commit") == "off"
     finally:
         postgresql.execute("ALTER ROLE lab RESET synchronous_commit")
 

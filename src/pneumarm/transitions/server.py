@@ -50,7 +50,7 @@ class System(NamedTuple):
 
     driver: str
     connection: Mapping[str, str]
-    """Settings of a connection that the address does not set. One that was lost is noticed within minutes."""
+    """Settings of a connection that the address does not set. One that was lost is noticed within five minutes."""
     session: tuple[str, ...]
     """Statements that begin every session."""
     writing: tuple[str, ...]
@@ -98,7 +98,7 @@ _MYSQL = System(
         "sql_mode": "ANSI_QUOTES,STRICT_ALL_TABLES",
         "charset": "utf8mb4",
         "connect_timeout": "10",
-        "read_timeout": "600",
+        "read_timeout": "300",
         "write_timeout": "60",
     },
     session=("SET SESSION TRANSACTION ISOLATION LEVEL REPEATABLE READ",),

@@ -12,6 +12,7 @@ from pneumarm.transitions.collect import (
     enough,
     require_enough,
 )
+from pneumarm.transitions.copying import CopyResult, copy_store
 from pneumarm.transitions.filtering import Filter, Filtered, NewCells, filter_transitions, new_cells
 from pneumarm.transitions.grid import Coverage, Grid, GridSettings
 from pneumarm.transitions.players import Keyboard, Trajectory
@@ -28,6 +29,7 @@ __all__ = [
     "CollectBegin",
     "CollectResult",
     "CollectSettings",
+    "CopyResult",
     "Coverage",
     "Filter",
     "Filtered",
@@ -43,6 +45,7 @@ __all__ = [
     "Transitions",
     "Window",
     "collect",
+    "copy_store",
     "enough",
     "filter_transitions",
     "held_out",

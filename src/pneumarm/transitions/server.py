@@ -42,6 +42,7 @@ from pneumarm.transitions.database import (
 
 _PATIENCE = 1.0  # s for which a lock is waited for: the server may not have noticed yet that its holder is dead
 _WRITER = "writer"  # the setting that says who writes
+_SETTINGS = {"spec", "valves", "version", _WRITER}
 _AGAIN = "what was acknowledged is safe: run the same command again"
 
 
@@ -256,9 +257,11 @@ class Server(Database):
         return found
 
     def _known(self) -> set[str]:
-        """Return the names of those that are tables of a store, of one joint or of more."""
+        """Return the names of those that are tables of a store, of an arm of one joint or of more."""
         ours = {name: table.columns.keys() for name, table in _tables(ArmSpec()).tables.items()}
-        return {name for name, columns in ours.items() if self._tables.get(name, [])[: len(columns)] == columns}
+        found = {name: self._tables.get(name, []) for name in ours}
+        found["rows"] = found["rows"][: len(ours["rows"])]
+        return {name for name, columns in ours.items() if found[name] == columns}
 
     def _kept(self) -> dict[str, str]:
         """Return the settings; none where there is no store."""
@@ -268,16 +271,20 @@ class Server(Database):
 
     def _require_store(self) -> None:
         """Raise UnusableInput unless the tables of a store are there."""
-        known = self._known()
-        if len(known) < len(_tables(ArmSpec()).tables) or "version" not in self._kept():
-            others = self._tables.keys() - known
-            holds = f"holds other tables ({_some(others)})" if others else "is empty"
+        if len(self._known()) < len(_tables(ArmSpec()).tables) or "version" not in self._kept():
+            holds = f"holds other tables ({_some(set(self._tables))})" if self._tables else "is empty"
             raise UnusableInput(f"{self.address}: {EXPECTED}, this database {holds}")
 
     def _require_vacant(self) -> None:
-        """Raise UnusableInput unless there is nothing but what is left of a store that was never filled."""
+        """Raise UnusableInput unless there is nothing but what is left of a store that was never filled.
+
+        What passes here is dropped: whatever might be somebody else's is not to.
+        """
         known = self._known()
-        if others := self._tables.keys() - known:
+        others = self._tables.keys() - known
+        if self._kept().keys() - _SETTINGS:
+            others = others | {"store"}
+        if others:
             raise UnusableInput(
                 f"{self.address}: holds other tables ({_some(others)}); give a database"
                 f"{' or a schema' if self._system is _POSTGRESQL else ''} of its own"

@@ -14,6 +14,8 @@ from pneumarm.arm.seam import Reading, checked
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.correction import Correction, features_of
+from pneumarm.learning.servo.foresight import Foresight
+from pneumarm.learning.servo.swinging import Swinging
 from pneumarm.task.forecast import Forecast
 from pneumarm.task.tracker import StateTracker
 
@@ -23,11 +25,16 @@ if TYPE_CHECKING:
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
 _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
-_SWINGS = 3  # from one side of the goal to the other, after which valves stay closed until the joint is at rest
+_SWINGS = 3  # from one side of the goal to the other, after which the joint swings
 _SWING, _FAR_SWING = 0.5, 4.0  # tolerances to either side that count as one, where noise is no larger; one muscle
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
+_FORESEEN, _STAYS = 0.3, 0.3  # s, and tolerances by which a joint that is at rest moves in them, by its simulation
+_LAIN = 0.5  # tolerances by which readings differ, in as long a time, where it is at rest whatever is foreseen
+_SHARES = np.array([0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1])  # of a pulse that are tried
+_AFTER = 0.1, 0.9  # s after a pulse in which the joint is to be at its goal ...
+_WANTED = 0.8  # ... by that share of its error
 _WAITED = 0.35  # s in which the readings of a joint with one muscle hardly differ, for it to come to rest
 _STEADY, _NOISY = 0.3, 1.5  # their standard deviation in tolerances, besides so many times the variance of the noise
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
@@ -46,15 +53,17 @@ _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, a
 class ServoController:
     """Maps readings to pulses with a :class:`~.agent.ServoAgent`.
 
-    Where the goal stays the same and a joint is nearly at rest near to it, it moves by single pulses, and looks at
-    what each did before the next, unless a valve is to be open for whole periods; what is left of the error is added
-    to what is asked for (integral action), so that no bias of the simulation remains. Where the mean of the readings
-    is off by less than ``quiet`` tolerances its valves stay closed, until it is off by more than ``alert``: closed
-    muscles are springs of air that hold the joint, nothing wears, and no noise of the sensors is answered.
+    Where the goal stays the same and a joint is nearly at rest near to it, it moves by single pulses, as much of what
+    the policy asks for as its error takes by the simulation, and looks at what each did before the next, unless a
+    valve is to be open for whole periods; what is left of the error is added to what is asked for (integral action),
+    so that no bias of the simulation remains. Where the mean of the readings is off by less than ``quiet`` tolerances
+    its valves stay closed, until it is off by more than ``alert``: closed muscles are springs of air that hold the
+    joint, nothing wears, and no noise of the sensors is answered.
 
-    A joint that goes on swinging about its goal is being kept swinging, by a model with less lag than the arm: its
-    valves stay closed until it is at rest, by its own damping. Integral action goes on while a joint swings near its
-    goal, unless valves stay as they are for whole periods.
+    At the turning points of a swing a joint stands still too. It is at rest only where it will stay with closed
+    valves, which its simulation foresees, or where it has stayed for as long. A joint that goes on swinging about its
+    goal is left alone until it is at rest, or goes on being damped: :class:`~.swinging.Swinging` learns which.
+    Integral action goes on while a joint swings near its goal, unless valves stay as they are for whole periods.
 
     A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next
     look, twice as many each time that those before did little. It has come to rest only once its readings hardly
@@ -86,8 +95,14 @@ class ServoController:
             self._close, self._kept = _CLOSE * tolerance, _KEPT * tolerance
         swing = _FAR_SWING if single else _SWING
         self._swing = max(swing * tolerance, _ANSWERED * noise) if fine else math.inf
-        self._slowly, self._waited = (max(self._look, round(time / spec.period)) for time in (_SLOWLY, waited))
-        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(self._slowly, self._waited))
+        self._slowly, self._waited, self._foreseen = (
+            max(self._look, round(time / spec.period)) for time in (_SLOWLY, waited, _FORESEEN)
+        )
+        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(self._slowly, self._waited, self._foreseen))
+        self._foresight = Foresight(agent.simulation) if fine else None
+        self._shortest = agent.task.commands.shortest
+        self._after = slice(*(round(time / spec.period) for time in _AFTER))
+        self._stays, self._lain = _STAYS * tolerance + noise, _LAIN * tolerance + 2 * noise
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)
@@ -96,7 +111,7 @@ class ServoController:
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
-        self._rest = [_Rest() for _ in range(spec.joints)]
+        self._rest = [_Rest(Swinging(spec.period)) for _ in range(spec.joints)]
         self._spread = None if spec.pulses else Spread(spec.joints)
 
     def reset(self, goal: NDArray[np.float64]) -> None:
@@ -116,6 +131,7 @@ class ServoController:
         self._pulse = np.zeros((self.spec.joints, 2))  # the last of each joint
         for rest in self._rest:
             rest.leave()
+            rest.swinging.leave()
 
     def act(self, reading: Reading) -> NDArray[np.float64]:
         """Return the commands (joints, 2) after ``reading``, shares of the period for which a valve is open."""
@@ -134,15 +150,17 @@ class ServoController:
         moves = np.ptp(path, axis=0) > 0
         steps = self._actor.task.inputs.steps
         preview = path[1 + steps]
-        acts = self._which_act(path[1], ~moves)
+        acts = self._which_act(path[1], ~moves, state)
         features = features_of(path, self._middle)
         self._correction.learn(np.where(moves, path[1] - reading.angle, 0.0), features[0])
         bias = np.where(moves, self._correction.of(features[steps]), [rest.bias for rest in self._rest])
         calm = np.array([rest.calm for rest in self._rest])
         command = self._actor.pulses(state, preview + bias, ~moves & ~calm)
         command[calm[:, None] & (command < 0) & (reading.pressure < self._empty)] = 0.0
-        self._pulse[acts] = command[acts]
         command[~acts] = 0.0
+        for j in np.flatnonzero(calm & acts & np.any(command != 0, axis=1)):
+            command[j] = self._sized(int(j), state, command)
+        self._pulse[acts] = command[acts]
         if self._spread is not None:
             command = self._spread(command)
         self._tracker.commanded(command)
@@ -161,10 +179,13 @@ class ServoController:
         before, self._before = now if self._before is None else self._before, now
         return np.concatenate([[before, now], coming])
 
-    def _which_act(self, now: NDArray[np.float64], stays: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _which_act(
+        self, now: NDArray[np.float64], stays: NDArray[np.bool_], state: NDArray[np.float32]
+    ) -> NDArray[np.bool_]:
         """Return which joints (joints,) may open valves now, and note which are nearly at rest.
 
-        ``now`` is what is asked for, ``stays`` whether that will stay as it is, both (joints,).
+        ``now`` is what is asked for, ``stays`` whether that will stay as it is, both (joints,), and ``state`` the
+        scaled state (state_size,).
         """
         readings = np.array(self._angles)
         read, longer = readings[-self._look :], readings[-self._slowly :]
@@ -173,9 +194,13 @@ class ServoController:
         slow = (len(longer) == self._slowly) & (np.ptp(longer, axis=0) < self._still + _EASY * np.abs(error))
         waited = readings[-self._waited :]
         steady = (len(waited) == self._waited) & (waited.var(axis=0) < self._steady)
+        asked = stays & (np.abs(error) <= self._near) & [not rest.calm for rest in self._rest]
+        steady &= self._stay(readings[-self._foreseen :], asked, state)
         acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
+            if rest.swings >= _SWINGS or rest.swinging.is_tried:
+                rest.swinging.see((now[j] - read[-1, j]) / self._tolerance)
             if len(read) < self._look or not stays[j] or abs(error[j]) > far * self._near:
                 rest.leave()
                 continue
@@ -183,9 +208,9 @@ class ServoController:
             if not (rest.calm or steady[j]) or (drift[j] > fast * self._still and not slow[j]):
                 counted = min(max(error[j], -self._counted), self._counted) if abs(error[j]) < self._close else 0.0
                 rest.stir(self._kept, counted * self.spec.period / _SWINGING)
-                acts[j] = rest.swings < _SWINGS
+                acts[j] = rest.swings < _SWINGS or rest.swinging.damps
                 continue
-            rest.calm = True
+            rest.calm, rest.error = True, error[j]
             rest.quiet = abs(error[j]) < (self._alert_above if rest.quiet else self._quiet_below)
             rest.look = max(rest.look - 1, 0)
             begins = not rest.quiet and rest.look == 0
@@ -197,6 +222,35 @@ class ServoController:
                 if begins and not saturated[j]:
                     rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._most, self._most))
         return acts
+
+    def _sized(self, joint: int, state: NDArray[np.float32], command: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return as much of the ``command`` (joints, 2) as takes a ``joint`` at rest nearest to its goal, shape (2,).
+
+        A policy acts in every period, and a heavy joint that it sets in motion it would stop in the next ones.
+        """
+        if self._foresight is None:
+            return command[joint]
+        size = _SHARES[:, None] * np.abs(command[joint])
+        size = np.where(size < self._shortest / 2, 0.0, np.maximum(size, self._shortest))
+        tried = np.zeros((len(size), *command.shape))
+        tried[:, joint] = np.copysign(size, command[joint])
+        angle = self._foresight.angles(state, tried.reshape(len(tried), -1), self._after.stop)[:, self._after, joint]
+        short = _WANTED * self._rest[joint].error - (angle - angle[0])
+        chosen: NDArray[np.float64] = tried[np.abs(short).mean(axis=1).argmin(), joint]
+        return chosen
+
+    def _stay(
+        self, lately: NDArray[np.float64], asked: NDArray[np.bool_], state: NDArray[np.float32]
+    ) -> NDArray[np.bool_]:
+        """Return which of the joints that are ``asked`` about (joints,) will stay where they are with closed valves.
+
+        ``lately`` are readings (n, joints), ``state`` is the scaled state.
+        """
+        if self._foresight is None or not asked.any():
+            return np.ones(asked.size, bool)
+        stayed = (len(lately) == self._foreseen) & (np.ptp(lately, axis=0) < self._lain)
+        closed = np.zeros((1, 2 * asked.size))
+        return stayed | (np.ptp(self._foresight.angles(state, closed, self._foreseen)[0], axis=0) <= self._stays)
 
 
 class Spread:
@@ -221,7 +275,8 @@ class Spread:
 class _Rest:
     """How one joint is nearly at rest."""
 
-    def __init__(self) -> None:
+    def __init__(self, swinging: Swinging) -> None:
+        self.swinging = swinging
         self.leave()
 
     def leave(self) -> None:
@@ -233,14 +288,14 @@ class _Rest:
     def stir(self, kept: float, added: float) -> None:
         """Note that it is near, but moves: its bias, with what is ``added``, is ``kept`` at most."""
         self.calm, self.quiet, self.look = False, False, 0
-        self.left, self._pulses, self._error = 0, 1, 0.0
+        self.left, self._pulses, self.error, self._before = 0, 1, 0.0, 0.0
         if self.swings < _SWINGS:
             self.bias = min(max(self.bias + added, -kept), kept)
 
     def begin(self, error: float, most: int) -> None:
         """Note that a pulse is due for the ``error``; where those before did little, several in a row, ``most``."""
-        done = error * self._error <= 0 or abs(error) < _DONE * abs(self._error)
-        self._pulses, self._error = 1 if done else min(2 * self._pulses, most), error
+        done = error * self._before <= 0 or abs(error) < _DONE * abs(self._before)
+        self._pulses, self._before = 1 if done else min(2 * self._pulses, most), error
         self.left = self._pulses
 
     def see(self, error: float, swing: float) -> None:

@@ -1,0 +1,108 @@
+"""What a servo does near a goal that stays: what it foresees, how long a pulse is, what becomes of a swing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from learning.synthetic_arm import synthetic_begin_states, synthetic_simulation
+from pneumarm.arm import Reading
+from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
+from pneumarm.learning.servo.controller import ServoController
+from pneumarm.learning.servo.foresight import Foresight
+from pneumarm.learning.servo.swinging import Swinging
+from pneumarm.simulation.kernel import scaled_state
+
+GOAL = 512.0
+PERIOD = 1 / 30
+
+
+@pytest.fixture(scope="module")
+def agent() -> ServoAgent:
+    """An agent of an arm that pulses were recorded of; what it learned does not matter here."""
+    simulation = synthetic_simulation()
+    simulation = replace(simulation, error_std=simulation.error_std / 4, commands="pulses")
+    settings = ServoSettings(arms=8, updates=2, agents=1, duration=0.3, hidden=(8, 8), validation_movements=8)
+    return train_servo(simulation, synthetic_begin_states(simulation), settings).agent
+
+
+def read(controller: ServoController, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the commands (n, 2) of a controller that is to hold the goal, after readings of the ``angle`` (n,)."""
+    controller.reset(np.array([GOAL]))
+    time = controller.spec.period * np.arange(len(angle))
+    readings = [Reading(t, np.array([a]), np.full((1, 2), 90.0)) for t, a in zip(time, angle, strict=True)]
+    return np.array([controller.act(one)[0] for one in readings])
+
+
+@pytest.mark.parametrize(("joints", "history"), [(1, 3), (2, 2)])
+def test_it_foresees_what_the_simulation_says(joints: int, history: int):
+    simulation = synthetic_simulation(joints, history)
+    window, random = simulation.window, np.random.default_rng(1)
+    observation = np.tile([500.0, 0.0, 80.0, 110.0], joints) + random.normal(0, 3, 4 * joints)
+    sigma = np.concatenate([np.tile(observation, history), np.zeros((history - 1) * window.command_size)])
+    commands = np.vstack([np.zeros(2 * joints), random.uniform(-1, 1, 2 * joints)])
+    foreseen = Foresight(simulation).angles(scaled_state(sigma, window, simulation.scaling), commands, 4)
+    for command, angles in zip(commands, foreseen, strict=True):
+        state, given = sigma.copy(), command
+        for angle in angles:
+            following = simulation.predict(np.concatenate([state, given])[None])[0]
+            np.testing.assert_allclose(angle, window.of_joints(following)[:, 0], rtol=1e-4)
+            observations, before = np.split(state, [history * window.observation_size])
+            state = np.concatenate(
+                [following, observations[: -len(following)], given, before[: -len(given)] if history > 1 else before]
+            )
+            given = np.zeros(2 * joints)
+
+
+def test_a_pulse_of_a_joint_at_rest_is_as_long_as_its_error_takes(agent: ServoAgent, monkeypatch: pytest.MonkeyPatch):
+    """However much a policy asks for that would stop the joint in the next periods."""
+    longest = []
+    for degrees in 0.5, 1.0, 2.0:
+        controller = agent.controller()
+        monkeypatch.setattr(controller._actor, "pulses", lambda *_: np.array([[0.7, -0.7]]))
+        command = read(controller, np.full(60, GOAL - degrees * agent.spec.counts_per_degree))[15:]
+        np.testing.assert_array_equal(command[:, 0], -command[:, 1])
+        longest.append(command[:, 0].max())
+        assert (command[:, 0] > 0).any()
+    assert longest[0] < longest[1] < longest[2] < 0.7
+
+
+def test_a_joint_is_not_at_rest_where_it_turns(agent: ServoAgent, monkeypatch: pytest.MonkeyPatch):
+    asked = []
+    controller = agent.controller()
+    monkeypatch.setattr(
+        controller._actor, "pulses", lambda state, preview, underway: asked.append(underway) or np.zeros((1, 2))
+    )
+    wave = np.sin(4 * np.pi * PERIOD * np.arange(90))
+    swing = GOAL + 1.5 * agent.spec.counts_per_degree * wave
+    read(controller, swing)
+    assert np.array(asked)[np.abs(wave) > 0.8].all()
+    read(controller, np.full(90, swing[0] + 5))
+    assert not np.array(asked[-30:]).any()
+
+
+def test_of_a_joint_that_swings_it_learns_whether_to_damp_it():
+    def errors(swinging: Swinging, alone: float, damped: float, seconds: float) -> list[bool]:
+        damps = []
+        for _ in range(round(seconds / PERIOD)):
+            swinging.see(damped if swinging.damps else alone)
+            damps.append(swinging.damps)
+        return damps
+
+    assert not any(errors(Swinging(PERIOD), 0.5, 0.1, 30))  # near enough: nothing else is tried
+    heavy = Swinging(PERIOD)
+    assert errors(heavy, 3.0, 0.5, 30)[-1]
+    heavy.leave()
+    assert heavy.damps  # with the next goal, too
+    pumped = errors(Swinging(PERIOD), 1.5, 4.0, 120)
+    assert any(pumped)
+    assert np.mean(pumped) < 0.1
+
+
+def test_being_thrown_far_off_counts_while_it_is_tried_and_another_goal_ends_that():
+    swinging = Swinging(PERIOD)
+    swinging.see(0.1)
+    assert swinging.is_tried
+    swinging.leave()
+    assert not swinging.is_tried

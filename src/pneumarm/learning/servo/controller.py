@@ -34,7 +34,7 @@ _FORESEEN, _STAYS = 0.3, 0.3  # s, and tolerances by which a joint that is at re
 _LAIN = 0.5  # tolerances by which readings differ, in as long a time, where it is at rest whatever is foreseen
 _SHARES = np.array([0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1])  # of a pulse that are tried
 _AFTER = 0.1, 0.9  # s after a pulse in which the joint is to be at its goal ...
-_WANTED = 0.8  # ... by that share of its error
+_WANTED, _BESIDES = 0.8, 0.5  # ... by that share of its error, and that of what the integral adds
 _WAITED = 0.35  # s in which the readings of a joint with one muscle hardly differ, for it to come to rest
 _STEADY, _NOISY = 0.3, 1.5  # their standard deviation in tolerances, besides so many times the variance of the noise
 _COARSE = 3.0  # tolerances of an arm without pulses to one, since a whole period moves it by degrees
@@ -235,7 +235,8 @@ class ServoController:
         tried = np.zeros((len(size), *command.shape))
         tried[:, joint] = np.copysign(size, command[joint])
         angle = self._foresight.angles(state, tried.reshape(len(tried), -1), self._after.stop)[:, self._after, joint]
-        short = _WANTED * self._rest[joint].error - (angle - angle[0])
+        rest = self._rest[joint]
+        short = _WANTED * rest.error + _BESIDES * rest.bias - (angle - angle[0])
         chosen: NDArray[np.float64] = tried[np.abs(short).mean(axis=1).argmin(), joint]
         return chosen
 

@@ -301,14 +301,15 @@ def test_options_come_from_a_file_and_the_command_line_goes_before_it(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, store: Path
 ) -> None:
     """All settings of a run are written, read again, and give the same settings."""
-    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
+    first, second, third = (tmp_path / f"{name}.toml" for name in ("first", "second", "third"))
     given = ("--arm", "virtual:seed=7", "--servo.tolerance", 0.5, "--moving.frequencies", 1, "--fit.one-network")
     assert Outcome(capsys, "run", *given, "--write-config", first).code == 0
     assert "# Error that counts as settled [degrees]" in first.read_text()
     assert Outcome(capsys, "run", "--config", first, "--write-config", second).code == 0
     assert second.read_text() == first.read_text()
-    assert Outcome(capsys, "run", f"--config={first}", "--seed", 9, "--write-config", second).code == 0
-    assert second.read_text() == first.read_text().replace("seed = 0", "seed = 9", 1)
+    assert Outcome(capsys, "run", f"--config={first}", "--seed", 9, "--write-config", third).code == 0
+    assert Outcome(capsys, "run", "--write-config", third).is_refused("exists already")
+    assert third.read_text() == first.read_text().replace("seed = 0", "seed = 9", 1)
     config = tmp_path / "options.toml"
     config.write_text("[fit]\nepochs = 2\n")
     fit = ("fit", store, "--out", tmp_path / "sim", "--config", config)

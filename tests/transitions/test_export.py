@@ -19,7 +19,7 @@ def test_csv_comes_back_as_it_was(exportable: Path, tmp_path: Path) -> None:
         spec, sequences = store.spec, store.sequences
     assert exported.rows == len(before)
     assert exported.sequences == sequences
-    imported = import_recording(tmp_path / "arm.csv", str(exported.mapping), tmp_path / "again.db")
+    imported = import_recording(tmp_path / "arm.csv", None, tmp_path / "again.db")
     assert imported.rows == exported.rows
     with Store.open(tmp_path / "again.db") as store:
         after = joined(store.blocks())
@@ -44,6 +44,23 @@ def test_parquet_holds_the_same_rows_as_csv(exportable: Path, tmp_path: Path) ->
     assert table.column_names == header
     found = np.column_stack([table[name].to_numpy() for name in header])
     np.testing.assert_array_equal(found, np.array(rows, float))
+
+
+def test_files_of_others_are_left_alone(exportable: Path, tmp_path: Path) -> None:
+    """Beside a recording often lies the calibration of its arm."""
+    theirs = tmp_path / "arm.toml", tmp_path / "arm.parquet.toml"
+    for file in theirs:
+        file.write_text("[spec]\n")
+    with Store.open(exportable) as store:
+        for _ in range(2):  # its own mapping is replaced
+            assert export_recording(store, tmp_path / "arm.csv").mapping == str(tmp_path / "arm.csv.toml")
+        with pytest.raises(UnusableInput, match=r"arm\.parquet\.toml: .* left alone; export under another name"):
+            export_recording(store, tmp_path / "arm.parquet")
+    assert [file.read_text() for file in theirs] == ["[spec]\n"] * 2
+    assert not (tmp_path / "arm.parquet").exists()
+    (tmp_path / "arm.csv.toml").unlink()
+    with pytest.raises(UnusableInput, match=r"no mapping .*arm\.csv\.toml.* by --mapping"):
+        import_recording(tmp_path / "arm.csv", None, tmp_path / "again.db")
 
 
 def test_what_cannot_be_written_is_refused(exportable: Path, tmp_path: Path) -> None:

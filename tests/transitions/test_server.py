@@ -419,7 +419,7 @@ def test_a_laboratory_works_on_a_server_by_command_line(served, capsys, tmp_path
     assert '"relative_error"' in said(capsys, "fit", address, "--out", tmp_path / "arm.sim", "--epochs", 3)
     assert '"cells"' in said(capsys, "coverage", address)
     said(capsys, "export", address, "--out", tmp_path / "arm.csv")
-    said(capsys, "import", tmp_path / "arm.csv", again, "--mapping", tmp_path / "arm.toml")
+    said(capsys, "import", tmp_path / "arm.csv", again)
     np.testing.assert_equal(content(address)[2][0][2:6], content(again)[2][0][2:6])
 
 

@@ -25,9 +25,9 @@ def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Jso
     file
         The store, or the agent.
     out
-        What to write. Of a store: .csv or .parquet (with a .toml beside it, by which it is imported again), .lerobot
-        (a folder, LeRobot's format v3.0) or .minari (a folder). Of an agent: .onnx, its network and scaling, or .c,
-        the same as C99 that needs no library, of one that settles, holds and tracks.
+        What to write. Of a store: .csv or .parquet (beside it lies arm.csv.toml, by which it is imported again),
+        .lerobot (a folder, LeRobot's format v3.0) or .minari (a folder). Of an agent: .onnx, its network and scaling,
+        or .c, the same as C99 that needs no library, of one that settles, holds and tracks.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """

@@ -8,7 +8,7 @@ from pneumarm.console import show, table
 from pneumarm.transitions import import_recording
 
 
-def import_(recording: Path, db: AnyStore, /, *, mapping: Path, json: Json = False) -> None:
+def import_(recording: Path, db: AnyStore, /, *, mapping: Path | None = None, json: Json = False) -> None:
     """Import a recording made elsewhere; a mapping file says what its columns are.
 
     Parameters
@@ -18,7 +18,8 @@ def import_(recording: Path, db: AnyStore, /, *, mapping: Path, json: Json = Fal
     db
         The store to make.
     mapping
-        TOML file with columns, units, sequences and sampling period.
+        TOML file with columns, units, sequences and sampling period; by default the one that ``pneumarm export`` left
+        beside the recording.
     """
     imported = asdict(import_recording(recording, mapping, db))
     show(imported, json, lambda: [table(("imported", ""), list(imported.items()))])

@@ -11,6 +11,7 @@ from pneumarm.commands.config_file import as_config
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
 from pneumarm.control.condition import complaints
+from pneumarm.errors import UnusableInput
 from pneumarm.files import write_text
 from pneumarm.progress import compiling, progress, seconds_since_start
 from pneumarm.run import Run, RunSettings
@@ -39,8 +40,8 @@ def run_(
         minutes needs some minutes of the arm's time; thesis takes the thesis' sizes, hours of it, for what no other
         option says.
     write_config
-        Write all settings, as they are given, with what each means into this TOML file and do nothing else; change
-        there what you like and call `pneumarm run --config FILE`.
+        Write all settings, as they are given, with what each means into this TOML file, which must not exist, and do
+        nothing else; change there what you like and call `pneumarm run --config FILE`.
     """
     if preset == "thesis":
         settings = settings.of_the_thesis()
@@ -90,5 +91,7 @@ def _took(stages: float) -> str:
 def _write_config(file: Path, settings: dict[str, Any]) -> None:
     from pneumarm.cli import app  # which has loaded this module
 
+    if file.exists():
+        raise UnusableInput(f"{file}: exists already; give another name, or remove it first")
     write_text(file, as_config("run", settings, app))
     say(f"settings: {file}; use them with `pneumarm run --config {file}`")

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
 from pneumarm.files import as_toml, require_folder, write_text, written_whole
-from pneumarm.transitions.lerobot import MAPPING, export_lerobot
+from pneumarm.transitions.lerobot import export_lerobot
 from pneumarm.transitions.minari import export_minari
+from pneumarm.transitions.recording import mapping_beside
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 
@@ -26,6 +27,8 @@ FORMATS = (".csv", ".parquet", ".lerobot", ".minari")
 """What can be written, by the end of the file's name."""
 _ANYTHING = (-1e9, 1e9)
 """Range in the mapping: what was recorded has been checked."""
+_HEAD = "# How pneumarm import reads what was exported."
+"""The first line of a mapping, by which one that may be replaced is known."""
 
 
 class Exported(NamedTuple):
@@ -41,7 +44,8 @@ def export_recording(store: Store, path: Path) -> Exported:
     """Write the rows of ``store`` to ``path``, whole or not at all, in bounded memory.
 
     Raises:
-        UnusableInput: the format is unknown or needs what is not installed, or ``path`` cannot be written.
+        UnusableInput: the format is unknown or needs what is not installed, ``path`` cannot be written, or something
+            else has the name of the mapping beside it.
 
     """
     require_folder(path)
@@ -51,7 +55,10 @@ def export_recording(store: Store, path: Path) -> Exported:
         return Exported(**export_minari(store, path), mapping=None)
     if path.suffix == ".lerobot":
         counts = export_lerobot(store, path, _mapping(store, "episode_index", "observation.time"))
-        return Exported(**counts, mapping=str(path / MAPPING))
+        return Exported(**counts, mapping=str(mapping_beside(path)))
+    mapping = mapping_beside(path)
+    if mapping.exists() and not _is_ours(mapping):
+        raise UnusableInput(f"{mapping}: is no mapping of an export and is left alone; export under another name")
     sequences = set[int]()
 
     def tables() -> Iterator[NDArray[np.float64]]:
@@ -61,9 +68,16 @@ def export_recording(store: Store, path: Path) -> Exported:
 
     names = _names(store)
     written = (_write_parquet if path.suffix == ".parquet" else _write_csv)(path, names, tables())
-    mapping = path.with_suffix(".toml")
     write_text(mapping, _mapping(store, "sequence", "time"))
     return Exported(written, len(sequences), str(mapping))
+
+
+def _is_ours(file: Path) -> bool:
+    try:
+        with open(file, encoding="utf-8") as opened:
+            return opened.readline().rstrip() == _HEAD
+    except (OSError, UnicodeDecodeError):
+        return False
 
 
 def _names(store: Store) -> list[str]:
@@ -119,7 +133,7 @@ def _mapping(store: Store, sequence: str, time: str) -> str:
     """Return the mapping file by which ``pneumarm import`` reads what was exported of ``store``."""
     spec = asdict(store.spec)
     arm = {name: value for name, value in spec.items() if name not in ("joints", "velocity_sensor", "sensors")}
-    lines = ["# How pneumarm import reads what was exported.", f'sequence = "{sequence}"', f'time = "{time}"']
+    lines = [_HEAD, f'sequence = "{sequence}"', f'time = "{time}"']
     lines += [f'commands = "{"pulses" if store.valves else "continuous"}"', "", "[arm]"]
     lines += [f"{name} = {as_toml(value)}" for name, value in arm.items() if value is not None]
     for joint in range(1, store.joints + 1):

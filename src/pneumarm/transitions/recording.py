@@ -2,7 +2,7 @@
 
 It is CSV, Parquet, or a dataset of LeRobot (:mod:`pneumarm.transitions.parquet`).
 
-The mapping, with every setting that is not of an arm's spec::
+Beside a recording that pneumarm exported lies its mapping. One with every setting that is not of an arm's spec::
 
     sequence = "episode"          # column that changes where a new sequence begins; optional
     time = "t_s"                  # column of the time [s]; without it rows are one period apart
@@ -44,6 +44,7 @@ from pneumarm.address import StoreAddress
 from pneumarm.arm.fill import filled
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
+from pneumarm.transitions.lerobot import MAPPING
 from pneumarm.transitions.parquet import is_parquet, lines_of
 from pneumarm.transitions.rows import Recorded, steps_of
 from pneumarm.transitions.store import Store
@@ -150,18 +151,24 @@ class _Column:
     whole: bool = False
 
 
-def import_recording(recording: Path | str, mapping: Path | str, store: StoreAddress) -> ImportResult:
+def mapping_beside(recording: Path) -> Path:
+    """Return where the mapping of a ``recording`` lies that pneumarm exported; in a dataset of LeRobot within it."""
+    return recording / MAPPING if recording.is_dir() else recording.with_name(f"{recording.name}.toml")
+
+
+def import_recording(recording: Path | str, mapping: Path | str | None, store: StoreAddress) -> ImportResult:
     """Import ``recording`` into a new store, which is made whole or not at all, in bounded memory.
 
-    Imported sequences do not begin at rest: windows begin within them. Rows further apart than one and a half
-    periods are not joined.
+    Without a ``mapping`` it is the one that was exported with the recording. Imported sequences do not begin at rest:
+    windows begin within them. Rows further apart than one and a half periods are not joined.
 
     Raises:
         UnusableInput: the mapping or the recording cannot be used (file, line and column are named), or there is a
             store already.
 
     """
-    recording, mapping = Path(recording), Path(mapping)
+    recording = Path(recording)
+    mapping = _mapping_of(recording) if mapping is None else Path(mapping)
     chosen, spec = read_mapping(mapping)
     columns = _columns(chosen, spec)
     with Store.made_whole(store, spec, chosen.commands != "continuous") as made:
@@ -171,6 +178,16 @@ def import_recording(recording: Path | str, mapping: Path | str, store: StoreAdd
         if not made.sequences:
             raise UnusableInput(f"{recording}: holds no sequence of two rows or more")
         return ImportResult(made.transitions, made.sequences, reader.rows, reader.single)
+
+
+def _mapping_of(recording: Path) -> Path:
+    found = mapping_beside(recording)
+    if not found.is_file():
+        raise UnusableInput(
+            f"{recording}: there is no mapping {found}, as an export leaves one; say what the columns are by "
+            "--mapping FILE.toml"
+        )
+    return found
 
 
 def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:

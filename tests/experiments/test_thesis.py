@@ -2,12 +2,14 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pneumarm.cli import main
+from pneumarm.experiments import design as design_
 from pneumarm.experiments.design import analyse_table, thesis_design
 from pneumarm.experiments.design.table import packaged_table
 from pneumarm.experiments.errata import ERRATA, Erratum, implied_success, page
@@ -107,7 +109,42 @@ def test_the_command_gives_the_rankings(tmp_path: Path, capsys: pytest.CaptureFi
     assert found["confirmation"]["observed"] == pytest.approx(6.69)
     page_ = (tmp_path / "page" / "page.html").read_text()
     assert page_.count("data:image/svg") == 5
+    # Nobody said what was varied, so nobody is told what is best.
+    assert "Best settings" not in page_
+    assert "as thesis" not in page_
+
+
+def said_of(capsys: pytest.CaptureFixture[str], code: int, *arguments: object) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main(["taguchi", "analyse", *map(str, arguments)])
+    assert ended.value.code == code
+    return "".join(capsys.readouterr())
+
+
+def test_best_settings_are_told_of_a_design(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = write(tmp_path / "c_7.csv", thesis("all_goals", "reward"))
+    confirmation = ("--confirmation", write(tmp_path / "c_14.csv", thesis("optimal_settings", "reward")))
+    alone = said_of(capsys, 0, table)
+    assert "Best settings" not in alone
+    assert "--design FILE" in alone
+    assert "no best settings to confirm" in said_of(capsys, 2, table, *confirmation)
+    design = ("--design", Path(design_.__file__).with_name("design.toml"), "--out", tmp_path / "page")
+    named = said_of(capsys, 0, table, *confirmation, *design)
+    assert "Best settings by rank: learning rate 0.1, number of neurons 5" in named
+    assert "6.69 was found: " in named
+    page_ = (tmp_path / "page" / "page.html").read_text()
     assert "Trial 10 has them" in page_
+    assert ">Best settings<" in page_
+    assert "as thesis" not in page_
+
+
+def test_the_design_in_the_docs_is_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page_ = (Path(__file__).parents[2] / "docs" / "how-to" / "experiments.md").read_text()
+    (text,) = re.findall(r"```toml\n(.*?)```", page_, re.S)
+    design = tmp_path / "design.toml"
+    design.write_text(text)
+    found = analysed(capsys, write(tmp_path / "table.csv", np.arange(16.0).reshape(8, 2)), "--design", design)
+    assert set(found["best"]["settings"]) == {"s", "h", "p"}
 
 
 def test_columns_can_be_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,6 @@
 """``pneumarm taguchi analyse``."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,8 @@ def analyse_(
 ) -> None:
     """Analyse a table of trials and runs by the design of its experiment.
 
+    Without a design the effects of the columns of L16 are shown, and no best settings: nobody said what was on them.
+
     Parameters
     ----------
     results
@@ -35,12 +38,13 @@ def analyse_(
     goal
         Which results are good: larger or smaller ones.
     design
-        TOML file of the design: array, factors, interactions; by default L16 with factors a to e on
-        the columns 1, 2, 4, 11 and 12 (thesis table 5.3).
+        TOML file of the design: array, factors, interactions (docs/how-to/experiments.md has one). In JSON L16 has
+        by default factors a to e on the columns 1, 2, 4, 11 and 12 (thesis table 5.3).
     columns
         How the headings of the columns to use begin; by default those that begin with run, or all.
     confirmation
-        A table with one row: runs made with the derived settings, compared with what the effects predict.
+        A table with one row: runs made with the derived settings, compared with what the effects predict. It needs a
+        design.
     quantity
         What the results are, for the pictures.
     out
@@ -54,15 +58,24 @@ def analyse_(
             "design of the experiment with --design"
         )
     analysis = analyse_table(chosen, read.results, goal)
+    shown = analysis if design else analyse_table(replace(chosen, factors=()), read.results, goal)
     figures = analysis.figures()
+    said = []
     if confirmation is not None:
+        if design is None and not json:
+            raise UnusableInput(f"{confirmation}: without --design there are no best settings to confirm; give it")
         observed = read_table(confirmation, columns).results
         if len(observed) != 1:
             raise UnusableInput(f"{confirmation}: expected one row, the runs of one trial, got {len(observed)}")
-        figures["confirmation"] = vars(analysis.confirm(observed[0]))
+        compared = analysis.confirm(observed[0])
+        figures["confirmation"] = vars(compared)
+        said.append(
+            f"Confirmation: the effects predict {compared.low:.4g} to {compared.high:.4g}, "
+            f"{compared.observed:.4g} was found: {'confirmed' if compared.confirmed else 'not confirmed'}"
+        )
     if out is not None:
-        _write(analysis, out, quantity, results)
-    show(figures, json, lambda: _tables(analysis))
+        _write(shown, out, quantity, results)
+    show(figures, json, lambda: [*_tables(shown), *said])
 
 
 def _write(analysis: TableAnalysis, out: Path, quantity: str, results: Path) -> None:
@@ -87,7 +100,10 @@ def _tables(analysis: TableAnalysis) -> list[Table | str]:
             row += [analysis.names[column - 1], size]
         rows.append(row)
     header = ("rank", *(part for name in names for part in (name, "effect")))
+    effects = table(header, rows, title="Columns by effect")
+    if not analysis.design.factors:
+        return [effects, "A design, --design FILE, says what is on the columns; then there are best settings, too."]
     best = analysis.best
     settings = ", ".join(f"{analysis.design.factor(label).name} {level}" for label, level in best.settings.items())
     which = f"trial {best.trial}" if best.trial else "none of the trials: confirm them"
-    return [table(header, rows, title="Columns by effect"), f"Best settings by rank: {settings} ({which})"]
+    return [effects, f"Best settings by rank: {settings} ({which})"]

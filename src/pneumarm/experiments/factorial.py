@@ -116,7 +116,7 @@ class Factorial(Trainings):
         for name, analysis in ours.items():
             if name.startswith(EXPLORING):
                 continue  # these are in the table above; their pictures would double the page
-            sections += table_sections(analysis, _IN_WORDS.get(name, name), name)
+            sections += table_sections(analysis, _IN_WORDS.get(name, name), name, cited=True)
         return Analysis(
             summary=[self.words.question, *self._answer(rows, ours)],
             figures={

@@ -238,7 +238,7 @@ def thesis_design() -> Design:
 
 
 def unnamed(design: Design) -> Design:
-    """Return ``design`` without what its factors and levels mean: another experiment may have used its columns."""
+    """Return ``design`` without what its factors and levels mean: programs get its columns, whoever used them."""
     factors = (
         replace(one, name=f"factor {one.label}", levels=tuple(range(1, len(one.levels) + 1)), setting="")
         for one in design.factors

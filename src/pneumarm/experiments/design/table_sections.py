@@ -13,24 +13,28 @@ from pneumarm.report.page import Picture, Section, Table
 _MOST_RUNS = 8  # side by side; of more only the losses are shown
 
 
-def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "") -> list[Section]:
-    """Return the sections on one table of results of a ``quantity``; ``prefix`` keeps titles of several apart."""
-    before = f"{prefix}: " if prefix else ""
-    meant = "; ".join(f"{factor.label}: {factor.name}" for factor in analysis.design.factors)
-    return [
+def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "", *, cited: bool = False) -> list[Section]:
+    """Return the sections on one table of results of a ``quantity``; ``prefix`` keeps titles of several apart.
+
+    ``cited`` names the thesis' counterparts, for experiments that are its own. Without factors there are effects of
+    columns, and no best settings.
+    """
+    factors = analysis.design.factors
+    meant = "; ".join(f"{factor.label}: {factor.name}" for factor in factors)
+    sections = [
         Section(
-            f"{before}results",
+            _title(prefix, "results"),
             [f"{analysis.goal.capitalize()} is better. Losses are of all runs of a trial."],
-            tables=[results_table(analysis, quantity)],
+            tables=[_results(analysis, quantity, cited)],
         ),
         Section(
-            f"{before}effects",
-            [f"{meant}. {_significance(analysis)}"],
-            pictures(analysis, quantity),
-            [_rankings(analysis)],
+            _title(prefix, "effects"),
+            [f"{meant}. {_significance(analysis)}" if factors else _significance(analysis)],
+            _pictures(analysis, quantity, cited),
+            [_rankings(analysis, cited)],
         ),
         Section(
-            f"{before}analysis of variance",
+            _title(prefix, "analysis of variance"),
             [
                 "Runs are blocks: in each, all trials begin with the same weights."
                 if analysis.results.shape[1] > 1
@@ -38,11 +42,21 @@ def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "") -> 
             ],
             tables=[_variance(analysis)],
         ),
-        Section(f"{before}best settings", derivation(analysis)),
     ]
+    return [*sections, Section(_title(prefix, "best settings"), _derivation(analysis))] if factors else sections
 
 
-def results_table(analysis: TableAnalysis, quantity: str) -> Table:
+def _title(prefix: str, title: str) -> str:
+    whole = f"{prefix}: {title}" if prefix else title
+    return whole[0].upper() + whole[1:]
+
+
+def _caption(text: str, counterpart: str, cited: bool) -> str:
+    """Return the caption ``text``, with its ``counterpart`` in the thesis if that is ``cited``."""
+    return f"{text} ({counterpart})." if cited else f"{text}."
+
+
+def _results(analysis: TableAnalysis, quantity: str, cited: bool) -> Table:
     """Return the loss table: trials with their settings, results and losses."""
     factors = analysis.design.factors
     runs = analysis.results.shape[1] if analysis.results.shape[1] <= _MOST_RUNS else 0
@@ -59,10 +73,11 @@ def results_table(analysis: TableAnalysis, quantity: str) -> Table:
             ]
         )
     header = ["trial", *(f"{f.label}: {f.name}" for f in factors), *(f"run {r + 1}" for r in range(runs)), *losses]
-    return Table(header, rows, f"Loss table: {quantity} by trial and run, and its losses (as thesis table 5.5).")
+    caption = f"Loss table: {quantity} by trial and run, and its losses"
+    return Table(header, rows, _caption(caption, "as thesis table 5.5", cited))
 
 
-def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
+def _pictures(analysis: TableAnalysis, quantity: str, cited: bool) -> list[Picture]:
     """Return the effects plots and the half-normal plots."""
     largest = _column(analysis, analysis.effects["mean"].ranking[0])
     drawn = []
@@ -71,14 +86,16 @@ def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
         drawn.append(
             Picture(
                 effects_figure(analysis, lines, quantity),
-                f"Effects on the {quantity} for all runs apart, a line a run (as thesis fig. 5.1).",
+                _caption(f"Effects on the {quantity} for all runs apart, a line a run", "as thesis fig. 5.1", cited),
                 f"{len(lines)} lines in {analysis.design.array.columns} columns.",
             )
         )
         drawn.append(
             Picture(
                 half_normal_runs_figure(analysis, quantity),
-                "Half-normal probability plots for all runs apart, a line a run (as thesis fig. C.2).",
+                _caption(
+                    "Half-normal probability plots for all runs apart, a line a run", "as thesis fig. C.2", cited
+                ),
                 f"Largest effects by run: {', '.join(f'{found.sizes.max():.2f}' for found in analysis.runs)}.",
             )
         )
@@ -88,21 +105,25 @@ def pictures(analysis: TableAnalysis, quantity: str) -> list[Picture]:
         drawn.append(
             Picture(
                 effects_figure(analysis, {name: analysis.effects[name]}, f"{name} of {quantity}"),
-                f"Effects on the {name} of the {quantity} (as thesis fig. {number}).",
+                _caption(f"Effects on the {name} of the {quantity}", f"as thesis fig. {number}", cited),
                 f"The largest effect is that of column {largest}.",
             )
         )
     drawn.append(
         Picture(
             half_normal_figure(analysis, names, quantity),
-            "Half-normal probability plots of the effects (thesis eq. 5.3; as fig. 5.4, 5.5), with Lenth's margins.",
+            _caption(
+                "Half-normal probability plots of the effects, with Lenth's margins",
+                "thesis eq. 5.3; as fig. 5.4, 5.5",
+                cited,
+            ),
             "; ".join(f"{name}: beyond the margin {_listed(analysis, name)}" for name in names),
         )
     )
     return drawn
 
 
-def derivation(analysis: TableAnalysis) -> list[str]:
+def _derivation(analysis: TableAnalysis) -> list[str]:
     """Return in words how the best settings were derived."""
     design, best = analysis.design, analysis.best
     steps = [
@@ -112,7 +133,7 @@ def derivation(analysis: TableAnalysis) -> list[str]:
     ]
     text = [
         f"Fixed in this order: {'; '.join(steps)}.",
-        f"The best settings are {described(best.settings, analysis)}.",
+        f"The best settings are {_described(best.settings, analysis)}.",
     ]
     if best.trial is None:
         text.append("No trial has them: a confirmation run is needed.")
@@ -127,7 +148,7 @@ def derivation(analysis: TableAnalysis) -> list[str]:
     return text
 
 
-def described(settings: Mapping[str, Level], analysis: TableAnalysis) -> str:
+def _described(settings: Mapping[str, Level], analysis: TableAnalysis) -> str:
     """Return ``settings`` in words."""
     return ", ".join(f"{analysis.design.factor(label).name} {level}" for label, level in settings.items())
 
@@ -146,7 +167,7 @@ def _column(analysis: TableAnalysis, column: int) -> str:
     return f"{column} ({label})" if label else str(column)
 
 
-def _rankings(analysis: TableAnalysis) -> Table:
+def _rankings(analysis: TableAnalysis, cited: bool) -> Table:
     names = [name for name in ("mean", "std") if name in analysis.effects]
     found: Sequence[Effects] = [analysis.effects[name] for name in names]
     rows = []
@@ -157,7 +178,8 @@ def _rankings(analysis: TableAnalysis) -> Table:
             row += [_column(analysis, column), f"{effect.sizes[column - 1]:.2f}"]
         rows.append(row)
     header = ["rank", *(part for name in names for part in (name, "effect"))]
-    return Table(header, rows, "Columns by the size of their effects (as thesis tables 5.6 and 5.9).")
+    caption = _caption("Columns by the size of their effects", "as thesis tables 5.6 and 5.9", cited)
+    return Table(header, rows, caption)
 
 
 def _variance(analysis: TableAnalysis) -> Table:

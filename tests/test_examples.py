@@ -52,7 +52,9 @@ def test_an_example_runs(workshop: Path, script: str, words: str) -> None:
 
 
 def test_the_example_with_stable_baselines3_runs(workshop: Path) -> None:
-    pytest.importorskip("stable_baselines3")
+    pytest.importorskip(
+        "stable_baselines3", reason="stable-baselines3 is not installed: pip install --editable '.[stable-baselines]'"
+    )
     done = python(EXAMPLES / "gymnasium_and_sb3.py", 2048, cwd=workshop, check=True)
     assert "500 Movements" in done.stdout
 

@@ -9,8 +9,9 @@ from pneumarm.errors import UnusableInput
 from pneumarm.gym import PointToPointVector, point_to_point
 from pneumarm.task.movements import TEST
 
-stable_baselines3 = pytest.importorskip("stable_baselines3")
-sb3_contrib = pytest.importorskip("sb3_contrib")
+WANTED = "stable-baselines3, which brings torch, is not installed: pip install --editable '.[stable-baselines]'"
+stable_baselines3 = pytest.importorskip("stable_baselines3", reason=WANTED)
+sb3_contrib = pytest.importorskip("sb3_contrib", reason=WANTED)
 
 from pneumarm.gym.stable_baselines import StableVector, imported  # noqa: E402 - needs what may be missing
 

@@ -101,6 +101,17 @@ def test_of_a_joint_that_swings_it_learns_whether_to_damp_it():
     assert np.mean(pumped) < 0.1
 
 
+def test_a_joint_that_is_pumped_far_from_its_goal_is_left_alone(agent: ServoAgent, monkeypatch: pytest.MonkeyPatch):
+    controller = agent.controller()
+    monkeypatch.setattr(controller._actor, "pulses", lambda *_: np.array([[1.0, -1.0]]))
+    degree, time = agent.spec.counts_per_degree, PERIOD * np.arange(90)
+    command = read(controller, GOAL + 12 * degree * np.sin(4 * np.pi * time))
+    assert command[5:15].any()
+    assert not command[25:50].any()  # for a second; then it is tried whether damping it brings it nearer
+    still = np.concatenate([12 * np.sin(4 * np.pi * time), np.full(30, 12.0)])
+    assert read(controller, GOAL + degree * still)[-1].any()  # until it lies still: then it is moved on
+
+
 def test_being_thrown_far_off_counts_while_it_is_tried_and_another_goal_ends_that():
     swinging = Swinging(PERIOD)
     swinging.see(0.1)

@@ -246,7 +246,7 @@ def test_with_one_muscle_a_joint_that_swings_a_little_is_damped_and_one_that_is_
     monkeypatch.setattr(controller._actor, "pulses", pulses)
     controller.reset(np.array([512.0]))
     counts, period = trained.spec.counts_per_degree, trained.spec.period
-    time = period * np.arange(90)
+    time = period * np.arange(60)
     angle = 512.0 - counts * (1.0 + degrees * np.sin(4 * np.pi * time))  # about a degree below the goal
     readings = [Reading(t, np.array([a]), np.full((1, 2), 300.0)) for t, a in zip(time, angle, strict=True)]
     opened = np.array([controller.act(one)[0, 0] != 0 for one in readings])[15:]

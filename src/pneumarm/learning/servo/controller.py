@@ -30,8 +30,9 @@ _SWING, _FAR_SWING = 0.5, 4.0  # tolerances to either side that count as one, wh
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
-_FORESEEN, _STAYS = 0.3, 0.3  # s, and tolerances by which a joint that is at rest moves in them, by its simulation
-_LAIN = 0.5  # tolerances by which readings differ, in as long a time, where it is at rest whatever is foreseen
+_FORESEEN = 0.3  # s in which a joint that is at rest hardly moves, by its simulation or by its readings
+_STAYS, _STAYS_NOISE = 0.3, 3.0  # tolerances and noises of a reading by which it does, by the simulation ...
+_LAIN, _LAIN_NOISE = 0.5, 3.5  # ... and by the readings
 _SHARES = np.array([0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1])  # of a pulse that are tried
 _AFTER = 0.1, 0.9  # s after a pulse in which the joint is to be at its goal ...
 _WANTED, _BESIDES = 0.8, 0.5  # ... by that share of its error, and that of what the integral adds
@@ -102,7 +103,8 @@ class ServoController:
         self._foresight = Foresight(agent.simulation) if fine else None
         self._shortest = agent.task.commands.shortest
         self._after = slice(*(round(time / spec.period) for time in _AFTER))
-        self._stays, self._lain = _STAYS * tolerance + noise, _LAIN * tolerance + 2 * noise
+        self._stays = _STAYS * tolerance + _STAYS_NOISE * noise
+        self._lain = _LAIN * tolerance + _LAIN_NOISE * noise
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)
@@ -194,17 +196,23 @@ class ServoController:
         slow = (len(longer) == self._slowly) & (np.ptp(longer, axis=0) < self._still + _EASY * np.abs(error))
         waited = readings[-self._waited :]
         steady = (len(waited) == self._waited) & (waited.var(axis=0) < self._steady)
-        asked = stays & (np.abs(error) <= self._near) & [not rest.calm for rest in self._rest]
-        steady &= self._stay(readings[-self._foreseen :], asked, state)
+        lately = readings[-self._foreseen :]
+        lain = (len(lately) == self._foreseen) & (np.ptp(lately, axis=0) < self._lain)
+        asked = stays & ~lain & (np.abs(error) <= self._near) & [not rest.calm for rest in self._rest]
+        steady &= lain | self._stay(asked, state)
         acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
             if rest.swings >= _SWINGS or rest.swinging.is_tried:
                 rest.swinging.see((now[j] - read[-1, j]) / self._tolerance)
-            if len(read) < self._look or not stays[j] or abs(error[j]) > far * self._near:
+            if len(read) < self._look or not stays[j]:
                 rest.leave()
                 continue
             rest.see(now[j] - read[-1, j], self._swing)
+            if abs(error[j]) > far * self._near:
+                rest.go(lain[j])
+                acts[j] = rest.swings < _SWINGS or rest.swinging.damps
+                continue
             if not (rest.calm or steady[j]) or (drift[j] > fast * self._still and not slow[j]):
                 counted = min(max(error[j], -self._counted), self._counted) if abs(error[j]) < self._close else 0.0
                 rest.stir(self._kept, counted * self.spec.period / _SWINGING)
@@ -240,18 +248,16 @@ class ServoController:
         chosen: NDArray[np.float64] = tried[np.abs(short).mean(axis=1).argmin(), joint]
         return chosen
 
-    def _stay(
-        self, lately: NDArray[np.float64], asked: NDArray[np.bool_], state: NDArray[np.float32]
-    ) -> NDArray[np.bool_]:
-        """Return which of the joints that are ``asked`` about (joints,) will stay where they are with closed valves.
+    def _stay(self, asked: NDArray[np.bool_], state: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Return which joints that are ``asked`` about (joints,) will stay where they are with closed valves.
 
-        ``lately`` are readings (n, joints), ``state`` is the scaled state.
+        ``state`` is the scaled state.
         """
         if self._foresight is None or not asked.any():
             return np.ones(asked.size, bool)
-        stayed = (len(lately) == self._foreseen) & (np.ptp(lately, axis=0) < self._lain)
         closed = np.zeros((1, 2 * asked.size))
-        return stayed | (np.ptp(self._foresight.angles(state, closed, self._foreseen)[0], axis=0) <= self._stays)
+        moved = np.ptp(self._foresight.angles(state, closed, self._foreseen)[0], axis=0)
+        return ~asked | (moved <= self._stays)
 
 
 class Spread:
@@ -283,6 +289,13 @@ class _Rest:
     def leave(self) -> None:
         """Note that it is far from what is asked for, or that this moves."""
         self.swings, self._side = 0, 0.0
+        self.bias = 0.0
+        self.stir(0.0, 0.0)
+
+    def go(self, lain: np.bool_) -> None:
+        """Note that it is far from its goal, and whether it lies still there: then its swings are over."""
+        if lain:
+            self.leave()
         self.bias = 0.0
         self.stir(0.0, 0.0)
 

@@ -6,7 +6,8 @@ pulse that follows. No simulation tells the two apart, but the arm does: by how 
 average while it is treated one way and the other.
 """
 
-_TRIED = 0.7  # s that one way is tried for
+_TRIED = 1.0  # s that one way is tried for
+_BEFORE = 0.5  # share of it that may be owed to what was before
 _HOPED = 0.7  # tolerances off on average: what is hoped of a way that was not tried, or long ago
 _MOST = 5.0  # tolerances of an error that count
 _LEARNED, _FORGOTTEN = 0.3, 0.02  # share of what is known of a way that a try of it replaces, and one of the other
@@ -34,7 +35,8 @@ class Swinging:
         """Note the ``error`` [tolerances] of a joint that swings, or has swung on its way to this goal."""
         self._errors.append(min(abs(error), _MOST))
         if len(self._errors) == self._turns:
-            way, mean = self.damps, sum(self._errors) / self._turns
+            late = self._errors[round(_BEFORE * self._turns) :]
+            way, mean = self.damps, sum(late) / len(late)
             self._off[way] += _LEARNED * (mean - self._off[way])
             self._off[not way] += _FORGOTTEN * (_HOPED - self._off[not way])
             self.leave()

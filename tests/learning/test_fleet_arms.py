@@ -25,7 +25,7 @@ def alone(environment, one, actions, states, reached, random):  # type: ignore[n
 def test_every_arm_moves_as_it_would_alone(joints: int) -> None:
     simulation = synthetic_simulation(joints, direct=joints == 1)
     env = environment(simulation, synthetic_begin_states(simulation), PolicySettings())
-    bounds = limits(simulation.window, simulation.scaling, simulation.spec, 25.0)
+    bounds = limits(simulation, 25.0)
     states = random_states(4, ARMS)
     arms = fleet(env, states.copy())
     begin_all(env, arms)
@@ -50,7 +50,7 @@ def test_every_arm_moves_as_it_would_alone(joints: int) -> None:
 def test_an_arm_does_not_depend_on_its_neighbours() -> None:
     simulation = synthetic_simulation()
     env = environment(simulation, synthetic_begin_states(simulation), PolicySettings())
-    bounds = limits(simulation.window, simulation.scaling, simulation.spec, 25.0)
+    bounds = limits(simulation, 25.0)
     found = []
     for others in (1, 2):
         states = random_states(others, ARMS)
@@ -69,7 +69,7 @@ def test_an_arm_does_not_depend_on_its_neighbours() -> None:
 def test_arms_that_are_done_stay_and_the_others_do_not_notice(joints: int) -> None:
     simulation = synthetic_simulation(joints)
     env = environment(simulation, synthetic_begin_states(simulation), PolicySettings())
-    bounds = limits(simulation.window, simulation.scaling, simulation.spec, 25.0)
+    bounds = limits(simulation, 25.0)
     all_arms, some = (fleet(env, random_states(4, ARMS)) for _ in range(2))
     begin_all(env, all_arms)
     begin_all(env, some)
@@ -106,7 +106,7 @@ def noted(limits, x, before, switched, still):  # type: ignore[no-untyped-def]
 def test_useless_actions() -> None:
     simulation = synthetic_simulation()
     scale = simulation.scaling
-    bounds = limits(simulation.window, scale, simulation.spec, 25.0, still=2.5, patience=2)
+    bounds = limits(simulation, 25.0, still=2.5, patience=2)
     x = np.zeros(24, np.float32)
     goal = bounds.goal_place
     still, held = np.zeros(1, np.int64), np.array([6])
@@ -115,6 +115,8 @@ def test_useless_actions() -> None:
 
     x[2] = bounds.inlet[0, 0] + 0.01  # muscle 1 over its limit: actions 6, 7, 8 would fill it
     assert [a for a in range(9) if not useful(bounds, x, held, still)[a]] == [6, 7, 8]
+    x[2] = bounds.outlet[0, 0] - 0.01  # muscle 1 is empty: actions 0, 1, 2 would let nothing out
+    assert [a for a in range(9) if not useful(bounds, x, held, still)[a]] == [0, 1, 2]
     x[2] = 0
 
     still[0] = 2
@@ -126,7 +128,7 @@ def test_useless_actions() -> None:
 def test_stillness_counts_steps_of_the_same_action_without_change() -> None:
     simulation = synthetic_simulation()
     scale = simulation.scaling.observation_scale
-    bounds = limits(simulation.window, simulation.scaling, simulation.spec, 25.0, still=2.5, patience=2)
+    bounds = limits(simulation, 25.0, still=2.5, patience=2)
     x, before, still = np.zeros(24, np.float32), np.zeros((1, 3), np.float32), np.zeros(1, np.int64)
     same, switch = np.zeros(1, np.int64), np.ones(1, np.int64)
     for expected in (1, 2, 3):

@@ -71,6 +71,14 @@ def test_a_movement_settles_when_it_no_longer_leaves_the_tolerance() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(("hold", "settles"), [(0.7, False), (0.9, True)])
+def test_an_arm_that_is_there_at_the_end_only_has_not_settled(hold: float, settles: bool) -> None:
+    (moved,) = move(Steered(), Towards(), [[600.0]], MoveSettings(hold=hold, tries=1))  # there after 0.5 s
+    assert moved.success == settles
+    (moved,) = move(Steered(), Towards(), [[600.0]], MoveSettings(hold=hold, tries=1, dwell=0.1))
+    assert moved.success
+
+
 def test_a_movement_that_fails_is_tried_again_after_a_pause() -> None:
     arm, stuck = Steered(), Towards(stuck=3)
     (moved,) = move(arm, stuck, [[600.0]], MoveSettings(hold=1.0, tries=3))

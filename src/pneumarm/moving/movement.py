@@ -1,6 +1,7 @@
 """Moving to a goal and holding it, and following a reference, on any arm, with figures for people.
 
-A goal is *settled* when all joints are within the tolerance from a moment on until the end of the hold. The *rest
+A goal is *settled* when all joints are within the tolerance from a moment on until the end of the hold, and for a
+dwell time at least: an arm that happens to pass its goal at the end is not. The *rest
 error* is the mean absolute error over the last second of the hold. A *valve change* is a change of the setting of a
 muscle's valves; a pulse within a control period is two.
 """
@@ -42,6 +43,8 @@ class MoveSettings(Settings):
     """A joint is there within so much [degrees]."""
     pause: float = 2.0
     """Time between two tries, with closed valves [s] (thesis section 5.6.1)."""
+    dwell: float = 0.3
+    """For how long it stays there at least, to the end of the hold, to have settled [s]; half of a shorter hold."""
 
     def _valid(self) -> Valid:
         return {
@@ -49,6 +52,7 @@ class MoveSettings(Settings):
             "tries": 1 <= self.tries <= 100 or "1 to 100",
             "tolerance": 0 < self.tolerance < 360 or "above 0 and below 360 degrees",
             "pause": 0 <= self.pause <= 3600 or "0 to 3600 s",
+            "dwell": 0 <= self.dwell <= 3600 or "0 to 3600 s",
         }
 
 
@@ -61,7 +65,7 @@ class Moved:
     time_start: float
     """When the goal was given: the beginning of the first try."""
     time_settled: float | None
-    """Since when all joints stayed within the tolerance; None where they did not."""
+    """Since when all joints stayed within the tolerance; None where they did not, or not for the dwell time."""
     rest_error: NDArray[np.float64]
     """Shape (joints,) [degrees]."""
     overshoot: NDArray[np.float64]
@@ -311,7 +315,8 @@ def _move_to(
         recorded = played(cycle, controller, settings.hold, lambda time: goal, watch, seen)
         switches += valve_changes(recorded.command[:-1], closed)
         error = (recorded.angle - goal) / spec.counts_per_degree
-        settled = _settled(recorded.time, np.abs(error).max(axis=1), settings.tolerance)
+        dwell = min(settings.dwell, settings.hold / 2)
+        settled = _settled(recorded.time, np.abs(error).max(axis=1), settings.tolerance, dwell)
         if settled is not None or number == settings.tries:
             break
         arm.wait(settings.pause)
@@ -331,11 +336,14 @@ def _move_to(
     )
 
 
-def _settled(times: NDArray[np.float64], error: NDArray[np.float64], tolerance: float) -> float | None:
-    """Return the first of the ``times`` (n,) from which on the ``error`` (n,) stays within ``tolerance``."""
+def _settled(times: NDArray[np.float64], error: NDArray[np.float64], tolerance: float, dwell: float) -> float | None:
+    """Return the first of the ``times`` (n,) from which on the ``error`` (n,) stays within ``tolerance``.
+
+    None where it did not, or for less than ``dwell`` before the last of the times.
+    """
     outside = np.flatnonzero(error > tolerance)
     first = int(outside[-1]) + 1 if len(outside) else 0
-    return float(times[first]) if first < len(times) else None
+    return float(times[first]) if first < len(times) and times[-1] - times[first] >= dwell else None
 
 
 def _air_since(arm: GuardedArm, before: float | None) -> float | None:

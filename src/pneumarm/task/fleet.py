@@ -11,14 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import VALVES
 from pneumarm.kernels import kernel, part
 from pneumarm.networks.layers import weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.random import RandomState
 from pneumarm.simulation.kernel import SimulationState, places, put_command, settle
-from pneumarm.simulation.simulation import Scaling
+from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.environment import (
     Environment,
     Episode,
@@ -27,7 +26,6 @@ from pneumarm.task.environment import (
     reached,
 )
 from pneumarm.task.reward import paid
-from pneumarm.transitions.window import Window
 
 
 class Fleet(NamedTuple):
@@ -81,11 +79,17 @@ def fleet(environment: Environment, random: RandomState) -> Fleet:
     )
 
 
+EMPTY = 0.03
+"""Share of the range of pressures below which a muscle is empty."""
+
+
 class Limits(NamedTuple):
     """Which actions are of no use. Made by :func:`limits`."""
 
     inlet: NDArray[np.float32]
     """Pressure over which an inlet stays closed, shape (joints, 2) [scaled]."""
+    outlet: NDArray[np.float32]
+    """Pressure below which a muscle has nothing to let out, shape (joints, 2) [scaled]."""
     still: NDArray[np.float32]
     """Largest change of angle and of pressures that counts as none, shape (joints, 3) [scaled]."""
     tolerance: NDArray[np.float32]
@@ -96,19 +100,21 @@ class Limits(NamedTuple):
     """Steps without change after which an action is not taken again; 0: it always may."""
 
 
-def limits(
-    window: Window, scaling: Scaling, spec: ArmSpec, tolerance: float, still: float = 2.5, patience: int = 2
-) -> Limits:
-    """Return the limits of an arm.
+def limits(simulation: Simulation, tolerance: float, still: float = 2.5, patience: int = 2) -> Limits:
+    """Return the limits of an arm by its ``simulation``.
 
     ``still`` is the largest change that counts as none, ``tolerance`` the distance from the goal within which a joint
     may stand still [both in counts of the thesis' sensors], ``patience`` the steps without change after which another
     action is taken.
     """
+    window, scaling, spec = simulation.window, simulation.scaling, simulation.spec
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+    lowest, highest = np.moveaxis(simulation.pressure_range, -1, 0)
+    empty = lowest + EMPTY * (highest - lowest)
     units = np.array([spec.angle_unit, spec.pressure_unit, spec.pressure_unit])
     return Limits(
         inlet=np.ascontiguousarray((spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:], np.float32),
+        outlet=np.ascontiguousarray((empty - offset[:, 2:]) / scale[:, 2:], np.float32),
         still=np.ascontiguousarray(still * units / scale[:, [0, 2, 3]], np.float32),
         tolerance=(tolerance * spec.angle_unit / scale[:, 0]).astype(np.float32),
         goal_place=places(window).goal,
@@ -120,14 +126,17 @@ def limits(
 def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-untyped-def]
     """Return whether ``joint`` may take ``action`` in the state ``x`` (inputs,).
 
-    Not useful is an action that would open the inlet of a muscle over its limit (the guard would keep it closed),
-    and one that has changed nothing for some steps: an arm that sticks near its goal would stick for ever.
+    Not useful is an action that would open the inlet of a muscle over its limit (the guard would keep it closed) or
+    the outlet of one that is empty, and one that has changed nothing for some steps: an arm that sticks near its goal
+    would stick for ever. Noise may hide that an empty muscle changes nothing.
     """
     is_stuck = limits.patience > 0 and action == actions[joint] and still[joint] >= limits.patience
     if is_stuck and abs(x[limits.goal_place + joint] - x[4 * joint]) > limits.tolerance[joint]:
         return False
     for muscle in range(2):
         if VALVES[action, muscle] > 0 and x[4 * joint + 2 + muscle] > limits.inlet[joint, muscle]:
+            return False
+        if VALVES[action, muscle] < 0 and x[4 * joint + 2 + muscle] < limits.outlet[joint, muscle]:
             return False
     return True
 

@@ -57,7 +57,7 @@ class ValueLearner(FleetLearner[Agent, BatchedSettings]):
         tolerance = settings.reward.angle_tolerance
         self.mind = Mind(
             environment=env,
-            limits=limits(window, scaling, simulation.spec, tolerance, patience=0),
+            limits=limits(simulation, tolerance, patience=0),
             inputs=input_parameters(window, scaling, ()),
             layers=self.values.layers,
             hold=0.0,

@@ -89,9 +89,7 @@ def mind(
     nowhere = BeginStates(window, np.zeros((0, window.state_size), np.float32), np.zeros((0, window.joints)))
     return Mind(
         environment=environment(simulation, begin or nowhere, settings),
-        limits=limits(
-            window, scaling, simulation.spec, settings.reward.angle_tolerance, settings.still, settings.patience
-        ),
+        limits=limits(simulation, settings.reward.angle_tolerance, settings.still, settings.patience),
         inputs=input_parameters(
             window, scaling, tuple(error * simulation.spec.angle_unit for error in settings.squash)
         ),

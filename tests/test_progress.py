@@ -7,6 +7,7 @@ import pty
 import re
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
@@ -19,6 +20,7 @@ from pneumarm import progress as module
 from pneumarm.cli import main
 from pneumarm.commands.run_ import _write_config
 from pneumarm.progress import Stage, compiling, progress
+from pneumarm.run import Run
 from small import SMALL
 
 
@@ -88,17 +90,18 @@ def test_compiling_is_named_and_counted_once(caplog: pytest.LogCaptureFixture) -
 
 
 def test_on_a_terminal_there_is_a_bar_with_the_time_that_is_left() -> None:
+    """Names do not wrap where a line has 80 letters."""
     program = (
         "from time import sleep\n"
         "from pneumarm.progress import progress, print_lines\n"
         "print_lines('info')\n"
-        "with progress('stage 2 of 8: doing') as report:\n"
-        "    for i in range(5): report(i, 4); sleep(0.05)\n"
+        "with progress('stage 4 of 7: testing in the simulation') as report:\n"
+        "    for i in range(5): report(2500 * i, 10000); sleep(0.05)\n"
     )
     ours, theirs = pty.openpty()
     seen = b""
     with child(
-        sys.executable, "-c", program, stderr=theirs, env={**os.environ, "TERM": "xterm", "COLUMNS": "100"}
+        sys.executable, "-c", program, stderr=theirs, env={**os.environ, "TERM": "xterm", "COLUMNS": "80"}
     ) as process:
         os.close(theirs)
         while True:
@@ -111,9 +114,25 @@ def test_on_a_terminal_there_is_a_bar_with_the_time_that_is_left() -> None:
             seen += some
         assert process.wait(LIMIT) == 0
     os.close(ours)
-    assert b"stage 2 of 8: doing" in seen
-    assert b"4/4" in seen
+    assert b"stage 4 of 7: testing in the simulation" in seen
+    assert b"10000/10000" in seen
     assert b"left" in seen
+
+
+def test_only_stages_that_are_done_are_counted(
+    small_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An agent that reaches goals does not settle; movements are not planned where nobody asked for that."""
+    monkeypatch.setattr("pneumarm.run.write_report", lambda folder: None)
+    for planned, last in ((8, 7), (0, 6)):
+        folder = tmp_path / str(planned)
+        shutil.copytree(small_run, folder)
+        (folder / "report.html").unlink()
+        settings = json.loads((folder / "settings.json").read_text()) | {"bound_episodes": planned}
+        (folder / "settings.json").write_text(json.dumps(settings))
+        run = Run(folder, replace(SMALL, bound_episodes=planned))
+        run.do()
+        assert run.numbered("writing") == f"stage {last} of {last}: writing"
 
 
 @pytest.mark.parametrize(("level", "lines"), [("info", True), ("warning", False)])
@@ -149,8 +168,8 @@ def test_stages_of_a_run_are_numbered_and_its_time_is_the_true_one(small_run: Pa
     done = python("-m", "pneumarm", "run", "--config", tmp_path / "run.toml")
     took = monotonic() - began
     assert done.returncode == 0, done.stderr
-    stages = re.findall(r"^stage (\d) of 8: .*: done in", done.stderr, re.M)
-    assert stages == ["7", "8"]
+    stages = re.findall(r"^stage (\d) of 7: .*: done in", done.stderr, re.M)
+    assert stages == ["6", "7"]
     said = re.search(
         r"report: \S+; (\d+) s(?:, \d+ s of them compiling.*?)?; (\d+) s with the calls before", done.stderr
     )

@@ -22,6 +22,7 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.table import Column
 from rich.text import Text
 
 from pneumarm.errors import UnusableInput
@@ -143,7 +144,14 @@ def progress(title: str) -> Iterator[Report]:
         with _lines(stage) as report:
             yield report
         return
-    columns = (_What(stage), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), _Left())
+    whole = Column(no_wrap=True)  # on a narrow terminal the bar gives way
+    columns = (
+        _What(stage, whole),
+        BarColumn(),
+        MofNCompleteColumn(table_column=whole.copy()),
+        TimeElapsedColumn(whole.copy()),
+        _Left(table_column=whole.copy()),
+    )
     with Progress(*columns, console=console, disable=not _log.isEnabledFor(logging.INFO)) as bar:
         task = bar.add_task(title, total=None)
 
@@ -180,14 +188,14 @@ class _What(ProgressColumn):
 
     max_refresh = 0.2
 
-    def __init__(self, stage: Stage) -> None:
-        super().__init__()
+    def __init__(self, stage: Stage, column: Column) -> None:
+        super().__init__(column)
         self._stage = stage
 
     def render(self, task: Task) -> Text:
         """Return the words."""
         if compiling.now and not task.finished:
-            return Text(f"{self._stage.title} (compiling, once on this machine)".ljust(_TITLE))
+            return Text(f"{self._stage.title} (compiling once)".ljust(_TITLE))
         return Text(self._stage.title.ljust(_TITLE))
 
 

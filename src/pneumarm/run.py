@@ -195,15 +195,19 @@ class Run:
             "settle": self._move,
             "bound": self._bound,
         }
+        left_out = {"settle": not self.settings.settles, "bound": self.settings.planned == 0}  # these only note that
+        counted = [name for name in stages if not left_out.get(name)]
+        last = len(counted) + 1
         with self._rehearsal:
-            for number, (name, stage) in enumerate(stages.items(), 1):
-                self._stage = f"stage {number} of {len(stages) + 1}"
+            for name, stage in stages.items():
+                if name in counted:
+                    self._stage = f"stage {counted.index(name) + 1} of {last}"
                 if name not in self.results:
                     with self._noted(name):
                         if name != "collect":
                             self._rehearsal.wait_for(name)
                         self.results |= stage()
-        self._stage = f"stage {len(stages) + 1} of {len(stages) + 1}"
+        self._stage = f"stage {last} of {last}"
         if not (self.folder / "report.html").exists():
             with self._noted("report"), self.progress("writing the report") as report:
                 report(0, 1)

@@ -17,6 +17,7 @@ from pneumarm.progress import compiling, progress, seconds_since_start
 from pneumarm.run import Run, RunSettings
 
 _MENTIONED = 0.5  # s of compiling
+_DONE = 0.05  # s; a stage that only notes that it was not asked for takes less
 
 
 def run_(
@@ -73,8 +74,10 @@ def run_(
 
 
 def _spent(results: dict[str, Any]) -> Iterator[str]:
-    """Say how long each stage took and how much of that was compiling."""
+    """Say how long each stage that was done took and how much of that was compiling."""
     for stage, seconds in results["wall_seconds"].items():
+        if seconds < _DONE:
+            continue
         compiled = results["compile_seconds"][stage]
         yield f"{stage} {seconds:.1f}" + (f" ({compiled:.1f} compiling)" if compiled >= _MENTIONED else "")
 

@@ -1,4 +1,4 @@
-"""A virtual arm whose sensors are wired or built as no plan of faults says: its readings go through a function."""
+"""A virtual arm that is wired or built as no plan of faults says: readings and valves go through a function."""
 
 from dataclasses import replace
 
@@ -9,12 +9,13 @@ from pneumarm.arm.virtual import VirtualArm, draw_parameters
 
 
 class FaultyArm(Arm):
-    """Arm ``seed`` with changed readings of the angle (joints,) and the pressure (joints, 2) [counts]."""
+    """Arm ``seed`` with changed readings of angles (joints,) and pressures (joints, 2) [counts] or changed valves."""
 
-    def __init__(self, seed, *, angle=None, pressure=None):
-        self.arm = VirtualArm(draw_parameters(seed), seed=seed)
+    def __init__(self, seed, *, joints=1, angle=None, pressure=None, valves=None):
+        self.arm = VirtualArm(draw_parameters(seed, joints), seed=seed)
         self.spec = replace(self.arm.spec, name="faulty")
         self._angle, self._pressure = angle or (lambda a: a), pressure or (lambda p: p)
+        self._valves = valves or (lambda v: v)
         self.applied = np.zeros((self.spec.joints, 2), np.int8)
 
     def read(self):
@@ -26,7 +27,7 @@ class FaultyArm(Arm):
 
     def set_valves(self, valves):
         self.applied = np.array(valves)
-        self.arm.set_valves(valves)
+        self.arm.set_valves(self._valves(self.applied))
 
     def wait(self, seconds):
         self.arm.wait(seconds)

@@ -49,6 +49,68 @@ def test_every_wrong_wiring_of_sensors_is_found_and_nothing_else(fault):
         assert str(finding).startswith("joint")
 
 
+def _places(*muscles):
+    """Return what puts into each place what belongs to the next: an exchange of joints or of (joint, muscle)."""
+
+    def exchange(values):
+        changed = values.copy()
+        for place, other in zip(muscles, (*muscles[1:], muscles[0]), strict=True):
+            changed[place] = values[other]
+        return changed
+
+    return exchange
+
+
+def _inlets(valves):
+    """Exchange the inlets of both joints' first muscles; their exhausts are right."""
+    opened, vents = np.maximum(valves, 0), np.minimum(valves, 0)
+    return _places((0, 0), (1, 0))(opened) + vents
+
+
+@pytest.mark.parametrize(
+    ("kind", "where", "wiring"),
+    [
+        ("valves", "joint 1, muscle 1 and joint 2, muscle 1", {"valves": _places((0, 0), (1, 0))}),
+        ("valves", "joint 1, muscle 2 and joint 2, muscle 1", {"valves": _places((0, 1), (1, 0))}),
+        ("inlets", "joint 1, muscle 1 and joint 2, muscle 1", {"valves": _inlets}),
+        (
+            "pressure sensors",
+            "joint 1, muscle 1 and joint 2, muscle 1",
+            {"pressure": _places((0, 0), (1, 0))},
+        ),
+        ("angle sensors", "joint 1 and joint 2", {"angle": _places(0, 1)}),
+        ("angle sensors", "joint 1 and joint 3", {"joints": 3, "angle": _places(0, 2)}),
+        ("angle sensors", "joint 1 and joint 3 and joint 2", {"joints": 3, "angle": _places(0, 1, 2)}),
+    ],
+)
+@pytest.mark.parametrize("seed", [3, 7])
+def test_wires_exchanged_between_joints_are_named_and_nothing_that_follows_from_them(kind, where, wiring, seed):
+    found = diagnose(measure(FaultyArm(seed, **{"joints": 2} | wiring), CheckupSettings(rest=5.0)))
+    assert [(one.kind, one.where) for one in found] == [(f"{kind} exchanged", where)]
+
+
+def test_both_muscles_of_joints_and_two_kinds_of_sensors_may_be_exchanged():
+    muscles = _places((0, 0), (1, 0)), _places((0, 1), (1, 1))
+    arm = FaultyArm(3, joints=2, valves=lambda v: muscles[0](muscles[1](v)))
+    assert [one.kind for one in diagnose(measure(arm))] == ["valves exchanged"] * 2
+    arm = FaultyArm(3, joints=2, valves=muscles[0], angle=_places(0, 1))
+    assert [one.kind for one in diagnose(measure(arm))] == ["valves exchanged", "angle sensors exchanged"]
+
+
+def test_a_joint_beside_exchanged_ones_is_judged_as_ever():
+    arm = FaultyArm(3, joints=3, angle=lambda a: _places(0, 2)(np.array([a[0], 1023 - a[1], a[2]])))
+    found = diagnose(measure(arm))
+    assert [(one.kind, one.where) for one in found] == [
+        ("angle sensors exchanged", "joint 1 and joint 3"),
+        ("angle reversed", "joint 2"),
+    ]
+
+
+@pytest.mark.parametrize(("joints", "seed"), [(2, 1), (2, 2), (2, 9), (3, 4)])
+def test_healthy_arms_of_several_joints_are_left_alone(joints, seed):
+    assert diagnose(measure(FaultyArm(seed, joints=joints))) == []
+
+
 def test_the_check_up_is_gentle_and_leaves_the_arm_vented_and_closed():
     guard = guarded(open_arm("virtual:seed=8", 8))
     checkup = measure(guard)

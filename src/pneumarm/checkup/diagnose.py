@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.spec_file import SoundState
+from pneumarm.checkup.exchanged import Exchange, What, exchanged
 from pneumarm.checkup.figures import (
+    FILLED,
     MOVED,
     JointFigures,
     autocorrelation,
@@ -22,6 +24,7 @@ from pneumarm.checkup.figures import (
     joint_figures,
     ljung_box,
     quickening,
+    rise,
 )
 from pneumarm.checkup.leaks import LeakRates, leaking
 from pneumarm.checkup.measure import Array, Checkup, JointTest, MuscleTest
@@ -49,9 +52,9 @@ LOGARITHMIC = 1.3
 """A potentiometer is logarithmic if one half of the sweep turns it so many times further than the other half."""
 WORN = 6.0
 """A place of the potentiometer is worn if its readings are off by so many counts there (root mean square)."""
-_EVEN = 0.35  # bar: what a filled muscle always exceeds, and one that is merely stretched never reaches
 
 Kind = Literal[
+    What,
     "muscles swapped", "pressure sensors swapped", "valves swapped", "inlet stuck closed", "inlet stuck open",
     "exhaust stuck closed", "exhaust stuck open", "low supply", "high supply", "rising supply", "leak",
     "angle reversed", "angle dead", "angle frozen", "pressure frozen", "angle logarithmic", "angle worn",
@@ -81,7 +84,10 @@ def diagnose(checkup: Checkup, sound: SoundState | None = None) -> list[Complain
         sound: what the same arm did when it was calibrated, with its sensors corrected as they are now.
 
     """
-    found = [finding for j in range(len(checkup.joints)) for finding in _of_joint(checkup, j, sound)]
+    crossed = exchanged(checkup)
+    found = [_of_exchange(exchange) for exchange in crossed]
+    untold = set(range(len(checkup.joints))).difference(*(exchange.joints for exchange in crossed))
+    found += [finding for j in sorted(untold) for finding in _of_joint(checkup, j, sound)]
     periods = checkup.timing.periods
     if np.quantile(periods, 0.95) > 1.5 * checkup.spec.period:
         worst = f"95 % of the control periods are below {1e3 * np.quantile(periods, 0.95):.0f} ms"
@@ -90,13 +96,30 @@ def diagnose(checkup: Checkup, sound: SoundState | None = None) -> list[Complain
     return found
 
 
+def _of_exchange(exchange: Exchange) -> Complaint:
+    """Return the complaint of what shows in no joint alone."""
+    places = [f"joint {j + 1}, muscle {m + 1}" for j, m in exchange.muscles]
+    places += [f"joint {j + 1}" for j in exchange.angles]
+    other, mend = "other", "Swap the two"
+    if len(places) > 2:
+        other, mend = "next, of the last that of the first", "Connect each in its place"
+    details: dict[What, str] = {
+        "valves exchanged": f"filling each raises the pressure of the {other}, and turns its joint",
+        "inlets exchanged": f"filling each raises the pressure of the {other}, which its own exhaust does not vent",
+        "pressure sensors exchanged": f"filling each raises the pressure of the {other}, yet turns its own joint",
+        "angle sensors exchanged": f"filling the muscles of each turns the angle of the {other}",
+    }
+    remedy = f"{mend}, then check again, for what else is wrong there"
+    return Complaint(exchange.what, " and ".join(places), details[exchange.what], remedy)
+
+
 def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Complaint]:
     test, figures, bar = checkup.joints[j], joint_figures(checkup, j), checkup.spec.counts_per_bar
     name = f"joint {j + 1}" if len(checkup.joints) > 1 else "joint"
-    rose = np.array([_rise(test.muscles[m]) for m in range(2)]) / bar  # [muscle filled, sensor]
+    rose = np.array([rise(test.muscles[m].fill) for m in range(2)]) / bar  # [muscle filled, sensor]
     own, other = rose.diagonal(), rose[:, ::-1].diagonal()
     turned = np.array([m.turned for m in figures.muscles])
-    crossed = bool((other > _EVEN).all() and (own < 0.5 * other).all())
+    crossed = bool((other > FILLED).all() and (own < 0.5 * other).all())
     reversed_ = bool(turned[0] < -5 and turned[1] > 5)
     yield from _of_sensors(checkup, j, name)
     before = test.before.pressure
@@ -173,7 +196,7 @@ def _of_valves(
         elif muscle.full < 0.6 * own[m]:
             detail = f"it keeps {muscle.full:.2f} of {own[m]:.2f} bar when its valves close"
             yield Complaint("exhaust stuck open", where, detail, "Check the exhaust valve; or the muscle has burst")
-        elif other[m] > _EVEN or muscle.leak < -LEAK:
+        elif other[m] > FILLED or muscle.leak < -LEAK:
             detail = "its pressure rises while its valves are closed"
             yield Complaint(
                 "inlet stuck open", where, detail, "Check the inlet valve: it sticks, or its seat is dirty"
@@ -306,13 +329,6 @@ def _is_frozen(test: JointTest, m: int) -> bool:
     """Return whether the pressure sensor of muscle ``m`` never says anything else."""
     pressures = np.concatenate([trace.pressure[:, m] for o in test.muscles for trace in (o.whole, o.pulse)])
     return bool(np.ptp(pressures) == 0)
-
-
-def _rise(test: MuscleTest) -> Array:
-    """Return how far each pressure rose while a muscle was filled, (2,) [counts]."""
-    fill = test.fill
-    rise: Array = np.quantile(fill.pressure, 0.95, axis=0) - fill.pressure[:3].mean(axis=0)
-    return rise
 
 
 def _stays(test: MuscleTest, m: int, checkup: Checkup) -> bool:

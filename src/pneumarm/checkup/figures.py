@@ -13,6 +13,8 @@ from pneumarm.checkup.measure import Array, Checkup, JointTest, Trace
 
 MOVED = 0.10
 """A pressure moved if it changed by so much [bar]; the other muscle, stretched or slackened, moves by less."""
+FILLED = 0.35
+"""What the pressure of a filled muscle always rises by [bar], and that of one that is merely stretched never does."""
 LAGS = 20
 """Readings apart up to which noise is correlated."""
 _BIN = 10.0  # counts: about a degree
@@ -103,6 +105,12 @@ def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
         noise=float(np.std(detrended(rest.time, rest.pressure[:, m]))),
         leap=float(peak - settled) / bar,
     )
+
+
+def rise(fill: Trace) -> Array:
+    """Return how far each pressure rose in a ``fill``, (2,) [counts]."""
+    rose: Array = np.quantile(fill.pressure, 0.95, axis=0) - fill.pressure[:3].mean(axis=0)
+    return rose
 
 
 def onset(rises: Sequence[tuple[Array, Array]]) -> float:

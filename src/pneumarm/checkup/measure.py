@@ -68,6 +68,10 @@ class Trace:
     pressure: Array
     """Shape (n, 2) [counts]."""
 
+    def __getitem__(self, readings: slice) -> "Trace":
+        """Return these ``readings`` of it."""
+        return Trace(*[values[readings] for values in vars(self).values()])
+
     def __add__(self, later: "Trace") -> "Trace":
         """Return this trace with a ``later`` one, on the same clock, after it."""
         return Trace(*[np.concatenate(both) for both in zip(vars(self).values(), vars(later).values(), strict=True)])
@@ -85,6 +89,8 @@ class MuscleTest:
     """The exhaust is open from its first reading on."""
     pulse: Trace
     """The pulse, on a clock of its own, and what comes after it."""
+    everywhere: tuple[Trace, ...]
+    """Fill, hold and exhaust as the sensors of each joint saw them, this one's among them."""
 
     @property
     def whole(self) -> Trace:
@@ -260,7 +266,8 @@ class _Bench:
         self.vent()
         begin = fill[0].time
         filled, held, vented = (_trace(readings, joint, begin) for readings in (fill, hold, exhaust))
-        return MuscleTest(filled, held, vented, _trace(pulse + after, joint))
+        everywhere = [_trace(fill + hold + exhaust, each, begin) for each in range(self.guard.spec.joints)]
+        return MuscleTest(filled, held, vented, _trace(pulse + after, joint), tuple(everywhere))
 
     def rest(self) -> list[Reading]:
         """Fill all muscles, close them, let them settle, and read."""

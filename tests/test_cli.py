@@ -231,6 +231,34 @@ def test_json_is_one_object_on_stdout_and_nothing_else(
     asked("collect", "simulation:" + str(sim), tmp_path / "s.db", "--transitions", 2000)
 
 
+def test_tables_for_people_have_words(
+    capsys: pytest.CaptureFixture[str], store: Path, sim: Path, agent: Path, tmp_path: Path
+) -> None:
+    """No names of fields, no numbers with all their digits."""
+    covered = Outcome(capsys, "coverage", store).out
+    assert covered.startswith(("Enough: ", "Collect "))
+    assert re.search(r"cells of the state space seen +│ [\d,]+ of [\d,]+ ", covered)
+    quick = ("--servo.updates", 2, "--servo.agents", 1)
+    trained = Outcome(capsys, "train", sim, store, "--out", tmp_path / "a", *quick).out
+    assert "mean error at the end [deg]" in trained
+    assert "reward" not in trained  # that would be a price, not the thesis' reward
+    said = [
+        covered,
+        trained,
+        Outcome(capsys, "track", tmp_path / "a", "--arm", "virtual:seed=3", "--reference", "sine:1Hz,5deg",
+                "--seconds", 1).out,
+        Outcome(capsys, "export", store, "--out", tmp_path / "arm.csv").out,
+        Outcome(capsys, "import", tmp_path / "arm.csv", tmp_path / "again.db").out,
+        Outcome(capsys, "analyse", store, sim, "--out", tmp_path / "quality").out,
+        Outcome(capsys, "arm", "calibrate", "virtual:seed=3", "--out", tmp_path / "arm.toml").out,
+        Outcome(capsys, "test", agent, sim, store, "--episodes", 20).out,
+    ]  # fmt: skip
+    assert re.match(r"sine:1Hz,5deg, 1\.0 s: RMS error [\d.]+°, \d+ valve changes, [\d.]+ l of air\n", said[2])
+    for one in said:
+        assert one
+        assert re.findall(r"│ [a-z]+_\w+|\b(?:None|True|False)\b|\d\.\d{7}", one) == []
+
+
 def test_the_file_of_a_simulation_is_an_agent_that_plans_in_it(
     capsys: pytest.CaptureFixture[str], store: Path, sim: Path, tmp_path: Path
 ) -> None:

@@ -68,7 +68,7 @@ def show(result: Mapping[str, Any], as_json: bool, table: Callable[[], Sequence[
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[Any]], title: str = "") -> Table:
-    """Return a table for people; numbers are rounded to four digits."""
+    """Return a table for people; numbers are rounded to four digits, None is a dash."""
     built = Table(*header, title=title or None, title_justify="left")
     for row in rows:
         built.add_row(*[_short(value) for value in row])
@@ -105,8 +105,12 @@ def jsonable(value: Any) -> Any:
 
 
 def _short(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, float):
         return f"{value:.4g}"
-    if isinstance(value, list):
-        return ", ".join(map(_short, value))
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_short, value)) or "none"
     return str(value)

@@ -34,5 +34,16 @@ def analyse_(db: AnyStore, sim: Path, /, *, out: Path, json: Json = False) -> No
         page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality, analysis.figures)
     say(f"page: {page}")
     errors = analysis.figures["held_out"]
-    rows = [(name, *figures.values()) for name, figures in errors.items()]
-    show(analysis.figures, json, lambda: [table(("held out", *errors["std"]), rows)])
+    rows = [(_WORDS[name], *figures.values()) for name, figures in errors.items()]
+    header = ("one-step error, held out", *(name.replace("_", " ") for name in errors["std"]))
+    show(analysis.figures, json, lambda: [table(header, rows)])
+
+
+_WORDS = {
+    "std": "standard deviation",
+    "relative_error": "relative to the change",
+    "mean": "mean",
+    "slope": "slope, predicted",
+    "calibration": "slope, observed",
+}
+"""What the statistics are called in the table."""

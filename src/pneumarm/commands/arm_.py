@@ -183,7 +183,8 @@ def calibrate_(
     for j, residual in enumerate(calibration.residual):
         if residual is not None:
             say(f"joint {j + 1}: the potentiometer is not linear; linearised off by {residual:.2f} degrees (rms)")
-    show(result, json, lambda: [table((str(out), ""), list(asdict(spec).items()))])
+    rows = [(name.replace("_", " "), value) for name, value in asdict(spec).items() if value not in (None, ())]
+    show(result, json, lambda: [table((str(out), ""), rows)])
 
 
 _NO_HINDRANCE = ("angle logarithmic", "low supply", "rising supply", "leak", "noise", "noise not white", "jitter")

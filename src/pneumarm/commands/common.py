@@ -34,3 +34,5 @@ Monitoring = Annotated[
 """What is done about faults of an arm that are found while it moves."""
 COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
 """Figures of movements that tables show."""
+HEADINGS = ("movements", *(name.replace("_", " ") for name in COLUMNS[1:]))
+"""What they are called there."""

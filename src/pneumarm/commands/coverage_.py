@@ -27,4 +27,14 @@ def coverage_(db: AnyStore, /, *, json: Json = False) -> None:
         "enough": judged is not None and judged.enough,
         "verdict": TOO_LITTLE if judged is None else judged.verdict,
     }
-    show(result, json, lambda: [table(("coverage", ""), list(result.items()))])
+    whole = found.whole
+    rows = [
+        ("transitions", f"{whole.seen:,}"),
+        ("of them kept by the filter", f"{whole.kept:,}"),
+        ("cells of the state space seen", f"{whole.occupied:,} of {whole.cells:,}"),
+        ("of them full", f"{whole.full:,}"),
+        ("new in the second half", f"{found.count:,}, {found.share:.0%} of those seen"),
+        ("chance that the next one is new", f"{whole.unseen:.0%}"),
+    ]
+    verdict = str(result["verdict"])
+    show(result, json, lambda: [verdict[0].upper() + verdict[1:], table(("", ""), rows)])

@@ -53,4 +53,8 @@ def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Jso
         raise UnusableInput(
             f"{out}: expected a name that ends in {', '.join(FORMATS)} (a store), .onnx or .c (an agent)"
         )
-    show(result, json, lambda: [table(("exported", ""), list(result.items()), str(out))])
+    rows = [(_WORDS.get(name, name), value) for name, value in result.items() if value is not None]
+    show(result, json, lambda: [table(("exported", ""), rows, str(out))])
+
+
+_WORDS = {"mapping": "imported again by", "period": "control period [s]"}

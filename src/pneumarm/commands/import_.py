@@ -22,4 +22,8 @@ def import_(recording: Path, db: AnyStore, /, *, mapping: Path | None = None, js
         beside the recording.
     """
     imported = asdict(import_recording(recording, mapping, db))
-    show(imported, json, lambda: [table(("imported", ""), list(imported.items()))])
+    rows = [(_WORDS.get(name, name), f"{count:,}") for name, count in imported.items()]
+    show(imported, json, lambda: [table(("imported", ""), rows)])
+
+
+_WORDS = {"rows": "rows of the recording", "single": "left out, alone in their sequence"}

@@ -34,8 +34,8 @@ def move_(
     controller
         An agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation.
     goals
-        20deg (from the middle of the range) or 650 (counts); of several joints 20deg,-5deg; - for standard input,
-        one a line.
+        20deg (from the middle of the range) or 650 (counts); of several joints 20deg,-5deg; x and y of the hand from
+        the first hinge 0.20m,-0.30m, where the arm's spec has its links; - for standard input, one a line.
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
@@ -46,8 +46,8 @@ def move_(
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
     with open_arm(arm, seed) as opened:
-        mover, spec, goal_range = open_tracking(controller, opened, settings.tolerance, method=method)
-        wanted = read_goals(goals, spec, goal_range)
+        mover, spec, known = open_tracking(controller, opened, settings.tolerance, method=method)
+        wanted = read_goals(goals, spec, known)
         made: list[Moved] = []
         with live(spec) as seen, recorder(record, spec) as keep:
             for one in move(opened, mover, wanted, settings, seen=seen):
@@ -56,29 +56,30 @@ def move_(
                 say(_told(one))
     # What is printed is printed even where one failed: it says which.
     result = {"movements": [one.results() for one in made]}
-    header = ("goal [deg]", "settled after [s]", "rest error [deg]", "tries", "valve changes", "air [l]")
+    header = ("goal", "settled after [s]", "rest error [deg]", "tries", "valve changes", "air [l]")
     show(result, json, lambda: [table(header, [_row(one) for one in made], arm)])
     failed = [one for one in made if not one.success]
     if failed:
         raise MovementFailed(
             f"{len(failed)} of {len(made)} movements did not settle within {settings.tolerance:g} degrees: to "
-            f"{'; '.join(_degrees(one) for one in failed)}"
+            f"{'; '.join(_goal(one) for one in failed)}"
         )
 
 
 def _told(one: Moved) -> str:
-    if one.time_settled is None:
-        how = f"not settled in {one.tries} tries"
-    else:
-        how = f"settled after {one.time_settled - one.time_start:.2f} s"
-    return f"{_degrees(one)}: {how}, rest error {', '.join(f'{e:.2f}' for e in one.rest_error)} deg"
+    """Return what is said as soon as a goal is done with; figures are in the table."""
+    return f"{_goal(one)}: " + ("settled" if one.success else f"not settled in {one.tries} tries")
 
 
-def _degrees(one: Moved) -> str:
-    return ", ".join(f"{degrees:.1f}deg" for degrees in one.goal_degrees)
+def _goal(one: Moved) -> str:
+    angles = ", ".join(f"{degrees:.1f}deg" for degrees in one.goal_degrees)
+    return angles if one.goal_xy is None else "x {:.3f} m, y {:.3f} m ({})".format(*one.goal_xy, angles)
 
 
 def _row(one: Moved) -> tuple[object, ...]:
-    settled = "no" if one.time_settled is None else one.time_settled - one.time_start
+    settled = "no" if one.time_settled is None else f"{one.time_settled - one.time_start:.2f}"
     rest = ", ".join(f"{e:.2f}" for e in one.rest_error)
-    return _degrees(one), settled, rest, one.tries, one.switches, "-" if one.air is None else one.air
+    if one.hand_error is not None:
+        rest += f" (hand: {1e3 * one.hand_error:.1f} mm)"
+    air = None if one.air is None else f"{one.air:.2f}"
+    return _goal(one), settled, rest, one.tries, one.switches, air

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from pneumarm.commands.common import COLUMNS, Json, Monitoring, Settings
+from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, Settings
 from pneumarm.commands.config_file import as_config
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
@@ -59,7 +59,7 @@ def run_(
         "after adaptation": results["transfer"]["after"],
     }
     rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
-    show(results, json, lambda: [table(("", *COLUMNS), rows, title="Ledger")])
+    show(results, json, lambda: [table(("", *HEADINGS), rows, title="Ledger")])
     say_history(out)
     for stage, doing in (("collect", "collecting"), ("transfer", "moving")):
         for line in complaints(results[stage], doing):

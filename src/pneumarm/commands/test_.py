@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pneumarm.commands.common import COLUMNS, AnyStore, Json, OwnMethod
+from pneumarm.commands.common import COLUMNS, HEADINGS, AnyStore, Json, OwnMethod
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
 from pneumarm.learning import LOOKING_AHEAD, results_with_lookahead, test_ahead
@@ -59,4 +59,4 @@ def test_(
         shown = [("in the simulation", result)] + ([("looking ahead", result["lookahead"])] if ahead else [])
         return [(name, *[figures[column] for column in COLUMNS]) for name, figures in shown]
 
-    show(result, json, lambda: [table(("tested", *COLUMNS), rows())])
+    show(result, json, lambda: [table(("reaching goals", *HEADINGS), rows())])

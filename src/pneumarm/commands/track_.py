@@ -3,9 +3,9 @@
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import AnyStore, Json, OwnMethod
 from pneumarm.commands.recorder import recorder
-from pneumarm.console import live, show, table
+from pneumarm.console import live, show
 from pneumarm.control.named import open_tracking
-from pneumarm.moving import SECONDS, check_seconds, track
+from pneumarm.moving import SECONDS, Tracked, check_seconds, track
 from pneumarm.task.reference import check_reachable, parse_reference
 
 
@@ -45,13 +45,18 @@ def track_(
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
     with open_arm(arm, seed) as opened:
-        mover, spec, goal_range = open_tracking(controller, opened, method=method)
+        mover, spec, goals = open_tracking(controller, opened, method=method)
         wanted = parse_reference(reference, spec, known_ahead=not unforeseen)
         lasting = seconds if seconds is not None else wanted.duration or SECONDS
         check_seconds(lasting)
-        check_reachable(wanted, lasting, goal_range, spec)
+        check_reachable(wanted, lasting, goals.range, spec)
         with live(spec) as seen, recorder(record, spec) as keep:
             followed = track(opened, mover, wanted, lasting, seen=seen)
             keep(followed.recorded, {"reference": reference})
-    result = followed.results()
-    show(result, json, lambda: [table((reference, ""), [(name, str(value)) for name, value in result.items()], arm)])
+    show(followed.results(), json, lambda: [_told(followed, reference)])
+
+
+def _told(followed: Tracked, reference: str) -> str:
+    errors = ", ".join(f"{error:.2f}°" for error in followed.rms_error)
+    air = "" if followed.air is None else f", {followed.air:.2f} l of air"
+    return f"{reference}, {followed.seconds:.1f} s: RMS error {errors}, {followed.switches} valve changes{air}"

@@ -5,13 +5,17 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pneumarm.commands.common import COLUMNS, AnyStore, Json, Settings
+import numpy as np
+from rich.table import Table
+
+from pneumarm.arm import ArmSpec
+from pneumarm.commands.common import COLUMNS, HEADINGS, AnyStore, Json, Settings
 from pneumarm.console import show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder
-from pneumarm.learning import LearnSettings, train
+from pneumarm.learning import LearnSettings, Tracks, train
 from pneumarm.learning.tensorboard import Scalars
-from pneumarm.learning.training import Progress
+from pneumarm.learning.training import Progress, Training
 from pneumarm.progress import progress
 from pneumarm.simulation import Simulation
 from pneumarm.task import begin_states
@@ -71,9 +75,33 @@ def train_(
             scalars.write(training)
     training.agent.save(out)
     result = training.results()
-    figures = [(name, value) for name, value in result.items() if name != _EACH]
-    each = [(i + 1, *(one[column] for column in COLUMNS)) for i, one in enumerate(result[_EACH])]
-    show(result, json, lambda: [table(("trained", ""), figures), table(("agent, validated", *COLUMNS), each)])
+    figures = [
+        ("movements in simulation", f"{result['episodes']:,}"),
+        ("steps", f"{result['steps']:,}"),
+        ("time [s]", f"{training.seconds:.1f}"),
+        ("steps a second", f"{result['steps_per_second']:,.0f}"),
+        *([("met the criterion", f"{training.met.sum()} of {training.met.size}")] if training.met.size else []),
+        ("kept", f"agent {training.best + 1}"),
+    ]
+    show(result, json, lambda: [table(("trained", ""), figures), _validated(training, simulation.spec)])
+
+
+def _validated(training: Training[Any], spec: ArmSpec) -> Table:
+    """Return how the agents move; of those that settle, how well they do, because what they learn from is a price."""
+    if isinstance(training.agent, Tracks):
+        rows = [
+            (
+                i + 1,
+                made.n,
+                f"{made.success.mean():.1%}",
+                f"{np.abs(made.goal - made.angle_end).mean() / spec.counts_per_degree:.2f}",
+            )
+            for i, made in enumerate(training.validation)
+        ]
+        return table(("agent, in simulation", "movements", "settled", "mean error at the end [deg]"), rows)
+    each = [one.results() for one in training.validation]
+    rows = [(i + 1, *(one[column] for column in COLUMNS)) for i, one in enumerate(each)]
+    return table(("agent, in simulation", *HEADINGS), rows)
 
 
 def with_agents(settings: Any, agents: int) -> Any:
@@ -86,6 +114,3 @@ def with_agents(settings: Any, agents: int) -> Any:
     if "agents" not in {one.name for one in fields(settings)}:
         raise UnusableInput("this method does not train several agents: leave --agents out")
     return replace(settings, agents=agents)
-
-
-_EACH = "validation"  # figures of every agent, in the results

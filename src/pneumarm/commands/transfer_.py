@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import COLUMNS, Json, Monitoring, OwnMethod, Settings
+from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, OwnMethod, Settings
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
@@ -49,8 +49,5 @@ def transfer_(
     for line in complaints(result, "moving"):
         say(line)
     say(f"adapted agent: {out / 'adapted.safetensors'}")
-    show(
-        result,
-        json,
-        lambda: [table(("phase", *COLUMNS), [(p, *(result[p][c] for c in COLUMNS)) for p in ("before", "after")])],
-    )
+    rows = [(phase, *(result[phase][column] for column in COLUMNS)) for phase in ("before", "after")]
+    show(result, json, lambda: [table(("reaching goals", *HEADINGS), rows)])

@@ -188,6 +188,7 @@ def move(
     goals: "Sequence[ArrayLike | str] | None" = None,
     *,
     goals_deg: "Sequence[ArrayLike] | None" = None,
+    goals_xy: "Sequence[ArrayLike] | None" = None,
     seed: int = 0,
     settings: "MoveSettings | None" = None,
 ) -> "list[Moved]":
@@ -196,8 +197,9 @@ def move(
     Args:
         controller: an agent, a tuned controller, the file of one, or ``plan:SIM``.
         arm: which one; not yet guarded.
-        goals: numbers, one a joint [counts], or text as on the command line: ``["20deg", "650"]``.
+        goals: numbers, one a joint [counts], or text as on the command line: ``["20deg", "0.20m,-0.30m"]``.
         goals_deg: the same in degrees from the middle of the range, in place of ``goals``: ``[20, -5]``.
+        goals_xy: where the hand is to be [m], in place of either: ``[(0.2, -0.3)]``, see :mod:`pneumarm.arm.hand`.
         seed: of a virtual arm's noise.
         settings: how long each is held, how often it is tried, how near is there.
 
@@ -207,17 +209,29 @@ def move(
     """
     from pneumarm.errors import UnusableInput
     from pneumarm.moving import MoveSettings, move
-    from pneumarm.task.goals import goal_in_counts, goal_of
+    from pneumarm.task.goals import Goal, goal_at, goal_in_counts, goal_of
 
-    if (goals is None) == (goals_deg is None):
-        raise UnusableInput("expected goals: either in counts (goals=[650]) or in degrees (goals_deg=[20])")
+    if sum(given is not None for given in (goals, goals_deg, goals_xy)) != 1:
+        raise UnusableInput(
+            "expected goals in one way: in counts (goals=[650]), in degrees (goals_deg=[20]) or as x and y of the "
+            "hand in metres (goals_xy=[(0.2, -0.3)])"
+        )
     how = settings or MoveSettings()
     with _opened(arm, seed) as opened:
         mover, spec, known = _tracking(controller, opened, how.tolerance)
-        wanted = [goal_in_counts(None, one, spec, known) for one in goals_deg or ()] + [
-            goal_of(one, spec, known) if isinstance(one, str) else goal_in_counts(one, None, spec, known)
-            for one in goals or ()
-        ]
+
+        def meant(one: Any, before: "Goal | None") -> "Goal":
+            if goals_xy is not None:
+                return goal_at(one, spec, known, before)
+            if isinstance(one, str):
+                return goal_of(one, spec, known, before)
+            counts, degrees = (one, None) if goals is not None else (None, one)
+            return Goal(goal_in_counts(counts, degrees, spec, known))
+
+        wanted: list[Goal] = []
+        for given in (goals, goals_deg, goals_xy):
+            for one in () if given is None else given:
+                wanted.append(meant(one, wanted[-1] if wanted else None))
         return list(move(opened, mover, wanted, how))
 
 
@@ -288,14 +302,16 @@ def load_controller(file: str | Path) -> "LoadedController":
     from pneumarm.control.agent import controller_of, warm_up
     from pneumarm.control.loaded import loaded
     from pneumarm.control.open_agent import open_agent
+    from pneumarm.learning.agents import goals_of
+    from pneumarm.transitions.goals import Goals
 
     path = Path(file)
     if is_tuned(path):
         tuned = load_tuned(path)
-        return loaded(tuned.controller(), tuned.spec, tuned.goal_range)
+        return loaded(tuned.controller(), tuned.spec, Goals.of(tuned.goal_range))
     agent = open_agent(path)
     warm_up(agent)
-    return loaded(controller_of(agent), agent.spec, agent.goal_range)
+    return loaded(controller_of(agent), agent.spec, goals_of(agent))
 
 
 @contextmanager

@@ -112,6 +112,9 @@ class ArmSpec(Settings):
     """Time [s] between reading and acting that the control cycle has to let pass on this arm.
 
     An arm whose reading and computing take real time by themselves leaves it 0."""
+    links: tuple[float, ...] = ()
+    """Lengths of the links, one a joint, from hinge to hinge and from the last hinge to the hand [m]; only goals in x
+    and y need them. At 0 degrees they are taken to hang straight down in a line (:mod:`pneumarm.arm.hand`)."""
     name: str = "arm"
     """What reports call the arm."""
 
@@ -135,6 +138,8 @@ class ArmSpec(Settings):
             "fill_times": len(self.fill_times) == 2 and all(map(_positive, self.fill_times)),
             "angle_limits": math.isfinite(lowest) and math.isfinite(highest) and lowest < highest,
             "latency": math.isfinite(self.latency) and 0 <= self.latency < self.period,
+            "links": (len(self.links) in (0, self.joints) and all(map(_positive, self.links)))
+            or f"{self.joints} length(s) above 0 m, one a joint, or none",
             "sensors": all(one.joint <= self.joints for one in self.sensors)
             and all((one.muscle or 1) <= self.muscles for one in self.sensors)
             and _unlike(one.name for one in self.sensors)
@@ -316,6 +321,9 @@ class Arm(ABC):
     @abstractmethod
     def close(self) -> None:
         """Leave every valve closed or vented and let go of the hardware. May be called twice."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.spec.name!r}>"
 
     def wait_until(self, time: float) -> None:
         """Let time pass until the arm's clock shows ``time`` [s]; return at once if it is past."""

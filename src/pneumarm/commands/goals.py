@@ -24,7 +24,9 @@ def read_goals(given: Iterable[str], spec: ArmSpec, known: Goals) -> Iterator[Go
     """
     texts = list(given)
     if not texts:
-        raise UnusableInput("no goal: give one or more, such as 20deg, 650 or 0.20m,-0.30m, or - for standard input, one a line")
+        raise UnusableInput(
+            "no goal: give one or more, such as 20deg, 650 or 0.20m,-0.30m, or - for standard input, one a line"
+        )
     checked: list[Goal | None] = []
     for text in texts:
         before = checked[-1] if checked else None

@@ -73,7 +73,10 @@ def _told(one: Moved) -> str:
 
 def _goal(one: Moved) -> str:
     angles = ", ".join(f"{degrees:.1f}deg" for degrees in one.goal_degrees)
-    return angles if one.goal_xy is None else "x {:.3f} m, y {:.3f} m ({})".format(*one.goal_xy, angles)
+    if one.goal_xy is None:
+        return angles
+    x, y = one.goal_xy
+    return f"x {x:.3f} m, y {y:.3f} m ({angles})"
 
 
 def _row(one: Moved) -> tuple[object, ...]:

@@ -9,6 +9,7 @@ from pneumarm.arm.reference import Reference
 from pneumarm.arm.valves import Command
 from pneumarm.task.goals import goal_in_counts
 from pneumarm.task.reference import parse_reference
+from pneumarm.transitions.goals import Goals
 
 
 class LoadedController:
@@ -17,12 +18,17 @@ class LoadedController:
     Args:
         controller: what acts.
         spec: of its arm.
-        goal_range: goals that it knows, shape (joints, 2) [counts].
+        goals: that it knows.
 
     """
 
-    def __init__(self, controller: Controller, spec: ArmSpec, goal_range: NDArray[np.float64]) -> None:
-        self.controller, self.spec, self.goal_range = controller, spec, goal_range
+    def __init__(self, controller: Controller, spec: ArmSpec, goals: Goals) -> None:
+        self.controller, self.spec, self.goals = controller, spec, goals
+
+    @property
+    def goal_range(self) -> NDArray[np.float64]:
+        """Goals that it knows, shape (joints, 2) [counts]; joints that pull on each other not all of them."""
+        return self.goals.range
 
     @property
     def goal_range_deg(self) -> NDArray[np.float64]:
@@ -40,7 +46,7 @@ class LoadedController:
             UnusableInput: it is no goal, or one that the arm has not been seen to reach.
 
         """
-        self.controller.reset(goal_in_counts(goal, goal_deg, self.spec, self.goal_range))
+        self.controller.reset(goal_in_counts(goal, goal_deg, self.spec, self.goals))
 
     def act(self, reading: Reading) -> Command:
         """Return the valves or pulses (joints, 2) to set after ``reading``; call it once a control period."""
@@ -54,8 +60,8 @@ class LoadedController:
 class LoadedTracker(LoadedController):
     """One that also follows references."""
 
-    def __init__(self, controller: TrackingController, spec: ArmSpec, goal_range: NDArray[np.float64]) -> None:
-        super().__init__(controller, spec, goal_range)
+    def __init__(self, controller: TrackingController, spec: ArmSpec, goals: Goals) -> None:
+        super().__init__(controller, spec, goals)
         self._tracking = controller
 
     def track(self, reference: Reference | str) -> None:
@@ -67,8 +73,8 @@ class LoadedTracker(LoadedController):
         self._tracking.track(known)
 
 
-def loaded(controller: Controller, spec: ArmSpec, goal_range: NDArray[np.float64]) -> LoadedController:
+def loaded(controller: Controller, spec: ArmSpec, goals: Goals) -> LoadedController:
     """Return ``controller`` as one that checks its goals; it follows references where ``controller`` does."""
     if isinstance(controller, TrackingController):
-        return LoadedTracker(controller, spec, goal_range)
-    return LoadedController(controller, spec, goal_range)
+        return LoadedTracker(controller, spec, goals)
+    return LoadedController(controller, spec, goals)

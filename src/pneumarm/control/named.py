@@ -3,9 +3,6 @@
 import math
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pneumarm.arm import Arm, ArmSpec
 from pneumarm.arm.controller import TrackingController
 from pneumarm.classical import Tuned, is_tuned, load_tuned
@@ -14,16 +11,18 @@ from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import AnyAgent, Tracks
+from pneumarm.learning.agents import goals_of
 from pneumarm.moving import Holding, at_period
 from pneumarm.planning.agent import PlanAgent
+from pneumarm.transitions.goals import Goals
 
 _PLAN = "plan:"
 
 
 def open_tracking(
     name: str, arm: Arm, tolerance: float = 1.0, method: str | None = None
-) -> tuple[TrackingController, ArmSpec, NDArray[np.float64]]:
-    """Return the controller called ``name`` for ``arm``, the arm's spec, and the goals (joints, 2) [counts] it knows.
+) -> tuple[TrackingController, ArmSpec, Goals]:
+    """Return the controller called ``name`` for ``arm``, the arm's spec, and the goals it knows.
 
     ``name`` is the file of an agent or of a tuned controller, or ``plan:SIM``; see :func:`tracking_for` for the rest.
 
@@ -51,7 +50,7 @@ def open_tracking(
 
 def tracking_for(
     made: AnyAgent | Tuned, arm: Arm, tolerance: float = 1.0
-) -> tuple[TrackingController, ArmSpec, NDArray[np.float64]]:
+) -> tuple[TrackingController, ArmSpec, Goals]:
     """Return what was trained or tuned as a controller for ``arm``, the arm's spec, and the goals it knows.
 
     The arm, not yet guarded, is controlled with the period that a tuned controller was tuned for.
@@ -64,9 +63,9 @@ def tracking_for(
         made.check_fit(arm)
         if not math.isclose(arm.spec.period, made.spec.period, rel_tol=1e-3):
             at_period(arm, made.spec.period)
-        return made.controller(), arm.spec, made.goal_range
+        return made.controller(), arm.spec, Goals.of(made.goal_range)
     check_fit(made, arm)
     if isinstance(made, Tracks):
-        return made.controller(), arm.spec, made.goal_range
+        return made.controller(), arm.spec, goals_of(made)
     warm_up(made)
-    return Holding(AgentController(made), arm.spec, made.goal_range, tolerance), arm.spec, made.goal_range
+    return Holding(AgentController(made), arm.spec, made.goal_range, tolerance), arm.spec, goals_of(made)

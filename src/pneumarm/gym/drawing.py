@@ -7,6 +7,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.hand import link_ends
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 
@@ -91,9 +92,7 @@ class _Figure:
 
     def draw(self, degrees: Angles, wanted: Angles) -> NDArray[np.uint8]:
         for line, angles in ((self._arm, degrees), (self._wanted, wanted)):
-            turned = np.radians(np.cumsum(angles))
-            x, y = np.cumsum(np.sin(turned)), -np.cumsum(np.cos(turned))
-            line.set_data([0.0, *(x / self._joints)], [0.0, *(y / self._joints)])
+            line.set_data(*link_ends(angles, [1 / self._joints] * self._joints).T)
         self._words.set_text(f"{_listed(degrees)}°, wanted {_listed(wanted)}°")
         self._canvas.draw()
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()

@@ -61,11 +61,11 @@ def opened(choice: Choice, arm: Arm, method: str | None = None) -> Mover:
         UnusableInput: it is for another arm, or there is no such controller.
 
     """
-    controller, spec, goal_range = open_tracking(choice.file, arm, method=method)
-    controller.reset(goal_range.mean(axis=1))
+    controller, spec, goals = open_tracking(choice.file, arm, method=method)
+    controller.reset(goals.middle)
     for reading in made_up_readings(spec):
         controller.act(reading)
-    return Mover(choice, controller, spec, goal_range)
+    return Mover(choice, controller, spec, goals.range)
 
 
 def monitor_for(choice: Choice | None, spec: ArmSpec, method: str | None = None) -> Monitor:

@@ -39,8 +39,6 @@ def measures_of(arm: Arm) -> tuple[list[Measures], bool]:
     virtual = behind(arm, VirtualArm)
     if virtual is None:
         return [USUAL] * arm.spec.joints, False
-    *inner, last = virtual.parameters.joints
-    links = [*(joint.length for joint in inner), last.distance]
     return [
         Measures(
             link=link,
@@ -48,5 +46,5 @@ def measures_of(arm: Arm) -> tuple[list[Measures], bool]:
             muscle=joint.muscles[0].length_at_zero,
             diameter=joint.muscles[0].diameter,
         )
-        for joint, link in zip(virtual.parameters.joints, links, strict=True)
+        for joint, link in zip(virtual.parameters.joints, virtual.parameters.links, strict=True)
     ], True

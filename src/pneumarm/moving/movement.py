@@ -15,9 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
 from pneumarm.arm.controller import Controller, TrackingController
+from pneumarm.arm.hand import hand
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
 from pneumarm.settings import Settings, Valid
+from pneumarm.task.goals import Goal
 from pneumarm.transitions.rows import Recorded
 from pneumarm.transitions.watch import Watch, watched
 
@@ -79,6 +81,8 @@ class Moved:
     """The last try."""
     spec: ArmSpec
     """Of the arm."""
+    goal_xy: NDArray[np.float64] | None = None
+    """Where the hand was to be, shape (2,) [m]; None where the goal was given in angles."""
 
     @property
     def goal_degrees(self) -> NDArray[np.float64]:
@@ -96,13 +100,21 @@ class Moved:
         return self.spec.degrees(self.recorded.angle)
 
     @property
+    def hand_error(self) -> float | None:
+        """Mean distance of the hand from ``goal_xy`` over the last second of the hold [m]; None without one."""
+        if self.goal_xy is None:
+            return None
+        there = hand(self.degrees[_last_second(self.recorded.time)], self.spec.links)
+        return float(np.linalg.norm(there - self.goal_xy, axis=1).mean())
+
+    @property
     def success(self) -> bool:
         """Whether it settled."""
         return self.time_settled is not None
 
     def results(self) -> dict[str, Any]:
         """Return it as ``pneumarm move --json`` tells it."""
-        return {
+        found = {
             "goal_deg": self.goal_degrees.round(4).tolist(),
             "time_start": self.time_start,
             "time_settled": self.time_settled,
@@ -112,6 +124,9 @@ class Moved:
             "switches": self.switches,
             "air_litres": self.air,
         }
+        if self.goal_xy is not None and self.hand_error is not None:
+            found |= {"goal_xy_m": self.goal_xy.tolist(), "rest_error_m": round(self.hand_error, 6)}
+        return found
 
     def __repr__(self) -> str:
         goal, rest = _listed(self.goal_degrees, ".1f"), _listed(self.rest_error, ".2f")
@@ -190,7 +205,7 @@ def at_period(arm: Arm, period: float) -> Arm:
 def move(
     arm: Arm,
     controller: Controller,
-    goals: Iterable[ArrayLike],
+    goals: Iterable[Goal | ArrayLike],
     settings: MoveSettings = MoveSettings(),
     *,
     watch: Watch | None = None,
@@ -201,7 +216,8 @@ def move(
     Args:
         arm: any arm; it is guarded here where it is not yet.
         controller: what acts. One that cannot hold a goal is to be wrapped in :class:`~pneumarm.moving.Holding`.
-        goals: in order; the next is taken when the one before has been held.
+        goals: in order, each a :class:`~pneumarm.task.goals.Goal` or its angles; the next is taken when the one
+            before has been held.
         settings: how long to hold, how often to try, how near is there.
         watch: sees every reading, such as a :class:`~pneumarm.control.Monitor`.
         seen: called with every reading, for a display.
@@ -209,7 +225,9 @@ def move(
     """
     cycle = ControlCycle(guarded(arm))
     for goal in goals:
-        yield _move_to(cycle, controller, np.array(goal, np.float64).reshape(-1), settings, watch, seen)
+        wanted = goal if isinstance(goal, Goal) else Goal(np.array(goal, np.float64).reshape(-1))
+        moved = _move_to(cycle, controller, wanted.angle, settings, watch, seen)
+        yield replace(moved, goal_xy=wanted.xy)
 
 
 def track(
@@ -320,13 +338,12 @@ def _move_to(
         if settled is not None or number == settings.tries:
             break
         arm.wait(settings.pause)
-    resting = recorded.time > recorded.time[-1] - 1
     direction = -np.sign(error[0])
     return Moved(
         goal=goal,
         time_start=start,
         time_settled=settled,
-        rest_error=np.abs(error[resting]).mean(axis=0),
+        rest_error=np.abs(error[_last_second(recorded.time)]).mean(axis=0),
         overshoot=np.maximum((direction * error).max(axis=0), 0.0),
         tries=number,
         switches=switches,
@@ -334,6 +351,10 @@ def _move_to(
         recorded=recorded,
         spec=spec,
     )
+
+
+def _last_second(times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return np.asarray(times > times[-1] - 1)
 
 
 def _settled(times: NDArray[np.float64], error: NDArray[np.float64], tolerance: float, dwell: float) -> float | None:

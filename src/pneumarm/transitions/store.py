@@ -12,7 +12,7 @@ import math
 import time as wall_clock
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
@@ -286,7 +286,8 @@ class Store:
         """Raise UnusableInput where what an arm of ``spec`` does cannot be added: the store is of another one."""
         if not self.valves:
             raise UnusableInput(f"{self.address}: holds continuous commands; collect into a store of its own")
-        mine, kept = asdict(spec), asdict(self.spec)
+        # Nothing that is stored depends on the links: they may be measured, or measured again, while an arm is used.
+        mine, kept = asdict(replace(spec, links=())), asdict(replace(self.spec, links=()))
         different = [f"{name} was {kept[name]!r}, is {mine[name]!r}" for name in kept if mine[name] != kept[name]]
         if different:
             raise UnusableInput(

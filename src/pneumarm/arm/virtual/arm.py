@@ -96,6 +96,7 @@ class VirtualArm(Arm):
             angle_range=(0.0, converter.highest),
             max_pressure=self.parameters.max_pressure / BAR,
             latency=LATENCY * faster,
+            links=self.parameters.links,
             name=name,
             velocity_sensor=velocity_sensor,
             sensors=tuple(sensors),

@@ -276,6 +276,12 @@ class ArmParameters(Settings):
     period: float = PERIOD
     """Control period that it is made for [s]."""
 
+    @property
+    def links(self) -> tuple[float, ...]:
+        """Lengths of the links, from hinge to hinge and from the last hinge to its weight, the hand [m]."""
+        *inner, last = self.joints
+        return (*(joint.length for joint in inner), last.distance)
+
     def _valid(self) -> Valid:
         passed = all(len(joint.passing) in (0, j) for j, joint in enumerate(self.joints))
         return {

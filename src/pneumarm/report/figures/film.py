@@ -8,6 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pneumarm.arm.hand import link_ends
 from pneumarm.report.shown import Shown
 from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, key, legend_below, of_joint, styled
 
@@ -26,9 +27,7 @@ def chain(degrees: Array) -> Array:
 
     The whole arm is 1 long and hangs down at 0 degrees; higher angles turn it to the right.
     """
-    turned = np.radians(np.cumsum(degrees))
-    steps = np.stack([np.sin(turned), -np.cos(turned)], axis=1) / len(degrees)
-    return np.vstack([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    return link_ends(degrees, [1 / len(degrees)] * len(degrees))
 
 
 @styled

@@ -74,6 +74,8 @@ def test_every_command_explains_itself_with_an_example(command: str, capsys: pyt
 def test_wrong_commands_and_options_are_refused(capsys: pytest.CaptureFixture[str], store: Path, sim: Path) -> None:
     assert Outcome(capsys, "fitt", store).is_refused("fitt")
     assert Outcome(capsys, "fit", store).is_refused("--out")
+    assert Outcome(capsys, "run", "x", "y").is_refused("pneumarm run: expected nothing more, got x y.", "--out x")
+    assert Outcome(capsys, "import", "none.csv", "x.db").is_refused("no mapping none.csv.toml")
     assert Outcome(capsys, "fit", store, "--out", "x", "--hidden", "many").is_refused("--hidden", "many")
     assert Outcome(capsys, "fit", store, "--out", "x", "--history", 0).is_refused("history cannot be 0")
     train = ("train", sim, store, "--out", "x")

@@ -141,7 +141,11 @@ def test_its_agent_and_its_recording_are_exported(workshop: Path, tmp_path: Path
         assert done.returncode == 0, done.stderr
     assert "void servo_act(" in (tmp_path / "agent.c").read_text()
     assert json.loads(done.stdout)["mapping"] == str(tmp_path / "arm.csv.toml")
-    for file, out, words in (("arm.sim", "sim.c", "servo and policy"), ("arm.db", "arm.xls", ".csv, .parquet")):
+    for file, out, words in (
+        ("arm.sim", "sim.c", "servo and policy"),
+        ("arm.db", "arm.xls", ".csv, .parquet"),
+        ("arm.db", "arm.onnx", "this is a store"),
+    ):
         done = python("-m", "pneumarm", "export", workshop / file, "--out", tmp_path / out)
         assert (done.returncode, words in done.stderr) == (2, True), done.stderr
 

@@ -71,6 +71,7 @@ def test_track_tells_of_the_error(controller: Path, capsys: pytest.CaptureFixtur
         (("move", "FILE", *ARM), "no goal"),
         (("move", "FILE", *ARM, "90deg"), "seen to reach"),
         (("move", "FILE", *ARM, "1000"), "seen to reach"),
+        (("move", "FILE", *ARM, "20"), "goal '20' in counts (degrees are 20deg): joint 1 has been seen to reach"),
         (("move", "FILE", *ARM, "10deg,5deg"), "expected 1 angle"),
         (("move", "FILE", *ARM, "ten"), "expected an angle"),
         (("move", "FILE", *ARM, "--holt", "2", "10deg"), "holt"),

@@ -1,13 +1,14 @@
 """The command line. Commands are loaded when they are called, so that ``pneumarm --help`` answers at once."""
 
 import errno
+import inspect
 import os
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from pneumarm import __version__
 from pneumarm.commands.config_file import take_config, take_option
@@ -192,6 +193,9 @@ def _run(arguments: list[str]) -> int:
         with _told_in_full(arguments) if HELP in arguments else nullcontext():
             app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
+    except UnusedCliTokensError as error:
+        complain(_too_many(error))
+        return 2
     except CycloptsError as error:
         complain(f"{error} See {' '.join(['pneumarm', *(error.command_chain or ())])} --help.")
         return 2
@@ -215,6 +219,14 @@ def _run(arguments: list[str]) -> int:
             complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
         return 1
     return 0
+
+
+def _too_many(error: UnusedCliTokensError) -> str:
+    """Return what is said to whoever gave words that no place is for; most likely they name what is to be written."""
+    command, given = " ".join(["pneumarm", *(error.command_chain or ())]), error.unused_tokens or []
+    writes = error.target is not None and "out" in inspect.signature(error.target).parameters
+    hint = f" What it writes is named by --out: --out {given[0]}." if given and writes else ""
+    return f"{command}: expected nothing more, got {' '.join(given)}.{hint} See {command} --help."
 
 
 def _interrupted(arguments: list[str], reason: str) -> str:

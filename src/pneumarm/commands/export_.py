@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from pneumarm.address import ServerAddress
+from pneumarm.address import Address, ServerAddress
 from pneumarm.commands.common import AnyStore, Json, OwnMethod
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
@@ -15,6 +15,7 @@ from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.as_c import as_c
 from pneumarm.transitions import Store
 from pneumarm.transitions.export import FORMATS, export_recording
+from pneumarm.transitions.schema import is_store
 
 
 def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Json = False) -> None:
@@ -38,7 +39,9 @@ def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Jso
             result = export_recording(store, out)._asdict()
     elif out.suffix in (".c", ".onnx"):
         if isinstance(file, ServerAddress):
-            raise UnusableInput(f"{file}: expected the file of an agent; of a store export {', '.join(FORMATS)}")
+            raise _no_agent(file)
+        if is_store(file):
+            raise _no_agent(file)
         agent = open_agent(file, method)
         if not isinstance(agent, NetworkAgent):
             raise UnusableInput(f"{file}: only agents of the methods servo and policy can be exported")
@@ -55,6 +58,12 @@ def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Jso
         )
     rows = [(_WORDS.get(name, name), value) for name, value in result.items() if value is not None]
     show(result, json, lambda: [table(("exported", ""), rows, str(out))])
+
+
+def _no_agent(store: Address) -> UnusableInput:
+    return UnusableInput(
+        f"{store}: this is a store, and expected is the file of an agent; of a store export {', '.join(FORMATS)}"
+    )
 
 
 _WORDS = {"mapping": "imported again by", "period": "control period [s]"}

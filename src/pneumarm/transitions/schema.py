@@ -272,6 +272,17 @@ def _connect(uri: str) -> sqlite3.Connection:
     return connection
 
 
+def is_store(path: Path) -> bool:
+    """Return whether ``path`` is a file that begins as those of stores do."""
+    if not path.is_file():
+        return False
+    with open(path, "rb") as file:
+        return file.read(len(_MAGIC)) == _MAGIC
+
+
+_MAGIC = b"SQLite format 3\0"
+
+
 def _check_header(path: Path) -> None:
     """Refuse what is plainly no store before SQLite, which would wait for or repair it, gets to see it."""
     if not path.exists():
@@ -283,7 +294,7 @@ def _check_header(path: Path) -> None:
             header = file.read(100)
     except OSError as error:
         raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
-    if len(header) < 100 or not header.startswith(b"SQLite format 3\0"):
+    if len(header) < 100 or not header.startswith(_MAGIC):
         raise UnusableInput(f"{path}: {EXPECTED}, this is something else")
     version, application = struct.unpack(">I4xI", header[60:72])
     if application != APPLICATION:

@@ -91,4 +91,4 @@ def _follow(mind, single, state):  # type: ignore[no-untyped-def]
     look(arm.x[:, 0], arm.before[0])
     for i in range(state.shape[0]):
         arm.x[i, 0] = state[i]
-    note_still(mind.limits, arm.x[:, 0], arm.before[0], arm.switched[0], arm.still[0])
+    note_still(mind.limits, arm.x[:, 0], arm.before[0], arm.actions[0], arm.switched[0], arm.still[0])

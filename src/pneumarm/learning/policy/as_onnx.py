@@ -53,12 +53,7 @@ def _useless(graph: Graph, agent: PolicyAgent, x: str, away: str, again: str, st
     limits, joints = agent.mind().limits, agent.window.joints
     pressures = graph.columns(x, [4 * j + 2 + m for j in range(joints) for m in range(2)])
     over = graph.reshaped(graph.node("Greater", pressures, limits.inlet.ravel()), joints, 1, 2)
-    empty = graph.reshaped(graph.node("Less", pressures, limits.outlet.ravel()), joints, 1, 2)
-    opens = graph.node(
-        "Or",
-        graph.node("And", over, graph.constant(VALVES > 0, bool)),
-        graph.node("And", empty, graph.constant(VALVES < 0, bool)),
-    )
+    opens = graph.node("And", over, graph.constant(VALVES > 0, bool))
     useless = graph.node("Or", *(graph.node("Gather", opens, graph.constant(m, np.int64), axis=3) for m in range(2)))
     if limits.patience == 0:
         return useless

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from pneumarm.api import move
+from pneumarm.arm import open_arm
+from pneumarm.arm.hand import hand
 from pneumarm.cli import main
 
 ARM = ("--arm", "virtual:seed=3")
@@ -44,6 +47,23 @@ def test_move_tells_of_every_goal(
         assert 1 <= one["tries"] <= 3
 
 
+def test_a_goal_can_be_where_the_hand_is_to_be(controller: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with open_arm("virtual:seed=3") as arm:
+        x, y = hand([8.0], arm.spec.links)
+    code, out, _ = called(capsys, "move", controller, *ARM, "--tries", 3, f"{x:.4f}m,{y:.4f}m", "8deg", "--json")
+    placed, angle = json.loads(out)["movements"]
+    assert code == 0
+    assert placed["goal_deg"] == [pytest.approx(8, abs=0.05)]
+    assert placed["goal_xy_m"] == [pytest.approx(x, abs=1e-4), pytest.approx(y, abs=1e-4)]
+    assert 0 < placed["rest_error_m"] < 0.01
+    assert placed.keys() - angle.keys() == {"goal_xy_m", "rest_error_m"}
+    (moved,) = move(controller, "virtual:seed=3", goals_xy=[(x, y)])
+    assert moved.hand_error is not None
+    assert 0 < moved.hand_error < 0.01
+    _, _, err = called(capsys, "move", controller, *ARM, "--tries", 3, f"{x:.4f}m,{y:.4f}m")
+    assert f"x {x:.3f} m, y {y:.3f} m (8.0deg): settled" in err
+
+
 def test_a_movement_that_fails_is_told_of_and_ends_with_1(
     controller: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -73,6 +93,7 @@ def test_track_tells_of_the_error(controller: Path, capsys: pytest.CaptureFixtur
         (("move", "FILE", *ARM, "1000"), "seen to reach"),
         (("move", "FILE", *ARM, "20"), "goal '20' in counts (degrees are 20deg): joint 1 has been seen to reach"),
         (("move", "FILE", *ARM, "10deg,5deg"), "expected 1 angle"),
+        (("move", "FILE", *ARM, "0.5m,0.5m"), "the hand has been seen to reach"),
         (("move", "FILE", *ARM, "ten"), "expected an angle"),
         (("move", "FILE", *ARM, "--holt", "2", "10deg"), "holt"),
         (("move", "FILE", *ARM, "--hold", "0", "10deg"), "hold"),

@@ -15,7 +15,9 @@ positive = st.floats(1e-3, 1e5)
 
 @given(st.integers(1, 9), st.floats(1e-3, 10), positive, positive, st.floats(-1e4, 0), positive, st.text(max_size=30))
 def test_a_spec_comes_back_as_it_was(tmp_path_factory, joints, period, per_degree, per_bar, low, span, name):
-    spec = ArmSpec(joints, period, per_degree, per_bar, (low, low + span), latency=period / 3, name=name)
+    spec = ArmSpec(
+        joints, period, per_degree, per_bar, (low, low + span), latency=period / 3, links=(0.2,) * joints, name=name
+    )
     path = tmp_path_factory.mktemp("spec") / "arm.toml"
     save_spec(spec, path)
     assert load_spec(path) == spec
@@ -82,7 +84,7 @@ def test_an_arm_is_opened_with_its_file(tmp_path):
         with arm:
             assert arm.spec == known.spec
             assert np.array_equal(arm.read().pressure, expected.pressure - [[10, 20]])
-    save_spec(replace(known.spec, joints=2), path)
+    save_spec(replace(known.spec, joints=2, links=()), path)
     with pytest.raises(UnusableInput, match=r"2 joint\(s\), this has 1"):
         open_arm(f"virtual,spec={path}")
     assert "name" in asdict(known.spec)

@@ -182,6 +182,14 @@ def test_seeds_make_the_difference(tmp_path):
     assert not np.array_equal(content(tmp_path / "0.db")[0]["command"], content(tmp_path / "1.db")[0]["command"])
 
 
+def test_a_store_goes_on_when_the_links_have_been_measured(tmp_path):
+    collected(tmp_path)
+    arm = FirstOrderArm()
+    arm.spec = replace(arm.spec, links=(0.21,))
+    with Store.append_to(tmp_path / "s.db") as store:
+        assert collect(arm, store, 4000, settings=SHORT).transitions == 4000
+
+
 def test_other_settings_or_another_arm_are_refused_before_anything_moves(tmp_path):
     collected(tmp_path)
     arm = FirstOrderArm()

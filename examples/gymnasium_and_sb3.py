@@ -5,8 +5,11 @@ Needs arm.db and arm.sim of first.py, and ``pip install 'pneumarm[stable-baselin
 
 import sys
 
-import gymnasium
-from stable_baselines3 import PPO
+try:
+    import gymnasium
+    from stable_baselines3 import PPO
+except ImportError as error:
+    sys.exit(f"{error}: pip install 'pneumarm[stable-baselines]'")
 
 import pneumarm
 import pneumarm.gym  # registers the environments

@@ -7,7 +7,10 @@ Needs arm.db and arm.sim of first.py, and ``pip install 'pneumarm[tuning]'``. Wr
 import sys
 from pathlib import Path
 
-import optuna
+try:
+    import optuna
+except ImportError as error:
+    sys.exit(f"{error}: pip install 'pneumarm[tuning]'")
 
 import pneumarm
 from pneumarm.learning import LearnSettings, ServoSettings

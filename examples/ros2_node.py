@@ -87,10 +87,13 @@ class Bridge:
 
 def main(arm: str) -> None:
     """Serve ``arm`` until the node is shut down."""
-    import rclpy
-    from sensor_msgs.msg import JointState
-    from std_msgs.msg import Float64MultiArray
-    from std_srvs.srv import Trigger
+    try:
+        import rclpy
+        from sensor_msgs.msg import JointState
+        from std_msgs.msg import Float64MultiArray
+        from std_srvs.srv import Trigger
+    except ImportError as error:
+        sys.exit(f"{error}: install ROS 2, and source its setup.bash in this shell")
 
     controller = pneumarm.load_controller("arm.agent")
     assert isinstance(controller, LoadedTracker)

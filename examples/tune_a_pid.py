@@ -7,6 +7,6 @@ ARM = "virtual:seed=7"
 
 tuned = pneumarm.tune("pid", ARM, "arm.pid", settings=TuneSettings(seconds=150))
 print(tuned)
-print(tuned.gains)
+print(", ".join(f"{name} {gain:.3g}" for name, gain in vars(tuned.gains).items()))
 for one in pneumarm.move("arm.pid", ARM, goals_deg=[20, -5, 10]):
     print(one)

@@ -41,7 +41,7 @@ def test_the_first_script_goes_all_the_way(workshop: Path) -> None:
     ("script", "words"),
     [
         ("track_a_reference.py", r"RMS error \d"),
-        ("tune_a_pid.py", "Tuned pid"),
+        ("tune_a_pid.py", r"<Tuned pid .*, (cost \d|too little time).*\nmove_time [\d.]{1,5}, "),
         ("own_arm.py", "settled after"),
         ("own_learner.py", r"500 Movements: reward"),
     ],
@@ -67,6 +67,20 @@ def test_settings_are_looked_for_by_optuna(workshop: Path) -> None:
     assert found.keys() == {"learning-rate", "precision", "change"}
     options = ("--config", "best.toml", "--servo.updates", 20, "--servo.agents", 1, "--out", "best.agent")
     python("-m", "pneumarm", "train", "arm.sim", "arm.db", *options, cwd=workshop, check=True)
+
+
+@pytest.mark.parametrize(
+    ("script", "module", "words"),
+    [
+        ("gymnasium_and_sb3.py", "stable_baselines3", "pip install 'pneumarm[stable-baselines]'"),
+        ("optuna_settings.py", "optuna", "pip install 'pneumarm[tuning]'"),
+        ("ros2_node.py", "rclpy", "install ROS 2"),
+    ],
+)
+def test_an_example_says_what_to_install(tmp_path: Path, script: str, module: str, words: str) -> None:
+    program = "import runpy, sys; sys.modules[sys.argv[1]] = None; runpy.run_path(sys.argv[2], run_name='__main__')"
+    done = python("-c", program, module, EXAMPLES / script, cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n"), words in done.stderr) == (1, 1, True), done.stderr
 
 
 def test_the_bridge_to_ros_moves_an_arm_and_vents_it(workshop: Path) -> None:

@@ -255,7 +255,7 @@ def track(
         wanted = parse_reference(reference, spec) if isinstance(reference, str) else reference
         lasting = seconds if seconds is not None else wanted.duration or SECONDS
         check_seconds(lasting)
-        check_reachable(wanted, lasting, known, spec)
+        check_reachable(wanted, lasting, known.range, spec)
         return track(opened, mover, wanted, lasting)
 
 

@@ -56,7 +56,7 @@ class Tuned:
     seconds: float
     """Arm time that tuning took, calibration among it [s]."""
     cost: float
-    """Of the gains, as measured in the end; see :mod:`pneumarm.classical.tuning`."""
+    """Of the gains, as measured in the end, see :mod:`pneumarm.classical.tuning`; -1 where there was no time."""
 
     @property
     def goal_range(self) -> NDArray[np.float64]:
@@ -82,7 +82,8 @@ class Tuned:
         check_pressures(self.spec, arm.spec, "this controller was tuned")
 
     def __repr__(self) -> str:
-        return f"<Tuned {self.kind} for {self.spec.name}, {1 / self.spec.period:.0f} Hz, cost {self.cost:.3f}>"
+        cost = f"cost {self.cost:.3f}" if self.cost >= 0 else "too little time to compare gains"
+        return f"<Tuned {self.kind} for {self.spec.name}, {1 / self.spec.period:.0f} Hz, {cost}>"
 
     def save(self, path: Path) -> None:
         """Write it to ``path``, whole or not at all."""

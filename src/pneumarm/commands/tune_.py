@@ -50,5 +50,5 @@ def tune_(
         "gains": gains,
         "goal_range_deg": list(map(list, zip(low.tolist(), high.tolist(), strict=True))),
     }
-    rows = [("arm time [s]", tuned.seconds), ("cost", tuned.cost), *gains.items()]
+    rows = [("arm time [s]", tuned.seconds), ("cost", tuned.cost if tuned.cost >= 0 else None), *gains.items()]
     show(result, json, lambda: [table((kind, ""), rows, arm)])

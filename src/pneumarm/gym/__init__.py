@@ -1,7 +1,7 @@
 """The tasks for everyone else's agents: Gymnasium's interface to a simulation, or to any arm.
 
     import gymnasium
-    import pneumarm.gym  # registers the environments, where Gymnasium did not find them by itself
+    import pneumarm.gym  # registers the environments
 
     follow = gymnasium.make("pneumarm/Follow-v0", arm="virtual:seed=7", render_mode="rgb_array")
 

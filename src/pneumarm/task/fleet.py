@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.valves import VALVES
+from pneumarm.arm.valves import CLOSED, VALVES
 from pneumarm.kernels import kernel, part
 from pneumarm.networks.layers import weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
@@ -79,21 +79,15 @@ def fleet(environment: Environment, random: RandomState) -> Fleet:
     )
 
 
-EMPTY = 0.03
-"""Share of the range of pressures below which a muscle is empty."""
-
-
 class Limits(NamedTuple):
     """Which actions are of no use. Made by :func:`limits`."""
 
     inlet: NDArray[np.float32]
     """Pressure over which an inlet stays closed, shape (joints, 2) [scaled]."""
     outlet: NDArray[np.float32]
-    """Pressure below which a muscle has nothing to let out, shape (joints, 2) [scaled]."""
+    """Pressure below which a muscle has nothing to let out, shape (joints, 2) [scaled]; as a rule none does."""
     still: NDArray[np.float32]
     """Largest change of angle and of pressures that counts as none, shape (joints, 3) [scaled]."""
-    noise: NDArray[np.float32]
-    """The same where nothing but empty muscles was vented: what else changes is noise."""
     tolerance: NDArray[np.float32]
     """Distance from the goal within which a joint may stand still, shape (joints,) [scaled]."""
     goal_place: int
@@ -111,16 +105,11 @@ def limits(simulation: Simulation, tolerance: float, still: float = 2.5, patienc
     """
     window, scaling, spec = simulation.window, simulation.scaling, simulation.spec
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
-    lowest, highest = np.moveaxis(simulation.pressure_range, -1, 0)
-    empty = lowest + EMPTY * (highest - lowest)
-    noise = simulation.error_std[:, [0, 2, 3]] / scale[:, [0, 2, 3]]
     units = np.array([spec.angle_unit, spec.pressure_unit, spec.pressure_unit])
-    unchanged = still * units / scale[:, [0, 2, 3]]
     return Limits(
         inlet=np.ascontiguousarray((spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:], np.float32),
-        outlet=np.ascontiguousarray((empty - offset[:, 2:]) / scale[:, 2:], np.float32),
-        still=np.ascontiguousarray(unchanged, np.float32),
-        noise=np.ascontiguousarray(np.maximum(unchanged, noise), np.float32),
+        outlet=np.full((window.joints, 2), -np.inf, np.float32),
+        still=np.ascontiguousarray(still * units / scale[:, [0, 2, 3]], np.float32),
         tolerance=(tolerance * spec.angle_unit / scale[:, 0]).astype(np.float32),
         goal_place=places(window).goal,
         patience=patience,
@@ -131,16 +120,21 @@ def limits(simulation: Simulation, tolerance: float, still: float = 2.5, patienc
 def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-untyped-def]
     """Return whether ``joint`` may take ``action`` in the state ``x`` (inputs,).
 
-    Not useful is an action that would open the inlet of a muscle over its limit (the guard would keep it closed),
-    and one that has changed nothing for some steps: an arm that sticks near its goal would stick for ever.
+    Not useful is an action that would open the inlet of a muscle over its limit (the guard would keep it closed), one
+    that would open nothing but outlets of muscles with nothing to let out, and one that has changed nothing for some
+    steps: an arm that sticks near its goal would stick for ever.
     """
     is_stuck = limits.patience > 0 and action == actions[joint] and still[joint] >= limits.patience
     if is_stuck and abs(x[limits.goal_place + joint] - x[4 * joint]) > limits.tolerance[joint]:
         return False
+    does_something = action == CLOSED
     for muscle in range(2):
-        if VALVES[action, muscle] > 0 and x[4 * joint + 2 + muscle] > limits.inlet[joint, muscle]:
+        valve, pressure = VALVES[action, muscle], x[4 * joint + 2 + muscle]
+        if valve > 0 and pressure > limits.inlet[joint, muscle]:
             return False
-    return True
+        if valve > 0 or (valve < 0 and pressure >= limits.outlet[joint, muscle]):
+            does_something = True
+    return does_something
 
 
 @kernel
@@ -235,7 +229,7 @@ def advance(environment, limits, fleet, e):  # type: ignore[no-untyped-def]
     arm, before = one(fleet, e), fleet.before[e]
     look(arm.state.x, before)
     settle(environment.simulation, environment.noise, arm.state, arm.command)
-    note_still(limits, arm.state.x, before, arm.actions, arm.switched, fleet.still[e])
+    note_still(limits, arm.state.x, before, arm.switched, fleet.still[e])
     fleet.taken[e] += 1
 
 
@@ -249,28 +243,12 @@ def look(x, before):  # type: ignore[no-untyped-def]
 
 
 @part
-def note_still(limits, x, before, actions, switched, still):  # type: ignore[no-untyped-def]
-    """Count in ``still`` (joints,) the steps in which the same action has changed nothing.
-
-    A muscle that is empty loses nothing more, which noise may hide, and the simulation may not know.
-    """
+def note_still(limits, x, before, switched, still):  # type: ignore[no-untyped-def]
+    """Count in ``still`` (joints,) the steps in which the same action has changed nothing."""
     for joint in range(still.shape[0]):
         count = still[joint] + 1 if switched[joint] == 0 else 1
-        limit = limits.noise if vents_nothing(limits, before, actions, joint) else limits.still
         for quantity in range(3):
             now = x[4 * joint + quantity + (1 if quantity > 0 else 0)]
-            if abs(now - before[joint, quantity]) > limit[joint, quantity]:
+            if abs(now - before[joint, quantity]) > limits.still[joint, quantity]:
                 count = 0
         still[joint] = count
-
-
-@part
-def vents_nothing(limits, before, actions, joint):  # type: ignore[no-untyped-def]
-    """Return whether the action of ``joint`` opened outlets, and of empty muscles alone."""
-    vented = False
-    for muscle in range(2):
-        valve = VALVES[actions[joint], muscle]
-        if valve > 0 or (valve < 0 and before[joint, 1 + muscle] >= limits.outlet[joint, muscle]):
-            return False
-        vented = vented or valve < 0
-    return vented

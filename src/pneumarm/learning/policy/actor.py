@@ -3,26 +3,37 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm.valves import CLOSED
+from pneumarm.arm.valves import CLOSED, VALVES
 from pneumarm.errors import PneumarmError
 from pneumarm.kernels import kernel
 from pneumarm.learning.policy.acting import Mind, decide, lanes
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.random import random_states
+from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.fleet import look, note_still
 from pneumarm.task.reward import is_switch
+
+_EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
+_IDLE = 0.35  # s in which valves do nothing, after which that does not go on
 
 
 class PolicyActor:
     """A policy acting greedily, looking ahead where its settings say so; see :class:`~.OnlineLearner` for its use.
 
     It does not learn. A joint that passes its goal again and again is one that its policy keeps swinging: its valves
-    stay closed until it has come to rest, and it goes on from there.
+    stay closed until it has come to rest, and it goes on from there. A joint that is off its goal while its policy
+    has long been venting empty muscles, of which the simulation knows least, is vented no longer: noise hides from
+    the policy that this changes nothing.
     """
 
-    def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings, period: float) -> None:
+    def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings, simulation: Simulation) -> None:
         self._mind, self._horizon, self._clear = mind, settings.horizon, settings.clear
-        self._most_passes, self._rest = settings.passes, round(settings.rest / period)
+        self._most_passes, self._rest = settings.passes, round(settings.rest / simulation.spec.period)
+        window, scaling = simulation.window, simulation.scaling
+        offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
+        lowest, highest = np.moveaxis(simulation.pressure_range, -1, 0)
+        self._empty = (lowest + _EMPTY * (highest - lowest) - offset[:, 2:]) / scale[:, 2:]
+        self._longest_idle = round(_IDLE / simulation.spec.period)
         self._single = lanes(mind, sizes, random_states(0, 1))
         self._lanes = lanes(mind, sizes, np.zeros((settings.lookahead, 4), np.uint64))
         self._samples = np.zeros(settings.lookahead, np.int64)
@@ -39,6 +50,8 @@ class PolicyActor:
         arm.still[...] = 0
         arm.x[: self._state_size, 0] = self._checked(state)
         self._side, self._passes, self._resting = self._sides(), np.zeros(goal.size, int), np.zeros(goal.size, int)
+        self._idle = np.zeros(goal.size, int)
+        self._mind.limits.outlet[...] = -np.inf
         self._decided = False
 
     def act(self) -> NDArray[np.int64]:
@@ -60,6 +73,7 @@ class PolicyActor:
             raise PneumarmError("begin an episode and act before going on")
         _follow(self._mind, self._single, self._checked(next_state))
         self._note_passes()
+        self._note_idle()
         self._decided = False
 
     def _note_passes(self) -> None:
@@ -70,6 +84,15 @@ class PolicyActor:
         self._side = np.where(side == 0, self._side, side)
         if self._most_passes:
             self._resting[self._passes >= self._most_passes] = self._rest
+
+    def _note_idle(self) -> None:
+        """Count for how long the valves of each joint off its goal do nothing; after long that is ruled out."""
+        pressure = self._single.fleet.x[: 4 * self._idle.size, 0].reshape(-1, 4)[:, 2:]
+        valves = VALVES[self._single.actions[0]]
+        works = ((valves > 0) | ((valves < 0) & (pressure >= self._empty))).any(axis=1)
+        self._idle = np.where(works | (self._sides() == 0), 0, self._idle + 1)
+        is_idle = self._idle >= self._longest_idle
+        self._mind.limits.outlet[...] = np.where(is_idle[:, None], self._empty, -np.inf)
 
     def _sides(self) -> NDArray[np.int64]:
         """Return on which side of its goal each joint is, shape (joints,): -1, 1, or 0 within the tolerance."""
@@ -91,4 +114,4 @@ def _follow(mind, single, state):  # type: ignore[no-untyped-def]
     look(arm.x[:, 0], arm.before[0])
     for i in range(state.shape[0]):
         arm.x[i, 0] = state[i]
-    note_still(mind.limits, arm.x[:, 0], arm.before[0], arm.actions[0], arm.switched[0], arm.still[0])
+    note_still(mind.limits, arm.x[:, 0], arm.before[0], arm.switched[0], arm.still[0])

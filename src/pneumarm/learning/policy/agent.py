@@ -47,7 +47,7 @@ class PolicyAgent(NetworkAgent):
 
     def actor(self) -> PolicyActor:
         """Return the policy acting greedily; it does not learn while it moves an arm."""
-        return PolicyActor(self.mind(), self.sizes, self.settings, self.spec.period)
+        return PolicyActor(self.mind(), self.sizes, self.settings, self.simulation)
 
     def adapted(
         self, simulation: Simulation, begin: BeginStates, updates: int, warm_up: int, learning_rate: float, seed: int

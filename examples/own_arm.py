@@ -38,5 +38,6 @@ class MyArm(Arm):
 if __name__ == "__main__":
     print(pneumarm.collect(MyArm(), "mine.db", transitions=3_000))
     print(pneumarm.fit("mine.db", "mine.sim"))
-    for one in pneumarm.move("plan:mine.sim", MyArm(), goals_deg=[15, -10]):
+    learned = pneumarm.train("mine.sim", "mine.db", "mine.agent")
+    for one in pneumarm.move(learned.agent, MyArm(), goals_deg=[15, -10]):
         print(one)

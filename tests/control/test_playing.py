@@ -28,7 +28,7 @@ def new_agent(joints: int = 1, **settings: object) -> Agent:
     simulation = synthetic_simulation(joints)
     chosen = TrainSettings(cutoff=40, **settings)  # type: ignore[arg-type]
     networks = draw_networks(simulation.window, chosen, np.random.default_rng(2))
-    spec = replace(VirtualArm().spec, joints=joints)
+    spec = replace(VirtualArm().spec, joints=joints, links=())
     goals = np.repeat(RANGE, joints, axis=0)
     return Agent(spec, simulation.window, simulation.scaling, goals, networks, chosen)
 

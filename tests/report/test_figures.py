@@ -164,9 +164,9 @@ def test_residue_by_class_tells_where_the_simulation_is_unsure():
     random = np.random.default_rng(0)
     velocity = random.uniform(-3, 3, 9000)
     residue = random.normal(0, 1 + np.abs(velocity))
-    text = figures.residue_by_class_alt(residue, [Classification("velocity [counts/ms]", velocity)])
+    text = figures.residue_by_class_alt(residue, [Classification("velocity [°/s]", velocity)])
     least, where_least, most, where_most = (
-        float(v) for v in re.search(r"from ([\d.]+) \(at (\S+)\) to ([\d.]+) \(at (\S+)\)", text).groups()
+        float(v) for v in re.search(r"from ([\d.]+)° \(at (\S+)\) to ([\d.]+)° \(at (\S+)\)", text).groups()
     )
     assert least < 1.5 < 3.2 < most
     assert abs(where_least) < 0.5 < 2 < abs(where_most)

@@ -112,6 +112,15 @@ def shown(browser: Browser, file: Path, width: int, **options: object) -> Page:
     return page
 
 
+def moving(page: Page) -> list[tuple[float, float, bool]]:
+    """Return of each playing picture its width, the width at which its letters are READABLE, and if it is cut."""
+    found = page.evaluate(
+        "[...document.querySelectorAll('.moving img')].map((one) =>"
+        " [one.getBoundingClientRect().width, one.naturalWidth, one.getBoundingClientRect().right > innerWidth])"
+    )
+    return [(seen, READABLE / 14 * natural, cut) for seen, natural, cut in found]
+
+
 def background(page: Page) -> int:
     """Return how light what is seen is between the letters, 0 to 255: the most frequent shade on the right."""
     seen = Image.open(io.BytesIO(page.screenshot())).convert("L")
@@ -131,9 +140,12 @@ def test_a_page_fits_and_can_be_read(
     size, text = smallest_text(page)
     assert size >= READABLE, text
     if name != "site":
-        widths = page.evaluate("[...document.images].map((one) => one.getBoundingClientRect().width)")
+        widths = page.evaluate(
+            "[...document.querySelectorAll('.drawing img')].map((one) => one.getBoundingClientRect().width)"
+        )
         assert len(widths) >= 3
         assert min(widths) >= LETTERS
+        assert all(seen >= least and not cut for seen, least, cut in moving(page))
     assert background(page) > 250 if scheme == "light" else background(page) < 60
     page.close()
 

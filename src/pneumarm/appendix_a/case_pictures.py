@@ -54,14 +54,16 @@ def isoplots(cases: Sequence[Case], which: Sequence[int]) -> Figure:
     figure, axes = panels(len(which), len(cases), 2.9 * len(which), sharex="row", sharey="row")
     for row, i in zip(axes, which, strict=True):
         kind = quantities(cases[0].spec)[i]
-        both = [np.stack([case.observed[:, _JOINT, i], case.simulated[:, _JOINT, i]]) for case in cases]
+        both = [
+            kind.per_count * np.stack([case.observed[:, _JOINT, i], case.simulated[:, _JOINT, i]]) for case in cases
+        ]
         limit = max(float(np.percentile(np.abs(one), 99.8)) for one in both)
         for place, case, (x, y) in zip(row, cases, both, strict=True):
             scatter(place, x, y, s=3, alpha=0.3)
             place.plot([-limit, limit], [-limit, limit], color=INK, ls="--", lw=1)
-            place.set(xlim=(-limit, limit), ylim=(-limit, limit), xlabel=f"observed change [{kind.counts}]")
-            place.set_title(f"{case.name}\n{kind.name}, std {(y - x).std():.2g} {kind.counts}")
-        row[0].set_ylabel(f"simulated change [{kind.counts}]")
+            place.set(xlim=(-limit, limit), ylim=(-limit, limit), xlabel=f"observed change [{kind.unit}]")
+            place.set_title(f"{case.name}\n{kind.name}, std {(y - x).std():.2g} {kind.unit}")
+        row[0].set_ylabel(f"simulated change [{kind.unit}]")
     return figure
 
 
@@ -82,21 +84,27 @@ def sweeps(cases: Sequence[Case]) -> Figure:
     return figure
 
 
+def _residue(case: Case) -> Array:
+    """Return the residue of the angle, shape (n,) [degrees]."""
+    residue: Array = case.residue[:, _JOINT, 0] / case.spec.counts_per_degree
+    return residue
+
+
 @styled
 def by_angle(cases: Sequence[Case]) -> Figure:
     """Draw the residue of the angle by the angle it was made at (thesis figure 3.2)."""
     figure, axes = panels(1, len(cases), 2.8, sharey=True)
-    limit = max(float(np.percentile(np.abs(case.residue[:, _JOINT, 0]), 99.8)) for case in cases)
+    limit = max(float(np.percentile(np.abs(_residue(case)), 99.8)) for case in cases)
     for place, case in zip(axes[0], cases, strict=True):
-        angle, residue = case.spec.degrees(case.angle[:, _JOINT]), case.residue[:, _JOINT, 0]
+        angle, residue = case.spec.degrees(case.angle[:, _JOINT]), _residue(case)
         scatter(place, angle, residue, s=3, alpha=0.25)
         stats = binned(angle, residue, bins=20)
         place.errorbar(
             stats.centre, stats.mean, stats.std, fmt="s-", color=MIDDLE, ms=3.5, capsize=2, lw=1.2, mec=INK, mew=0.5
         )
         place.set(ylim=(-limit, limit), xlabel="angle as read [°]")
-        place.set_title(f"{case.name}: std {residue.std():.2g} counts")
-    axes[0, 0].set_ylabel("residue of the angle [counts]")
+        place.set_title(f"{case.name}: std {residue.std():.2g}°")
+    axes[0, 0].set_ylabel("residue of the angle [°]")
     return figure
 
 
@@ -135,11 +143,12 @@ def in_a_row(cases: Sequence[Case]) -> Figure:
     """Draw the residue of the angle, transition after transition (thesis figure 3.1)."""
     figure, axes = panels(len(cases), 1, 1.5 * len(cases) + 0.3, sharex=True, sharey=True)
     for place, case in zip(axes[:, 0], cases, strict=True):
-        residue = case.residue[:_IN_A_ROW, _JOINT, 0]
-        place.vlines(np.arange(len(residue)), 0, residue, color=DARK, lw=1)
+        residue = _residue(case)
+        shown = residue[:_IN_A_ROW]
+        place.vlines(np.arange(len(shown)), 0, shown, color=DARK, lw=1)
         place.axhline(0, color=INK, lw=0.7)
-        place.set_ylabel("residue [counts]")
-        place.set_title(f"{case.name}: std {case.residue[:, _JOINT, 0].std():.2g} counts")
+        place.set_ylabel("residue [°]")
+        place.set_title(f"{case.name}: std {residue.std():.2g}°")
     axes[-1, 0].set_xlabel("transition k [-]")
     return figure
 

@@ -33,8 +33,8 @@ def verdicts(error: PlayedError) -> Table:
     kinds = quantities(error.cases[0].spec)
     rows = [
         (
-            f"error of the simulation: {kind.name} [{kind.counts}]",
-            *(f"{case.residue[..., i].std():.2g}" for case in error.cases),
+            f"error of the simulation: {kind.name} [{kind.unit}]",
+            *(f"{kind.per_count * case.residue[..., i].std():.2g}" for case in error.cases),
         )
         for i, kind in enumerate(kinds)
     ]
@@ -51,8 +51,9 @@ def _checkup(case: Case) -> str:
 
 
 def _errors_of(error: PlayedError) -> str:
+    angle, _, pressure, _ = quantities(error.cases[0].spec)
     return "; ".join(
-        f"{case.name}: error of the angle {case.residue[..., 0].std():.2g} counts, of pressure 1 "
-        f"{case.residue[..., 2].std():.2g} counts"
+        f"{case.name}: error of the angle {angle.per_count * case.residue[..., 0].std():.2g}°, of pressure 1 "
+        f"{pressure.per_count * case.residue[..., 2].std():.2g} bar"
         for case in error.cases
     )

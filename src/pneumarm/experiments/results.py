@@ -26,9 +26,9 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     of_trials = f"{_many(runs, 'run')} of {_many(len(experiment.trials), 'trial')}"
     where = f"{experiment.words.source}. {of_trials} on {_listed(arms)}."
     sections = [*analysis.sections]
-    summary = [where, *analysis.summary]
+    summary = [*analysis.summary, where]
     if analysis.claims:
-        summary.append(_count(analysis.claims))
+        summary.insert(0, _count(analysis.claims))
         rows = [[_HYPHEN.sub("−", cell) for cell in (c.text, c.thesis, c.ours, c.verdict)] for c in analysis.claims]
         table = Table(
             ["claim", "thesis", "here", "verdict"], rows, "What the thesis found, and what holds here.", words=True

@@ -10,8 +10,10 @@ from pneumarm.checkup.diagnose import WHITE, WORN, Complaint
 from pneumarm.checkup.figures import (
     JOINT_HEADER,
     MUSCLE_HEADER,
+    MuscleFigures,
     autocorrelation,
     detrended,
+    ends,
     irregularity,
     joint_figures,
     joint_row,
@@ -19,6 +21,7 @@ from pneumarm.checkup.figures import (
 )
 from pneumarm.checkup.measure import Checkup
 from pneumarm.report.page import Picture, Section, Table, render
+from pneumarm.report.playing import playing
 from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
 
 _LINES = ((DARK, "-"), (MIDDLE, "--"))
@@ -26,31 +29,65 @@ _LINES = ((DARK, "-"), (MIDDLE, "--"))
 
 def checkup_page(checkup: Checkup, findings: Sequence[Complaint], sound: SoundState | None = None) -> str:
     """Return the page as HTML text; ``sound`` is what the arm did when it was calibrated."""
-    name = checkup.spec.name
-    verdict = [f"{len(findings)} thing(s) to see to." if findings else "Nothing is wrong with it."]
+    joints = range(len(checkup.joints))
+    figures = [joint_figures(checkup, j) for j in joints]
+    wrong = "Nothing is wrong with it." if not findings else _to_see_to(findings)
+    told = [_in_a_sentence(checkup, j, figures[j].muscles) for j in joints]
     rows = [(f.where, f.kind, f.told_by, f.remedy) for f in findings]
     said = [Table(("where", "what", "told by", "what to do"), rows, "What is wrong.", words=True)] if rows else []
-    muscles = [
-        (f"joint {j + 1}, muscle {m + 1}", *muscle_row(joint_figures(checkup, j), j, m, sound))
-        for j in range(len(checkup.joints))
-        for m in range(2)
+    of_muscles = [
+        (f"joint {j + 1}, muscle {m + 1}", *muscle_row(figures[j], j, m, sound)) for j in joints for m in range(2)
     ]
-    joints = [
-        (f"joint {j + 1}", *joint_row(joint_figures(checkup, j), checkup.spec)) for j in range(len(checkup.joints))
-    ]
-    figures = [
-        Table(("", *MUSCLE_HEADER), muscles, "Muscles and valves; times from the command on, to 63 % of the way."),
-        Table(("", *JOINT_HEADER), joints, "Joints and their potentiometers."),
+    of_joints = [(f"joint {j + 1}", *joint_row(figures[j], checkup.spec)) for j in joints]
+    tables = [
+        Table(("", *MUSCLE_HEADER), of_muscles, "Muscles and valves; times from the command on, to 63 % of the way."),
+        Table(
+            ("", *JOINT_HEADER),
+            of_joints,
+            "Joints and their potentiometers; from and to by a slow sweep.",
+        ),
     ]
     return render(
-        f"Check-up of {name}",
-        verdict,
+        f"Check-up of {checkup.spec.name}",
+        [" ".join([*told, wrong])],
         [
+            Section("How it moves", figures=[_playing(checkup, j) for j in joints], opens=True),
             Section("Findings", [] if rows else ["None."], tables=said),
-            Section("Figures", tables=figures),
-            *[_of_joint(checkup, j) for j in range(len(checkup.joints))],
+            Section("Figures", tables=tables),
+            *[_of_joint(checkup, j) for j in joints],
         ],
     )
+
+
+def _name(checkup: Checkup, j: int) -> str:
+    """Return what joint ``j`` is called in a sentence."""
+    return f"joint {j + 1}" if len(checkup.joints) > 1 else "it"
+
+
+def _to_see_to(findings: Sequence[Complaint]) -> str:
+    """Say what is wrong, in a sentence."""
+    found = "; ".join(f"{one.kind} ({one.where})" for one in findings)
+    return f"{'One thing is' if len(findings) == 1 else f'{len(findings)} things are'} wrong: {found}."
+
+
+def _in_a_sentence(checkup: Checkup, j: int, muscles: Sequence[MuscleFigures]) -> str:
+    """Say how far joint ``j`` turns, and how fast its muscles fill and leak where they do."""
+    low, high = (f"{angle:.0f}°".replace("-", "−") for angle in checkup.spec.degrees(ends(checkup.joints[j])))
+    slowest, leakiest = (max(getattr(one, what) for one in muscles) for what in ("fill_time", "leak"))
+    does = [f"fill to two thirds within {slowest:.1f} s"] if np.isfinite(slowest) else []
+    does += [f"leak up to {max(leakiest, 0.0):.1f} % a minute"] if np.isfinite(leakiest) else []
+    of_muscles = f"; its muscles {' and '.join(does)}" if does else ""
+    return f"{_name(checkup, j).capitalize()} turns from {low} to {high}{of_muscles}."
+
+
+def _playing(checkup: Checkup, j: int) -> Picture:
+    """Return joint ``j`` moving while each of its muscles was filled, held and exhausted."""
+    one, two = (muscle.whole for muscle in checkup.joints[j].muscles)
+    time = np.concatenate([one.time, two.time + one.time[-1] + checkup.settings.step])
+    caption = "muscle 1 is filled, held and exhausted, and turns it one way; then muscle 2 turns it the other way."
+    name = _name(checkup, j).replace("it", "the joint").capitalize()
+    angle = np.concatenate([one.angle, two.angle])[:, None]
+    return playing(time, angle, None, checkup.spec, f"{name} moves: {caption}")
 
 
 def _of_joint(checkup: Checkup, j: int) -> Section:

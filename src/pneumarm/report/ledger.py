@@ -11,6 +11,7 @@ from pneumarm.report import thesis
 from pneumarm.report.data import QualityData, TransferData
 from pneumarm.report.figures import expectation
 from pneumarm.report.page import Table
+from pneumarm.report.style import quantities
 from pneumarm.statistics import Estimate, mean_estimate, rate_estimate
 from pneumarm.task import Movements
 
@@ -27,6 +28,7 @@ _FIGURES = (
     "… of successes",
     "arm time",
 )
+_SHARE = "{:.2%}"  # of successes
 _PLANNERS = {"open_loop": "open loop", "closed_loop": "closed loop"}
 
 
@@ -53,9 +55,9 @@ def ledger(
         rows,
         "The ledger: means over the episodes with 95% confidence intervals in brackets (normal approximation, for "
         "the success Wilson's; episodes taken as independent; none below 30 episodes). Greedy and without learning, "
-        "except while learning. A success reached its goal: at a reading every joint was within 25 counts of it and "
-        "not faster than 1 count/ms, unless other tolerances were asked for. Arm time holds everything, the way to "
-        "the begin states too.",
+        "except while learning. A success reached its goal: at a reading every joint was within 25 counts of it "
+        "and not faster than 1 count/ms, on the thesis' arm 2.2° and 88°/s, unless other tolerances were asked for. "
+        "Arm time holds everything, the way to the begin states too.",
     )
 
 
@@ -65,7 +67,7 @@ def _ledger_column(name: str, episodes: Movements, *, on_arm: bool) -> list[str]
         name,
         f"{episodes.n:,}",
         with_interval(mean_estimate(episodes.reward), "{:.2f}"),
-        with_interval(rate_estimate(won), "{:.1%}"),
+        with_interval(rate_estimate(won), _SHARE),
         with_interval(mean_estimate(episodes.actions), "{:.1f}"),
         with_interval(mean_estimate(episodes.actions[won]), "{:.1f}"),
         with_interval(mean_estimate(episodes.all_switches), "{:.2f}"),
@@ -88,7 +90,7 @@ def _summarised(figures: Mapping[str, Any]) -> tuple[str, str, str, str]:
 
     return (
         in_words("reward", "{:.2f}"),
-        in_words("success_rate", "{:.1%}"),
+        in_words("success_rate", _SHARE),
         in_words("actions", "{:.1f}"),
         in_words("switches", "{:.2f}"),
     )
@@ -186,30 +188,39 @@ def _collected(results: Mapping[str, Any]) -> list[list[str]]:
     ]
 
 
+_NAMES = ("angle", "velocity", "pressure_1", "pressure_2")  # of the quantities, in results
+
+
 def _simulated(results: Mapping[str, Any], quality: QualityData | None, spec: ArmSpec) -> list[list[str]]:
+    """Return errors of the simulation; the thesis' counts are those of its own arm."""
     std = results.get("simulation", {}).get("std", {})
-    rows = []
-    for name, value in thesis.STEP_STD.items():
-        unit = "counts/ms" if name == "velocity" else "counts"
-        words = name.replace("pressure_", f"{spec.pressure_word} ")
-        rows.append(
-            [f"std of one-step error, {words} [{unit}]", _decimals(std.get(name)), f"{value:.2f}", "table 5.2"]
-        )
+    named = list(zip(_NAMES, quantities(spec), quantities(ArmSpec()), strict=True))
+    rows = [
+        [
+            f"std of one-step error, {ours.in_units()}",
+            _decimals(std.get(name), ours.per_count),
+            _decimals(thesis.STEP_STD[name], theirs.per_count),
+            "table 5.2",
+        ]
+        for name, ours, theirs in named
+    ]
     if quality is None or len(quality.propagation) == 0:
         return rows
     second = min(len(quality.propagation), round(1 / spec.period))
-    seconds = second * spec.period
-    for i, name in ((0, "angle"), (2, "pressure_1"), (3, "pressure_2")):
-        measured = quality.propagation[second - 1, :, i]
-        expected = expectation(quality.propagation)[second - 1, :, i]
-        rows.append(
-            [
-                f"std of error after {seconds:.2g} s, {name.replace('pressure_', f'{spec.pressure_word} ')} [counts]",
-                f"{_decimals(measured)} measured; {_decimals(expected)} by eq. 3.7",
-                f"{thesis.SECOND_STD[name]:.2f} by eq. 3.7",
-                "table 5.2",
-            ]
-        )
+    expected = expectation(quality.propagation)
+    for i, (name, ours, theirs) in enumerate(named):
+        if name in thesis.SECOND_STD:
+            spread, by_chance = (
+                _decimals(of[second - 1, :, i], ours.per_count) for of in (quality.propagation, expected)
+            )
+            rows.append(
+                [
+                    f"std of error after {second * spec.period:.2g} s, {ours.in_units()}",
+                    f"{spread} measured; {by_chance} by eq. 3.7",
+                    f"{_decimals(thesis.SECOND_STD[name], theirs.per_count)} by eq. 3.7",
+                    "table 5.2",
+                ]
+            )
     return rows
 
 
@@ -231,7 +242,7 @@ def _learned(results: Mapping[str, Any], test: Movements | None) -> list[list[st
         *rows,
         ["reward in the simulation", with_interval(reward, "{:.2f}"),
          f"{_runs(best)} best trial; {_runs(optimal)} settings derived as optimal", "tables 5.5 (trial 10) and 5.7"],
-        ["success in the simulation", with_interval(success, "{:.2%}"), thesis.SUCCESS, "section 5.6.1"],
+        ["success in the simulation", with_interval(success, _SHARE), thesis.SUCCESS, "section 5.6.1"],
         ["actions an episode", with_interval(actions, "{:.2f}"), _runs(best_actions), "table C.8, trial 10"],
         ["switches an episode", with_interval(switches, "{:.2f}"), _runs(best_switches), "table C.9, trial 10"],
     ]  # fmt: skip
@@ -251,12 +262,12 @@ def _on_the_arm(test: Movements | None, transfer: TransferData | None) -> list[l
         ["rise of the switches of successes on arrival",
          _mean(came.all_switches[came.success], home.all_switches[home.success]),
          f"{least:g} learning, {most:g} not", "section 5.5.1"],
-        ["success on arrival", with_interval(rate_estimate(came.success), "{:.1%}"), thesis.SUCCESS, "section 5.6.1"],
+        ["success on arrival", with_interval(rate_estimate(came.success), _SHARE), thesis.SUCCESS, "section 5.6.1"],
     ]  # fmt: skip
     if transfer.after.n:
         now = transfer.after
         rows += [
-            ["success after adaptation", with_interval(rate_estimate(now.success), "{:.1%}"), thesis.SUCCESS,
+            ["success after adaptation", with_interval(rate_estimate(now.success), _SHARE), thesis.SUCCESS,
              "section 5.6.1"],
             ["reward gained by adaptation", _mean(now.reward, came.reward), MISSING, "figure 5.9, not in numbers"],
             ["learning on the arm", f"{transfer.learning.n:,} episodes, {duration(transfer.learning.seconds)}",
@@ -283,6 +294,6 @@ def _time(value: float | None) -> str:
     return MISSING if value is None else duration(value)
 
 
-def _decimals(value: float | Sequence[float] | Any) -> str:
-    """Return one number, or one a joint."""
-    return MISSING if value is None else ", ".join(f"{v:.2f}" for v in np.atleast_1d(value))
+def _decimals(value: float | Sequence[float] | Any, factor: float) -> str:
+    """Return one number, or one a joint, times ``factor``."""
+    return MISSING if value is None else ", ".join(f"{factor * v:.2g}" for v in np.atleast_1d(value))

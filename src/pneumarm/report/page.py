@@ -20,6 +20,8 @@ class Picture:
     """Drawn, or an SVG as text."""
     caption: str
     alt: str
+    narrow: str | None = None
+    """The same SVG, laid out for the width of a phone. A figure that has it also knows dark screens by itself."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page: paragraphs, then its tables, then its pictures."""
+    """A section of the page: paragraphs, then its tables, then its pictures; where a page opens, pictures first."""
 
     title: str
     text: Sequence[str] = ()

@@ -27,11 +27,13 @@ from pneumarm.report.page import render
 from pneumarm.report.sections import (
     RunData,
     all_sections,
+    arrival_words,
     collected,
     moving_words,
+    one_step,
     predicted,
+    predicted_words,
     propagated,
-    reached_words,
 )
 from pneumarm.task.movements import Movements, movements, read_episodes
 
@@ -66,8 +68,13 @@ def write_analysis(
 ) -> Path:
     """Write ``analysis.html``, the part of the report on a store and a simulation, to ``folder``."""
     path = folder / ANALYSIS
-    sections = [collected(coverage, spec), predicted(quality, spec), propagated(quality, spec, found)]
-    summary = [f"{spec.name}: what was collected, and how well the simulation predicts what it was not fitted to."]
+    sections = [
+        one_step(quality, spec),
+        collected(coverage, spec),
+        predicted(quality, spec),
+        propagated(quality, spec, found),
+    ]
+    summary = predicted_words(quality, spec)
     write_text(path, render(f"The simulation of {spec.name}", summary, sections))
     return path
 
@@ -159,11 +166,4 @@ def _summary(run: RunData) -> list[str]:
             "told. The guard could not limit them, and the monitor judged angles alone: neither valves, nor the "
             "supply, nor leaks."
         )
-    moves = moving_words(run.results)
-    text = [*moves, *text]
-    if not moves:
-        text += reached_words(run)
-    text += summary_of_health(run.results)
-    if run.adaptation is not None:
-        text += [f"{line[0].upper()}{line[1:]}." for line in run.adaptation.sentences]
-    return text
+    return [*(moving_words(run.results) or arrival_words(run)), *text, *summary_of_health(run.results)]

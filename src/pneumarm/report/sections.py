@@ -1,7 +1,7 @@
 """The sections of a run's report: which figures, with which words."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,9 +23,12 @@ from pneumarm.report.data import (
     TransferData,
 )
 from pneumarm.report.figures import Classification, CurveMark, Phase
+from pneumarm.report.figures.residues import IN_A_ROW
+from pneumarm.report.figures.training import PRICE
 from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger, written
 from pneumarm.report.page import Picture, Section, Table
+from pneumarm.report.playing import playing
 from pneumarm.report.style import of_joint, quantities
 from pneumarm.task import Movements, running_time
 
@@ -50,7 +53,8 @@ class RunData:
 
 def all_sections(run: RunData) -> list[Section]:
     """Return the sections of ``run`` in the order of the way of the data."""
-    sections = [] if run.moving is None else [moving(run.moving, run.results, run.spec)]
+    shown = run.moving or one_after_the_other(run.demonstrations)
+    sections = [] if shown is None else [moving(shown, run.results, run.spec)]
     sections.append(overview(run))
     if run.coverage is not None:
         sections.append(collected(run.coverage, run.spec))
@@ -75,14 +79,25 @@ def all_sections(run: RunData) -> list[Section]:
     return sections
 
 
+def one_after_the_other(shown: Sequence[Demonstration]) -> MovingData | None:
+    """Return demonstrations as one record, without what passed between them; None where there are none."""
+    if not shown:
+        return None
+    times, begin = [], 0.0
+    for one in shown:
+        times.append(one.time - one.time[0] + begin)
+        begin = times[-1][-1] + float(np.diff(one.time).mean())
+    return MovingData(
+        time=np.concatenate(times),
+        angle=np.concatenate([one.angle for one in shown]),
+        wanted=np.concatenate([np.tile(one.goal, (len(one.time), 1)) for one in shown]),
+    )
+
+
 def moving(data: MovingData, results: Mapping[str, Any], spec: ArmSpec) -> Section:
     """Return how the arm moves, as a picture that plays, and in degrees and seconds."""
-    numbers = (data.time, data.angle, data.wanted, spec)
-    picture = Picture(
-        figures.moving_arm(*numbers),
-        "The arm as it moved to goals and held them; the light arm is where it was asked to be.",
-        figures.moving_arm_alt(*numbers),
-    )
+    caption = "The arm as it moved to goals; the broad one behind it is where it was asked to be."
+    picture = playing(data.time, data.angle, data.wanted, spec, caption)
     tracked = [
         (
             f"{one['frequency_hz']:g} Hz, {one['amplitude_deg']:.0f}°",
@@ -111,14 +126,29 @@ def moving_words(results: Mapping[str, Any]) -> list[str]:
     return [words + (f" and {air:.2f} normal litres of air a movement." if air is not None else ".")]
 
 
+def arrival_words(run: RunData) -> list[str]:
+    """Return how often, how soon and how exactly goals are reached, as sentences; on the arm where it was tried."""
+    transfer = run.transfer
+    phases = [] if transfer is None else [("on the arm", transfer.after), ("on the arm, on arrival", transfer.before)]
+    for where, made in (*phases, ("in the simulation", run.test)):
+        if made is None or not made.n:
+            continue
+        words, won = f"It reaches {made.success.mean():.1%} of {made.n:,} goals {where}", made.success
+        if not won.any():
+            return [f"{words}."]
+        seconds = float(np.median(made.actions[won])) * run.spec.period
+        off = np.abs(made.angle_end - made.goal)[won].max(axis=1).mean() / run.spec.counts_per_degree
+        return [f"{words}, half of them within {seconds:.2f} s, and is {off:.1f}° off on average when it does."]
+    return []
+
+
 def reached_words(run: RunData) -> list[str]:
     """Return how an agent reaches goals, in the thesis' measure, as sentences."""
     text = []
     if run.test is not None and run.test.n:
         text.append(
-            f"In the simulation the controller reaches {run.test.success.mean():.2%} of its goals "
-            "with a mean reward of "
-            f"{written(run.test.reward.mean(), '{:.2f}')}."
+            f"In the simulation the controller reaches {run.test.success.mean():.1%} of its goals with a mean reward "
+            f"of {written(run.test.reward.mean(), '{:.2f}')}."
         )
     if run.transfer is not None:
         parts = [
@@ -143,13 +173,14 @@ def reached_words(run: RunData) -> list[str]:
 
 def overview(run: RunData) -> Section:
     """Return the ledger and the comparison with the thesis."""
-    bound, text = run.results.get("bound", {}), []
+    bound, reached = run.results.get("bound", {}), reached_words(run)
+    text = [" ".join(reached)] if reached else []
     if moving_words(run.results):
-        text = [
+        text.insert(
+            0,
             "What follows is the thesis' measure: a goal is reached once it is touched slowly enough, and each "
             "change of valves costs 8 of the reward. This agent stays at goals instead, and does not save changes.",
-            " ".join(reached_words(run)),
-        ]
+        )
     text += [
         "The first table is what counts: how well the controller moves in the simulation it was trained in, on the "
         "arm as it arrives there, and after it went on learning on the arm. The last table puts our figures beside "
@@ -212,8 +243,8 @@ def classifications(data: QualityData, joint: int, spec: ArmSpec) -> list[Classi
     else:
         acted = Classification("command of muscle 1 [-]", command[:, 0])
     return [
-        Classification(velocity.in_counts(), data.observation[:, joint, 1]),
-        Classification(angle.in_counts(), data.observation[:, joint, 0]),
+        Classification(velocity.in_units(), velocity.per_count * data.observation[:, joint, 1]),
+        Classification(angle.in_units(), spec.degrees(data.observation[:, joint, 0])),
         acted,
         _times(data.time),
     ]
@@ -225,30 +256,58 @@ def _times(time: NDArray[np.float64]) -> Classification:
     return Classification("time since the begin [min]", time / 60)
 
 
+def predicted_words(data: QualityData, spec: ArmSpec) -> list[str]:
+    """Return how exactly the simulation predicts the angle, soon and later, as sentences."""
+    moved, off = (
+        float(np.sqrt(np.mean(change[:, :, 0] ** 2))) / spec.counts_per_degree
+        for change in (data.target - data.observation, data.predicted - data.target)
+    )
+    text = (
+        f"In {1e3 * spec.period:.0f} ms the arm turns by {moved:.2f}°, root mean square, and the simulation is off "
+        f"by {off:.2f}°, {off / moved if moved else 0:.0%} of that"
+    )
+    if len(data.propagation):
+        later = np.sqrt(np.mean(data.propagation[-1, :, 0] ** 2)) / spec.counts_per_degree
+        seconds = len(data.propagation) * spec.period
+        text += f"; going on from its own predictions it is off by {later:.1f}° after {seconds:.2g} s"
+    return [f"{text}. All of this is on recordings that it was not fitted to."]
+
+
+def one_step(data: QualityData, spec: ArmSpec) -> Section:
+    """Return the recorded arm beside what was predicted of it a step before, as a picture that plays."""
+    shown = slice(IN_A_ROW)
+    observed, simulated = (one[shown, :, 0].astype(np.float64) for one in (data.target, data.predicted))
+    time = spec.period * np.arange(len(observed), dtype=np.float64)
+    caption = "The recorded arm, and broad behind it where the simulation said one reading before that it would be."
+    return Section(
+        "How it moved", (), [playing(time, observed, simulated, spec, caption, dashed="predicted")], opens=True
+    )
+
+
 def predicted(data: QualityData, spec: ArmSpec) -> Section:
     """Return residues and isoplots."""
     joints = data.observation.shape[1]
-    error = data.predicted - data.target
+    error = (data.predicted - data.target)[:, :, 0] / spec.counts_per_degree
     real, simulated = data.target - data.observation, data.predicted - data.observation
     pictures = [
         Picture(
             figures.residue(data.target[:, :, 0], data.predicted[:, :, 0], spec),
             "Observed and simulated angle of successive transitions and the residue between them "
             "(thesis figure 3.1).",
-            figures.residue_alt(data.target[:, :, 0], data.predicted[:, :, 0]),
+            figures.residue_alt(data.target[:, :, 0], data.predicted[:, :, 0], spec),
         )
     ]
     for joint in range(joints):
         classes = classifications(data, joint, spec)
         pictures.append(
             Picture(
-                figures.residue_by_class(error[:, joint, 0], classes),
+                figures.residue_by_class(error[:, joint], classes),
                 f"Residue of the angle{of_joint(joint, joints)} against classes of the transitions "
                 "(thesis figure 3.2): "
                 "points are transitions, squares and bars are mean and standard deviation in a class. A trend of the "
                 "means is a bias, a trend of the bars shows where the simulation is unsure. Valves: + in, 0 closed, "
                 "−\u00a0out.",
-                figures.residue_by_class_alt(error[:, joint, 0], classes),
+                figures.residue_by_class_alt(error[:, joint], classes),
             )
         )
     caption = (
@@ -265,7 +324,7 @@ def predicted(data: QualityData, spec: ArmSpec) -> Section:
         ),
     ]
     return Section(
-        "Residues and isoplots of the simulation",
+        "How well the simulation predicts one step",
         (
             f"The simulation's prediction one step ahead, on {len(error):,} transitions of sequences that it was not "
             "fitted to (thesis section 3.3).",
@@ -299,27 +358,29 @@ def propagated(data: QualityData, spec: ArmSpec, figures_found: Mapping[str, Any
             )
         )
     return Section(
-        "Error propagation",
+        "How errors grow over many steps",
         (
             "Small errors add up over a movement. Above the dashed line errors of successive steps are alike and add "
             "up faster than chance; below it the arm's own dynamics pull the simulation back.",
-            *_invalid(figures_found),
+            *_invalid(figures_found, spec),
         ),
         pictures,
     )
 
 
-def _invalid(found: Mapping[str, Any]) -> list[str]:
+def _invalid(found: Mapping[str, Any], spec: ArmSpec) -> list[str]:
     if "invalid" not in found or "propagation" not in found:
         return []
     invalid, spread = found["invalid"], found["propagation"]
-    before, remedied = (np.atleast_1d(spread[name]["angle"]) for name in ("measured", "resynchronised"))
-    errors = " and ".join(f"from {a:.1f} to {b:.1f}" for a, b in zip(before, remedied, strict=True))
+    before, remedied = (
+        np.atleast_1d(spread[name]["angle"]) / spec.counts_per_degree for name in ("measured", "resynchronised")
+    )
+    errors = " and ".join(f"from {a:.2f}° to {b:.2f}°" for a, b in zip(before, remedied, strict=True))
     return [
         f"After {spread['steps']} simulated steps {invalid['simulated']:.1%} of the states lie in cells of the "
         f"filter's grid that hold no data, and {invalid['recorded']:.1%} of the recorded ones do. Replacing the "
         f"state by the most similar one of the database every ten steps changes the angle's error then {errors} "
-        "counts (invalid predictions and their remedy, thesis section 3.4)."
+        "(invalid predictions and their remedy, thesis section 3.4)."
     ]
 
 
@@ -334,20 +395,33 @@ def trained(data: TrainingData, spec: ArmSpec) -> Section:
             "Shaping lets begin states lie farther from the goal as the agent meets its criterion (thesis section "
             "4.3.2)."
         )
+    priced = PRICE in data.columns
+    learned = "How the agents learned; exploring they earn less than tested (over deviations: thesis figure 4.3)."
+    validated = "Validation of all agents, ordered by reward (the spread over runs: thesis tables 5.5 and 5.7)."
+    if priced:
+        text.append(
+            "A movement has a price here, for errors, changes of valves and slack muscles, in place of the thesis' "
+            "reward; less is better. These simulated movements are harder than those on the arm: they begin wherever "
+            "the movement before left the arm, and most follow a reference that jumps or moves. So fewer of them end "
+            "within tolerance than goals are settled at on the arm."
+        )
+        learned = "How the agents learned (prices: no figure in the thesis)."
+        validated = "Validation of all agents, cheapest first (the spread over runs: thesis tables 5.5 and 5.7)."
     pictures = []
     if len(data.columns) > 1:
         pictures.append(
             Picture(
                 figures.training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec),
-                "How the agents learned; exploring they earn less than tested (over deviations: thesis figure 4.3).",
-                figures.training_curves_alt(data.curves, data.columns, data.evaluated, data.chosen),
+                learned,
+                figures.training_curves_alt(data.curves, data.columns, data.evaluated, data.chosen, spec),
             )
         )
+    numbers = (data.reward, data.success, data.chosen)
     pictures.append(
         Picture(
-            figures.spread_of_agents(data.reward, data.success, data.chosen),
-            "Validation of all agents, ordered by reward (the spread over runs: thesis tables 5.5 and 5.7).",
-            figures.spread_of_agents_alt(data.reward, data.success, data.chosen),
+            figures.spread_of_agents(*numbers, priced=priced),
+            validated,
+            figures.spread_of_agents_alt(*numbers, priced=priced),
         )
     )
     return Section("Training in the simulation", text, pictures)

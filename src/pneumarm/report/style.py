@@ -136,16 +136,10 @@ class Quantity:
 
     name: str
     symbol: str
-    counts: str
-    """Unit as stored."""
     unit: str
     """Unit for people."""
     per_count: float
     """How many of the unit for people one stored unit is."""
-
-    def in_counts(self, prefix: str = "") -> str:
-        """Return an axis label in stored units."""
-        return f"{prefix}{self.name} [{self.counts}]"
 
     def in_units(self, prefix: str = "") -> str:
         """Return an axis label in units for people."""
@@ -156,31 +150,16 @@ def quantities(spec: ArmSpec) -> tuple[Quantity, ...]:
     """Return angle, velocity, pressure 1 and pressure 2 for the sensors of ``spec``."""
     angle, pressure = 1 / spec.counts_per_degree, 1 / spec.counts_per_bar
     return (
-        Quantity("angle", r"\theta", "counts", "°", angle),
-        Quantity("velocity", r"\omega", "counts/ms", "°/s", 1e3 * angle),
-        Quantity(f"{spec.pressure_word} 1", r"p_1", "counts", "bar", pressure),
-        Quantity(f"{spec.pressure_word} 2", r"p_2", "counts", "bar", pressure),
+        Quantity("angle", r"\theta", "°", angle),
+        Quantity("velocity", r"\omega", "°/s", 1e3 * angle),
+        Quantity(f"{spec.pressure_word} 1", r"p_1", "bar", pressure),
+        Quantity(f"{spec.pressure_word} 2", r"p_2", "bar", pressure),
     )
 
 
 def of_joint(joint: int, joints: int) -> str:
     """Return " of joint 2" where there is more than one, else nothing."""
     return f" of joint {joint + 1}" if joints > 1 else ""
-
-
-def second_unit(axes: Axes, label: str, per_unit: float, side: str = "right") -> None:
-    """Add a second scale to ``axes``: ``per_unit`` of its unit for each unit of the first."""
-
-    def forward(value: Any) -> Any:
-        return np.asarray(value) * per_unit
-
-    def back(value: Any) -> Any:
-        return np.asarray(value) / per_unit
-
-    if side == "right":
-        axes.secondary_yaxis("right", functions=(forward, back)).set_ylabel(label)
-    else:
-        axes.secondary_xaxis("top", functions=(forward, back)).set_xlabel(label)
 
 
 def scatter(axes: Axes, x: Any, y: Any, **options: Any) -> None:

@@ -15,7 +15,6 @@ from pneumarm.report.style import (
     of_joint,
     panels,
     scatter,
-    second_unit,
     styled,
     whole_ticks,
 )
@@ -52,7 +51,6 @@ def against_displacement(distance: Array, actions: Array, switches: Array, spec:
             place.set_xlim(0)
             place.set_ylim(min(0, float((y + jitter).min())))
             whole_ticks(place, "y")
-            second_unit(place, "[counts]", spec.counts_per_degree, side="top")
             place.legend([key(MIDDLE, marker="s", mec=INK, mew=0.5)], ["running median"], loc="upper left")
     return figure
 

@@ -43,9 +43,9 @@ def isoplot(observed: Array, simulated: Array, spec: ArmSpec, *, density: bool =
     for joint in range(joints):
         places = axes[2 * joint : 2 * joint + 2].flat
         for i, (place, kind) in enumerate(zip(places, quantities(spec), strict=True)):
-            x, y = observed[:, joint, i], simulated[:, joint, i]
-            place.set_xlabel(f"observed change of {kind.in_counts()}")
-            place.set_ylabel(f"simulated change [{kind.counts}]")
+            x, y = (kind.per_count * change[:, joint, i] for change in (observed, simulated))
+            place.set_xlabel(f"observed change of {kind.in_units()}")
+            place.set_ylabel(f"simulated change [{kind.unit}]")
             if len(x) == 0:
                 nothing(place, "no transitions")
                 continue
@@ -81,9 +81,9 @@ def isoplot_alt(observed: Array, simulated: Array, spec: ArmSpec) -> str:
     parts = []
     for joint in range(observed.shape[1]):
         for i, kind in enumerate(quantities(spec)):
-            x, y = observed[:, joint, i], simulated[:, joint, i]
+            x, y = (kind.per_count * change[:, joint, i] for change in (observed, simulated))
             parts.append(
                 f"{kind.name}{of_joint(joint, observed.shape[1])}: slope {slope(x, y):.3f}, standard deviation about "
-                f"the 45 degree line {(y - x).std():.2f} {kind.counts}"
+                f"the 45 degree line {(y - x).std():.2g} {kind.unit}"
             )
     return f"Simulated against observed change of {len(observed):,} transitions. " + "; ".join(parts) + "."

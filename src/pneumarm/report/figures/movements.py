@@ -35,7 +35,9 @@ def movement(
         above, middle, below = axes[:, joint]
         above.set_ylabel(f"angle{of_joint(joint, joints)} [°]")
         low, high = spec.degrees(goal[joint] + GOAL_TOLERANCE * np.array([-1, 1]))
-        above.axhspan(low, high, color=LIGHT, alpha=0.5, lw=0, label="goal ± 25 counts")
+        above.axhspan(
+            low, high, color=LIGHT, alpha=0.5, lw=0, label=f"goal ± {GOAL_TOLERANCE / spec.counts_per_degree:.1f}°"
+        )
         above.plot(t, spec.degrees(angle[:, joint]), color=DARK, marker=".", ms=4, label="angle")
         for muscle, (color, style) in enumerate(((DARK, "-"), (MIDDLE, "--"))):
             middle.plot(t, spec.bar(pressure[:, joint, muscle]), style, color=color, label=f"muscle {muscle + 1}")

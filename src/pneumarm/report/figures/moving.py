@@ -1,5 +1,6 @@
 """An arm that moves by itself, as recorded, with the angle that was asked for beside it: a picture that plays."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -10,24 +11,54 @@ from pneumarm.report.style import DARK, INK, LIGHT, MIDDLE
 
 Array = NDArray[np.float64]
 
-_WIDTH, _HEIGHT = 720, 300
-_PIVOT, _LINK = (130, 70), 150  # of the arm, all links together
-_LEFT, _RIGHT, _TOP, _BOTTOM = 320, 700, 30, 250  # of the curve
-_NAMES = 52  # beside the curves, for the names of several joints
-_APART = 16.0  # of two names
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where things are in the picture."""
+
+    width: int
+    height: int
+    pivot: tuple[int, int]
+    link: int
+    """Of the arm, all links together."""
+    left: int
+    """Of the curve, as are the next three."""
+    right: int
+    top: int
+    bottom: int
+
+
+_WIDE = _Layout(720, 300, pivot=(130, 70), link=150, left=320, right=700, top=30, bottom=250)
+_NARROW = _Layout(360, 410, pivot=(180, 30), link=135, left=42, right=350, top=200, bottom=360)
+_NAMES = 56  # beside the curves, for the names of several joints
+_APART = 18.0  # of two names
 _FRAMES_A_SECOND = 15
+_COLORS = {
+    "paper": ("fill", "#ffffff", "#0f1418"),
+    "words": ("fill", INK, "#e7ebee"),
+    "ink": ("stroke", INK, "#e7ebee"),
+    "arm": ("stroke", DARK, "#7fbfee"),
+    "asked": ("stroke", MIDDLE, "#ff9560"),
+    "goal": ("stroke", LIGHT, "#7a6128"),
+}
+"""What has a color: whether lines or areas have it, and what it is on light and on dark screens."""
 
 
-def moving_arm(time: Array, angle: Array, wanted: Array | None, spec: ArmSpec) -> str:
-    """Return an SVG that plays the record for ever.
+def moving_arm(
+    time: Array, angle: Array, wanted: Array | None, spec: ArmSpec, *, dashed: str = "asked for", narrow: bool = False
+) -> str:
+    """Return an SVG that plays the record for ever, in light or dark as the screen is.
 
     Args:
         time: of the readings, shape (n,) [s].
         angle: shape (n, joints) [counts].
         wanted: what was asked for, shape (n, joints) [counts]; None where nothing was.
         spec: the arm, for units.
+        dashed: what ``wanted`` is.
+        narrow: draw the arm above the curve, for the width of a phone.
 
     """
+    at = _NARROW if narrow else _WIDE
     known = wanted is not None and bool(np.isfinite(wanted).all())
     asked = wanted if wanted is not None and known else angle
     seconds = float(time[-1] - time[0])
@@ -38,47 +69,57 @@ def moving_arm(time: Array, angle: Array, wanted: Array | None, spec: ArmSpec) -
     )
     low, high = min(degrees.min(), goals.min()) - 3, max(degrees.max(), goals.max()) + 3
     joints = degrees.shape[1]
-    right = _RIGHT if joints == 1 else _RIGHT - _NAMES
-    x = _LEFT + (right - _LEFT) * grid / seconds
+    right = at.right if joints == 1 else at.right - _NAMES
+    x = at.left + (right - at.left) * grid / seconds
 
     def height(values: Array) -> Array:
-        return _BOTTOM - (_BOTTOM - _TOP) * (values - low) / (high - low)
+        return at.bottom - (at.bottom - at.top) * (values - low) / (high - low)
 
     def line(values: Array, style: str) -> str:
         points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, height(values), strict=True))
-        return f'<polyline points="{points}" fill="none" {style}/>'
+        return f'<polyline points="{points}" fill="none" stroke-width="2" {style}/>'
 
     curves = "".join(
-        (line(goals[:, j], f'stroke="{MIDDLE}" stroke-width="2" stroke-dasharray="6 4"') if known else "")
-        + line(degrees[:, j], f'stroke="{DARK}" stroke-width="2"')
+        (line(goals[:, j], 'class="asked" stroke-dasharray="6 4"') if known else "")
+        + line(degrees[:, j], 'class="arm"')
         for j in range(joints)
     )
     cursor = _animated("x1", x, seconds) + _animated("x2", x, seconds)
     ticks = "".join(
-        f'<text x="{_LEFT - 8}" y="{height(tick) + 4:.1f}" text-anchor="end">{f"{tick:g}°".replace("-", "−")}</text>'
+        f'<text x="{at.left - 6}" y="{height(tick) + 4:.1f}" text-anchor="end">{tick:g}°</text>'.replace(">-", ">−")
         for tick in np.array(_ticks(low, high))
     )
     names = "".join(
         f'<text x="{right + 8}" y="{y + 4:.1f}">joint {joint + 1}</text>'
         for joint, y in enumerate(_spread(height(degrees[-1])) if joints > 1 else ())
     )
+    links = _links(goals, seconds, at, 'class="goal" stroke-width="14"') if known else ""
+    links += _links(degrees, seconds, at, 'class="arm" stroke-width="7"')
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" '
-        f'height="{_HEIGHT}" font-family="sans-serif" font-size="13" fill="{INK}">'
-        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="white"/>'
-        f'<path d="M{_PIVOT[0] - 60} {_PIVOT[1] - 8}h120" stroke="{INK}" stroke-width="3"/>'
-        f"{_links(goals, seconds, f'stroke={chr(34)}{LIGHT}{chr(34)} stroke-width={chr(34)}14{chr(34)}')}"
-        f"{_links(degrees, seconds, f'stroke={chr(34)}{DARK}{chr(34)} stroke-width={chr(34)}7{chr(34)}')}"
-        f'<path d="M{_LEFT} {_TOP}V{_BOTTOM}H{right}" fill="none" stroke="{INK}"/>{ticks}{curves}{names}'
-        f'<line y1="{_TOP}" y2="{_BOTTOM}" stroke="{INK}">{cursor}</line>'
-        f'<text x="{right}" y="{_BOTTOM + 18}" text-anchor="end">{seconds:.0f} s</text>'
-        f'<text x="{_LEFT}" y="{_BOTTOM + 36}">{"dashed: asked for; solid: the arm" if known else ""}</text></svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="pneumarm" viewBox="0 0 {at.width} {at.height}" '
+        f'width="{at.width}" height="{at.height}" font-family="sans-serif" font-size="14">{_style()}'
+        f'<rect class="paper" width="{at.width}" height="{at.height}"/><g class="words">'
+        f'<path class="ink" d="M{at.pivot[0] - 60} {at.pivot[1] - 8}h120" stroke-width="3"/>{links}'
+        f'<path class="ink" d="M{at.left} {at.top}V{at.bottom}H{right}" fill="none"/>{ticks}{curves}{names}'
+        f'<line class="ink" y1="{at.top}" y2="{at.bottom}">{cursor}</line>'
+        f'<text x="{right}" y="{at.bottom + 18}" text-anchor="end">{seconds:.0f} s</text>'
+        f'<text x="{at.left}" y="{at.bottom + 36}">{f"dashed: {dashed}; solid: the arm" if known else ""}</text>'
+        "</g></svg>"
     )
 
 
-def _links(degrees: Array, seconds: float, style: str) -> str:
+def _style() -> str:
+    """Return the colors as a style sheet; it names the picture, because in a notebook it reaches the whole page."""
+    light, dark = (
+        "".join(f".pneumarm .{name}{{{kind}:{shades[i]}}}" for name, (kind, *shades) in _COLORS.items())
+        for i in (0, 1)
+    )
+    return f"<style>{light}@media screen and (prefers-color-scheme:dark){{{dark}}}</style>"
+
+
+def _links(degrees: Array, seconds: float, at: _Layout, style: str) -> str:
     """Return a chain of links that turn about their joints, 0 degrees hanging down."""
-    joints, length = degrees.shape[1], _LINK / degrees.shape[1]
+    joints, length = degrees.shape[1], at.link / degrees.shape[1]
     inner = ""
     for joint in reversed(range(joints)):
         turns = ";".join(f"{-value:.2f}" for value in degrees[:, joint])
@@ -89,7 +130,7 @@ def _links(degrees: Array, seconds: float, style: str) -> str:
         link = f'<path d="M0 0V{length:.1f}" {style} stroke-linecap="round"/>'
         end = f'<g transform="translate(0 {length:.1f})">{inner}</g>' if inner else ""
         inner = f"<g>{turning}{link}{end}</g>"
-    return f'<g transform="translate({_PIVOT[0]} {_PIVOT[1]})">{inner}</g>'
+    return f'<g transform="translate({at.pivot[0]} {at.pivot[1]})">{inner}</g>'
 
 
 def _spread(heights: Array) -> Array:
@@ -110,10 +151,16 @@ def _ticks(low: float, high: float) -> list[float]:
     return [float(tick) for tick in np.arange(np.ceil(low / step) * step, high, step)]
 
 
-def moving_arm_alt(time: Array, angle: Array, wanted: Array, spec: ArmSpec) -> str:
+def moving_arm_alt(
+    time: Array, angle: Array, wanted: Array | None, spec: ArmSpec, *, dashed: str = "asked for"
+) -> str:
     """Return in words what the picture shows."""
-    off = np.abs(spec.degrees(angle) - spec.degrees(wanted))
-    return (
-        f"{time[-1] - time[0]:.0f} seconds of movement; the arm is within 1 degree of what is asked for in "
-        f"{(off <= 1).all(axis=1).mean():.0%} of the time."
-    )
+    degrees = spec.degrees(angle)
+    words = (
+        f"{time[-1] - time[0]:.0f} seconds of movement between {degrees.min():.0f} and {degrees.max():.0f} degrees"
+    ).replace("-", "−")
+    if wanted is None:
+        return f"{words}."
+    off = np.abs(degrees - spec.degrees(wanted))
+    share = (off <= 1).all(axis=1).mean()
+    return f"{words}; the arm is within 1 degree of what is {dashed} in {share:.0%} of the time."

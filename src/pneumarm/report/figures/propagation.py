@@ -13,7 +13,6 @@ from pneumarm.report.style import (
     of_joint,
     panels,
     quantities,
-    second_unit,
     styled,
 )
 
@@ -37,16 +36,15 @@ def error_propagation(measured: Array, spec: ArmSpec) -> Figure:
         places = axes[2 * joint : 2 * joint + 2].flat
         for i, (place, kind) in enumerate(zip(places, quantities(spec), strict=True)):
             place.set_title(kind.name + of_joint(joint, joints))
-            place.set_ylabel(f"std of error [{kind.counts}]")
+            place.set_ylabel(f"std of error [{kind.unit}]")
             if steps == 0:
                 nothing(place, "not measured")
                 continue
-            found = place.plot(k, measured[:, joint, i], "o-", color=DARK, ms=3)[0]
-            expected = place.plot(k, expectation(measured)[:, joint, i], "--", color=MIDDLE)[0]
+            found = place.plot(k, kind.per_count * measured[:, joint, i], "o-", color=DARK, ms=3)[0]
+            expected = place.plot(k, kind.per_count * expectation(measured)[:, joint, i], "--", color=MIDDLE)[0]
             handles = [found, expected]
             place.set_ylim(0)
             place.set_xlim(0, steps + 0.5)
-            second_unit(place, f"[{kind.unit}]", kind.per_count)
     for place in axes[-1]:
         place.set_xlabel(f"steps simulated freely [-], {1e3 * spec.period:.3g} ms each")
     if handles:
@@ -68,8 +66,8 @@ def error_propagation_alt(measured: Array, spec: ArmSpec) -> str:
     expected = expectation(measured)
     joints = measured.shape[1]
     parts = [
-        f"{kind.name}{of_joint(j, joints)} {measured[-1, j, i]:.3g} measured, {expected[-1, j, i]:.3g} expected "
-        f"{kind.counts}"
+        f"{kind.name}{of_joint(j, joints)} {kind.per_count * measured[-1, j, i]:.3g} {kind.unit} measured, "
+        f"{kind.per_count * expected[-1, j, i]:.3g} {kind.unit} expected"
         for j in range(joints)
         for i, kind in enumerate(quantities(spec))
     ]

@@ -17,16 +17,15 @@ from pneumarm.report.style import (
     nothing,
     of_joint,
     panels,
-    quantities,
     scatter,
-    second_unit,
     styled,
 )
 from pneumarm.statistics import Bins, binned, by_group
 
 Array = NDArray[np.float64]
 
-_SHOWN = 200  # transitions of figure 3.1: one sequence of the thesis
+IN_A_ROW = 200
+"""Transitions that are drawn one after the other (thesis figure 3.1: a sequence)."""
 
 
 @styled
@@ -41,35 +40,33 @@ def residue(observed: Array, simulated: Array, spec: ArmSpec) -> Figure:
     """
     joints = observed.shape[1]
     figure, axes = panels(2, joints, 3.9, sharex=True, height_ratios=(3, 2))
-    angle = quantities(spec)[0]
     for joint in range(joints):
-        o, s = observed[:_SHOWN, joint], simulated[:_SHOWN, joint]
+        o, s = (spec.degrees(angle[:IN_A_ROW, joint]) for angle in (observed, simulated))
         k = np.arange(len(o))
         above, below = axes[:, joint]
         seen = above.plot(k, o, "o", color=DARK, ms=3)[0]
         told = above.plot(k, s, color=MIDDLE, lw=1)[0]
-        above.set_ylabel(angle.in_counts() + of_joint(joint, joints))
+        above.set_ylabel(f"angle{of_joint(joint, joints)} [°]")
         below.vlines(k, 0, s - o, color=INK, lw=0.9)
         below.axhline(0, color=INK, lw=0.7)
-        below.set_ylabel("residue [counts]")
+        below.set_ylabel("residue [°]")
         below.set_xlabel("transition k [-]")
-        second_unit(below, "residue [°]", angle.per_count)
         if len(o) == 0:
             nothing(above, "no transitions")
     legend_below(figure, [seen, told], ["observed", "simulated"])
     return figure
 
 
-def residue_alt(observed: Array, simulated: Array) -> str:
+def residue_alt(observed: Array, simulated: Array, spec: ArmSpec) -> str:
     """Say in words what :func:`residue` shows."""
     if len(observed) == 0:
         return "There are no transitions to compare."
-    shown = min(len(observed), _SHOWN)
-    error = (simulated - observed)[:_SHOWN]
+    shown = min(len(observed), IN_A_ROW)
+    error = (simulated - observed)[:IN_A_ROW] / spec.counts_per_degree
     return (
         f"Observed and simulated angle of {shown} transitions, and their difference below: its mean is "
-        f"{error.mean():.2f} counts, its standard deviation {error.std():.2f} counts, the largest "
-        f"{np.abs(error).max():.1f} counts."
+        f"{error.mean():.2f}°, its standard deviation {error.std():.2f}°, the largest "
+        f"{np.abs(error).max():.1f}°."
     )
 
 
@@ -90,13 +87,12 @@ class Classification:
 
 
 @styled
-def residue_by_class(residue: Array, classes: Sequence[Classification], unit: str = "counts") -> Figure:
+def residue_by_class(residue: Array, classes: Sequence[Classification]) -> Figure:
     """Draw the residue against every classification, with mean and standard deviation in each class.
 
     Args:
-        residue: sim_{k+1} - o_{k+1} (eq. 3.2) of one quantity, shape (n,).
+        residue: sim_{k+1} - o_{k+1} (eq. 3.2) of the angle, shape (n,) [degrees].
         classes: what the transitions are classified by.
-        unit: the residue's unit.
 
     """
     rows = -(-len(classes) // 2)
@@ -104,7 +100,7 @@ def residue_by_class(residue: Array, classes: Sequence[Classification], unit: st
     limit = 1.05 * float(np.percentile(np.abs(residue), 99.8)) if len(residue) else 1.0
     for place, kind in zip(axes.flat, classes, strict=False):
         place.set_xlabel(kind.label)
-        place.set_ylabel(f"residue [{unit}]")
+        place.set_ylabel("residue [°]")
         place.set_ylim(-limit or -1, limit or 1)
         if len(residue) == 0:
             nothing(place, "no transitions")
@@ -126,7 +122,7 @@ def residue_by_class(residue: Array, classes: Sequence[Classification], unit: st
     return figure
 
 
-def residue_by_class_alt(residue: Array, classes: Sequence[Classification], unit: str = "counts") -> str:
+def residue_by_class_alt(residue: Array, classes: Sequence[Classification]) -> str:
     """Say in words what :func:`residue_by_class` shows: the trend in every classification."""
     if len(residue) == 0:
         return "There are no transitions to classify."
@@ -137,9 +133,9 @@ def residue_by_class_alt(residue: Array, classes: Sequence[Classification], unit
             continue
         least, most = int(np.argmin(stats.std)), int(np.argmax(stats.std))
         sentences.append(
-            f"By {kind.label}: class means from {stats.mean.min():.2f} to {stats.mean.max():.2f} {unit}, standard "
-            f"deviation from {stats.std[least]:.2f} (at {_at(kind, stats, least)}) to {stats.std[most]:.2f} "
-            f"(at {_at(kind, stats, most)}) {unit}."
+            f"By {kind.label}: class means from {stats.mean.min():.2f} to {stats.mean.max():.2f}°, standard "
+            f"deviation from {stats.std[least]:.2f}° (at {_at(kind, stats, least)}) to {stats.std[most]:.2f}° "
+            f"(at {_at(kind, stats, most)})."
         )
     return f"Residue of {len(residue):,} transitions, with mean and standard deviation a class. " + " ".join(
         sentences

@@ -18,7 +18,6 @@ from pneumarm.report.style import (
     legend_below,
     nothing,
     panels,
-    second_unit,
     styled,
     whole_ticks,
 )
@@ -27,13 +26,16 @@ Array = NDArray[np.float64]
 
 
 EPISODES, CRITERION, DEVIATION = "episodes", "criterion", "deviation"
-LABELS = {
-    DEVIATION: ("deviation [counts]", 1.0),
+PRICE = "price"
+_LABELS = {
+    DEVIATION: ("deviation [°]", 1.0),
     "performance": ("performance p(k) [-]", 1.0),
     "epsilon": ("exploring share ε [-]", 1.0),
     "temperature": ("temperature T [-]", 1.0),
     "reward": ("reward an episode, exploring [-]", 1.0),
     "success": ("success, exploring [%]", 100.0),
+    PRICE: ("price of a control period [-]", 1.0),
+    "settled": ("within tolerance at the end [%]", 100.0),
 }
 """Labels of curves by the name of their column, and what values are multiplied by; others are called as they are."""
 _WORST = 100.0  # of rewards, below the best: the very first ones wander about
@@ -60,7 +62,7 @@ def training_curves(
         place.set_visible(False)
     of = {name: (place, curves[:, :, columns.index(name)]) for name, place in zip(drawn, axes.flat, strict=False)}
     for name, (place, values) in of.items():
-        label, factor = LABELS.get(name, (f"{name} [-]", 1.0))
+        label, factor = _label(name, spec)
         place.set_ylabel(label)
         for agent in [*(a for a in range(agents) if a != chosen), *([chosen] if agents else [])]:
             upto = slice(int(evaluated[agent]))
@@ -76,35 +78,43 @@ def training_curves(
         handles.insert(1, key(MIDDLE, "--"))
         words.insert(1, "its criterion")
     if evaluated.any():
-        if DEVIATION in of:
-            second_unit(of[DEVIATION][0], "deviation [°]", 1 / spec.counts_per_degree)
         legend_below(figure, handles, words)
-    _limit(of, evaluated)
+    _limit(of, evaluated, spec)
     for place in axes[-1]:
         place.set_xlabel("episodes [thousands]")
     return figure
 
 
-def _limit(of: Mapping[str, tuple[Any, Array]], evaluated: NDArray[np.int64]) -> None:
+def _label(name: str, spec: ArmSpec) -> tuple[str, float]:
+    """Return the label of a column's axis and what its values are multiplied by."""
+    label, factor = _LABELS.get(name, (f"{name} [-]", 1.0))
+    return label, factor / spec.counts_per_degree if name == DEVIATION else factor
+
+
+def _limit(of: Mapping[str, tuple[Any, Array]], evaluated: NDArray[np.int64], spec: ArmSpec) -> None:
     """Let axes begin at 0, but for rewards."""
     for name, (place, values) in of.items():
         place.set_xlim(0)
         known = np.concatenate([values[agent, : int(rows)] for agent, rows in enumerate(evaluated)] or [np.zeros(0)])
         if name != "reward" and (known >= 0).all():
-            place.set_ylim(0, 1.05 * float(known.max(initial=0.0)) * LABELS.get(name, ("", 1.0))[1] or None)
+            place.set_ylim(0, 1.05 * float(known.max(initial=0.0)) * _label(name, spec)[1] or None)
         elif name == "reward" and known.size:
             best = float(known.max())
             place.set_ylim(max(float(known.min()), best - _WORST), best + 5)
 
 
-def training_curves_alt(curves: Array, columns: Sequence[str], evaluated: NDArray[np.int64], chosen: int) -> str:
+def training_curves_alt(
+    curves: Array, columns: Sequence[str], evaluated: NDArray[np.int64], chosen: int, spec: ArmSpec
+) -> str:
     """Say in words what :func:`training_curves` shows."""
     if len(evaluated) == 0 or evaluated[chosen] == 0:
         return "No agent was trained."
     mine = curves[chosen, : int(evaluated[chosen])]
-    told = [
-        f"{name} from {a:.4g} to {b:.4g}" for name, a, b in zip(columns[1:], mine[0, 1:], mine[-1, 1:], strict=True)
-    ]
+    told = []
+    for name, first, last in zip(columns[1:], mine[0, 1:], mine[-1, 1:], strict=True):
+        label, factor = _label(name, spec)
+        words, unit = label.removesuffix("]").split(" [")
+        told.append(f"{words} from {factor * first:.4g} to {factor * last:.4g}{'' if unit == '-' else f' {unit}'}")
     return (
         f"Learning of {len(evaluated)} agents. The chosen one made {mine[-1, 0]:,.0f} episodes; meanwhile "
         f"{'; '.join(told)}."
@@ -112,13 +122,14 @@ def training_curves_alt(curves: Array, columns: Sequence[str], evaluated: NDArra
 
 
 @styled
-def spread_of_agents(reward: Array, success: Array, chosen: int) -> Figure:
+def spread_of_agents(reward: Array, success: Array, chosen: int, *, priced: bool = False) -> Figure:
     """Draw the validation of all agents, ordered by reward.
 
     Args:
         reward: mean reward of each agent in the validation, shape (agents,).
         success: its success rate, shape (agents,).
         chosen: index of the chosen agent.
+        priced: the reward is a price, negative, and a success is to be within the tolerance at the end.
 
     """
     figure, axes = panels(1, 2, 2.6)
@@ -126,10 +137,10 @@ def spread_of_agents(reward: Array, success: Array, chosen: int) -> Figure:
     rank = np.arange(1, len(order) + 1)
     picked = order == chosen
     for place, values, label in (
-        (axes[0, 0], reward, "reward an episode [-]"),
-        (axes[0, 1], 100 * success, "success [%]"),
+        (axes[0, 0], -reward if priced else reward, "price of a movement [-]" if priced else "reward an episode [-]"),
+        (axes[0, 1], 100 * success, "within tolerance at the end [%]" if priced else "success [%]"),
     ):
-        place.set_xlabel("agent, best reward first [-]")
+        place.set_xlabel("agent, best first [-]")
         place.set_ylabel(label)
         whole_ticks(place)
         if len(order) == 0:
@@ -149,13 +160,14 @@ def spread_of_agents(reward: Array, success: Array, chosen: int) -> Figure:
     return figure
 
 
-def spread_of_agents_alt(reward: Array, success: Array, chosen: int) -> str:
+def spread_of_agents_alt(reward: Array, success: Array, chosen: int, *, priced: bool = False) -> str:
     """Say in words what :func:`spread_of_agents` shows."""
     if len(reward) == 0:
         return "No agent was trained."
+    sign, paid, won = (-1, "price", "share that ends within tolerance") if priced else (1, "reward", "success")
+    low, middle, high = sorted(sign * np.percentile(reward, (0, 50, 100)))
     return (
-        f"Validation of {len(reward)} agents from different initial weights: reward from {reward.min():.2f} to "
-        f"{reward.max():.2f}, median {np.median(reward):.2f}; success from {success.min():.1%} to "
-        f"{success.max():.1%}. "
-        f"The chosen agent has reward {reward[chosen]:.2f} and success {success[chosen]:.1%}."
+        f"Validation of {len(reward)} agents from different initial weights: {paid} from {low:.2f} to {high:.2f}, "
+        f"median {middle:.2f}; {won} from {success.min():.1%} to {success.max():.1%}. "
+        f"The chosen agent has {paid} {sign * reward[chosen]:.2f} and {won} {success[chosen]:.1%}."
     )

@@ -12,7 +12,7 @@ from children import wait_until
 from live.browser import WIDTHS, keep, opened_browser, smallest_text, too_wide
 from live.chromium import missing
 from live.noted_arm import board, vented_after
-from live.serving import served
+from live.serving import ARM, served
 from pneumarm.live.rig import Rig
 from pneumarm.live.server import Server
 from pneumarm.run import RunSettings
@@ -20,6 +20,7 @@ from pneumarm.run import RunSettings
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 READABLE = 11.0  # px
 LIMIT = 60.0  # s
+KEYS = ("#charts .key.one", "#charts .key.two")
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +88,7 @@ def arrive(page: Page, degrees: float, within: float = 2.0) -> None:
 
 
 def angle(page: Page) -> float:
-    return float(page.locator("#angles b").inner_text().rstrip("°"))
+    return float(page.locator("#angles b").inner_text().rstrip("°").replace("\N{MINUS SIGN}", "-"))
 
 
 def comes(page: Page, what: str, is_so: Callable[[], bool]) -> None:
@@ -160,6 +161,74 @@ def test_ten_watch_while_one_moves_the_arm(browser: Browser, server: Server) -> 
             comes(watcher, "it sees the arm arrive", lambda watcher=watcher: abs(angle(watcher) - 15) < 2)  # type: ignore[misc]
             assert watcher.locator("#role").inner_text().startswith("watching")
         context.close()
+
+
+def test_muscle_1_is_on_the_side_to_which_it_pulls(browser: Browser, server: Server) -> None:
+    with page_of(browser, server) as page:
+        arrive(page, 20.0)
+        first, second = (page.locator(f"#arm .of-{muscle}") for muscle in (1, 2))
+        assert first.locator(".name").text_content() == "muscle 1"
+        parts = first.locator(".rubber"), second.locator(".rubber"), page.locator("#arm .weight").last
+        places = [one.bounding_box() for one in parts]
+        right, left, end = (box["x"] + box["width"] / 2 for box in places if box is not None)
+        assert left < right < end
+        bar = [float((one.get_by_text("bar").text_content() or "").removesuffix(" bar")) for one in (first, second)]
+        assert bar[0] > bar[1]
+        ink = [page.locator(key).evaluate("one => getComputedStyle(one, '::before').borderTopColor") for key in KEYS]
+        drawn = [one.locator(".name").evaluate("one => getComputedStyle(one).fill") for one in (first, second)]
+        assert drawn == ink
+
+
+def test_what_can_be_done_and_what_is_done_is_said(browser: Browser, server: Server) -> None:
+    with page_of(browser, server) as page:
+        assert "Drag the orange ring" in page.locator("#hint").inner_text()
+        assert page.locator("#arm .handle path").first.is_visible()
+        page.get_by_text("it needs 20 s of movement").wait_for()
+        arrive(page, -20.0, 1.0)
+        assert page.locator("#angles span").inner_text() == "goal \N{MINUS SIGN}20.0°"
+        page.get_by_text("Holding its goal").wait_for()
+        with page_of(browser, server, 400) as other:
+            other.get_by_text("You are watching").wait_for()
+            assert not other.locator("#arm .handle path").first.is_visible()
+        page.get_by_text("Sine").click()
+        page.get_by_text("Following the curve").wait_for()
+        page.get_by_text("Holding the end of the curve").wait_for()
+
+
+def test_a_page_that_hears_nothing_says_so(browser: Browser, pid: Path) -> None:
+    with served(Rig(RunSettings(arm=ARM), [str(pid)], None)) as server:
+        context = browser.new_context()
+        page = context.new_page()
+        page.add_init_script("window.WebSocket = class { readyState = 0; send() {} }; WebSocket.OPEN = 1;")
+        page.goto(server.url)
+        page.get_by_text("Waiting for the arm's first reading").wait_for()
+        assert not page.locator("#arm").is_visible()
+        context.close()
+        context = browser.new_context()
+        page = context.new_page()
+        page.goto(server.url)
+        page.get_by_text("Relaxed").wait_for()
+        assert not page.get_by_text("Waiting for").is_visible()
+        server.end()
+        page.get_by_text("this is how it was last seen").wait_for()
+        context.close()
+
+
+def test_an_arm_with_one_muscle_is_drawn_with_a_spring_also_while_it_learns(browser: Browser, tmp_path: Path) -> None:
+    settings = RunSettings(arm=f"{ARM},muscles=1", transitions=200_000)
+    with served(Rig(settings, [], tmp_path / "run")) as server, page_of(browser, server) as page:
+        assert page.locator("#arm .muscle").count() == 1
+        assert page.locator("#arm .spring").get_by_text("spring").is_visible()
+        assert page.get_by_text("muscle 2").all() == [] or not any(
+            one.is_visible() for one in page.get_by_text("muscle 2").all()
+        )
+        page.locator("#begin").click()
+        page.locator("body[data-mode=learning]").wait_for()
+        page.get_by_text("times as fast as in reality").wait_for()
+        assert not page.locator("#relax").is_enabled()
+        page.locator("#stop").click()
+        page.locator("body[data-mode=relaxed]").wait_for()
+        page.get_by_text("what was recorded so far is kept").wait_for()
 
 
 @pytest.mark.parametrize("width", WIDTHS)

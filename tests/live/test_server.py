@@ -2,7 +2,9 @@
 
 import json
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from socket import SHUT_RDWR
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -64,6 +66,23 @@ def test_one_page_moves_the_arm_and_the_others_watch(server: Server) -> None:
         told(second, "state", lambda state: state["writer"] == state["you"])
         order(first, "stop")  # whoever looks on may
         told(second, "state", lambda state: state["mode"] == "stopped")
+
+
+def test_ten_go_on_watching_when_the_page_that_moves_the_arm_is_killed(server: Server) -> None:
+    with ExitStack() as stack:
+        writer = stack.enter_context(joined(server))
+        watchers = [stack.enter_context(joined(server)) for _ in range(10)]
+        order(writer, "take")
+        told(writer, "state", lambda state: state["writer"] == state["you"])
+        order(writer, "goal", degrees=[20])
+        told(watchers[-1], "frame", lambda frame: abs(frame["angle"][0] - 20) < 2)
+        writer.socket.shutdown(SHUT_RDWR)  # nothing is said any more, not even that it ends
+        for watcher in watchers:
+            told(watcher, "state", lambda state: state["writer"] is None and state["pages"] == 10)
+        told(watchers[0], "state", lambda state: state["mode"] == "relaxed" and "gone" in state["why"])
+        order(watchers[3], "take")
+        order(watchers[3], "goal", degrees=[-10])
+        told(watchers[0], "frame", lambda frame: abs(frame["angle"][0] + 10) < 2)
 
 
 def test_nonsense_is_refused_and_harms_nobody(server: Server) -> None:

@@ -111,6 +111,14 @@ def test_a_curve_is_followed_and_its_end_held(played: Played) -> None:
     assert played.screen.state["figures"]["pid"]["curve"] < 3
 
 
+def test_a_curve_that_has_ended_is_no_longer_followed(played: Played) -> None:
+    curve = Draw([0.0, 1.0], [[10.0], [10.0]])
+    played.run((0.1, curve), (3.0, lambda: None), (4.0, Goal([-10.0])), until=7.0)
+    assert [mode for _, mode, _ in played.modes] == ["following", "holding", "moving"]
+    assert played.arm.at(3.9) == pytest.approx(10, abs=2)
+    assert played.arm.at(6.9) == pytest.approx(-10, abs=2)
+
+
 def test_a_stop_vents_and_stays_until_it_is_released(played: Played) -> None:
     played.run(
         (0.1, Goal([15.0])), (3.0, Stop()), (4.0, Goal([0.0])), (5.0, Release()), (6.0, Goal([0.0])), until=9.0
@@ -147,6 +155,9 @@ def test_a_fault_is_switched_on_found_and_switched_off(played: Played) -> None:
     played.run(*goals, (25.05, on), (48.0, off), until=51.0)  # after 20 s it knows the arm
     kinds = {one.kind for one in played.session._watch.findings if one.since > 24}
     assert "stuck-valve" in kinds
+    told = [words for words, _, _ in played.screen.state["was_wrong"] + played.screen.state["wrong"]]
+    assert "Muscle 1: the inlet is stuck closed" in told
+    assert played.screen.state["familiar"]
     assert played.virtual.faults == ()
 
 

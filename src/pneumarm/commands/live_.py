@@ -13,6 +13,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.live.learning import TRANSFER, TRANSITIONS
 from pneumarm.live.rig import Rig
 from pneumarm.live.server import Server
+from pneumarm.progress import progress
 from pneumarm.run import SETTINGS, RunSettings, settings_in
 
 _LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -72,8 +73,8 @@ def live_(
     )
     if token is None and host not in _LOCAL:
         token = secrets.token_urlsafe(12)
-    say(f"opening {settings.arm}")
-    rig = Rig(settings, named, folder, method)
+    with progress(f"opening {settings.arm}"):
+        rig = Rig(settings, named, folder, method)
     server = Server(rig, host, port, token)
 
     def opened() -> None:

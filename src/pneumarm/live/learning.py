@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Event, Thread
 from time import monotonic
 from typing import Any
 
@@ -14,13 +15,15 @@ from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Reading
 from pneumarm.errors import PneumarmError
 from pneumarm.live.screen import Screen
-from pneumarm.progress import Report
+from pneumarm.progress import Report, compiling
 from pneumarm.run import Run, RunSettings, RunTransferSettings, settings_in
 
 TRANSITIONS = 36_000
 """How much is recorded: 20 minutes of an arm that is controlled at 30 Hz."""
 TRANSFER = RunTransferSettings(episodes=100, test_episodes=50)
 """Few movements: people are looking on."""
+REPORT = "report"
+"""The last stage, which leaves a page and no results."""
 STAGES = {
     "collect": "move about and record",
     "simulation": "learn a simulation from the recording",
@@ -28,9 +31,10 @@ STAGES = {
     "test": "try it in the simulation",
     "transfer": "move it onto the arm and adapt",
     "settle": "move to goals and hold them",
+    REPORT: "write the report",
 }
 """Stages of the job by the name of their results, in words."""
-_TELL = 0.2  # s between two looks
+_TELL = 0.2  # s between two tellings
 
 
 class LeftOff(PneumarmError):  # noqa: N818 - reads as a sentence where it is raised
@@ -81,7 +85,8 @@ class Learning:
 
     def __init__(self, folder: Path, settings: RunSettings, screen: Screen, stopped: Callable[[], bool]) -> None:
         self._screen, self._stopped = screen, stopped
-        self._begun, self._told = monotonic(), 0.0
+        self._begun = monotonic()
+        self._at = "", 0.0, 0.0  # what is being done, how much of it is done, and the total
         self._run = Run(folder, settings_in(folder) or settings, self._progress, self._watched)
 
     def do(self) -> None:
@@ -91,8 +96,10 @@ class Learning:
             LeftOff: somebody stopped it.
 
         """
-        self._tell("", 0.0, 0.0)
-        self._run.do()
+        compiling.watch()
+        with self._telling():
+            self._run.do()
+        self._tell(done=True)
 
     def _watched(self, arm: Arm) -> Arm:
         return Watched(arm, self._screen, self._check)
@@ -105,22 +112,46 @@ class Learning:
     def _progress(self, title: str) -> Iterator[Report]:
         def report(done: float, total: float) -> None:
             self._check()
-            if monotonic() - self._told >= _TELL:
-                self._tell(title, done, total)
+            self._at = title, done, total
 
-        self._tell(title, 0.0, 0.0)
+        self._at = title, 0.0, 0.0
         yield report
+        self._at = "", 0.0, 0.0
 
-    def _tell(self, title: str, done: float, total: float) -> None:
-        """Tell what is being done, how far it is, and what came of the stages before."""
-        self._told = monotonic()
-        results = self._run.results
-        now = next((name for name in STAGES if name not in results), None)
+    @contextmanager
+    def _telling(self) -> Iterator[None]:
+        """Tell how far it is from a thread of its own: what compiles or fits says nothing for a while."""
+        over = Event()
+
+        def go_on() -> None:
+            while not over.wait(_TELL):
+                self._tell()
+
+        self._tell()
+        telling = Thread(target=go_on, name="learning", daemon=True)
+        telling.start()
+        try:
+            yield
+        finally:
+            over.set()
+            telling.join()
+
+    def _tell(self, done: bool = False) -> None:
+        """Tell what is being done, how far it is, and what came of the stages before; or that all is ``done``."""
+        title, so_far, total = self._at
+        results = dict(self._run.results)
+        if done:
+            results[REPORT] = {}
+        now = next((name for name in STAGES if name not in results), REPORT)
         self._screen.tell(
             learning={
                 "seconds": round(monotonic() - self._begun),
                 "title": title,
-                "share": done / total if total else None,
+                "compiling": compiling.now,
+                "stopping": self._stopped(),
+                "share": so_far / total if total else None,
+                "done": done,
+                "report": str(self._run.folder / "report.html"),
                 "stages": [
                     {
                         "words": words,
@@ -136,6 +167,8 @@ class Learning:
 def figures_of(stage: str, results: dict[str, Any]) -> str:
     """Return in words what came of a ``stage`` that is done."""
     found = results[stage]
+    if stage == REPORT:
+        return ""
     if stage == "collect":
         return f"{found['transitions']:,} readings, {found['seconds'] / 60:.0f} min of the arm's time"
     if stage == "simulation":

@@ -21,7 +21,6 @@ from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
 from pneumarm.run import RunSettings, settings_in
 from pneumarm.simulation.enough import EnoughSettings
-from pneumarm.transitions.watch import warm_up
 
 
 class Rig:
@@ -125,8 +124,8 @@ class Rig:
         try:
             mover = opened(choices[0], arm, self._method) if choices else None
             watch = monitor_for(choices[0] if choices else None, arm.spec, self._method)
-            warm_up(watch, arm.spec)
             paced = in_real_time(arm)
+            self.screen.show(arm.spec, arm.read(), None, None)
         except BaseException:
             arm.close()
             raise
@@ -135,6 +134,7 @@ class Rig:
         self.screen.tell(
             arm=self.settings.arm,
             joints=spec.joints,
+            muscles=spec.muscles,
             period=spec.period,
             range=spec.degrees(spec.angle_range),
             goals=None if mover is None else spec.degrees(mover.goal_range),
@@ -146,7 +146,6 @@ class Rig:
             in_use=self._in_use(),
             can_learn=self._can_learn(),
             minutes=round((self.settings.transitions or 0) * spec.period / 60 or EnoughSettings().most_of(spec) / 60),
-            learning=None,
         )
         return Session(guarded(paced), mover, watch, self.screen, lambda: self.desk.silence)
 

@@ -43,8 +43,8 @@ class Screen:
             "time": round(reading.time, 4),
             "angle": spec.degrees(reading.angle).round(2).tolist(),
             "goal": None if wanted is None else spec.degrees(wanted).round(2).tolist(),
-            "pressure": spec.bar(reading.pressure).round(4).tolist(),
-            "valves": None if command is None else np.round(command, 3).tolist(),
+            "pressure": _of_muscles(spec.bar(reading.pressure), spec).round(4).tolist(),
+            "valves": None if command is None else _of_muscles(command, spec).round(3).tolist(),
         }
         self.frame = msgspec.json.encode(frame).decode()
         self.frames += 1
@@ -62,3 +62,8 @@ class Screen:
         """How things stand."""
         with self._lock:
             return dict(self._state)
+
+
+def _of_muscles(values: NDArray[Any], spec: ArmSpec) -> NDArray[Any]:
+    """Return ``values`` of muscles that are there, shape (joints, muscles)."""
+    return np.asarray(values).reshape(spec.joints, -1)[:, : spec.muscles]

@@ -11,6 +11,7 @@ from contextlib import suppress
 from enum import StrEnum
 from threading import Event
 from time import monotonic, sleep
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from pneumarm.arm.serial.arm import SerialArm
 from pneumarm.arm.valves import Command
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import Monitor
+from pneumarm.control.monitor.findings import Finding
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.live.choices import Mover
 from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
@@ -32,7 +34,9 @@ from pneumarm.live.hand import Dragged, drawn
 from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop
 from pneumarm.live.picture import behind
 from pneumarm.live.screen import Screen
+from pneumarm.live.words import prevented, sentence
 from pneumarm.task.reference import counts_of
+from pneumarm.transitions.watch import warm_up
 
 _MOST_ORDERS = 200  # that wait for the next turn; then the oldest is forgotten
 _FINDINGS = 6  # newest, that are told
@@ -44,16 +48,23 @@ _LOST = "holding: the page that controls the arm is not heard"
 class Mode(StrEnum):
     """What the arm is doing."""
 
+    OPENING = "opening"
+    """Nothing yet: what it needs is being compiled, if this machine has not done so before."""
     RELAXED = "relaxed"
     """Everything is vented until somebody gives a goal."""
     MOVING = "moving"
     """A controller goes to a goal and holds it."""
     FOLLOWING = "following"
     """A controller follows a curve."""
+    HOLDING = "holding"
+    """A curve has ended, and a controller holds its end."""
     STOPPED = "stopped"
     """Everything is vented until somebody releases that."""
     FAILED = "failed"
     """The arm or the controller failed, and somebody has to look."""
+
+
+_ACTING = (Mode.MOVING, Mode.FOLLOWING, Mode.HOLDING)  # a controller moves the arm
 
 
 class Session:
@@ -106,6 +117,8 @@ class Session:
 
     def run(self) -> None:
         """Move the arm until somebody leaves; it is vented then. Failures are shown, and wait for a release."""
+        self._screen.tell(mode=Mode.OPENING, why="")
+        warm_up(self._watch, self.arm.spec)  # here and not before, so that the page can be looked at meanwhile
         try:
             while not self._leave.is_set():
                 try:
@@ -138,13 +151,14 @@ class Session:
                 self._screen.tell(notice=str(error))
         if self._stop.is_set():
             self._stop.clear()
-            self._vent_all(Mode.STOPPED, "stopped by hand")
+            self._vent_all(Mode.STOPPED, "stopped by hand: everything is vented until somebody releases it")
         self._mind_silence()
         if self._leave.is_set():
             return None
-        if self._mover is None or self.mode not in (Mode.MOVING, Mode.FOLLOWING):
+        if self._mover is None or self.mode not in _ACTING:
             return self._vent
         self._begun = reading.time if self._begun is None else self._begun
+        self._end_curve(reading.time)
         self._see_error(reading)
         return self._mover.controller.act(reading)
 
@@ -158,17 +172,22 @@ class Session:
         """Return the angles (joints,) [counts] wanted at ``time`` [s]; None while nothing is."""
         if self.mode is Mode.MOVING:
             return self._dragged.goal
-        if self.mode is not Mode.FOLLOWING or self._curve is None or self._begun is None:
+        if self.mode not in (Mode.FOLLOWING, Mode.HOLDING) or self._curve is None or self._begun is None:
             return None
-        passed = time - self._begun
-        if self._curve.duration is not None and passed > self._curve.duration and self._mover is not None:
+        return self._curve.at(time - self._begun)
+
+    def _end_curve(self, time: float) -> None:
+        """Hold the end of a curve that is over at ``time`` [s]."""
+        if self.mode is not Mode.FOLLOWING or self._curve is None or self._begun is None or self._mover is None:
+            return
+        if self._curve.duration is not None and time - self._begun > self._curve.duration:
+            self.mode = Mode.HOLDING
             self.figures.end_curve(self._mover.choice.name)
-        return self._curve.at(passed)
 
     def _mind_silence(self) -> None:
         """Stop a moving arm where it is when nobody who controls it is heard, then vent it."""
         silence = self._silence()
-        if silence < HOLD_AFTER or self.mode not in (Mode.MOVING, Mode.FOLLOWING):
+        if silence < HOLD_AFTER or self.mode not in _ACTING:
             return
         if silence >= VENT_AFTER:
             self._vent_all(Mode.RELAXED, "vented: the page that controlled the arm is gone")
@@ -233,7 +252,7 @@ class Session:
     def _change(self, mover: Mover) -> None:
         self._mover = mover
         self.figures.forget()
-        if self.mode in (Mode.MOVING, Mode.FOLLOWING):
+        if self.mode in _ACTING:
             self.mode = Mode.RELAXED  # so that the new one begins afresh
             self._go(self._now)
 
@@ -300,10 +319,15 @@ class Session:
             why=self._why,
             controller=None if self._mover is None else self._mover.choice.name,
             figures={name: goals.results() for name, goals in self.figures.by_controller.items()},
-            wrong=[str(one) for one in wrong],
-            was_wrong=[str(one) for one in self._watch.findings[-_FINDINGS:] if one.until is not None],
-            guard=str(self.arm.interventions),
+            wrong=[self._told_of(one) for one in wrong],
+            was_wrong=[self._told_of(one) for one in self._watch.findings[-_FINDINGS:] if one.until is not None],
+            familiar=self._watch.familiar,
+            guard=prevented(self.arm.interventions),
             missed=self._missed,
             air=None if air is None else round(air, 2),
             faults=None if self._switches is None else self._switches.on,
         )
+
+    def _told_of(self, found: Finding) -> list[Any]:
+        """Return what was found, in words, when it was noticed and when it was over [s]."""
+        return [sentence(found, self.arm.spec), found.noticed, found.until]

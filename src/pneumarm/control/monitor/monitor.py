@@ -119,6 +119,12 @@ class Monitor:
             self._close(key, float(memory.clock[0]))
         memory.clock[3] = self._width()
 
+    @property
+    def familiar(self) -> bool:
+        """Whether it has seen enough of the arm to tell what is unusual; with a simulation it has from the start."""
+        known = self._expects
+        return not isinstance(known, Identified) or bool(known.clock[2] * known.look[1] >= EXPERIENCE)
+
     def _packed(self) -> Thresholds:
         settings, spec, weighing = self.settings, self.spec, self._weighing
         return Thresholds(

@@ -1,10 +1,11 @@
-// The arm as a drawing: each joint's link, pulley and two muscles with their valves, and the goal to be dragged.
+// The arm as a drawing: each joint's link, pulley and muscles with their valves, and the goal to be dragged.
 // Lengths are millimetres. Angles are degrees from the middle of the range; higher ones turn the link to the right,
-// where muscle 1 pulls.
+// where muscle 1 pulls. Where a joint has one muscle, a spring is drawn in place of the other.
 
 const SVG = "http://www.w3.org/2000/svg";
 const PLATE = 16; // from the valves to where the muscles hang
 const TENDON = 26; // least length of the cord between a muscle and its pulley
+const ABOVE = 52; // from the valves' hoses to the upper end of the picture: words stand there
 const FADING = 0.75; // of a valve's light, a frame: pulses of milliseconds are to be seen
 
 function make(name, attributes, parent) {
@@ -23,11 +24,41 @@ function spindle(length, width, shorter = 0) {
     `C${w} ${end} ${w} ${shorter + end * 0.4} ${e} ${shorter}Z`;
 }
 
+// A spring from (0, 0) to (0, length).
+function coil(length, width, turns = 11) {
+  const end = 12, step = (length - 2 * end) / (2 * turns);
+  let path = `M0 0V${end}`;
+  for (let k = 0; k < 2 * turns; k++) path += `L${(k % 2 ? -1 : 1) * width / 2} ${end + (k + 0.5) * step}`;
+  return `${path}L0 ${length - end}V${length}`;
+}
+
+class Spring {
+  constructor(parent, side, measures) {
+    Object.assign(this, measures, { side });
+    const group = make("g", { class: "spring", transform: `translate(${side * this.radius} ${-this.top})` }, parent);
+    this.coil = make("path", { class: "coil" }, group);
+    this.tendon = make("line", { class: "tendon", x1: 0, x2: 0, y2: this.top }, group);
+    if (this.worded) make("text", beside(side, this.diameter, this.rest * 0.5), group).textContent = "spring";
+  }
+
+  show(angle) {
+    const length = this.rest - this.side * this.radius * angle * Math.PI / 180;
+    this.coil.setAttribute("d", coil(length, this.diameter * 0.7));
+    this.tendon.setAttribute("y1", length);
+  }
+}
+
+// Where words stand beside a muscle.
+function beside(side, diameter, y) {
+  return { x: side * (diameter * 0.75 + 6), y, "text-anchor": side > 0 ? "start" : "end" };
+}
+
 class Muscle {
   constructor(parent, side, measures) {
     this.side = side; // +1: muscle 1, on the right, pulls to higher angles
-    Object.assign(this, measures); // radius, rest, diameter, top
-    this.group = make("g", { transform: `translate(${side * this.radius} ${-this.top})` }, parent);
+    this.number = side > 0 ? 1 : 2;
+    Object.assign(this, measures); // radius, rest, diameter, top, worded
+    this.group = make("g", { class: `muscle of-${this.number}`, transform: `translate(${side * this.radius} ${-this.top})` }, parent);
     this.tendon = make("line", { class: "tendon", x1: 0, x2: 0, y2: this.top }, this.group);
     this.rubber = make("path", { class: "rubber" }, this.group);
     this.air = make("path", { class: "air" }, this.group);
@@ -36,9 +67,16 @@ class Muscle {
     this.inlet = make("path", { class: "valve", d: `M${x - 6} ${-PLATE - 9}h12l-6 9z` }, this.group);
     this.outlet = make("path", { class: "valve", d: `M${x - 6} ${-PLATE + 13}h12l-6 -9z` }, this.group);
     make("path", { class: "tendon", d: `M0 0V${-PLATE + 2}H${x}`, fill: "none" }, this.group);
-    this.inGlow = make("path", { class: "open-in", d: this.inlet.getAttribute("d"), opacity: 0 }, this.group);
-    this.outGlow = make("path", { class: "open-out", d: this.outlet.getAttribute("d"), opacity: 0 }, this.group);
-    this.label = make("text", { x: side * 38, y: this.rest * 0.55, "text-anchor": "middle" }, this.group);
+    this.inGlow = make("path", { class: "open", d: this.inlet.getAttribute("d"), opacity: 0 }, this.group);
+    this.outGlow = make("path", { class: "open", d: this.outlet.getAttribute("d"), opacity: 0 }, this.group);
+    const name = make("text", { class: "name", ...beside(side, this.diameter, this.rest * 0.5) }, this.group);
+    name.textContent = this.worded ? `muscle ${this.number}` : this.number;
+    this.label = this.worded ? make("text", { ...beside(side, this.diameter, this.rest * 0.5), dy: "1.3em" }, this.group) : null;
+    if (this.worded) {
+      const at = { x: side * 26, "text-anchor": side > 0 ? "start" : "end" };
+      make("text", { ...at, y: -PLATE - 1, dy: "-0.05em" }, this.group).textContent = "in";
+      make("text", { ...at, y: -PLATE + 11, dy: "0.3em" }, this.group).textContent = "out";
+    }
     this.light = [0, 0];
   }
 
@@ -57,7 +95,7 @@ class Muscle {
     this.light[1] = Math.max(Math.sqrt(Math.max(-valve, 0)), this.light[1] * FADING);
     this.inGlow.setAttribute("opacity", this.light[0].toFixed(2));
     this.outGlow.setAttribute("opacity", this.light[1].toFixed(2));
-    this.label.textContent = pressure.toFixed(2);
+    if (this.label) this.label.textContent = `${pressure.toFixed(2)} bar`;
   }
 }
 
@@ -71,8 +109,9 @@ export class ArmDrawing {
     for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) svg.addEventListener(name, (event) => this[name](event));
   }
 
-  build({ measures, range, goals, most_bar }) {
+  build({ measures, muscles, range, goals, most_bar }) {
     this.svg.replaceChildren();
+    this.each = muscles;
     this.links = measures.map((one) => one.link * 1000);
     this.range = range;
     this.goals = goals ?? measures.map(() => range);
@@ -80,7 +119,7 @@ export class ArmDrawing {
     this.goal = measures.map(() => 0);
     this.angle = measures.map(() => 0);
     const reach = this.links.reduce((a, b) => a + b, 0);
-    const top = Math.min(measures[0].muscle * 1000, 230) + TENDON + PLATE + 40;
+    const top = Math.min(measures[0].muscle * 1000, 230) + TENDON + PLATE + ABOVE;
     let turned = 0, aside = 0; // as far as all links reach to a side together
     this.links.forEach((length, j) => {
       turned = Math.min(turned + Math.max(...this.goals[j].map(Math.abs)), 90);
@@ -93,13 +132,13 @@ export class ArmDrawing {
     this.ghosts = this.chain((parent, j) => {
       make("line", { class: "ghost", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, parent);
     }, "goal");
-    this.handles = this.links.map(() => make("circle", { class: "handle", r: Math.max(13, reach / 16) }));
+    this.handles = this.links.map(() => this.handle(Math.max(13, reach / 16)));
     this.muscles = [];
     this.joints = this.chain((parent, j, frame) => this.joint(parent, frame, j, measures[j]), "is");
-    this.handleLayer = make("g", {}, this.svg);
+    this.handleLayer = make("g", { class: "handles" }, this.svg);
     this.handleLayer.append(...this.handles);
-    make("line", { class: "plate", x1: -70, x2: 70, y1: -top + 34, y2: -top + 34 }, this.svg);
-    make("line", { class: "plate", x1: 0, x2: 0, y1: -top + 34, y2: 0, opacity: 0.14 }, this.svg);
+    make("line", { class: "plate", x1: -70, x2: 70, y1: -top + ABOVE - 6, y2: -top + ABOVE - 6 }, this.svg);
+    make("line", { class: "plate", x1: 0, x2: 0, y1: -top + ABOVE - 6, y2: 0, opacity: 0.14 }, this.svg);
   }
 
   // Text is as large on a phone as elsewhere.
@@ -126,15 +165,23 @@ export class ArmDrawing {
     const room = j ? this.links[j - 1] * 0.6 : measures.muscle * 1000;
     const rest = Math.min(measures.muscle * 1000, room);
     const radius = measures.pulley * 1000, top = rest + TENDON + radius * 0.8;
-    const own = { radius, rest, diameter: measures.diameter * 1000, top };
-    this.muscles.push([new Muscle(still, 1, own), new Muscle(still, -1, own)]);
-    if (this.links.length > 1) this.muscles[j].forEach((muscle) => muscle.label.remove());
+    const own = { radius, rest, diameter: measures.diameter * 1000, top, worded: this.links.length === 1 };
+    this.muscles.push([new Muscle(still, 1, own), this.each > 1 ? new Muscle(still, -1, own) : new Spring(still, -1, own)]);
+    if (!own.worded) make("text", { class: "name", x: radius + 26, y: 4, "text-anchor": "start" }, still).textContent = `joint ${j + 1}`;
     make("line", { class: "link", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, turn);
     make("line", { class: "bone", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, turn);
     make("circle", { class: "pulley", r: radius }, turn);
     make("line", { class: "mark", x1: 0, y1: radius * 0.4, x2: 0, y2: radius }, turn);
     make("circle", { class: "weight", r: 4 }, turn);
     if (j === this.links.length - 1) make("circle", { class: "weight", cx: 0, cy: this.links[j], r: 13 }, turn);
+  }
+
+  // What a goal is dragged by: a ring with arrows to both sides.
+  handle(r) {
+    const group = make("g", { class: "handle" });
+    make("circle", { r }, group);
+    for (const side of [-1, 1]) make("path", { d: `M${side * (r + 5)} -7L${side * (r + 14)} 0L${side * (r + 5)} 7Z` }, group);
+    return group;
   }
 
   scale(radius) {
@@ -144,23 +191,24 @@ export class ArmDrawing {
     for (let degrees = Math.ceil(low / 10) * 10; degrees <= high; degrees += 10) {
       make("path", { class: "tick", d: `M${at(degrees, radius - 3)}L${at(degrees, radius + 3)}` }, this.svg);
       const [x, y] = at(degrees, radius + 15).split(" ");
-      make("text", { x, y: Number(y) + 4 }, this.svg).textContent = `${degrees}°`;
+      make("text", { x, y: Number(y) + 4, "text-anchor": "middle" }, this.svg).textContent = `${degrees}°`.replace("-", "\u2212");
     }
   }
 
   show({ angle, goal, pressure, valves }) {
     this.angle = angle;
     this.joints.forEach((joint, j) => joint.setAttribute("transform", `rotate(${-angle[j]})`));
-    this.muscles.forEach((pair, j) => pair.forEach((muscle, m) => muscle.show(angle[j], pressure[j][m], this.most, valves?.[j]?.[m] ?? 0)));
+    this.muscles.forEach((pair, j) => pair.forEach((muscle, m) => muscle.show(angle[j], pressure[j][m] ?? 0, this.most, valves?.[j]?.[m] ?? 0)));
     if (this.dragging === null) this.place(goal ?? angle, goal !== null);
   }
 
   place(degrees, wanted) {
     this.goal = [...degrees];
     this.ghosts.forEach((ghost, j) => ghost.setAttribute("transform", `rotate(${-degrees[j]})`));
+    let turned = 0;
     this.ends(degrees).forEach(([x, y], j) => {
-      this.handles[j].setAttribute("cx", x);
-      this.handles[j].setAttribute("cy", y);
+      turned += degrees[j];
+      this.handles[j].setAttribute("transform", `translate(${x} ${y}) rotate(${-turned})`);
     });
     this.ghosts[0].parentNode.parentNode.classList.toggle("no-goal", !wanted);
     this.handleLayer.classList.toggle("no-goal", !wanted);

@@ -54,14 +54,14 @@ export class Charts {
     if (!this.hello) return;
     this.plots?.forEach((plot) => plot.destroy());
     const [low, high] = this.hello.range, most = this.hello.most_bar;
-    const blue = css("--blue"), orange = css("--orange"), sand = css("--sand");
+    const blue = css("--blue"), orange = css("--orange"), sand = css("--sand"), two = this.hello.muscles > 1;
     this.ids = ["angle-chart", "pressure-chart", "valve-chart"];
     const wanted = { stroke: orange, width: 2, dash: [7, 5] }, is = { stroke: blue, width: 2.2 };
     this.plots = [
-      this.plot(this.ids[0], [wanted, is], { range: [low, high], size: 44, values: (u, v) => v.map((one) => `${one}°`) }, false),
-      this.plot(this.ids[1], [{ stroke: blue, width: 2 }, { stroke: sand, width: 2 }], { range: [0, most * 1.15], size: 44 }, false),
-      this.plot(this.ids[2], [this.stepped(blue), this.stepped(sand)], {
-        range: [-3, 3], size: 44, splits: () => [-1.5, 1.5], values: () => ["2", "1"], grid: { show: false },
+      this.plot(this.ids[0], [wanted, is], { range: [low, high], size: 44, values: (u, v) => v.map((one) => `${one}°`.replace("-", "\u2212")) }, false),
+      this.plot(this.ids[1], [{ stroke: blue, width: 2 }, ...(two ? [{ stroke: sand, width: 2 }] : [])], { range: [0, most * 1.15], size: 44 }, false),
+      this.plot(this.ids[2], [this.stepped(blue), ...(two ? [this.stepped(sand)] : [])], {
+        range: two ? [-3, 3] : [0, 3], size: 44, splits: () => (two ? [-1.5, 1.5] : [1.5]), values: () => (two ? ["2", "1"] : ["1"]), grid: { show: false },
       }, true),
     ];
     this.fill();
@@ -81,7 +81,7 @@ export class Charts {
       cursor: { show: false },
       scales: { x: { time: false }, y: { range } },
       axes: [
-        { ...axis, show: true, size: times ? 22 : 0, values: (u, all) => all.map((one) => (times ? `${one} s` : "")) },
+        { ...axis, show: true, size: times ? 22 : 0, values: (u, all) => all.map((one) => (times ? `${one} s`.replace("-", "\u2212") : "")) },
         { ...axis, size, ...(values ? { values } : {}), ...(splits ? { splits } : {}), space: 28 },
       ],
       series: [{}, ...series.map((one) => ({ points: { show: false }, ...one }))],
@@ -94,11 +94,12 @@ export class Charts {
     const end = frames.at(-1).time;
     const time = frames.map((one) => one.time - end);
     const x = { min: -SECONDS, max: 0 };
-    const valve = (m) => frames.map((one) => (m ? -1.5 : 1.5) + 1.2 * (one.valves?.[j][m] ?? 0));
+    const muscles = this.hello.muscles > 1 ? [0, 1] : [0];
+    const valve = (m) => frames.map((one) => (m ? -1.5 : 1.5) + 1.2 * (one.valves?.[j]?.[m] ?? 0));
     const data = [
       [time, frames.map((one) => one.goal?.[j] ?? null), frames.map((one) => one.angle[j])],
-      [time, frames.map((one) => one.pressure[j][0]), frames.map((one) => one.pressure[j][1])],
-      [time, valve(0), valve(1)],
+      [time, ...muscles.map((m) => frames.map((one) => one.pressure[j][m]))],
+      [time, ...muscles.map(valve)],
     ];
     this.plots.forEach((plot, i) => plot.batch(() => {
       plot.setData(data[i], false);
@@ -209,18 +210,23 @@ export class Paper {
       pen.moveTo(0, y(degrees));
       pen.lineTo(width, y(degrees));
       pen.stroke();
-      if (degrees % 20 === 0 && y(degrees) > 18) pen.fillText(`${degrees}°`, 5, y(degrees) - 3);
+      if (degrees % 20 === 0 && y(degrees) > 18) pen.fillText(`${degrees}°`.replace("-", "\u2212"), 5, y(degrees) - 3);
     }
     for (let t = 1; t < this.seconds; t++) {
       pen.beginPath();
       pen.moveTo(x(t), 0);
       pen.lineTo(x(t), height);
       pen.stroke();
+      if (this.seconds <= 8 || t % 2 === 0) pen.fillText(`${t} s`, x(t) + 3, height - 5);
     }
     if (!this.points.length) {
       pen.font = "15px system-ui, sans-serif";
       pen.textAlign = "center";
-      pen.fillText("draw with a finger, from left to right", width / 2, height / 2 - 8);
+      pen.fillStyle = css("--card");
+      pen.fillRect(width / 2 - 130, height / 2 - 28, 260, 54);
+      pen.fillStyle = css("--ink");
+      pen.fillText("Draw a curve here, from left to right.", width / 2, height / 2 - 8);
+      pen.fillText("The arm follows it when you let go.", width / 2, height / 2 + 16);
       pen.textAlign = "start";
     }
     const line = (points, color, dash, size) => {

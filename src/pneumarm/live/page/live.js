@@ -2,16 +2,14 @@
 
 import { ArmDrawing } from "./arm.js";
 import { Charts, Paper } from "./charts.js";
+import { Movement, asDegrees, capital, finding, hint, lasted, learningNow } from "./words.js";
 
 const BEAT = 250; // ms between two signs of life: who controls the arm and is silent has it held, then vented
 const SENT = 33; // ms between two goals while one is dragged
-const WORDS = {
-  relaxed: "Relaxed: all muscles are vented", moving: "Holding its goal", following: "Following the curve",
-  stopped: "Stopped: everything is vented", failed: "Failed", learning: "Learning",
-};
+const OLD = 1500; // ms after which what is shown is no longer what is
 
 const $ = (id) => document.getElementById(id);
-let socket = null, state = null, built = "", again = 500, beaten = 0, joint = 0, muscle = 1, frame = null;
+let socket = null, state = null, built = "", again = 500, beaten = 0, joint = 0, muscle = 1, frame = null, seen = 0;
 
 function send(order) {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(order));
@@ -50,6 +48,7 @@ function connect() {
     $("role").textContent = "not connected: a moving arm holds, then is vented";
     $("control").hidden = true;
     state = null;
+    showMode();
     setTimeout(connect, again);
     again = Math.min(again * 1.6, 4000);
   };
@@ -67,29 +66,48 @@ function notify(text) {
 
 function showFrame(now) {
   frame = now;
+  seen = performance.now();
   if (!built) return;
+  if (document.body.classList.contains("empty")) document.body.classList.remove("empty");
+  movement.see(now, seen);
   drawing.show(now);
   charts.add(now);
   if (state?.mode === "following") paper.follow(now);
   [...$("angles").children].forEach((place, j) => {
-    place.firstChild.textContent = `${now.angle[j].toFixed(1)}°`;
-    place.lastChild.textContent = now.goal ? `of ${now.goal[j].toFixed(1)}°` : "\u00a0";
+    place.children[1].textContent = asDegrees(now.angle[j]);
+    place.children[2].textContent = now.goal ? `goal ${asDegrees(now.goal[j])}` : "no goal";
   });
+  showMode();
+}
+
+// What the arm is doing, and whether what is shown is how it is now.
+function showMode() {
+  const old = performance.now() - seen > OLD, lost = state === null;
+  document.body.classList.toggle("old", old || lost);
+  const words = lost ? "Not connected: this is how it was last seen" : movement.words(state, old);
+  if ($("mode").textContent !== words) $("mode").textContent = words;
+  const help = state ? hint(state, writes()) : "";
+  if ($("hint").textContent !== help) $("hint").textContent = help;
+  document.body.classList.toggle("goals", !lost && writes() && Boolean(state.controller) && !stopped() && state.mode !== "learning");
 }
 
 function build(now) {
-  const key = JSON.stringify([now.arm, now.measures, now.range, now.goals, now.most_bar]);
+  const key = JSON.stringify([now.arm, now.measures, now.range, now.goals, now.most_bar, now.muscles]);
   if (key === built) return;
   built = key;
   drawing.build(now);
   charts.build(now);
   paper.build(now.goals, now.range);
   $("arm-name").textContent = now.arm;
-  $("hint").textContent = "Valves: blue lets air in, orange lets it out." + (now.to_scale ? "" : " The measures of this arm are not known: it is not drawn to scale.");
+  $("legend").textContent = [
+    now.joints > 1 ? "Valves: \u25bd lets air in, \u25b3 lets it out; filled while open." : "",
+    now.to_scale ? "" : "The measures of this arm are not known: it is not drawn to scale.",
+  ].join(" ").trim();
+  document.body.classList.toggle("one-muscle", now.muscles < 2);
   $("angles").replaceChildren(...now.measures.map((_, j) => {
     const place = document.createElement("div");
-    place.append(document.createElement("b"), document.createElement("span"));
-    if (now.joints > 1) place.title = `joint ${j + 1}`;
+    place.append(document.createElement("small"), document.createElement("b"), document.createElement("span"));
+    place.firstChild.textContent = now.joints > 1 ? `joint ${j + 1}` : "angle";
     return place;
   }));
   document.querySelectorAll(".joints").forEach((row) => {
@@ -128,7 +146,7 @@ function showState(now) {
   if (now.measures) build(now);
   document.body.dataset.mode = now.mode ?? "relaxed";
   document.body.dataset.role = writes() ? "writer" : "watcher";
-  $("mode").textContent = now.why ? capital(now.why) : WORDS[now.mode] ?? "";
+  showMode();
   const stopped = now.mode === "stopped" || now.mode === "failed";
   $("stop").textContent = !stopped ? "Stop" : now.mode === "failed" ? "Try again" : "Release";
   $("stop").disabled = stopped && !writes();
@@ -142,10 +160,8 @@ function showState(now) {
   if (now.notice && now.notice !== before?.notice) notify(now.notice);
   if (before?.mode === "following" && now.mode !== "following") paper.ended();
   const curve = now.figures?.[now.controller]?.curve;
-  $("followed").textContent = curve == null ? "" : `followed within ${curve.toFixed(2)}° (RMS)`;
+  $("followed").textContent = now.mode === "following" ? "following it \u2026" : curve == null ? "" : `last one followed within ${curve.toFixed(2)}° (RMS)`;
 }
-
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 function showRole(now) {
   const others = now.pages - 1;
@@ -168,11 +184,11 @@ function showRole(now) {
 
 function showLearning(now) {
   const learning = now.learning, busy = now.mode === "learning";
-  $("learn").hidden = !(now.can_learn || busy);
-  $("learn-words").textContent = busy || now.controller ? "" : "Nothing has learned to move this arm yet.";
-  $("begin").hidden = busy;
+  $("learn").hidden = !(now.can_learn || busy || learning?.done);
+  $("learn-words").textContent = busy ? "" : learning?.done ? `Learned in ${lasted(learning.seconds)}; the report is ${learning.report}` : now.controller ? "" : "Nothing has learned to move this arm yet.";
+  $("begin").hidden = busy || !now.can_learn;
   $("begin").disabled = !writes();
-  $("begin").textContent = `Learn to move it: record ${now.minutes} min of its time`;
+  $("begin").textContent = `Learn to move it: record ${now.minutes} min of its movement`;
   $("stages").replaceChildren(...(learning?.stages ?? []).map((stage) => {
     const line = document.createElement("li");
     line.className = stage.state;
@@ -183,15 +199,20 @@ function showLearning(now) {
   $("progress").hidden = !busy;
   if (learning?.share == null) $("progress").removeAttribute("value");
   else $("progress").value = learning.share;
-  $("learn-now").textContent = busy && learning ? `${learning.title || "beginning"}, ${learning.seconds} s so far` : "";
+  $("learn-now").textContent = busy && learning ? learningNow(learning) : "";
 }
 
 function showHealth(now) {
-  const lines = (now.wrong ?? []).map((text) => ["", text]);
-  if (!lines.length) lines.push(["fine", now.mode === "learning" ? "The report will tell." : "Nothing has been noticed."]);
-  lines.push(...(now.was_wrong ?? []).map((text) => ["over", text]));
+  const learns = now.mode === "learning", time = frame?.time ?? 0;
+  const lines = (now.wrong ?? []).map((one) => ["", finding(one, time)]);
+  if (learns) lines.push(["over", "While it learns, what is noticed is written into the report."]);
+  else if (!lines.length) lines.push(now.familiar ? ["fine", "Nothing unusual."] : ["over", "Nothing unusual so far. The monitor does not know this arm yet: it needs 20 s of movement."]);
+  lines.push(...(now.was_wrong ?? []).map((one) => ["over", finding(one, time)]));
   $("wrong").replaceChildren(...lines.map(([kind, text]) => Object.assign(document.createElement("li"), { className: kind, textContent: text })));
-  const counts = { "the guard": now.guard, "periods missed": now.missed, "air used": now.air == null ? null : `${now.air.toFixed(2)} l` };
+  const counts = learns ? {} : {
+    "the guard": now.guard, "control periods missed": now.missed,
+    "air used": now.air == null ? null : `${now.air.toFixed(2)} normal litres`,
+  };
   $("counts").replaceChildren(...Object.entries(counts).filter(([, value]) => value != null).flatMap(([name, value]) => [
     Object.assign(document.createElement("dt"), { textContent: name }), Object.assign(document.createElement("dd"), { textContent: value }),
   ]));
@@ -204,7 +225,7 @@ function showChoices(now) {
     const row = document.createElement("tr"), figures = now.figures?.[name];
     const number = (value, digits, unit) => (value == null ? "–" : `${value.toFixed(digits)}${unit}`);
     const acts = document.createElement("td");
-    acts.append(now.controller === name ? "acts" : button("Use", () => send({ do: "choose", controller: name })));
+    acts.append(now.controller === name ? "moves it" : button("Use", () => send({ do: "choose", controller: name })));
     row.append(acts);
     const cells = [
       name + (version !== null && version === now.in_use ? " (in use)" : ""),
@@ -233,6 +254,14 @@ function showFaults(now) {
     made.setAttribute("aria-pressed", on);
     return made;
   }));
+  const elsewhere = (j, m) => [now.joints > 1 && j ? `joint ${j}` : "", m && now.muscles > 1 ? `muscle ${m}` : ""].filter(Boolean).join(", ");
+  $("on").replaceChildren(...now.faults.map(([kind, j, m]) => {
+    const words = [now.offered[kind][0], elsewhere(j, m)].filter(Boolean).join(", ");
+    const made = button(`${words} \u00d7`, () => send({ do: "faults", kind, joint: j || 1, muscle: m || 1, on: false }));
+    made.title = "switch it off";
+    return made;
+  }));
+  if (now.faults.length) $("on").prepend("on: ");
 }
 
 // ---- what people want
@@ -248,6 +277,7 @@ function goTo(degrees, last) {
   } else waiting = setTimeout(() => goTo(degrees, true), SENT);
 }
 
+const movement = new Movement();
 const drawing = new ArmDrawing($("arm"), goTo);
 const charts = new Charts();
 const paper = new Paper($("paper"), (seconds, values) => {
@@ -280,5 +310,5 @@ $("seconds").onchange = () => {
   $("again").disabled = true;
 };
 
-setInterval(beat, BEAT);
+setInterval(() => { beat(); showMode(); }, BEAT);
 connect();

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import pneumarm
 from pneumarm.adaptation import AdaptationSettings, RefitSettings
 from pneumarm.arm import Reading, open_arm
-from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm.virtual import StuckValve, VirtualArm
 from pneumarm.control import TransferSettings, put_back, read_history, transfer, transfer_into
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.learning import Agent, AnyAgent, PolicyAgent, PolicySettings, train
@@ -324,3 +324,33 @@ def test_the_episodes_file_tells_the_time_on_the_arm(small_run: Path) -> None:
     before = results["transfer"]["before"]
     assert 20 * 3 < before["seconds"] < 20 * 12
     assert before["intervals"]["success_rate"][0] <= before["success_rate"] <= before["intervals"]["success_rate"][1]
+
+
+WATCHED = TransferSettings(episodes=6, test_episodes=6, learning_rate=0.0)
+
+
+def broken_valve(end: float | None = None) -> VirtualArm:
+    return VirtualArm(seed=4, faults=[StuckValve(position="open", begin=20.0, end=end)])
+
+
+def test_a_transfer_gives_up_on_an_arm_that_stays_broken_and_goes_on_once_it_is_told_to(
+    policy: AnyAgent, tmp_path: Path
+) -> None:
+    """What is right for collecting is right here."""
+    folder = tmp_path / "t"
+    with pytest.raises(ArmFailure, match=r"stuck-valve.*for 5 movements now.*--monitor warn"):
+        transfer_into(folder, policy, broken_valve(), WATCHED, seed=1)
+    with Store.open(folder / "transitions.db") as store:
+        made, marked = store.sequences, sum(store.marked_rows(1).values())
+    assert 5 <= made < 18
+    assert marked > 0  # the movements that it gave up for are stored
+    result = transfer_into(folder, policy, broken_valve(), WATCHED, seed=1, monitor="warn")
+    assert [result[phase]["episodes"] for phase in ("before", "after")] == [6, 6]
+    assert any(one["kind"] == "stuck-valve" for one in result["findings"])
+    assert sum(result["marked"].values()) == marked
+
+
+def test_a_fault_that_passes_does_not_end_a_transfer(policy: AnyAgent, tmp_path: Path) -> None:
+    result = transfer_into(tmp_path / "t", policy, broken_valve(end=28.0), WATCHED, seed=1)
+    assert any(one["kind"] == "stuck-valve" for one in result["findings"])
+    assert result["after"]["episodes"] == 6

@@ -26,7 +26,7 @@ from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
 from pneumarm.transitions.store import SequenceEntry
-from pneumarm.transitions.watch import keep_watch
+from pneumarm.transitions.watch import Patience, keep_watch
 from pneumarm.transitions.watch import warm_up as warm_up_watch
 
 Phase = Literal["before", "learning", "after"]
@@ -133,12 +133,13 @@ def transfer(
 
     A transfer that was interrupted goes on after the last movement that was stored, on an arm that can be put into
     a saved state as if nothing had happened. What ``watch`` finds spoiled, by default a :class:`Monitor` with the
-    agent's simulation, is stored but not learned from; it counts in the figures, because it happened. It goes on with
-    the simulation of an adapted agent: an arm that has changed is not complained of once it is adapted to.
+    agent's simulation, is stored but not learned from; it counts in the figures, because it happened. Where that
+    lasts the transfer stops, as collecting does, and a call after the arm was seen to goes on. The monitor goes on
+    with the simulation of an adapted agent: an arm that has changed is not complained of once it is adapted to.
 
     Raises:
         UnusableInput: arm and agent do not fit, or the store holds a transfer with other settings.
-        ArmFailure: the arm failed; the movements up to then are stored.
+        ArmFailure: the arm failed, or something has been wrong for several movements; those up to then are stored.
 
     """
     return Transfer(agent, arm, store, settings, seed, keep_version, watch).run(progress)
@@ -174,6 +175,7 @@ class Transfer:
         if isinstance(agent, Learns) and self._adapting is None:
             self._learning = _Learning(agent, settings.learning_rate, seed)
         self._watch = watch or monitor_of(agent, self._arm)
+        self._patience = Patience(arm.spec.name, "movements")
         self._waiting: list[Recorded] = []
         self._broken: list[Recorded] = []
         self._resume()
@@ -231,7 +233,7 @@ class Transfer:
         """Make all movements that are not made yet; return what came of the transfer.
 
         Raises:
-            ArmFailure: the arm failed; the movements up to then are stored.
+            ArmFailure: the arm failed, or stays broken; the movements up to then are stored.
 
         """
         phase: Phase = PHASES[0]
@@ -271,6 +273,7 @@ class Transfer:
             self._count(phase)
             if len(self._waiting) == _TOGETHER or number == movements - 1:
                 self._keep()
+            self._judge_arm()
             progress(len(self._done), total)
 
     def _controller(self, phase: Phase) -> Controller:
@@ -315,6 +318,14 @@ class Transfer:
             self._judge()
         self._done.append(info)
         self._waiting.append(replace(movement.recorded, info=info))
+
+    def _judge_arm(self) -> None:
+        """Give up, with all movements stored, where what is wrong with the arm is no passing trouble."""
+        try:
+            self._patience.judge(self._watch)
+        except ArmFailure:
+            self._keep()
+            raise
 
     def _count(self, phase: Phase) -> None:
         """Count what happened in ``phase`` since it was last counted."""

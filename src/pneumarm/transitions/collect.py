@@ -39,14 +39,12 @@ from pneumarm.transitions.fill_times import FillTimes, find_fill_times
 from pneumarm.transitions.players import Trajectory
 from pneumarm.transitions.rows import Recorded, broken_off
 from pneumarm.transitions.store import Store
-from pneumarm.transitions.watch import Watch, keep_watch, warm_up, watched
+from pneumarm.transitions.watch import Patience, Watch, keep_watch, warm_up, watched
 
 KINDS = ("zero-velocity", "velocity", "pulses", "sparse", "controller")
 """Kinds of the sequences made here."""
 FEWEST_TRANSITIONS = 2_000
 """Fewer cannot be learnt from."""
-MOST_SPOILED = 5
-"""Sequences in a row in which something may be wrong before collecting gives up."""
 PURPOSE = "collect"
 """The purpose of the runs made here."""
 
@@ -300,7 +298,7 @@ class _Collection:
         self._arm = guarded(arm)
         if kept["arm"] is not None:
             self._arm.set_state(kept["arm"])
-        self._wrong = 0  # sequences in a row
+        self._patience = Patience(arm.spec.name)
         if watch is not None:
             if kept["watch"] is not None:
                 watch.set_state(kept["watch"])
@@ -365,22 +363,11 @@ class _Collection:
             self.done -= keep_watch(self._store, watch, self._run)
             state["watch"] = watch.get_state()
             if whole:
-                self._judge(watch)
+                self._patience.judge(watch)
         self._store.append(recorded, state)
         if whole:
             self.done += recorded.transitions
             self.number += 1
-
-    def _judge(self, watch: Watch) -> None:
-        """Count the sequences in which something is wrong; raise ArmFailure where that is no passing trouble."""
-        found = watch.spoiled_since()
-        self._wrong = 0 if found is None else self._wrong + 1
-        if found is not None and self._wrong >= MOST_SPOILED:
-            raise ArmFailure(
-                f"{self._arm.spec.name}: {found[1]}, for {MOST_SPOILED} sequences now; nothing is learned of these: "
-                f"{watch.reasons()}. See to the arm and run the same command again; where nothing is wrong with it, "
-                "add --monitor warn, which tells of such things, marks no rows and does not stop (or off)"
-            )
 
     def result(self, wall_seconds: float) -> CollectResult:
         """Return what there is of it now, after a call that took ``wall_seconds`` [s]."""

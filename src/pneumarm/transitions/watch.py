@@ -10,8 +10,12 @@ import numpy as np
 from pneumarm.arm.cycle import Step
 from pneumarm.arm.seam import ArmSpec, Reading, with_measured
 from pneumarm.arm.valves import Command
+from pneumarm.errors import ArmFailure
 from pneumarm.transitions.rows import Mark, Recorded
 from pneumarm.transitions.store import Store
+
+MOST_SPOILED = 5
+"""Sequences in a row in which something may be wrong before whoever moves the arm gives up."""
 
 
 class Watch(Protocol):
@@ -37,6 +41,29 @@ class Watch(Protocol):
 
     def set_state(self, state: bytes) -> None:
         """Take up a state of ``get_state``."""
+
+
+class Patience:
+    """Counts the sequences of the arm called ``name`` in a row after which something was wrong with it."""
+
+    def __init__(self, name: str, sequences: str = "sequences") -> None:
+        self._name, self._sequences, self._wrong = name, sequences, 0
+
+    def judge(self, watch: Watch) -> None:
+        """Count the sequence that ``watch`` has just seen.
+
+        Raises:
+            ArmFailure: it is the :data:`MOST_SPOILED`-th in a row, so that this is no passing trouble.
+
+        """
+        found = watch.spoiled_since()
+        self._wrong = 0 if found is None else self._wrong + 1
+        if found is not None and self._wrong >= MOST_SPOILED:
+            raise ArmFailure(
+                f"{self._name}: {found[1]}, for {MOST_SPOILED} {self._sequences} now; nothing is learned of these: "
+                f"{watch.reasons()}. See to the arm and run the same command again; where nothing is wrong with it, "
+                "add --monitor warn, which tells of such things, marks no rows and does not stop (or off)"
+            )
 
 
 def watched(

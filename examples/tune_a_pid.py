@@ -5,7 +5,7 @@ from pneumarm.classical import TuneSettings
 
 ARM = "virtual:seed=7"
 
-tuned = pneumarm.tune("pid", ARM, "arm.pid", settings=TuneSettings(seconds=150))
+tuned = pneumarm.tune("pid", ARM, "arm.pid", settings=TuneSettings(seconds=300))
 print(tuned)
 print(", ".join(f"{name} {gain:.3g}" for name, gain in vars(tuned.gains).items()))
 for one in pneumarm.move("arm.pid", ARM, goals_deg=[20, -5, 10]):

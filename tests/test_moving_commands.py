@@ -25,9 +25,18 @@ def called(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int,
 def controller(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("tuned") / "arm.pid"
     with pytest.raises(SystemExit) as ended:
-        main(["tune", "pid", *ARM, "--out", str(file), "--seconds", "150", "--json"])
+        main(["tune", "pid", *ARM, "--out", str(file), "--seconds", "180", "--json"])
     assert ended.value.code == 0
     return file
+
+
+def test_what_tuning_used_is_what_it_was_given(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, out, err = called(capsys, "tune", "pid", *ARM, "--out", tmp_path / "pid", "--seconds", 180, "--json")
+    tuned = json.loads(out)
+    assert code == 0
+    assert 150 < tuned["seconds"] <= 180
+    assert tuned["cost"] > 0  # it was measured
+    assert "not to find better gains" in err
 
 
 def test_move_tells_of_every_goal(
@@ -104,6 +113,8 @@ def test_track_tells_of_the_error(controller: Path, capsys: pytest.CaptureFixtur
         (("tune", "fuzzy", *ARM, "--out", "x"), "pid, pwm"),
         (("tune", "pid", *ARM, "--out", "missing/x"), "does not exist"),
         (("tune", "pid", *ARM, "--out", "x", "--seconds", "0"), "seconds"),
+        (("tune", "pid", *ARM, "--out", "x", "--seconds", "5"), "give 180 or more"),
+        (("tune", "pid", "--arm", "virtual:joints=2", "--out", "x", "--seconds", "180"), "give 330 or more"),
     ],
 )
 def test_unusable_input_is_one_line_and_2(

@@ -271,16 +271,17 @@ def tune(
     It takes 20 minutes of the arm's time, or as long as ``TuneSettings(seconds=...)`` says.
 
     Raises:
-        UnusableInput: there is no such kind, or ``out`` cannot be written.
+        UnusableInput: there is no such kind, the time is too short, or ``out`` cannot be written.
 
     """
-    from pneumarm.classical import TuneSettings, tune
+    from pneumarm.classical import TuneSettings, require_time, tune
     from pneumarm.files import require_folder
     from pneumarm.progress import progress
 
     if out is not None:
         require_folder(Path(out))
     with _opened(arm, seed) as opened, progress("tuning") as report:
+        require_time(opened.spec, settings or TuneSettings())
         tuned = tune(kind, opened, settings or TuneSettings(), seed, report)
     if out is not None:
         tuned.save(Path(out))

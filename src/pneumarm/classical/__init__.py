@@ -3,6 +3,6 @@ sliding mode over the nine actions. None of them has a model of the arm but a ca
 """
 
 from pneumarm.classical.tuned import KINDS, Tuned, is_tuned, load_tuned
-from pneumarm.classical.tuning import TuneSettings, tune
+from pneumarm.classical.tuning import TuneSettings, require_time, tune
 
-__all__ = ["KINDS", "TuneSettings", "Tuned", "is_tuned", "load_tuned", "tune"]
+__all__ = ["KINDS", "TuneSettings", "Tuned", "is_tuned", "load_tuned", "require_time", "tune"]

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import GuardedArm, Reading
+from pneumarm.arm import ArmSpec, GuardedArm, Reading
 from pneumarm.classical.pressure_loop import PressureLoop, Rates
 from pneumarm.classical.static_map import StaticMap, fit_map
 from pneumarm.errors import ArmFailure
 
-_VENT, _FILL = 2.0, 2.5
-"""Times that all muscles are vented and filled for [s]."""
+_VENT, _FILL, _PAUSE = 2.0, 2.5, 0.3
+"""Times that all muscles are vented, filled, and left closed in between [s]."""
 _SUMS = (0.4, 0.7, 1.0, 1.3, 1.6)
 """Of the map, in units of the highest pressure."""
 _RATIOS = (-0.96, -0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 0.96)
@@ -85,6 +85,14 @@ def calibrate(arm: GuardedArm, report: Report | None = None) -> Calibration:
     return Calibration(tuple(maps), rates, tuple(ranges), arm.read().time - begin)
 
 
+def calibration_seconds(spec: ArmSpec) -> float:
+    """Return about how long :func:`calibrate` takes on an arm [s]."""
+    rates = _VENT + 2 * (_FILL + _PAUSE + _VENT)
+    point = _SETTING + _RESTING + _LOOKING + spec.period
+    points = sum(2 * len(_ratios(share)) for share in _SUMS)
+    return rates + spec.joints * points * point
+
+
 def _watch(arm: GuardedArm, valves: NDArray[np.int8], seconds: float) -> _Watched:
     """Set ``valves`` (joints, 2) and read once a control period for ``seconds``; the valves stay as they are."""
     begin = arm.read().time
@@ -106,7 +114,7 @@ def _measure_rates(arm: GuardedArm) -> tuple[tuple[Rates, Rates], ...]:
     filled, vented = [], []
     for _ in range(2):
         filled.append(_watch(arm, full, _FILL))
-        _watch(arm, 0 * full, 0.3)
+        _watch(arm, 0 * full, _PAUSE)
         vented.append(_watch(arm, -full, _VENT))
     return tuple(
         (_rates(arm, filled, vented, j, 0), _rates(arm, filled, vented, j, 1)) for j in range(arm.spec.joints)
@@ -176,11 +184,16 @@ def _rest_points(
     found = []
     for share in _SUMS:
         total = share * highest
-        ratios = [one for one in _RATIOS if total * (1 + abs(one)) / 2 <= highest]
+        ratios = _ratios(share)
         for ratio in [*ratios, *ratios[::-1]]:
             found.append(_rest_point(arm, joint, rates, (total * (1 + ratio) / 2, total * (1 - ratio) / 2)))
             tell()
     return found
+
+
+def _ratios(share: float) -> list[float]:
+    """Return the ratios at which no muscle needs more than the highest pressure, of which both have ``share``."""
+    return [one for one in _RATIOS if share * (1 + abs(one)) / 2 <= 1]
 
 
 def _rest_point(

@@ -59,6 +59,12 @@ class Tuned:
     """Of the gains, as measured in the end, see :mod:`pneumarm.classical.tuning`; -1 where there was no time."""
 
     @property
+    def is_as_it_began(self) -> bool:
+        """Whether its gains are those that tuning begins with: no better ones were found, or none were tried."""
+        mine, first = vars(self.gains), vars(KINDS[self.kind].gains())
+        return all(np.isclose(mine[name], first[name]) for name in first)
+
+    @property
     def goal_range(self) -> NDArray[np.float64]:
         """Angles that the arm was seen to rest at, shape (joints, 2) [counts]."""
         return np.array(self.calibration.goal_range)

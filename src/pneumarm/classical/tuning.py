@@ -6,15 +6,16 @@ covariance matrix adaptation (:mod:`pneumarm.classical.search`); one that is cle
 movements is broken off. In the end the best few are measured again on movements that none was chosen by.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import Arm, GuardedArm, guarded
+from pneumarm.arm import Arm, ArmSpec, GuardedArm, guarded
 from pneumarm.arm.reference import Reference
-from pneumarm.classical.calibration import calibrate
+from pneumarm.classical.calibration import calibrate, calibration_seconds
 from pneumarm.classical.following import CommonGains
 from pneumarm.classical.ranges import RANGES, Range
 from pneumarm.classical.search import Evolution
@@ -33,6 +34,8 @@ _PLACES = (0.1, 0.62, 0.33, 0.9, 0.45, 0.5)
 _SINES = (0.5, 1.0)
 """Frequencies that are followed [Hz]."""
 _SINE_SECONDS = 2.0
+_TRIAL = len(_PLACES) * _HOLD + len(_SINES) * _SINE_SECONDS
+"""Arm time of one trial [s]."""
 _AMPLITUDE = 20.0
 """Of the sinusoids, as far as the arm reaches [degrees]."""
 _SETTLED = ((1.0, 1.0), (2.2, 0.5))
@@ -61,7 +64,7 @@ class TuneSettings(Settings):
     """How a controller is tuned."""
 
     seconds: float = 1200.0
-    """Arm time [s], calibration among it."""
+    """Arm time [s]; calibration takes some 150 of them a joint."""
     rate: float = 0.0
     """Control periods a second [Hz]; 0: as the arm's spec says."""
     whole_periods: bool = False
@@ -74,12 +77,23 @@ class TuneSettings(Settings):
         }
 
 
+def require_time(spec: ArmSpec, settings: TuneSettings) -> None:
+    """Raise UnusableInput where the time is not enough to calibrate an arm and to measure once how its gains do."""
+    least = 10 * math.ceil((1.05 * calibration_seconds(spec) + 2 * _TRIAL) / 10)
+    if settings.seconds < least:
+        raise UnusableInput(
+            f"seconds cannot be {settings.seconds:g}: calibrating {spec.name} and measuring once how it moves needs "
+            f"{least} s of its time, trying gains twice that and more; give {least} or more (1200 by default)"
+        )
+
+
 def tune(
     kind: str, arm: Arm, settings: TuneSettings = TuneSettings(), seed: int = 0, report: Report | None = None
 ) -> Tuned:
     """Return a controller of ``kind`` tuned on ``arm``, as it was opened.
 
-    Where the time is not enough to try any gains, the calibrated controller has those that it begins with.
+    Where the time is not enough to try any gains, the calibrated controller has those that it begins with; commands
+    refuse that, see :func:`require_time`.
 
     Raises:
         UnusableInput: there is no such kind, or the arm has one muscle a joint.
@@ -141,7 +155,7 @@ class _Trials:
         self, guard: GuardedArm, start: Tuned, space: "Range", left: Callable[[], float], tell: Callable[[], None]
     ) -> None:
         self.guard, self.start, self._space, self.left, self._tell = guard, start, space, left, tell
-        self.seconds = len(_PLACES) * _HOLD + len(_SINES) * _SINE_SECONDS
+        self.seconds = _TRIAL
         """Arm time of one trial [s]."""
         self._low, self._high = start.goal_range.T
         self._sines = [self._sine(frequency) for frequency in _SINES]

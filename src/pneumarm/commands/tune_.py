@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import open_arm
-from pneumarm.classical import TuneSettings, tune
+from pneumarm.classical import TuneSettings, require_time, tune
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import say, show, table
 from pneumarm.files import require_folder
@@ -23,6 +23,8 @@ def tune_(
 ) -> None:
     """Tune a classical controller on an arm: measure a static map and filling rates, then try gains on movements.
 
+    The first takes some 150 s of the arm's time a joint; what is left of ``--seconds`` is for gains.
+
     Parameters
     ----------
     kind
@@ -38,8 +40,14 @@ def tune_(
     """
     require_folder(out)
     with open_arm(arm, seed) as opened, progress("tuning") as report:
+        require_time(opened.spec, settings)
         tuned = tune(kind, opened, settings, seed, report)
     tuned.save(out)
+    if tuned.is_as_it_began:
+        say(
+            f"{tuned.seconds:.0f} s of the arm's time were enough to calibrate it, not to find better gains than "
+            "those that tuning begins with; more --seconds may find some"
+        )
     say(f"controller: {out}; move the arm by it with `pneumarm move {out} --arm {arm} 10deg`")
     gains = dict(vars(tuned.gains))
     low, high = tuned.spec.degrees(tuned.goal_range).T

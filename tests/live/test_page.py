@@ -126,6 +126,15 @@ def test_a_fault_is_switched_on_and_told_to_all(browser: Browser, server: Server
         assert other.locator("#hold").is_disabled()
 
 
+def test_a_slow_press_counts_while_figures_change(browser: Browser, server: Server) -> None:
+    with page_of(browser, server) as page:
+        drag_to(page, 20.0)
+        page.locator("body[data-mode=moving]").wait_for()
+        page.locator("#offered").get_by_text("leaking muscle").click(delay=1500)
+        page.locator("#on").get_by_text("leaking muscle, muscle 1").click(delay=1500)
+        comes(page, "it is off again", lambda: page.locator("#on").inner_text() == "")
+
+
 def test_a_stop_on_any_page_vents_an_arm_on_a_board(browser: Browser, pid: Path, tmp_path: Path) -> None:
     with on_board(pid, tmp_path) as (server, notes), page_of(browser, server) as page:
         with page_of(browser, server, 400) as watcher:

@@ -140,6 +140,15 @@ function choice(row, options, chosen, choose) {
   }));
 }
 
+// Replace what is in `place` by what `make` returns, unless `key` is as before: what is being pressed stays there.
+const keys = new Map();
+function fill(place, key, make) {
+  const text = JSON.stringify(key);
+  if (keys.get(place) === text) return;
+  keys.set(place, text);
+  $(place).replaceChildren(...make());
+}
+
 function showState(now) {
   const before = state;
   state = now;
@@ -189,7 +198,7 @@ function showLearning(now) {
   $("begin").hidden = busy || !now.can_learn;
   $("begin").disabled = !writes();
   $("begin").textContent = `Learn to move it: record ${now.minutes} min of its movement`;
-  $("stages").replaceChildren(...(learning?.stages ?? []).map((stage) => {
+  fill("stages", learning?.stages, () => (learning?.stages ?? []).map((stage) => {
     const line = document.createElement("li");
     line.className = stage.state;
     line.textContent = stage.words;
@@ -208,12 +217,12 @@ function showHealth(now) {
   if (learns) lines.push(["over", "While it learns, what is noticed is written into the report."]);
   else if (!lines.length) lines.push(now.familiar ? ["fine", "Nothing unusual."] : ["over", "Nothing unusual so far. The monitor does not know this arm yet: it needs 20 s of movement."]);
   lines.push(...(now.was_wrong ?? []).map((one) => ["over", finding(one, time)]));
-  $("wrong").replaceChildren(...lines.map(([kind, text]) => Object.assign(document.createElement("li"), { className: kind, textContent: text })));
+  fill("wrong", lines, () => lines.map(([kind, text]) => Object.assign(document.createElement("li"), { className: kind, textContent: text })));
   const counts = learns ? {} : {
     "the guard": now.guard, "control periods missed": now.missed,
     "air used": now.air == null ? null : `${now.air.toFixed(2)} normal litres`,
   };
-  $("counts").replaceChildren(...Object.entries(counts).filter(([, value]) => value != null).flatMap(([name, value]) => [
+  fill("counts", counts, () => Object.entries(counts).filter(([, value]) => value != null).flatMap(([name, value]) => [
     Object.assign(document.createElement("dt"), { textContent: name }), Object.assign(document.createElement("dd"), { textContent: value }),
   ]));
 }
@@ -221,7 +230,7 @@ function showHealth(now) {
 function showChoices(now) {
   const choices = now.choices ?? [];
   $("controllers").hidden = !choices.length;
-  $("choices").replaceChildren(...choices.map(([name, version]) => {
+  fill("choices", [choices, now.figures, now.controller, now.in_use, writes()], () => choices.map(([name, version]) => {
     const row = document.createElement("tr"), figures = now.figures?.[name];
     const number = (value, digits, unit) => (value == null ? "–" : `${value.toFixed(digits)}${unit}`);
     const acts = document.createElement("td");
@@ -247,7 +256,7 @@ function button(words, press) {
 function showFaults(now) {
   $("faults").hidden = !now?.faults || now.mode === "learning";
   if ($("faults").hidden) return;
-  $("offered").replaceChildren(...Object.entries(now.offered).map(([kind, [words, place]]) => {
+  fill("offered", [now.offered, now.faults, joint, muscle, writes()], () => Object.entries(now.offered).map(([kind, [words, place]]) => {
     const at = [kind, place === "arm" ? 0 : joint + 1, place === "muscle" ? muscle : 0];
     const on = now.faults.some((one) => one.every((value, i) => value === at[i]));
     const made = button(words, () => send({ do: "faults", kind, joint: joint + 1, muscle, on: !on }));
@@ -255,13 +264,12 @@ function showFaults(now) {
     return made;
   }));
   const elsewhere = (j, m) => [now.joints > 1 && j ? `joint ${j}` : "", m && now.muscles > 1 ? `muscle ${m}` : ""].filter(Boolean).join(", ");
-  $("on").replaceChildren(...now.faults.map(([kind, j, m]) => {
+  fill("on", [now.faults, writes()], () => [...(now.faults.length ? ["on:"] : []), ...now.faults.map(([kind, j, m]) => {
     const words = [now.offered[kind][0], elsewhere(j, m)].filter(Boolean).join(", ");
     const made = button(`${words} \u00d7`, () => send({ do: "faults", kind, joint: j || 1, muscle: m || 1, on: false }));
     made.title = "switch it off";
     return made;
-  }));
-  if (now.faults.length) $("on").prepend("on: ");
+  })]);
 }
 
 // ---- what people want

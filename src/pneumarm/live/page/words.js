@@ -19,6 +19,7 @@ export class Movement {
     this.goal = "";
     this.away = 0;
     this.clocks = []; // of the arm [s] and of the page [ms]
+    this.opened = 0; // when the page saw it getting ready [ms]
   }
 
   see(frame, now) {
@@ -44,7 +45,10 @@ export class Movement {
       if (old) return "Learning: the arm waits, this is how it was last seen";
       return this.pace > FAST ? `Learning: ${this.pace.toFixed(0)} times as fast as in reality` : "Learning";
     }
-    if (state.mode === "opening") return "Getting ready: compiling, once on this machine";
+    if (state.mode === "opening") {
+      this.opened ||= performance.now();
+      return `Getting ready: compiling, once on this machine; ${lasted((performance.now() - this.opened) / 1000)} so far`;
+    }
     if (old) return "Nothing new is heard of the arm: this is how it was last seen";
     if (state.mode === "moving") {
       return this.there ? "Holding its goal" : this.late ? `Not at its goal: ${this.away.toFixed(0)}° away` : "Moving to its goal";

@@ -42,7 +42,7 @@ def test_what_tuning_used_is_what_it_was_given(capsys: pytest.CaptureFixture[str
 def test_move_tells_of_every_goal(
     controller: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sys.stdin", io.StringIO("12.5deg\n\n500\n"))
+    monkeypatch.setattr("sys.stdin", io.StringIO("# there\n12.5deg\n\n500  # and back\n"))
     code, out, _ = called(capsys, "move", controller, *ARM, "--tries", 3, "0deg", "-5deg", "-", "650", "--json")
     assert code == 0
     assert out.count("\n") == 1
@@ -54,6 +54,37 @@ def test_move_tells_of_every_goal(
         assert 0 <= one["rest_error_deg"][0] < 1.5
         assert one["switches"] > 0
         assert 1 <= one["tries"] <= 3
+
+
+@pytest.mark.parametrize(
+    ("lines", "moved", "words"),
+    [
+        ("", 0, "standard input: held no goal"),
+        ("\n# nothing but words\n", 0, "standard input: held no goal"),
+        ("# first\n\nten\n5deg\n", 0, "line 3 of standard input: goal 'ten'"),
+        ("5deg\nten\n0deg\n", 1, "line 2 of standard input: goal 'ten'"),
+        ("5deg\n90deg\n", 1, "line 2 of standard input: goal '90deg': joint 1 has been seen to reach"),
+    ],
+)
+def test_a_line_that_is_no_goal_is_named_and_what_was_done_is_told(
+    controller: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, lines: str, moved: int,
+    words: str,
+) -> None:  # fmt: skip
+    monkeypatch.setattr("sys.stdin", io.StringIO(lines))
+    code, out, err = called(capsys, "move", controller, *ARM, "--hold", 1, "--tries", 1, "-", "--json")
+    assert code == 2
+    assert words in err.splitlines()[-1]
+    assert [one["goal_deg"] for one in json.loads(out)["movements"]] == [[5]] * moved
+
+
+def test_what_planning_is_not_for_is_said(small_run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = f"plan:{small_run / 'simulation.safetensors'}"
+    code, out, err = called(
+        capsys, "move", plan, *ARM, "--hold", 1, "--tries", 1, "--tolerance", 20, "5deg", "--json"
+    )
+    assert code == 0
+    assert out.count("\n") == 1
+    assert f"{plan}: plans turn by turn to reach each goal" in err
 
 
 def test_a_goal_can_be_where_the_hand_is_to_be(controller: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -107,6 +138,8 @@ def test_track_tells_of_the_error(controller: Path, capsys: pytest.CaptureFixtur
         (("move", "FILE", *ARM, "--holt", "2", "10deg"), "holt"),
         (("move", "FILE", *ARM, "--hold", "0", "10deg"), "hold"),
         (("move", "none", *ARM, "10deg"), "no file none"),
+        (("move", "SIM", *ARM, "10deg"), "simulation.safetensors plans in it"),
+        (("track", "SIM", *ARM, "--reference", "sine:1Hz,8deg"), "is a simulation; plan:"),
         (("track", "FILE", *ARM, "--reference", "sine:1Hz,80deg"), "choose a smaller one"),
         (("track", "FILE", *ARM, "--reference", "cosine"), "expected sine"),
         (("track", "FILE", *ARM, "--reference", "sine:1Hz,8deg", "--seconds", "0"), "86400"),
@@ -118,9 +151,10 @@ def test_track_tells_of_the_error(controller: Path, capsys: pytest.CaptureFixtur
     ],
 )
 def test_unusable_input_is_one_line_and_2(
-    controller: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
+    controller: Path, small_run: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
 ) -> None:
-    code, out, err = called(capsys, *[str(controller) if one == "FILE" else one for one in arguments])
+    files = {"FILE": controller, "SIM": small_run / "simulation.safetensors"}
+    code, out, err = called(capsys, *[files.get(one, one) for one in arguments])
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
 

@@ -13,13 +13,14 @@ STANDARD_INPUT = "-"
 
 
 def read_goals(given: Iterable[str], spec: ArmSpec, known: Goals) -> Iterator[Goal]:
-    """Yield the goals in ``given``; those on standard input as they come in.
+    """Yield the goals in ``given``; those on standard input as they come in, without empty lines and comments (#).
 
     All that are given are checked before the first is yielded. One in x and y is taken as near to the one before as
     can be.
 
     Raises:
-        UnusableInput: one is none, or none of those that are ``known``.
+        UnusableInput: one is none, or none of those that are ``known``; or standard input held none. Of a line there
+            it is raised when the goals before it have been moved to.
 
     """
     texts = list(given)
@@ -38,8 +39,18 @@ def read_goals(given: Iterable[str], spec: ArmSpec, known: Goals) -> Iterator[Go
             if goal is not None:
                 yield (before := goal)
                 continue
-            for line in sys.stdin:
-                if line.strip():
-                    yield (before := goal_of(line.strip(), spec, known, before))
+            found = 0
+            for number, line in enumerate(sys.stdin, 1):
+                text = line.partition("#")[0].strip()
+                if not text:
+                    continue
+                found += 1
+                try:
+                    before = goal_of(text, spec, known, before)
+                except UnusableInput as error:
+                    raise UnusableInput(f"line {number} of standard input: {error}") from error
+                yield before
+            if not found:
+                raise UnusableInput("standard input: held no goal; expected one or more lines such as 20deg or 650")
 
     return goals()

@@ -9,8 +9,8 @@ from pneumarm.commands.common import AnyStore, Json, OwnMethod, Settings
 from pneumarm.commands.goals import read_goals
 from pneumarm.commands.recorder import recorder
 from pneumarm.console import live, say, show, table
-from pneumarm.control.named import open_tracking
-from pneumarm.errors import MovementFailed
+from pneumarm.control.named import open_tracking, remarks_on
+from pneumarm.errors import MovementFailed, UnusableInput
 from pneumarm.moving import Moved, MoveSettings, move
 
 
@@ -27,15 +27,21 @@ def move_(
 ) -> None:
     """Move an arm to goals, one after the other, and hold each. A goal that is not settled at is tried again.
 
-    Exit code 1 where one is still not settled at after its tries; the goals after it are moved to all the same.
+    Exit code 1 where one is still not settled at after its tries; the goals after it are moved to all the same. Exit
+    code 2 where a line of standard input is no goal: what was moved to before is told all the same. How stiff a joint
+    is to be at its goals is chosen when the agent is trained (``train --servo.stiffness``). The air used is known of
+    virtual arms, and of others that say it by ``Arm.air_used``; else it is left out, null with --json.
 
     Parameters
     ----------
     controller
-        An agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation.
+        An agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation: turn by turn to reach
+        the goal, like an agent trained by ``--task reach``, and closes the valves there. It learns nothing; to
+        settle and to stay is what the default agent is trained for and the others are tuned for.
     goals
         20deg (from the middle of the range) or 650 (counts); of several joints 20deg,-5deg; x and y of the hand from
-        the first hinge 0.20m,-0.30m, where the arm's spec has its links; - for standard input, one a line.
+        the first hinge 0.20m,-0.30m, where the arm's spec has its links; - for standard input, one a line, where
+        empty lines and what follows # are left out.
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
@@ -47,17 +53,25 @@ def move_(
     """
     with open_arm(arm, seed) as opened:
         mover, spec, known = open_tracking(controller, opened, settings.tolerance, method=method)
+        for line in remarks_on(controller):
+            say(line)
         wanted = read_goals(goals, spec, known)
         made: list[Moved] = []
+        unusable: UnusableInput | None = None
         with live(spec) as seen, recorder(record, spec) as keep:
-            for one in move(opened, mover, wanted, settings, seen=seen):
-                made.append(one)
-                keep(one.recorded, {"goal": one.goal.tolist()})
-                say(_told(one))
-    # What is printed is printed even where one failed: it says which.
+            try:
+                for one in move(opened, mover, wanted, settings, seen=seen):
+                    made.append(one)
+                    keep(one.recorded, {"goal": one.goal.tolist()})
+                    say(_told(one))
+            except UnusableInput as error:
+                unusable = error
+    # What is printed is printed even where one failed, or was none: it says which.
     result = {"movements": [one.results() for one in made]}
     header = ("goal", "settled after [s]", "rest error [deg]", "tries", "valve changes", "air [l]")
-    show(result, json, lambda: [table(header, [_row(one) for one in made], arm)])
+    show(result, json, lambda: [table(header, [_row(one) for one in made], arm)] if made else [])
+    if unusable is not None:
+        raise unusable
     failed = [one for one in made if not one.success]
     if failed:
         raise MovementFailed(

@@ -10,10 +10,12 @@ from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
+from pneumarm.files import kind_of
 from pneumarm.learning import AnyAgent, Tracks
 from pneumarm.learning.agents import goals_of
 from pneumarm.moving import Holding, at_period
 from pneumarm.planning.agent import PlanAgent
+from pneumarm.simulation.simulation import KIND as SIMULATION
 from pneumarm.transitions.goals import Goals
 
 _PLAN = "plan:"
@@ -37,15 +39,31 @@ def open_tracking(
 
     """
     path = Path(name.removeprefix(_PLAN))
-    if not path.exists():
+    if not path.is_file():
         raise UnusableInput(
             f"controller {name!r}: expected the file of an agent, a file from `pneumarm tune`, or plan:SIM; there is "
             f"no file {path}"
         )
+    if name.startswith(_PLAN):
+        return tracking_for(PlanAgent.load(path), arm, tolerance)
     if is_tuned(path):
         return tracking_for(load_tuned(path), arm, tolerance)
-    agent = PlanAgent.load(path) if name.startswith(_PLAN) else open_agent(path, method)
-    return tracking_for(agent, arm, tolerance)
+    if kind_of(path) == SIMULATION:
+        raise UnusableInput(
+            f"controller {name!r}: is a simulation; {_PLAN}{name} plans in it, `pneumarm train` trains an agent in it"
+        )
+    return tracking_for(open_agent(path, method), arm, tolerance)
+
+
+def remarks_on(name: str) -> list[str]:
+    """Return the lines that are told before the controller called ``name`` moves an arm: what it is not for."""
+    if not name.startswith(_PLAN):
+        return []
+    return [
+        f"{name}: plans turn by turn to reach each goal, in few actions and switches, and closes the valves there; "
+        "it sees neither speed nor future of a reference, is not made to settle as the default agent is, and learns "
+        "nothing"
+    ]
 
 
 def tracking_for(

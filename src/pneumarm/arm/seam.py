@@ -315,7 +315,11 @@ class Arm(ABC):
         return False
 
     def air_used(self) -> float | None:
-        """Return the air that the muscles have taken so far [normal litres]; None where nobody knows."""
+        """Return the air that the muscles have taken so far [normal litres]; None where nobody knows.
+
+        Nobody does by default: pressures alone do not tell what flows through a leak or into a muscle that grows. An
+        arm with a flow meter says it here, and then ``move`` and ``track`` do.
+        """
         return None
 
     @abstractmethod

@@ -151,8 +151,8 @@ class LearnSettings(Settings):
     """Which method learns, and the settings of each."""
 
     task: TaskName | None = None
-    """What the agent is for: to settle at goals, hold them and track references (the default; one agent does all), or
-    to reach goals as in the thesis, where flying through one slowly enough counts."""
+    """What the agent is for: settle, hold and track name one and the same agent, which does all three (the default);
+    reach one that reaches goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
     """servo, policy, batched (the thesis' networks learned in many arms at once), sarsa or q-learning (the thesis'),
     an installed method, or MODULE:NAME of your own; by default servo, and policy to reach."""

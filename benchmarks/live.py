@@ -2,9 +2,10 @@
 
 Board, page and browser are processes of their own, as they are where a real board moves an arm. A stop takes from the
 press of the mouse on a page to the command at the board that vents all muscles; each is pressed while the arm is on
-its way. PNEUMARM_LIVE_STOPS sets their number; PNEUMARM_LIVE_MINUTES sets for how long the arm is then moved about,
-with ten pages open, after which the memory of the program and of a page is told at the beginning, after a quarter of
-the time, and in the end.
+its way. PNEUMARM_LIVE_STOPS sets their number; PNEUMARM_LIVE_MINUTES sets for how long the arm is then moved about
+and follows curves with ten pages open, of which one is killed and opened anew now and then. The memory of the program
+and of a page is told at the beginning, after a quarter of the time, and in the end, and how fast both grow after that
+quarter.
 """
 
 import re
@@ -12,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -26,6 +27,7 @@ ROOT = Path(__file__).parents[1]
 STOPS = environment.whole("PNEUMARM_LIVE_STOPS", 30)
 MINUTES = environment.number("PNEUMARM_LIVE_MINUTES", 2.0)
 WATCHERS = 9
+SAMPLES = 24  # of the memory; after each a watching page is killed and opened anew
 
 
 @contextmanager
@@ -73,7 +75,7 @@ def measure() -> Iterator[str]:
         watchers = [browser.new_page(viewport={"width": 400, "height": 860}) for _ in range(WATCHERS)]
         for watcher in watchers:
             watcher.goto(told.split()[-1])
-        yield from _memory(page, process.pid)
+        yield from _memory(page, process.pid, watchers)
 
 
 def _press(page, degrees: float) -> None:
@@ -122,25 +124,55 @@ def _stops(page, notes: Path) -> Iterator[str]:
     )
 
 
-def _memory(page, process: int) -> Iterator[str]:
-    begin = monotonic()
-    end, quarter, goal = begin + 60 * MINUTES, begin + 15 * MINUTES, 20.0
-    yield f"at the beginning {_used(page, process)}"
-    while monotonic() < end:
-        _press(page, goal)
-        goal = -goal
-        page.wait_for_timeout(2500)
-        if quarter is not None and monotonic() > quarter:
-            yield f"after {15 * MINUTES / 60:.1f} min {_used(page, process)}"
-            quarter = None
-    yield f"after {MINUTES:.0f} min with {WATCHERS + 1} pages {_used(page, process)}"
+def _memory(page, process: int, watchers: list) -> Iterator[str]:
+    begin, goal = monotonic(), 20.0
+    samples = [(0.0, *_used(page, process))]
+    yield f"at the beginning {_told(samples[-1])}"
+    for k in range(1, SAMPLES + 1):
+        _renew(watchers, k % len(watchers), page)
+        while monotonic() < begin + 60 * MINUTES * k / SAMPLES:
+            if page.locator("body").get_attribute("data-mode") in ("stopped", "failed"):
+                page.locator("#stop").click()  # not even the board was heard: this machine had too much to do
+                page.wait_for_timeout(500)
+            _press(page, goal)
+            goal = -goal
+            page.wait_for_timeout(2500)
+            if goal > 0:
+                page.locator("#sine").click()
+                page.wait_for_timeout(3000)
+        samples.append(((monotonic() - begin) / 60, *_used(page, process)))
+        if k in (SAMPLES // 4, SAMPLES):
+            yield f"after {samples[-1][0]:.1f} min with {WATCHERS + 1} pages {_told(samples[-1])}"
+    minutes, *kinds = np.array(samples[SAMPLES // 4 :]).T
+    program, heap, nodes = (np.polyfit(minutes, values, 1)[0] for values in kinds)
+    yield (
+        f"since then the program grows by {1e3 * program:.0f} kB a minute, a page by {1e3 * heap:.1f} kB and "
+        f"{nodes:.1f} nodes; {SAMPLES} pages were killed meanwhile"
+    )
 
 
-def _used(page, process: int) -> str:
+def _renew(watchers: list, place: int, page) -> None:
+    """Kill the watching page at a ``place`` without a word, and open another like ``page``."""
+    killed = watchers[place]
+    watchers[place] = killed.context.browser.new_page(viewport={"width": 400, "height": 860})
+    watchers[place].goto(page.url)
+    with suppress(Exception):  # who crashes does not arrive
+        killed.goto("chrome://crash", timeout=5000)
+    killed.context.close()
+
+
+def _used(page, process: int) -> tuple[float, float, float]:
+    """Return what the program and the page hold [MB], and the nodes of the page."""
     status = Path(f"/proc/{process}/status").read_text()
     resident = int(re.findall(r"VmRSS:\s+(\d+)", status)[0]) / 1e3
     session = page.context.new_cdp_session(page)
     session.send("HeapProfiler.collectGarbage")
     heap = session.send("Runtime.getHeapUsage")["usedSize"] / 1e6
+    nodes = session.send("Memory.getDOMCounters")["nodes"]
     session.detach()
-    return f"the program holds {resident:.0f} MB, a page {heap:.1f} MB"
+    return resident, heap, nodes
+
+
+def _told(sample: tuple[float, ...]) -> str:
+    _, program, heap, nodes = sample
+    return f"the program holds {program:.0f} MB, a page {heap:.1f} MB and {nodes:.0f} nodes"

@@ -1,5 +1,6 @@
 """The loop that moves an arm for people: goals, curves, stops, faults, silence, failures. No time is waited for."""
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from children import wait_until
 from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.virtual import VirtualArm
@@ -15,8 +17,10 @@ from pneumarm.errors import ArmFailure
 from pneumarm.live.choices import Choice, opened
 from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
 from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop
+from pneumarm.live.rig import Rig
 from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
+from pneumarm.run import RunSettings
 
 
 class Scripted(PassedOn):
@@ -88,6 +92,23 @@ def played(pid: Path) -> Iterator[Played]:
 
 
 VENTED = [[-1, -1]]
+
+
+def test_the_arm_is_seen_before_its_monitor_is_compiled(pid: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Rig(RunSettings(arm="virtual:seed=3"), [str(pid)], None)
+    seen: list[object] = []
+    monkeypatch.setattr("pneumarm.live.session.warm_up", lambda *_: seen.append(rig.screen.state["mode"]))
+    assert json.loads(rig.screen.frame)["goal"] is None
+    with rig:
+        wait_until("it is ready", lambda: rig.screen.state["mode"] == "relaxed")
+    assert seen == ["opening"]
+
+
+def test_of_an_arm_with_one_muscle_nothing_else_is_shown() -> None:
+    with open_arm("virtual:seed=3,muscles=1") as arm:
+        screen = Screen()
+        screen.show(arm.spec, arm.read(), None, np.array([[1, -1]]))
+    assert np.shape(json.loads(screen.frame)["pressure"]) == np.shape(json.loads(screen.frame)["valves"]) == (1, 1)
 
 
 def test_goals_are_moved_to_held_and_counted(played: Played) -> None:

@@ -14,6 +14,7 @@ from pneumarm.arm.virtual.parameters import without_noise
 from pneumarm.control.playing import Player
 from pneumarm.control.turns import TurnPlayer
 from pneumarm.experiments import registry
+from pneumarm.experiments.arm_time import arm_time
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.displacement import typical
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, TrialRows, run_seed, sorted_rows
@@ -240,6 +241,32 @@ def test_they_move_any_arm(name: str, plain_laboratory: Path, tmp_path: Path) ->
     told = "Only a virtual arm can" in " ".join(analysis.summary)
     assert told == (name == "transfer")
     assert write_page(experiment, tmp_path, analysis, 1, (PLAIN,)).exists()
+
+
+def test_it_is_said_for_how_long_an_arm_will_be_needed(tmp_path: Path) -> None:
+    def said(name: str, arm: str = PLAIN, folder: Path = tmp_path / "none", **settings: Any) -> str | None:
+        one = registry.experiment(name)
+        rows = [(trial, 1) for trial in one.trials]
+        return arm_time(one, arm, folder, rows, LaboratorySettings(**settings))
+
+    recorded = tmp_path / "recorded"
+    recorded.mkdir()
+    (recorded / "simulation.safetensors").touch()
+    ideal, each = 2 * 300 + 800 + 300, 300  # sensors without noise, never late; both and warm
+    known = 3 * 2000 + 2 * 300 + 800 + each
+    assert said("transfer", folder=recorded) == (
+        f"{PLAIN}: at most {known:,} movements, about {round(known * 5.5 / 60)} minutes, 11.8 hours of the arm's time"
+    )
+    assert f"at most {known + ideal:,} movements" in str(said("transfer", "virtual:seed=1", recorded))
+    assert said("goal-area", transitions=20_000, folder=tmp_path) == (
+        f"{PLAIN}: 20,000 transitions to record and at most 1,200 movements, about 127 minutes, 2.1 hours of the "
+        "arm's time"
+    )
+    nights = round((4 * 2000 * 5.5 + 3 * 14 * 3600) / 60)
+    assert f"about {nights:,} minutes" in str(said("overnight", folder=recorded))
+    assert "at most 1,001 movements" in str(said("on-the-arm-only", folder=recorded, max_episodes=1))
+    assert said("all-goals", folder=recorded) is None  # it learns and tests in the simulation
+    assert said("coupling") is None  # it moves arms in a way of its own
 
 
 def test_a_virtual_arm_is_moved_as_it_is_named(tmp_path: Path) -> None:

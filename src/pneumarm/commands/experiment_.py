@@ -29,7 +29,8 @@ def experiment_(
 ) -> None:
     """Repeat an experiment of the thesis and write its page.
 
-    A second call computes only the missing rows, also after a call that was killed or that asked for fewer runs.
+    Before an arm is recorded, or moved by an agent, it is said for how long, about. A second call computes only the
+    missing rows, also after a call that was killed or that asked for fewer runs.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def experiment_(
     """
     chosen = experiment(name)
     names = chosen.arms if arms is None else names_in(arms)
-    done = sweep(chosen, out, names, runs, settings, workers=workers, dask=dask, progress=progress)
+    done = sweep(chosen, out, names, runs, settings, workers=workers, dask=dask, progress=progress, tell=say)
     analysis = chosen.analyse(done.rows)
     page = write_page(chosen, out / chosen.name, analysis, done.rows.runs, done.rows.arms)
     found = {"experiment": name, "rows": len(done.rows.rows), "computed": done.computed, "seconds": done.seconds}

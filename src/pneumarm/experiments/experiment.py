@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import msgspec
 import numpy as np
@@ -154,6 +154,8 @@ class Experiment(ABC):
     """By default."""
     arms: tuple[str, ...] = ("virtual",)
     """By default."""
+    records: ClassVar[bool] = False
+    """Whether it is prepared by recording the arm, as :func:`pneumarm.experiments.preparation.simulated` does."""
 
     @property
     @abstractmethod
@@ -175,6 +177,14 @@ class Experiment(ABC):
     @abstractmethod
     def measure(self, material: Any, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Return the figures of ``trial`` in ``run``. The same arguments give the same figures, bit for bit."""
+
+    def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
+        """Return how many movements :meth:`measure` makes on ``arm`` at most, as far as that is known before."""
+        return 0
+
+    def rest(self, trial: int) -> float:
+        """Return for how long the arm is left alone meanwhile [s]."""
+        return 0.0
 
     def analyse(self, rows: TrialRows) -> Analysis:
         """Return what the complete ``rows`` say; runs nothing.

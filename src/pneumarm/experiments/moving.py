@@ -68,6 +68,8 @@ class OnTheArm(Experiment):
     sizes: Any = None
     """How much is moved in a row: a dataclass of each experiment's own."""
 
+    records = True
+
     def settings(self) -> Any:
         """Return the trials in words, the settings of the agent and the sizes."""
         return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
@@ -90,6 +92,10 @@ class AgentsByTrial(OnTheArm):
     """An experiment in which every trial has an agent of its own, tested in the simulation and on the arm."""
 
     sizes: TestSizes = TestSizes()
+
+    def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
+        """Return those of the test."""
+        return self.sizes.test
 
     @abstractmethod
     def train_settings(self, trial: int) -> TrainSettings:

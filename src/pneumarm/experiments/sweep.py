@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from pneumarm.errors import UnusableInput
+from pneumarm.experiments.arm_time import arm_time
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, Row, TrialRows, sorted_rows
 from pneumarm.experiments.preparation import SETTINGS, claim
 from pneumarm.experiments.row_file import RowWriter
@@ -55,6 +56,7 @@ def sweep(
     workers: int | None = None,
     dask: str | None = None,
     progress: Progress = silent,
+    tell: Callable[[str], None] = lambda line: None,
 ) -> Sweep:
     """Compute the rows of ``experiment`` that the folder ``laboratory`` does not hold yet, and return all of them.
 
@@ -67,6 +69,7 @@ def sweep(
         workers: threads, or tasks at once on a cluster; by default as many as there are cores.
         dask: address of the scheduler of a dask cluster, such as tcp://127.0.0.1:8786; otherwise this machine.
         progress: shows how far preparing and computing are.
+        tell: told for how long each arm will be needed, before anything moves.
 
     Raises:
         UnusableInput: the folder was begun with other settings, another process works in it, no arm or cluster.
@@ -91,7 +94,12 @@ def sweep(
         there = {row.key for row in writer.rows}
         missing = [key for key in keys if key not in there]
         materials = {}
-        for arm in dict.fromkeys(arm for arm, _, _ in missing):
+        needed = tuple(dict.fromkeys(arm for arm, _, _ in missing))
+        for arm in needed:
+            rows = [(trial, run) for one, trial, run in missing if one == arm]
+            if (words := arm_time(experiment, arm, arm_folder(laboratory, arm), rows, settings)) is not None:
+                tell(words)
+        for arm in needed:
             with progress(f"preparing {arm}") as report:
                 materials[arm] = experiment.prepare(arm, arm_folder(laboratory, arm), settings, report)
         tasks = [(experiment, materials[key[0]], key, settings) for key in missing]

@@ -52,6 +52,8 @@ _TEST_SEED = 0  # the same begin states and goals for every agent of every exper
 class Trainings(Experiment):
     """An experiment in which every trial is a training in the arm's simulation, and a test there."""
 
+    records = True
+
     @abstractmethod
     def train_settings(self, trial: int) -> TrainSettings:
         """Return the settings of the training of ``trial``."""

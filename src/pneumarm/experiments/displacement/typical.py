@@ -111,6 +111,11 @@ class Displacement(OnTheArm):
             found |= figures
         return found
 
+    def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
+        """Return those while adapting and after it, and the typical ones."""
+        sizes = self.sizes
+        return sizes.adapting + sizes.shown + sizes.typical * len(sizes.degrees)
+
 
 def relations(distance: Array, actions: Counts, switches: Counts) -> dict[str, float]:
     """Return correlations with the displacement, and the share of movements with few switches."""

@@ -107,6 +107,11 @@ class OnTheArmOnly(OnTheArm):
             **series("performance", performance),
         }
 
+    def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
+        """Return the looks, the test, and all that learning on the arm may take."""
+        most = settings.max_episodes or self.agent.max_episodes
+        return self.sizes.looks + self.sizes.test + (most if trial == ON_ARM else 0)
+
 
 def look(arm: Arm, settings: TrainSettings, looks: int, seed: int) -> Agent:
     """Return an agent for ``arm`` that has learned nothing, after visiting ``looks`` begin states.

@@ -78,6 +78,14 @@ class Overnight(OnTheArm):
             next_day = second.play(*draws(agent, seed, sizes.second, MOVEMENTS, sizes.first))
         return course(joined([day, next_day]), sizes.block)
 
+    def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
+        """Return those of both days."""
+        return self.sizes.first + self.sizes.second
+
+    def rest(self, trial: int) -> float:
+        """Return how long the night is [s]."""
+        return 3600 * self.sizes.hours if DAYS[trial].night else 0.0
+
 
 def _rest(arm: Arm, seconds: float) -> None:
     """Leave the arm vented for ``seconds`` [s]; a virtual one in no time."""

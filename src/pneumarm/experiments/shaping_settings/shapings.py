@@ -56,6 +56,8 @@ def _packaged(name: str) -> str:
 class ShapingSettings(Experiment):
     """Trainings that differ in their shaping."""
 
+    records = True
+
     name = "shaping-settings"
     words = words_of(__package__)
     runs: int = 4

@@ -76,6 +76,15 @@ class TransferToTheArm(OnTheArm):
             return self._learning(material, RATES[trial], run, settings)
         return self._condition(material, trial, run, settings)
 
+    def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
+        """Return those while learning, or of warming and tests."""
+        if trial in RATES:
+            return self.sizes.learning
+        if trial in IDEAL and not arm.startswith("virtual"):
+            return 0
+        warming = self.sizes.warming if trial in (WARM, ALL) else 0
+        return warming + self.sizes.test * (2 if trial == AS_IT_IS else 1)
+
     def _learning(self, of: Material, rate: float, run: int, laboratory: LaboratorySettings) -> Figures:
         agent, seed = agent_of(of, self.agent, run, laboratory), run_seed(laboratory, run)
         explores = self.agent.exploration

@@ -137,6 +137,20 @@ def test_an_unknown_arm_is_refused(capsys: pytest.CaptureFixture[str], tmp_path:
         assert Outcome(capsys, "collect", arm, tmp_path / "a.db").is_refused(), arm
 
 
+def test_an_error_that_nobody_foresaw_says_that_it_is_a_bug(
+    capsys: pytest.CaptureFixture[str], store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unforeseen(path: Path) -> None:
+        raise ZeroDivisionError("nobody thought of that")
+
+    monkeypatch.setattr("pneumarm.commands.fit_.require_folder", unforeseen)
+    outcome = Outcome(capsys, "fit", store, "--out", tmp_path / "sim", "--json")
+    assert (outcome.code, outcome.out) == (1, "")
+    assert outcome.err == (
+        "pneumarm: ZeroDivisionError: nobody thought of that (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)\n"
+    )
+
+
 def test_an_arm_that_fails_in_the_middle_costs_nothing_that_was_stored(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

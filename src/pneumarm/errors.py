@@ -24,5 +24,9 @@ class ControllerFailure(PneumarmError):  # noqa: N818
     """A controller went on giving decisions that cannot be used; the arm is vented."""
 
 
+class ArmUnsound(PneumarmError):  # noqa: N818
+    """A check-up that was asked to be strict found something wrong with the arm."""
+
+
 class MovementFailed(PneumarmError):  # noqa: N818
     """A movement did not come to rest at its goal, after all its tries."""

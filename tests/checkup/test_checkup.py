@@ -316,8 +316,13 @@ def test_the_commands(capsys, tmp_path, monkeypatch):
     (tmp_path / "crossed_arm.py").write_text(
         "from faulty_arm import FAULTS\nimport functools\nmine = functools.partial(FAULTS['angle reversed'], 2)\n"
     )
-    _, out, _ = run(capsys, "arm", "check", "python:crossed_arm:mine", "--json")
+    code, out, _ = run(capsys, "arm", "check", "python:crossed_arm:mine", "--json")
+    assert code == 0  # it was checked
     assert [f["kind"] for f in json.loads(out)["findings"]] == ["angle reversed"]
+    code, again, err = run(capsys, "arm", "check", "python:crossed_arm:mine", "--strict", "--json")
+    assert (code, json.loads(again)["findings"]) == (1, json.loads(out)["findings"])
+    assert err.splitlines()[-1] == "pneumarm: python:crossed_arm:mine: 1 thing(s) wrong: angle reversed"
+    assert run(capsys, "arm", "check", "virtual:seed=4", "--strict")[0] == 0
     code, _, err = run(capsys, "arm", "calibrate", "python:crossed_arm:mine", "--out", tmp_path / "no.toml")
     assert code == 2
     assert "Swap the outer wires of the potentiometer" in err

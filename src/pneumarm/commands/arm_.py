@@ -27,7 +27,7 @@ from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, mus
 from pneumarm.commands.asking import asked_for, missing_of
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import say, show, table
-from pneumarm.errors import UnusableInput
+from pneumarm.errors import ArmUnsound, UnusableInput
 from pneumarm.files import require_folder, write_text
 from pneumarm.progress import progress
 from pneumarm.transitions.window import QUANTITIES
@@ -43,11 +43,14 @@ def check_(
     /,
     *,
     out: Path | None = None,
+    strict: bool = False,
     seed: int = 0,
     settings: Annotated[CheckupSettings, Settings] = CheckupSettings(),
     json: Json = False,
 ) -> None:
     """Move an arm gently, a muscle at a time, and say what is wrong with it. Its joints must be free to move.
+
+    What is found wrong is told, and the exit code is 0 all the same unless ``--strict`` is given: the check was done.
 
     Parameters
     ----------
@@ -56,6 +59,8 @@ def check_(
         the arm is compared with its sound state there.
     out
         Folder for a page with curves; created if it does not exist.
+    strict
+        Exit with 1 where something is wrong with the arm, for scripts.
     seed
         Of a virtual arm's noise.
     """
@@ -98,6 +103,8 @@ def check_(
         ]
 
     show(result, json, rows)
+    if strict and findings:
+        raise ArmUnsound(f"{arm}: {len(findings)} thing(s) wrong: {', '.join(one.kind for one in findings)}")
 
 
 def _timing(checkup: Checkup) -> dict[str, float]:

@@ -18,7 +18,7 @@ from live.serving import served  # noqa: E402
 from pneumarm.live.rig import Rig  # noqa: E402
 from pneumarm.run import RunSettings  # noqa: E402
 
-_COLORS = 128
+_COLORS = 256
 _GOALS = (25, -20, 10)  # degrees
 _PLACE = """(degrees) => {
   const turned = degrees * Math.PI / 180, point = new DOMPoint(210 * Math.sin(turned), 210 * Math.cos(turned));

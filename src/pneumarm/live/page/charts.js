@@ -1,11 +1,13 @@
 // The last seconds as curves, and the paper that a movement is drawn on.
 
-const SECONDS = 10; // that are shown
+const SECONDS = 10; // that are shown ...
+const LONGER = [1, 3, 10, 30, 100, 300]; // ... times this where the arm's time passes faster than on the wall
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 export class Charts {
   constructor() {
     this.frames = []; // of the last seconds: bounded by time
+    this.seconds = SECONDS;
     this.joint = 0;
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
     new ResizeObserver(() => this.resize()).observe(document.getElementById("charts"));
@@ -18,12 +20,14 @@ export class Charts {
     this.draw();
   }
 
-  add(frame) {
+  // Take in a frame; the arm's time passes `pace` times as fast as on the wall.
+  add(frame, pace = 1) {
+    this.seconds = SECONDS * (LONGER.find((factor) => factor >= pace * 0.8) ?? LONGER.at(-1));
     const last = this.frames.at(-1);
     if (last && frame.time <= last.time) this.frames = []; // another clock
     this.frames.push(frame);
     let old = 0;
-    while (this.frames[old].time < frame.time - SECONDS) old++;
+    while (this.frames[old].time < frame.time - this.seconds) old++;
     if (old) this.frames.splice(0, old);
     this.fresh = true;
   }
@@ -93,7 +97,7 @@ export class Charts {
     if (!frames.length) return;
     const end = frames.at(-1).time;
     const time = frames.map((one) => one.time - end);
-    const x = { min: -SECONDS, max: 0 };
+    const x = { min: -this.seconds, max: 0 };
     const muscles = this.hello.muscles > 1 ? [0, 1] : [0];
     const valve = (m) => frames.map((one) => (m ? -1.5 : 1.5) + 1.2 * (one.valves?.[j]?.[m] ?? 0));
     const data = [

@@ -71,7 +71,7 @@ function showFrame(now) {
   if (document.body.classList.contains("empty")) document.body.classList.remove("empty");
   movement.see(now, seen);
   drawing.show(now);
-  charts.add(now);
+  charts.add(now, movement.pace);
   if (state?.mode === "following") paper.follow(now);
   [...$("angles").children].forEach((place, j) => {
     place.children[1].textContent = asDegrees(now.angle[j]);
@@ -195,6 +195,7 @@ function showLearning(now) {
   const learning = now.learning, busy = now.mode === "learning";
   $("learn").hidden = !(now.can_learn || busy || learning?.done);
   $("learn-words").textContent = busy ? "" : learning?.done ? `Learned in ${lasted(learning.seconds)}; the report is ${learning.report}` : now.controller ? "" : "Nothing has learned to move this arm yet.";
+  $("learn").classList.toggle("over", !busy && Boolean(learning?.done)); // then there is more to look at
   $("begin").hidden = busy || !now.can_learn;
   $("begin").disabled = !writes();
   $("begin").textContent = `Learn to move it: record ${now.minutes} min of its movement`;

@@ -238,6 +238,7 @@ def test_an_arm_with_one_muscle_is_drawn_with_a_spring_also_while_it_learns(brow
         page.locator("#stop").click()
         page.locator("body[data-mode=relaxed]").wait_for()
         page.get_by_text("what was recorded so far is kept").wait_for()
+        assert page.locator("#begin").inner_text() == "Go on learning"
 
 
 @pytest.mark.parametrize("width", WIDTHS)

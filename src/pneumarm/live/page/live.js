@@ -198,7 +198,7 @@ function showLearning(now) {
   $("learn").classList.toggle("over", !busy && Boolean(learning?.done)); // then there is more to look at
   $("begin").hidden = busy || !now.can_learn;
   $("begin").disabled = !writes();
-  $("begin").textContent = `Learn to move it: record ${now.minutes} min of its movement`;
+  $("begin").textContent = learning && !learning.done ? "Go on learning" : `Learn to move it: record ${now.minutes} min of its movement`;
   fill("stages", learning?.stages, () => (learning?.stages ?? []).map((stage) => {
     const line = document.createElement("li");
     line.className = stage.state;

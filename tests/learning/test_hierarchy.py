@@ -8,7 +8,7 @@ import pytest
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import find_method, load_agent, test, train
+from pneumarm.learning import LearnSettings, find_method, load_agent, test, train
 from pneumarm.learning.hierarchy import HIERARCHY, HierarchicalAgent, HierarchySettings
 from pneumarm.learning.hierarchy.loop import begin_plan, go_on, hierarchy, plan, upper_shape
 from pneumarm.learning.online.loop import Schedule, remember
@@ -95,12 +95,21 @@ def test_what_both_levels_learn_from_a_step() -> None:
     assert lower[1, -1, 0] == pytest.approx(before[1, -1, 0] + 0.1 * at_both, rel=1e-4)
 
 
+def test_its_settings_are_given_as_those_of_ones_own() -> None:
+    chosen = LearnSettings(method="hierarchy", own={"period": "7", "ways": [0.5, 1.0]}).chosen
+    assert chosen == HierarchySettings(period=7, ways=(0.5, 1.0))
+    with pytest.raises(UnusableInput, match=r"method hierarchy: has no setting perod; it has .*period"):
+        LearnSettings(method="hierarchy", own={"perod": "7"})
+    with pytest.raises(UnusableInput, match="expected reach, what hierarchy is for"):
+        LearnSettings(method="hierarchy", task="settle")
+
+
 def test_is_trained_and_kept_as_any_method(tmp_path: Path) -> None:
     simulation = synthetic_simulation(2)
     begin = synthetic_begin_states(simulation)
-    method = find_method("pneumarm.learning.hierarchy:HIERARCHY")
+    method = find_method("hierarchy")
     assert method is HIERARCHY
-    first = train(simulation, begin, SHORT, 4, method=method, threads=1)
+    first = train(simulation, begin, SHORT, 4, threads=1)  # its settings say by which method
     second = train(simulation, begin, SHORT, 4, method=method, checkpoint=tmp_path / "checkpoint")
     np.testing.assert_array_equal(first.agent.upper, second.agent.upper)
     assert (first.agent.upper != an_agent(simulation, SHORT).upper).any()

@@ -15,11 +15,11 @@ from pneumarm.learning.agents import (
     goals_of,
 )
 from pneumarm.learning.batched.settings import BatchedSettings
+from pneumarm.learning.method import Method
 from pneumarm.learning.methods import (
     LOOKING_AHEAD,
     METHODS,
     LearnSettings,
-    Method,
     find_method,
     load_agent,
     results_with_lookahead,

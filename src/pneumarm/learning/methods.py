@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -26,8 +26,12 @@ from pneumarm.files import kind_of
 from pneumarm.learning.agents import Acts, AnyAgent, LooksAhead, SelfTesting
 from pneumarm.learning.batched.settings import BatchedSettings
 from pneumarm.learning.batched.training import train_batched
+from pneumarm.learning.hierarchy import HIERARCHY
+from pneumarm.learning.hierarchy.agent import KIND as HIERARCHICAL
+from pneumarm.learning.hierarchy.agent import HierarchicalAgent
 from pneumarm.learning.imported import KIND as IMPORTED
 from pneumarm.learning.imported import ImportedPolicy
+from pneumarm.learning.method import Method, TaskName
 from pneumarm.learning.online.agent import KIND as ACTION_VALUES
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.settings import TrainSettings
@@ -48,30 +52,10 @@ from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
 from pneumarm.task.movements import TEST, Movements
 
-TaskName = Literal["reach", "settle", "hold", "track"]
 GROUP = "pneumarm.methods"
 """The group of entry points of installed methods."""
 LOOKING_AHEAD = 500
 """Movements of a test that looks ahead; they take seconds."""
-
-
-@dataclass(frozen=True)
-class Method:
-    """A method: what it is told, how it trains agents, and how these are read again."""
-
-    settings: type[Any]
-    """Class of its settings, a dataclass whose defaults work. They decide the task of its agents, too."""
-    train: Callable[..., Training[Any]]
-    """Called with simulation, begin states, settings and seed, and by their names ``progress``, ``checkpoint`` and
-    ``threads``, see :func:`train`."""
-    load: Callable[[Path], AnyAgent]
-    """Returns the agent in a file."""
-    tasks: tuple[TaskName, ...] = ("reach",)
-    """What its agents can be asked to do."""
-    place: str = "own"
-    """Field of :class:`LearnSettings` that holds its settings."""
-    fixed: Mapping[str, Any] = field(default_factory=dict)
-    """Settings that are as they are, because they make the method."""
 
 
 def _thesis(name: str) -> Method:
@@ -82,14 +66,18 @@ METHODS: Mapping[str, Method] = {
     "servo": Method(ServoSettings, train_servo, ServoAgent.load, ("settle", "hold", "track", "reach"), place="servo"),
     "policy": Method(PolicySettings, train_policy, PolicyAgent.load, place="policy"),
     "batched": Method(BatchedSettings, train_batched, Agent.load, place="batched"),
+    "hierarchy": HIERARCHY,
     "sarsa": _thesis("sarsa"),
     "q-learning": _thesis("q-learning"),
 }
-"""A servo, by default; a policy to reach goals; the thesis' nine networks learned in many arms; the thesis' own."""
+"""A servo, by default; a policy to reach goals; the thesis' nine networks learned in many arms; the thesis' agents
+under an upper one, which sets subgoals; the thesis' own. A method whose settings are those of another and more comes
+before that."""
 _LOADS: Mapping[str, Callable[[Path], AnyAgent]] = {
     SERVO: ServoAgent.load,
     POLICY: PolicyAgent.load,
     ACTION_VALUES: Agent.load,
+    HIERARCHICAL: HierarchicalAgent.load,
     IMPORTED: ImportedPolicy.load,
 }
 """By kind of file."""
@@ -154,8 +142,9 @@ class LearnSettings(Settings):
     """What the agent is for: settle, hold and track name one and the same agent, which does all three (the default);
     reach one that reaches goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
-    """servo, policy, batched (the thesis' networks learned in many arms at once), sarsa or q-learning (the thesis'),
-    an installed method, or MODULE:NAME of your own; by default servo, and policy to reach."""
+    """servo, policy, batched (the thesis' networks learned in many arms at once), hierarchy (an upper agent sets
+    subgoals of the thesis' agents), sarsa or q-learning (the thesis'), an installed method, or MODULE:NAME of your
+    own; by default servo, and policy to reach."""
     servo: ServoSettings = field(default_factory=ServoSettings)
     """Of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)
@@ -165,14 +154,14 @@ class LearnSettings(Settings):
     thesis: TrainSettings = field(default_factory=TrainSettings)
     """Of the methods sarsa and q-learning."""
     own: dict[str, Any] = field(default_factory=dict)
-    """Of a method of your own, by name."""
+    """Of hierarchy, or of a method of your own, by name."""
 
     def _valid(self) -> Valid:
         _ = self.chosen  # it says what is wrong with the method or with settings of one's own
         own, can = self.found.place == "own", self.found.tasks
         return {
             "task": self.task is None or self.task in can or f"{' or '.join(can)}, what {self.method} is for",
-            "own": own or not self.own or "nothing, as the method is not one of your own",
+            "own": own or not self.own or "nothing, as the method has options of its own",
         }
 
     @property

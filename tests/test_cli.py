@@ -182,9 +182,9 @@ def test_anyone_can_collect(
     for controller in (agent, trajectory):
         db = tmp_path / f"{controller.stem}.db"
         outcome = Outcome(
-            capsys, "collect", "virtual:seed=3", db, "--transitions", 2000, "--controller", controller, "--json"
+            capsys, "collect", "virtual:seed=3", db, "--transitions", 2030, "--controller", controller, "--json"
         )
-        assert json.loads(outcome.out)["transitions"] == 2000
+        assert json.loads(outcome.out)["transitions"] == 2030
     wrong = tmp_path / "wrong.csv"
     wrong.write_text("1,2,3\n")
     asked = ("collect", "virtual", tmp_path / "no.db", "--controller")

@@ -82,7 +82,8 @@ def collect(
         watch = Monitor(opened.spec, mode=monitor)
 
         def record(wanted: int) -> "CollectResult":
-            return collect(opened, store, wanted, seed, progress=report, settings=settings, watch=watch)
+            exact = transitions is not None
+            return collect(opened, store, wanted, seed, progress=report, settings=settings, watch=watch, exact=exact)
 
         if transitions is None:
             say(collect_enough(record, store)["verdict"])

@@ -248,7 +248,14 @@ class Run:
 
             def record(transitions: int) -> CollectResult:
                 return collect(
-                    arm, store, transitions, wanted.seed, progress=report, settings=wanted.collect, watch=watch
+                    arm,
+                    store,
+                    transitions,
+                    wanted.seed,
+                    progress=report,
+                    settings=wanted.collect,
+                    watch=watch,
+                    exact=wanted.transitions is not None,
                 )
 
             decided = {}

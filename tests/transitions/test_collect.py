@@ -176,6 +176,26 @@ def test_asking_for_more_goes_on_and_for_less_does_nothing(tmp_path):
     assert_same(content(tmp_path / "more.db"), content(tmp_path / "s.db"))
 
 
+def test_the_last_sequence_is_cut_short_where_no_more_are_asked_for(tmp_path):
+    _, result = collected(tmp_path, count=2050, exact=True)
+    assert (result.transitions, result.sequences) == (2050, 21)
+    collected(tmp_path, "whole.db", count=2100)
+    cut, whole = content(tmp_path / "s.db"), content(tmp_path / "whole.db")
+    assert [entry.transitions for entry in cut[1]] == [*[100] * 20, 50]
+    for name, values in cut[0].items():  # but for where it ends it is the same
+        np.testing.assert_array_equal(values[:-1], whole[0][name][: len(values) - 1], err_msg=name)
+    with Store.append_to(tmp_path / "s.db") as store:
+        assert collect(FirstOrderArm(), store, 2051, settings=SHORT, exact=True).transitions == 2051
+        assert collect(FirstOrderArm(), store, 2052, settings=SHORT).transitions == 2151
+        store.check()
+
+
+def test_what_a_lost_period_cost_is_made_up_for(tmp_path):
+    _, result = collected(tmp_path, arm=FirstOrderArm(late=60), exact=True)
+    assert result.missed_deadlines == 3
+    assert (result.transitions, result.sequences) == (2000, 21)
+
+
 def test_seeds_make_the_difference(tmp_path):
     collected(tmp_path, "0.db", seed=0)
     collected(tmp_path, "1.db", seed=1)

@@ -36,8 +36,8 @@ def collect_(
         The store; created if it does not exist. A file, or postgresql://user@host/database or
         mysql://user@host/database.
     transitions
-        How many to record in all (thesis section 3.2.2: 200,000, two hours); by default it goes on until more would
-        not make a simulation better.
+        How many to record in all, those that a fault spoils not counted (thesis section 3.2.2: 200,000, two hours);
+        the last sequence is cut short for that. By default it goes on until more would not make a simulation better.
     seed
         Seed of the random begin states and actions, and of a virtual arm's noise.
     controller
@@ -57,7 +57,15 @@ def collect_(
 
         def record(wanted: int) -> CollectResult:
             return collect(
-                opened, store, wanted, seed, progress=report, settings=settings, controller=player, watch=watch
+                opened,
+                store,
+                wanted,
+                seed,
+                progress=report,
+                settings=settings,
+                controller=player,
+                watch=watch,
+                exact=transitions is not None,
             )
 
         judged = None if transitions is not None else collect_enough(record, store, enough)

@@ -203,12 +203,13 @@ def collect(
     controller: Controller | None = None,
     goals: ArrayLike | None = None,
     watch: Watch | None = None,
+    exact: bool = False,
 ) -> CollectResult:
     """Collect at least ``transitions`` transitions in ``store``, going on where an earlier call was interrupted.
 
-    Only whole sequences are stored, each durable before the next begins. A call that asks for more than is there
-    goes on with the same collection; one that asks for less does nothing. Where the arm has a state, a collection
-    that was interrupted and resumed equals an uninterrupted one bit for bit.
+    Each sequence is durable before the next begins. A call that asks for more than is there goes on with the same
+    collection; one that asks for less does nothing. Where the arm has a state, a collection that was interrupted and
+    resumed equals an uninterrupted one bit for bit.
 
     Args:
         arm: any arm; it is closed when anything fails, and left open when all went well.
@@ -222,6 +223,8 @@ def collect(
             the range of the angle's sensor.
         watch: sees every reading and marks what nothing may be learned from, such as a
             :class:`~pneumarm.control.Monitor`; marked transitions do not count as collected.
+        exact: cut the last sequence short, so that no more are recorded than were asked for. By default all are
+            whole, and asking for some and then for more gives what asking for all of them at once does.
 
     Raises:
         UnusableInput: fewer than 2,000 transitions, another arm or other settings than the store was begun with.
@@ -238,7 +241,7 @@ def collect(
         if collection.done < transitions:
             collection.find_fill_times()
         while collection.done < transitions:
-            collection.make_sequence()
+            collection.make_sequence(transitions - collection.done if exact else None)
             if progress is not None:
                 progress(min(collection.done, transitions), transitions)
     except BaseException as error:
@@ -314,15 +317,16 @@ class _Collection:
             self._tally.seconds += self._arm.read().time - start
         self._settings = self._settings.for_arm(FillTimes(*self._tally.fill_times))
 
-    def make_sequence(self) -> None:
-        """Bring the arm to a begin state, carry out one sequence, and store it."""
+    def make_sequence(self, most: int | None = None) -> None:
+        """Bring the arm to a begin state, carry out one sequence, no longer than ``most`` actions, and store it."""
         arm, random = self._arm, np.random.default_rng([self._seed, self.number])
         cycle = ControlCycle(arm, self._settings.close_while_computing)
         before, start = Counts.now(cycle), arm.read().time
         assert self._settings.begin is not None
         self._settings.begin.reach(arm, random)
         kind, actor, info = self._actor(random)
-        remaining = iter(range(self._settings.actions or 0))
+        actions = self._settings.actions or 0
+        remaining = iter(range(actions if most is None else min(actions, most)))
 
         def decide(reading: Reading) -> Command | None:
             return None if next(remaining, None) is None else actor.act(reading)

@@ -273,7 +273,7 @@ class Transfer:
             self._count(phase)
             if len(self._waiting) == _TOGETHER or number == movements - 1:
                 self._keep()
-            self._judge_arm()
+            self._judge_arm(float(movement.recorded.time[-1]))
             progress(len(self._done), total)
 
     def _controller(self, phase: Phase) -> Controller:
@@ -319,10 +319,13 @@ class Transfer:
         self._done.append(info)
         self._waiting.append(replace(movement.recorded, info=info))
 
-    def _judge_arm(self) -> None:
-        """Give up, with all movements stored, where what is wrong with the arm is no passing trouble."""
+    def _judge_arm(self, time: float) -> None:
+        """Give up, with all movements stored, where what is wrong with the arm is no passing trouble.
+
+        The movement just made ended at ``time`` [s].
+        """
         try:
-            self._patience.judge(self._watch)
+            self._patience.judge(self._watch, time)
         except ArmFailure:
             self._keep()
             raise

@@ -367,7 +367,7 @@ class _Collection:
             self.done -= keep_watch(self._store, watch, self._run)
             state["watch"] = watch.get_state()
             if whole:
-                self._patience.judge(watch)
+                self._patience.judge(watch, float(recorded.time[-1]))
         self._store.append(recorded, state)
         if whole:
             self.done += recorded.transitions

@@ -15,7 +15,9 @@ from pneumarm.transitions.rows import Mark, Recorded
 from pneumarm.transitions.store import Store
 
 MOST_SPOILED = 5
-"""Sequences in a row in which something may be wrong before whoever moves the arm gives up."""
+"""Sequences in a row in which something may be wrong before whoever moves the arm gives up ..."""
+LONGEST_SPOILED = 30.0
+"""... and seconds since it began: one that is over after ten is passing trouble, however short movements are."""
 
 
 class Watch(Protocol):
@@ -49,18 +51,19 @@ class Patience:
     def __init__(self, name: str, sequences: str = "sequences") -> None:
         self._name, self._sequences, self._wrong = name, sequences, 0
 
-    def judge(self, watch: Watch) -> None:
-        """Count the sequence that ``watch`` has just seen.
+    def judge(self, watch: Watch, time: float) -> None:
+        """Count the sequence that ``watch`` has just seen, which ended at ``time`` [s].
 
         Raises:
-            ArmFailure: it is the :data:`MOST_SPOILED`-th in a row, so that this is no passing trouble.
+            ArmFailure: it is the :data:`MOST_SPOILED`-th in a row at least, and :data:`LONGEST_SPOILED` have passed,
+                so that this is no passing trouble.
 
         """
         found = watch.spoiled_since()
         self._wrong = 0 if found is None else self._wrong + 1
-        if found is not None and self._wrong >= MOST_SPOILED:
+        if found is not None and self._wrong >= MOST_SPOILED and time - found[0] >= LONGEST_SPOILED:
             raise ArmFailure(
-                f"{self._name}: {found[1]}, for {MOST_SPOILED} {self._sequences} now; nothing is learned of these: "
+                f"{self._name}: {found[1]}, for {self._wrong} {self._sequences} now; nothing is learned of these: "
                 f"{watch.reasons()}. See to the arm and run the same command again; where nothing is wrong with it, "
                 "add --monitor warn, which tells of such things, marks no rows and does not stop (or off)"
             )

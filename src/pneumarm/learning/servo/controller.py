@@ -15,7 +15,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.correction import Correction, features_of
 from pneumarm.learning.servo.foresight import Foresight
-from pneumarm.learning.servo.swinging import Swinging
+from pneumarm.learning.servo.two_ways import TwoWays
 from pneumarm.task.forecast import Forecast
 from pneumarm.task.tracker import StateTracker
 
@@ -26,6 +26,8 @@ _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly
 _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
 _SWINGS = 3  # from one side of the goal to the other, after which the joint swings
+_DAMPED = 0.7  # tolerances that a joint is hoped to be off by where it swings and goes on being damped ...
+_ACTIVE = 0.4  # ... and where its policy acts in every period
 _SWING, _FAR_SWING = 0.5, 4.0  # tolerances to either side that count as one, where noise is no larger; one muscle
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
@@ -47,6 +49,8 @@ _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving ref
 _DONE = 0.7  # share of an error that pulses of a joint with one muscle may leave, for the next not to be more
 _SWINGING = 0.6  # s in which an error is added to what is asked for while a joint swings near its goal
 _CLOSE, _KEPT = 2.5, 1.2  # tolerances of an error, for that, and most that is then added
+_ARRIVED = 0.5  # s after a joint was first near its goal, from which on it is noted how near it stays
+_FARTHER = 4.0  # most that is added where the policy acts in every period
 _COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an error that count, most that is added
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
@@ -113,7 +117,9 @@ class ServoController:
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
-        self._rest = [_Rest(Swinging(spec.period)) for _ in range(spec.joints)]
+        self._rest = [_Rest(spec.period) for _ in range(spec.joints)]
+        self._actively, self._share = fine, spec.period / _SWINGING
+        self._arrived = round(_ARRIVED / spec.period)
         self._spread = None if spec.pulses else Spread(spec.joints)
 
     def reset(self, goal: NDArray[np.float64]) -> None:
@@ -133,7 +139,9 @@ class ServoController:
         self._pulse = np.zeros((self.spec.joints, 2))  # the last of each joint
         for rest in self._rest:
             rest.leave()
-            rest.swinging.leave()
+            rest.near = 0
+            rest.damped.leave()
+            rest.active.leave()
 
     def act(self, reading: Reading) -> NDArray[np.float64]:
         """Return the commands (joints, 2) after ``reading``, shares of the period for which a valve is open."""
@@ -157,7 +165,8 @@ class ServoController:
         self._correction.learn(np.where(moves, path[1] - reading.angle, 0.0), features[0])
         bias = np.where(moves, self._correction.of(features[steps]), [rest.bias for rest in self._rest])
         calm = np.array([rest.calm for rest in self._rest])
-        command = self._actor.pulses(state, preview + bias, ~moves & ~calm)
+        active = np.array([rest.active.second for rest in self._rest])
+        command = self._actor.pulses(state, preview + bias, ~moves & ~calm & ~active)
         command[calm[:, None] & (command < 0) & (reading.pressure < self._empty)] = 0.0
         command[~acts] = 0.0
         for j in np.flatnonzero(calm & acts & np.any(command != 0, axis=1)):
@@ -203,20 +212,29 @@ class ServoController:
         acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
         for j, rest in enumerate(self._rest):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
-            if rest.swings >= _SWINGS or rest.swinging.is_tried:
-                rest.swinging.see((now[j] - read[-1, j]) / self._tolerance)
+            off = now[j] - read[-1, j]
+            if rest.swings >= _SWINGS or rest.damped.is_tried:
+                rest.damped.see(off / self._tolerance)
             if len(read) < self._look or not stays[j]:
                 rest.leave()
                 continue
-            rest.see(now[j] - read[-1, j], self._swing)
+            rest.near += abs(off) <= self._near or rest.near > 0
+            if rest.near and self._actively:
+                if rest.near > self._arrived:
+                    rest.active.see(off / self._tolerance)
+                if rest.active.second:
+                    rest.swings = 0
+                    rest.stir(_FARTHER * self._tolerance, off * self._share if abs(off) < self._close else 0.0)
+                    continue
+            rest.see(off, self._swing)
             if abs(error[j]) > far * self._near:
                 rest.go(lain[j])
-                acts[j] = rest.swings < _SWINGS or rest.swinging.damps
+                acts[j] = rest.swings < _SWINGS or rest.damped.second
                 continue
             if not (rest.calm or steady[j]) or (drift[j] > fast * self._still and not slow[j]):
                 counted = min(max(error[j], -self._counted), self._counted) if abs(error[j]) < self._close else 0.0
-                rest.stir(self._kept, counted * self.spec.period / _SWINGING)
-                acts[j] = rest.swings < _SWINGS or rest.swinging.damps
+                rest.stir(self._kept, counted * self._share)
+                acts[j] = rest.swings < _SWINGS or rest.damped.second
                 continue
             rest.calm, rest.error = True, error[j]
             rest.quiet = abs(error[j]) < (self._alert_above if rest.quiet else self._quiet_below)
@@ -282,8 +300,9 @@ class Spread:
 class _Rest:
     """How one joint is nearly at rest."""
 
-    def __init__(self, swinging: Swinging) -> None:
-        self.swinging = swinging
+    def __init__(self, period: float) -> None:
+        self.damped, self.active = TwoWays(period, _DAMPED), TwoWays(period, _ACTIVE)
+        self.near = 0  # turns since it first was near this goal
         self.leave()
 
     def leave(self) -> None:

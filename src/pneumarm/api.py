@@ -290,7 +290,7 @@ def tune(
 
 
 def load_controller(file: str | Path) -> "LoadedController":
-    """Return the controller in ``file``, a greedy agent or a tuned one.
+    """Return the controller in ``file``, a greedy agent or a tuned one; the folder of a run gives its agent.
 
     ``reset(goal=650)`` or ``reset(goal_deg=20)`` begins a movement, then ``act(reading)`` gives the valves for each
     control period; one that follows references has ``track(reference)`` too. It has made its first turns when it is

@@ -24,6 +24,7 @@ from pneumarm.control import Monitor, TransferSettings, save_history, transfer, 
 from pneumarm.control.condition import collected_results
 from pneumarm.control.monitor import Mode
 from pneumarm.control.transfer import monitor_of
+from pneumarm.control.versions import ADAPTED, TRAINED
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_json
 from pneumarm.learning import (
@@ -150,8 +151,8 @@ class Run:
         self._stage = ""
         self.store = folder / "transitions.db"
         self.simulation = folder / "simulation.safetensors"
-        self.agent = folder / "agent.safetensors"
-        self.adapted = folder / "adapted.safetensors"
+        self.agent = folder / TRAINED
+        self.adapted = folder / ADAPTED
         self.episodes = folder / "episodes.csv"
         self._rehearsal = Rehearsal()
         compiling.watch()

@@ -11,7 +11,7 @@ from pneumarm.arm import Reading
 from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
 from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.foresight import Foresight
-from pneumarm.learning.servo.swinging import Swinging
+from pneumarm.learning.servo.two_ways import TwoWays
 from pneumarm.simulation.kernel import scaled_state
 
 GOAL = 512.0
@@ -75,7 +75,7 @@ def test_a_joint_is_not_at_rest_where_it_turns(agent: ServoAgent, monkeypatch: p
     monkeypatch.setattr(
         controller._actor, "pulses", lambda state, preview, underway: asked.append(underway) or np.zeros((1, 2))
     )
-    wave = np.sin(4 * np.pi * PERIOD * np.arange(90))
+    wave = np.sin(4 * np.pi * PERIOD * np.arange(45))
     swing = GOAL + 1.5 * agent.spec.counts_per_degree * wave
     read(controller, swing)
     assert np.array(asked)[np.abs(wave) > 0.8].all()
@@ -83,22 +83,48 @@ def test_a_joint_is_not_at_rest_where_it_turns(agent: ServoAgent, monkeypatch: p
     assert not np.array(asked[-30:]).any()
 
 
-def test_of_a_joint_that_swings_it_learns_whether_to_damp_it():
-    def errors(swinging: Swinging, alone: float, damped: float, seconds: float) -> list[bool]:
-        damps = []
+def test_of_two_ways_the_second_is_taken_where_it_is_seen_to_be_nearer():
+    def seconds(ways: TwoWays, first: float, second: float, seconds: float) -> list[bool]:
+        taken = []
         for _ in range(round(seconds / PERIOD)):
-            swinging.see(damped if swinging.damps else alone)
-            damps.append(swinging.damps)
-        return damps
+            ways.see(second if ways.second else first)
+            taken.append(ways.second)
+        return taken
 
-    assert not any(errors(Swinging(PERIOD), 0.5, 0.1, 30))  # near enough: nothing else is tried
-    heavy = Swinging(PERIOD)
-    assert errors(heavy, 3.0, 0.5, 30)[-1]
-    heavy.leave()
-    assert heavy.damps  # with the next goal, too
-    pumped = errors(Swinging(PERIOD), 1.5, 4.0, 120)
-    assert any(pumped)
-    assert np.mean(pumped) < 0.1
+    assert not any(seconds(TwoWays(PERIOD, 0.7), 0.5, 0.1, 30))  # near enough: nothing else is tried
+    nearer = TwoWays(PERIOD, 0.7)
+    assert seconds(nearer, 3.0, 0.5, 30)[-1]
+    nearer.leave()
+    assert nearer.second  # with the next goal, too
+    worse = seconds(TwoWays(PERIOD, 0.7), 1.5, 4.0, 120)
+    assert any(worse)
+    assert np.mean(worse) < 0.1
+
+
+def test_where_single_pulses_leave_a_joint_off_its_policy_acts_in_every_period(
+    agent: ServoAgent, monkeypatch: pytest.MonkeyPatch
+):
+    asked = []
+
+    def pulses(state: object, preview: NDArray[np.float64], underway: object) -> NDArray[np.float64]:
+        asked.append(preview[0, 0])
+        return np.array([[0.5, -0.5]])
+
+    degree = agent.spec.counts_per_degree
+    controller = agent.controller()
+    monkeypatch.setattr(controller._actor, "pulses", pulses)
+    calm = read(controller, np.full(90, GOAL - 0.6 * degree))
+    assert not calm[10:].any(axis=1).all()  # looks at what each pulse did, and learns that this stays off
+    read(controller, np.full(90, GOAL - 0.6 * degree))
+    asked.clear()
+    active = read(controller, np.full(90, GOAL - 0.3 * degree))
+    np.testing.assert_array_equal(active, [[0.5, -0.5]] * 90)
+    assert GOAL < asked[45] < asked[89] <= GOAL + 4 * degree  # integral action goes on, and is bounded
+    near = agent.controller()
+    monkeypatch.setattr(near._actor, "pulses", pulses)
+    for _ in range(4):
+        command = read(near, np.full(90, GOAL - 0.1 * degree))
+        assert not command[20:].any()  # near enough
 
 
 def test_a_joint_that_is_pumped_far_from_its_goal_is_left_alone(agent: ServoAgent, monkeypatch: pytest.MonkeyPatch):
@@ -113,8 +139,8 @@ def test_a_joint_that_is_pumped_far_from_its_goal_is_left_alone(agent: ServoAgen
 
 
 def test_being_thrown_far_off_counts_while_it_is_tried_and_another_goal_ends_that():
-    swinging = Swinging(PERIOD)
-    swinging.see(0.1)
-    assert swinging.is_tried
-    swinging.leave()
-    assert not swinging.is_tried
+    ways = TwoWays(PERIOD, 0.7)
+    ways.see(0.1)
+    assert ways.is_tried
+    ways.leave()
+    assert not ways.is_tried

@@ -1,11 +1,14 @@
 """What the commands share."""
 
+import shlex
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter, Token
 
 from pneumarm.address import Address, address_of
+from pneumarm.arm import ArmSpec
 from pneumarm.control.monitor.settings import Mode
 
 Json = Annotated[
@@ -36,3 +39,11 @@ COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
 """Figures of movements that tables show."""
 HEADINGS = ("movements", *(name.replace("_", " ") for name in COLUMNS[1:]))
 """What they are called there."""
+_EXAMPLE = 10.0  # degrees
+
+
+def move_command(controller: Path, arm: str, spec: ArmSpec, goal_range: Any) -> str:
+    """Return what a person can call next: `pneumarm move` to a goal within ``goal_range`` (joints, 2) [counts]."""
+    angles = (_EXAMPLE if low <= _EXAMPLE <= high else (low + high) / 2 for low, high in spec.degrees(goal_range))
+    goal = ",".join(f"{angle:.3g}deg" for angle in angles)
+    return f"`{shlex.join(['pneumarm', 'move', str(controller), '--arm', arm, goal])}`"

@@ -35,7 +35,7 @@ def move_(
     Parameters
     ----------
     controller
-        An agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation: turn by turn to reach
+        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation: turn by turn to reach
         the goal, like an agent trained by ``--task reach``, and closes the valves there. It learns nothing; to
         settle and to stay is what the default agent is trained for and the others are tuned for.
     goals

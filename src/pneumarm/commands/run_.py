@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, Settings
+from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, Settings, move_command
 from pneumarm.commands.config_file import as_config
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
@@ -15,6 +15,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.files import write_text
 from pneumarm.progress import compiling, progress, seconds_since_start
 from pneumarm.run import Run, RunSettings
+from pneumarm.transitions import Store
 
 _MENTIONED = 0.5  # s of compiling
 _DONE = 0.05  # s; a stage that only notes that it was not asked for takes less
@@ -71,6 +72,8 @@ def run_(
         f"report: {out / 'report.html'}; {_took(sum(results['wall_seconds'].values()))}, "
         f"at most {results['peak_memory_mb']:.0f} MB of memory{also}"
     )
+    with Store.open(run.store) as store:
+        say(f"move the arm with {move_command(out, settings.arm, store.spec, store.percentiles())}")
 
 
 def _spent(results: dict[str, Any]) -> Iterator[str]:

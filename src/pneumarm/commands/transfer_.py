@@ -4,11 +4,12 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, OwnMethod, Settings
+from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, OwnMethod, Settings, move_command
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
 from pneumarm.control import TransferSettings, open_agent, transfer_into
 from pneumarm.control.condition import complaints
+from pneumarm.control.versions import ADAPTED
 from pneumarm.progress import progress
 
 
@@ -48,6 +49,7 @@ def transfer_(
     say_history(out)
     for line in complaints(result, "moving"):
         say(line)
-    say(f"adapted agent: {out / 'adapted.safetensors'}")
+    ready = move_command(out, arm, trained.spec, trained.goal_range)
+    say(f"adapted agent: {out / ADAPTED}; move the arm by it with {ready}")
     rows = [(phase, *(result[phase][column] for column in COLUMNS)) for phase in ("before", "after")]
     show(result, json, lambda: [table(("reaching goals", *HEADINGS), rows)])

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pneumarm.arm import open_arm
 from pneumarm.classical import TuneSettings, require_time, tune
-from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.common import Json, Settings, move_command
 from pneumarm.console import say, show, table
 from pneumarm.files import require_folder
 from pneumarm.progress import progress
@@ -48,7 +48,7 @@ def tune_(
             f"{tuned.seconds:.0f} s of the arm's time were enough to calibrate it, not to find better gains than "
             "those that tuning begins with; more --seconds may find some"
         )
-    say(f"controller: {out}; move the arm by it with `pneumarm move {out} --arm {arm} 10deg`")
+    say(f"controller: {out}; move the arm by it with {move_command(out, arm, tuned.spec, tuned.goal_range)}")
     gains = dict(vars(tuned.gains))
     low, high = tuned.spec.degrees(tuned.goal_range).T
     result = {

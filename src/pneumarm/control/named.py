@@ -9,6 +9,7 @@ from pneumarm.classical import Tuned, is_tuned, load_tuned
 from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
+from pneumarm.control.versions import agent_file
 from pneumarm.errors import UnusableInput
 from pneumarm.files import kind_of
 from pneumarm.learning import AnyAgent, Tracks
@@ -26,7 +27,8 @@ def open_tracking(
 ) -> tuple[TrackingController, ArmSpec, Goals]:
     """Return the controller called ``name`` for ``arm``, the arm's spec, and the goals it knows.
 
-    ``name`` is the file of an agent or of a tuned controller, or ``plan:SIM``; see :func:`tracking_for` for the rest.
+    ``name`` is the file of an agent or of a tuned controller, the folder of a run, whose agent is taken, or
+    ``plan:SIM``; see :func:`tracking_for` for the rest.
 
     Args:
         name: of the controller.
@@ -39,10 +41,12 @@ def open_tracking(
 
     """
     path = Path(name.removeprefix(_PLAN))
+    if not name.startswith(_PLAN):
+        path = agent_file(path)
     if not path.is_file():
         raise UnusableInput(
-            f"controller {name!r}: expected the file of an agent, a file from `pneumarm tune`, or plan:SIM; there is "
-            f"no file {path}"
+            f"controller {name!r}: expected the folder of a run, the file of an agent, a file from `pneumarm tune`, or "
+            f"plan:SIM; there is no file {path}"
         )
     if name.startswith(_PLAN):
         return tracking_for(PlanAgent.load(path), arm, tolerance)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from pneumarm.control.versions import agent_file
 from pneumarm.files import kind_of
 from pneumarm.learning import AnyAgent, find_method, load_agent
 from pneumarm.planning.agent import PlanAgent
@@ -9,7 +10,7 @@ from pneumarm.simulation.simulation import KIND as SIMULATION
 
 
 def open_agent(path: Path, method: str | None = None) -> AnyAgent:
-    """Return the agent in ``path``; the file of a simulation gives one that plans in it.
+    """Return the agent in ``path``, a file or a run's folder; that of a simulation gives one that plans in it.
 
     ``method`` is a method of one's own, MODULE:NAME, whose agents may be read; see :mod:`pneumarm.learning.methods`.
 
@@ -19,4 +20,5 @@ def open_agent(path: Path, method: str | None = None) -> AnyAgent:
     """
     if method is not None:
         find_method(method)  # which imports it
+    path = agent_file(path)
     return PlanAgent.load(path) if kind_of(path) == SIMULATION else load_agent(path)

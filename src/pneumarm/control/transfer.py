@@ -17,7 +17,7 @@ from pneumarm.control.agent import AgentController, controller_of, warm_up
 from pneumarm.control.condition import Condition
 from pneumarm.control.monitor import Mode, Monitor
 from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
-from pneumarm.control.versions import Adapted, save_history, version_keeper
+from pneumarm.control.versions import ADAPTED, Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
 from pneumarm.learning import AnyAgent, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
@@ -449,7 +449,7 @@ def transfer_into(
             keep_version=version_keeper(folder),
             watch=monitor_of(agent, arm, monitor),
         )
-    moved.agent.save(folder / "adapted.safetensors")
+    moved.agent.save(folder / ADAPTED)
     save_history(folder, moved.adapted)
     write_episodes(folder / "episodes.csv", moved.movements)
     return moved.results()

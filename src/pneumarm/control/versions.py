@@ -22,6 +22,30 @@ from pneumarm.files import write_json
 from pneumarm.learning import AnyAgent, load_agent
 
 AGENTS, HISTORY, ADAPTED = "agents", "adaptation.json", "adapted.safetensors"
+TRAINED = "agent.safetensors"
+"""The agent of a run as it was trained in the simulation."""
+
+
+def agents_in(folder: Path) -> list[Path]:
+    """Return the agents in the folder of a run or of a transfer, the one in use first: adapted, or else as trained."""
+    return [file for file in (folder / ADAPTED, folder / TRAINED) if file.exists()]
+
+
+def agent_file(path: Path) -> Path:
+    """Return the file of an agent: ``path``, or where that is a folder the agent in use there.
+
+    Raises:
+        UnusableInput: it is a folder without one.
+
+    """
+    if not path.is_dir():
+        return path
+    if not (found := agents_in(path)):
+        raise UnusableInput(
+            f"{path}: expected the folder of a run or of a transfer, or a file; there is neither {ADAPTED} nor "
+            f"{TRAINED} in it"
+        )
+    return found[0]
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,10 @@ from pneumarm.arm.controller import TrackingController
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control import Monitor, open_agent
 from pneumarm.control.named import open_tracking
-from pneumarm.control.versions import ADAPTED, AGENTS, kept_versions
+from pneumarm.control.versions import ADAPTED, AGENTS, agents_in, kept_versions
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.learning import SimulationAgent
 from pneumarm.transitions.watch import made_up_readings
-
-TRAINED = "agent.safetensors"
-"""The agent of a run as it was trained in the simulation."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +42,7 @@ class Mover:
 
 def choices_in(folder: Path) -> list[Choice]:
     """Return the controllers that the run in ``folder`` has made, the one to begin with first."""
-    found = [Choice("adapted", str(folder / ADAPTED)), Choice("as trained", str(folder / TRAINED))]
-    found = [one for one in found if Path(one.file).exists()]
+    found = [Choice("adapted" if file.name == ADAPTED else "as trained", str(file)) for file in agents_in(folder)]
     versions = [
         Choice(f"version {number}", str(folder / AGENTS / f"{number:03d}.safetensors"), number)
         for number in kept_versions(folder)

@@ -8,9 +8,9 @@ from threading import Event, Lock, Thread
 from typing import Any
 
 from pneumarm.arm import guarded, open_arm
-from pneumarm.control.versions import HISTORY, put_back, read_history
+from pneumarm.control.versions import HISTORY, TRAINED, put_back, read_history
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.live.choices import TRAINED, Choice, Mover, choices_in, monitor_for, opened
+from pneumarm.live.choices import Choice, Mover, choices_in, monitor_for, opened
 from pneumarm.live.desk import Desk
 from pneumarm.live.faults import OFFERED
 from pneumarm.live.learning import Learning, LeftOff

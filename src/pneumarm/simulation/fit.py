@@ -49,6 +49,8 @@ _ROWS_A_WEIGHT = 20
 _AGAIN = 0.25
 """Share of the epochs in which it is taught what pulses do on average where none were recorded."""
 _LONGEST_AHEAD = 10.0
+_EPOCHS_ON = 20
+"""Epochs of a fit that goes on from where another ended."""
 _EPOCHS_AHEAD = 10
 """Epochs of each network that fitting ahead takes about as long as."""
 _ROWS = 7  # stream of random numbers
@@ -506,6 +508,35 @@ def fit_store(
     )
     goals = seen_goals(store.blocks, result.simulation.goal_range)
     return StoreFit(result._replace(simulation=result.simulation.with_goals(goals)), filtered)
+
+
+def fitted_on(simulation: Simulation, store: Store, ahead: float = FitSettings.ahead) -> Simulation:
+    """Return ``simulation``, a network an output, fitted on from where it is to all that ``store`` holds by now.
+
+    Its window, scaling, ranges and goals stay, so that an agent of the one can act in the other. Its errors are those
+    on sequences that are held out. ``ahead`` is how far ahead it is fitted [s].
+    """
+    window, places, seed = simulation.window, simulation.outputs, simulation.seed
+    filtered = filter_transitions(store, window, seed=seed, hold_out=simulation.held_out)
+    training = filtered.transitions
+    change = training.target[:, places].astype(np.float64) - training.observation[:, places]
+    spread = change.std(axis=0)
+    spread[spread == 0] = 1.0
+    factor = spread / simulation.scaling.observation_scale[places]
+    factors = np.split(factor, len(simulation.networks))
+    fitted, _ = _fitted(
+        simulation,
+        simulation.scaling.inputs(training.inputs, window).astype(np.float32),
+        change / spread,
+        factor,
+        FitSettings(epochs=_EPOCHS_ON, one_network=len(factors) == 1, seed=seed),
+        lambda done, total: None,
+        [_rescaled(one, 1 / each) for one, each in zip(simulation.networks, factors, strict=True)],
+    )
+    steps = round(ahead / simulation.spec.period)
+    if steps > 1:
+        fitted = fitted_ahead(fitted, stretches(store.blocks(), fitted, steps), seed)
+    return fitted.with_errors(statistics(fitted, filtered.stream("held-out")).std)
 
 
 def _goal_range(store: Store) -> NDArray[np.float64]:

@@ -67,7 +67,9 @@ class ServoController:
 
     At the turning points of a swing a joint stands still too. It is at rest only where it will stay with closed
     valves, which its simulation foresees, or where it has stayed for as long. A joint that goes on swinging about its
-    goal is left alone until it is at rest, or goes on being damped: :class:`~.swinging.Swinging` learns which.
+    goal is left alone until it is at rest, or goes on being damped: :class:`~.two_ways.TwoWays` learns which. It
+    learns, too, whether a joint does not come near its goal that way, as where friction lets go or air leaks: then its
+    policy acts in every period, which changes more valves and keeps nearer.
     Integral action goes on while a joint swings near its goal, unless valves stay as they are for whole periods.
 
     A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next

@@ -147,6 +147,6 @@ def _extremes(checkup: Checkup) -> dict[str, float]:
         "full muscle [of the limit]": max(m.full for m in figures.muscles) / checkup.spec.max_pressure,
         "leap [bar]": max(m.leap for m in figures.muscles),
         "halves": max(figures.halves, 1 / figures.halves),
-        "irregularity [counts]": figures.worst,
+        "irregularity [degrees]": figures.worst,
         "fill time at the end [of that before]": quickening(checkup.joints[0], checkup),
     }

@@ -25,7 +25,9 @@ from pneumarm.arm.virtual import (
     draw_parameters,
 )
 from pneumarm.checkup import CheckupSettings, Known, calibrate, diagnose, ends, joint_figures, measure
+from pneumarm.checkup.diagnose import WORN
 from pneumarm.checkup.figures import LAGS, autocorrelation, irregularity, ljung_box, onset
+from pneumarm.checkup.measure import JointTest, MuscleTest, Trace
 from pneumarm.cli import main
 from pneumarm.commands import asking
 from pneumarm.errors import UnusableInput
@@ -234,12 +236,33 @@ def test_a_logarithmic_potentiometer_is_linearised(bent):
 def test_a_worn_zone_is_shown_by_its_angle(angle):
     arm = VirtualArm(draw_parameters(6), seed=6, faults=(WornPotentiometer(angle=angle, width=3.0, height=20.0),))
     checkup = measure(arm)
-    places, off = irregularity(checkup.joints[0])
-    worst = checkup.spec.degrees(places[np.argmax(off)])
+    places, off = irregularity(checkup.joints[0], checkup.spec)
+    worst = places[np.argmax(off)]
     assert worst == pytest.approx(angle, abs=6.0)
     (finding,) = [f for f in diagnose(checkup) if f.kind == "angle worn"]
     shown = finding.told_by.partition(" at ")[2].replace(" to ", " and ").removesuffix(" degrees").split(" and ")
     assert all(abs(float(place) - angle) < 9 for place in shown)
+
+
+def test_a_joint_that_springs_off_its_end_stop_is_not_worn_and_a_worn_one_is():
+    """A light joint, at 250 degrees/s when it comes to its stop at 38, where it swings at 15 Hz."""
+    spec = VirtualArm(draw_parameters(1), seed=1).spec
+    time, random = np.arange(0.0, 1.0, 0.005), np.random.default_rng(1)
+    met = 2 * 38 / 250
+    since = np.maximum(time - met, 0.0)
+    degrees = 38 * np.minimum(time / met, 1) ** 2 + 250 / 91 * np.exp(-10 * since) * np.sin(91 * since)
+
+    def irregular(contact):
+        moved = degrees + contact * np.exp(-0.5 * ((degrees - 15) / 3) ** 2) * random.normal(size=len(time))
+        counts = np.round(spec.counts_per_degree * moved + random.normal(0, 0.5, len(time)) + 512)
+        trace = Trace(time, counts, np.zeros((len(time), 2)))
+        muscle = MuscleTest(trace, trace[-1:], trace[-1:], trace + trace[-1:], ())
+        return irregularity(JointTest(trace, (muscle, muscle), trace, trace, (trace, trace)), spec)
+
+    assert irregular(0.0)[1].max() < WORN / 2
+    places, off = irregular(1.0)
+    assert abs(places[off > WORN] - 15).max() < 8
+    assert places[off > WORN].size
 
 
 def test_what_cannot_be_linearised_is_refused():

@@ -50,8 +50,8 @@ LEAP = 0.08
 """A sensor is at the valve's side if its reading leaps by so much [bar] when the valve opens and falls back."""
 LOGARITHMIC = 1.3
 """A potentiometer is logarithmic if one half of the sweep turns it so many times further than the other half."""
-WORN = 6.0
-"""A place of the potentiometer is worn if its readings are off by so many counts there (root mean square)."""
+WORN = 0.4
+"""A place of the potentiometer is worn if its readings are off by so many degrees there (root mean square)."""
 
 Kind = Literal[
     What,
@@ -284,7 +284,7 @@ def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Complaint]:
             detail = f"at rest its readings {worst} apart have a correlation of {correlation[worst]:.2f}"
             remedy = "Look for hum of the mains, a bad ground, or a filter; medians of such readings help little"
             yield Complaint("noise not white", f"{name}, {what}", detail, remedy)
-        elif clean.std() > NOISY and not (what == "angle" and len(_worn(test)[0])):
+        elif clean.std() > NOISY and not (what == "angle" and len(_worn(test, checkup)[0])):
             detail = f"at rest its readings vary by {clean.std():.1f} counts, independently of each other"
             remedy = "Let the board take the median of more conversions (thesis A.1.3); check ground and shield"
             yield Complaint("noise", f"{name}, {what}", detail, remedy)
@@ -302,12 +302,11 @@ def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, 
         )
         remedy = "Put in a linear one, or let `pneumarm arm calibrate` linearise it"
         yield Complaint("angle logarithmic", name, detail, remedy)
-    worn, off = _worn(test)
-    if len(worn):
-        degrees = checkup.spec.degrees(worn)
+    degrees, off = _worn(test, checkup)
+    if len(degrees):
         zones = np.split(degrees, np.flatnonzero(np.diff(degrees) > _APART) + 1)
         places = " and ".join(f"{z[0]:.0f}" if len(z) == 1 else f"{z[0]:.0f} to {z[-1]:.0f}" for z in zones)
-        detail = f"readings are off by up to {off.max():.0f} counts at {places} degrees"
+        detail = f"readings are off by up to {off.max():.1f} degrees at {places} degrees"
         remedy = "Put in a new potentiometer, and mount it so that nothing presses on its axis (thesis A.1.2)"
         yield Complaint("angle worn", name, detail, remedy)
 
@@ -315,9 +314,9 @@ def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, 
 _APART = 6.0  # degrees between two worn zones
 
 
-def _worn(test: JointTest) -> tuple[Array, Array]:
-    """Return worn places of the angle [counts], and how irregular its readings are at all places [counts]."""
-    places, off = irregularity(test)
+def _worn(test: JointTest, checkup: Checkup) -> tuple[Array, Array]:
+    """Return worn places of the angle [degrees], and how irregular its readings are at all places [degrees]."""
+    places, off = irregularity(test, checkup.spec)
     usual = float(np.median(off)) if len(off) else 0.0  # noise is as wide everywhere
     return places[off > max(WORN, _CLEARLY * usual)], off
 

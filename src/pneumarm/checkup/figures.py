@@ -17,7 +17,6 @@ FILLED = 0.35
 """What the pressure of a filled muscle always rises by [bar], and that of one that is merely stretched never does."""
 LAGS = 20
 """Readings apart up to which noise is correlated."""
-_BIN = 10.0  # counts: about a degree
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class JointFigures:
     halves: float
     """How many times further the upper half of the pressure difference turns the joint than the lower half."""
     worst: float
-    """Largest irregularity of the angle at any place (root mean square) [counts]."""
+    """Largest irregularity of the angle at any place (root mean square) [degrees]."""
 
 
 def joint_figures(checkup: Checkup, joint: int) -> JointFigures:
@@ -73,7 +72,7 @@ def joint_figures(checkup: Checkup, joint: int) -> JointFigures:
         lowest=float(test.sweep.angle.min()),
         highest=float(test.sweep.angle.max()),
         halves=halves(test),
-        worst=float(max(irregularity(test)[1], default=0.0)),
+        worst=float(max(irregularity(test, checkup.spec)[1], default=0.0)),
     )
 
 
@@ -227,36 +226,42 @@ def halves(test: JointTest) -> float:
     return float(upper / lower) if lower > 0 and upper > 0 else float("nan")
 
 
-def irregularity(test: JointTest) -> tuple[Array, Array]:
-    """Return places of the angle [counts] and how far readings there are off those before and after (rms) [counts].
+def irregularity(test: JointTest, spec: ArmSpec) -> tuple[Array, Array]:
+    """Return places of the angle [degrees] and how far readings there are off those around them (rms) [degrees].
 
     A joint has inertia: within a few readings it moves on a parabola. What departs from the parabola at the same
-    angle again and again, whatever the movement, is the potentiometer.
+    angle again and again, whatever the movement, is the potentiometer. A few, because a light joint that bounces off
+    its end stop is on no parabola for longer than that. Readings that are not as far apart in time as their
+    neighbours tell nothing: one movement's last is the next one's first.
     """
     places, offs = [], []
     for trace in [piece for muscle in test.muscles for piece in (muscle.whole, muscle.pulse)]:
-        angle = trace.angle
+        angle = spec.degrees(trace.angle)
         if len(angle) < 2 * _AROUND + 1:
             continue
         around = np.lib.stride_tricks.sliding_window_view(angle, 2 * _AROUND + 1)
-        places.append(np.median(around, axis=1))
-        offs.append(angle[_AROUND:-_AROUND] - around @ _PARABOLA)
+        steps = np.lib.stride_tricks.sliding_window_view(np.diff(trace.time), 2 * _AROUND)
+        even = steps.min(axis=1) > 0.5 * steps.max(axis=1)
+        places.append(np.median(around, axis=1)[even])
+        offs.append((angle[_AROUND:-_AROUND] - around @ _PARABOLA)[even])
     place, off = np.concatenate(places), np.concatenate(offs)
-    bins = np.floor(place / _BIN).astype(int)
+    bins = np.floor(place / _PLACE).astype(int)
     found = [(b, off[bins == b]) for b in np.unique(bins)]
     kept = [(b, values) for b, values in found if len(values) >= 3]
-    centres = np.array([(b + 0.5) * _BIN for b, _ in kept])
+    centres = np.array([(b + 0.5) * _PLACE for b, _ in kept])
     return centres, np.array([float(np.sqrt(np.mean(values**2))) for _, values in kept])
 
 
-_AROUND = 7
-"""Readings either side that a parabola is fitted to, without those in the middle."""
+_PLACE = 1.0
+"""How wide a place of the angle is [degrees]."""
+_AROUND = 3
+"""Readings either side that a parabola is fitted to, without the one in the middle."""
 
 
 def _parabola() -> Array:
     """Return the weights that give a parabola's value in the middle of 2 * _AROUND + 1 readings."""
     x = np.arange(-_AROUND, _AROUND + 1.0)
-    outer = np.abs(x) > 1
+    outer = x != 0
     weights = np.zeros(len(x))
     weights[outer] = np.linalg.pinv(np.vander(x[outer], 3, increasing=True))[0]
     return weights
@@ -294,7 +299,7 @@ def muscle_row(figures: JointFigures, joint: int, muscle: int, sound: SoundState
     )
 
 
-JOINT_HEADER = ("from [°]", "to [°]", "halves turn", "irregular by [counts]", "noise [counts]")
+JOINT_HEADER = ("from [°]", "to [°]", "halves turn", "irregular by [°]", "noise [counts]")
 """What :func:`joint_row` gives."""
 
 
@@ -305,6 +310,6 @@ def joint_row(figures: JointFigures, spec: ArmSpec) -> tuple[str, ...]:
         f"{lowest:.0f}",
         f"{highest:.0f}",
         f"1 : {figures.halves:.2f}",
-        f"{figures.worst:.1f}",
+        f"{figures.worst:.2f}",
         f"{figures.angle_noise:.2f}",
     )

@@ -111,7 +111,7 @@ def _of_joint(checkup: Checkup, j: int) -> Section:
                 potentiometer(checkup, j),
                 "The angle at rest against the difference of the pressures, up and down; and how irregular the angle "
                 "is by place; over the dotted line it is worn there.",
-                f"the upper half turns {figures.halves:.2f} times as far; irregular by {figures.worst:.1f} counts",
+                f"the upper half turns {figures.halves:.2f} times as far; irregular by {figures.worst:.2f} degrees",
             ),
         ],
     )
@@ -181,12 +181,12 @@ def potentiometer(checkup: Checkup, j: int) -> Figure:
     for piece, (color, line), name in ((slice(0, turn + 1), _LINES[0], "up"), (slice(turn, None), _LINES[1], "down")):
         angle = spec.degrees(test.sweep.angle[piece])
         axes[0, 0].plot(difference[piece], angle, line, color=color, marker="o", label=name)
-    places, off = irregularity(test)
-    axes[0, 1].bar(spec.degrees(places), off, width=0.8, color=DARK)
+    places, off = irregularity(test, spec)
+    axes[0, 1].bar(places, off, width=0.8, color=DARK)
     axes[0, 1].axhline(WORN, color=GREY, linewidth=0.8, linestyle=":")
     axes[0, 0].set_xlabel("pressure 1 - pressure 2 [bar]")
     axes[0, 0].set_ylabel("angle at rest [°]")
     axes[0, 0].legend()
     axes[0, 1].set_xlabel("angle [°]")
-    axes[0, 1].set_ylabel("irregularity, rms [counts]")
+    axes[0, 1].set_ylabel("irregularity, rms [°]")
     return figure

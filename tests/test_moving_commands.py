@@ -2,14 +2,18 @@
 
 import io
 import json
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from pneumarm.api import move
-from pneumarm.arm import open_arm
+from pneumarm.api import load_controller, move
+from pneumarm.arm import ArmSpec, open_arm
 from pneumarm.arm.hand import hand
 from pneumarm.cli import main
+from pneumarm.commands.common import move_command
+from pneumarm.control.versions import agent_file
 
 ARM = ("--arm", "virtual:seed=3")
 
@@ -54,6 +58,30 @@ def test_move_tells_of_every_goal(
         assert 0 <= one["rest_error_deg"][0] < 1.5
         assert one["switches"] > 0
         assert 1 <= one["tries"] <= 3
+
+
+def test_the_folder_of_a_run_moves_the_arm_by_the_agent_in_use(
+    small_run: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    goals = ("--tries", 1, "--hold", 0.5, "5deg", "--json")
+    by_folder = called(capsys, "move", small_run, *ARM, *goals)[1]
+    by_file = called(capsys, "move", small_run / "adapted.safetensors", *ARM, *goals)[1]
+    assert json.loads(by_folder)["movements"] == json.loads(by_file)["movements"]
+    shutil.copy(small_run / "agent.safetensors", tmp_path)  # a run that has not come to adapt
+    assert called(capsys, "move", tmp_path, *ARM, *goals)[0] in (0, 1)
+    assert agent_file(tmp_path) == tmp_path / "agent.safetensors"
+    assert load_controller(small_run).reset(goal_deg=5) is None
+    code, _, err = called(capsys, "move", tmp_path.parent, *ARM, "5deg")
+    assert code == 2
+    assert "neither adapted.safetensors nor agent.safetensors" in err
+
+
+def test_the_command_to_move_by_is_ready_to_be_called() -> None:
+    spec = ArmSpec(joints=2)
+    told = move_command(Path("my runs/arm"), "virtual:joints=2", spec, spec.angle_unit * np.array([[300, 700]] * 2))
+    assert told == "`pneumarm move 'my runs/arm' --arm virtual:joints=2 10deg,10deg`"
+    told = move_command(Path("arm"), "virtual", ArmSpec(), np.array([[300, 400]]))
+    assert told == "`pneumarm move arm --arm virtual -14.2deg`"
 
 
 @pytest.mark.parametrize(

@@ -35,9 +35,9 @@ def move_(
     Parameters
     ----------
     controller
-        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation: turn by turn to reach
-        the goal, like an agent trained by ``--task reach``, and closes the valves there. It learns nothing; to
-        settle and to stay is what the default agent is trained for and the others are tuned for.
+        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation:
+        turn by turn to reach the goal, like an agent trained by ``--task reach``, and closes the valves there. It
+        learns nothing; to settle and to stay is what the default agent is trained for and the others are tuned for.
     goals
         20deg (from the middle of the range) or 650 (counts); of several joints 20deg,-5deg; x and y of the hand from
         the first hinge 0.20m,-0.30m, where the arm's spec has its links; - for standard input, one a line, where

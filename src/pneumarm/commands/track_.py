@@ -27,9 +27,9 @@ def track_(
     Parameters
     ----------
     controller
-        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation: to reach a goal, and
-        a new one whenever the reference is a degree away. It sees neither the speed nor the future of a reference,
-        which the default agent and tuned controllers do.
+        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation:
+        to reach a goal, and a new one whenever the reference is a degree away. It sees neither the speed nor the
+        future of a reference, which the default agent and tuned controllers do.
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     reference

@@ -45,8 +45,8 @@ def open_tracking(
         path = agent_file(path)
     if not path.is_file():
         raise UnusableInput(
-            f"controller {name!r}: expected the folder of a run, the file of an agent, a file from `pneumarm tune`, or "
-            f"plan:SIM; there is no file {path}"
+            f"controller {name!r}: expected the folder of a run, the file of an agent, a file from `pneumarm tune`, "
+            f"or plan:SIM; there is no file {path}"
         )
     if name.startswith(_PLAN):
         return tracking_for(PlanAgent.load(path), arm, tolerance)

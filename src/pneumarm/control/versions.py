@@ -27,7 +27,7 @@ TRAINED = "agent.safetensors"
 
 
 def agents_in(folder: Path) -> list[Path]:
-    """Return the agents in the folder of a run or of a transfer, the one in use first: adapted, or else as trained."""
+    """Return the agents in the folder of a run or of a transfer, the one in use first."""
     return [file for file in (folder / ADAPTED, folder / TRAINED) if file.exists()]
 
 

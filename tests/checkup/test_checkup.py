@@ -20,6 +20,7 @@ from pneumarm.arm.spec_file import load_arm_file
 from pneumarm.arm.virtual import (
     Leak,
     LogarithmicPotentiometer,
+    StuckValve,
     VirtualArm,
     WornPotentiometer,
     draw_parameters,
@@ -111,6 +112,22 @@ def test_a_joint_beside_exchanged_ones_is_judged_as_ever():
 @pytest.mark.parametrize(("joints", "seed"), [(2, 1), (2, 2), (2, 9), (3, 4)])
 def test_healthy_arms_of_several_joints_are_left_alone(joints, seed):
     assert diagnose(measure(FaultyArm(seed, joints=joints))) == []
+
+
+@pytest.mark.parametrize("seed", [3, 6])
+def test_air_that_a_turning_joint_compresses_is_not_let_in_by_an_inlet(seed):
+    """A closed muscle gains half of the limit by being stretched, and loses it when the joint goes back."""
+
+    class Compressed(FaultyArm):
+        def read(self):
+            reading = super().read()
+            away = np.clip(np.outer(self.spec.degrees(reading.angle), [-1, 1]) / 35, 0, 1)
+            return replace(reading, pressure=np.round(reading.pressure + 0.5 * 166 * away))
+
+    assert diagnose(measure(Compressed(seed))) == []
+    stuck = Compressed(seed)
+    stuck.arm.faults = (StuckValve(muscle=1, position="open"),)
+    assert [(f.kind, f.where) for f in diagnose(measure(stuck))] == [("inlet stuck open", "joint, muscle 1")]
 
 
 def test_the_check_up_is_gentle_and_leaves_the_arm_vented_and_closed():

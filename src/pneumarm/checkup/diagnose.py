@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm import ArmSpec
 from pneumarm.arm.spec_file import SoundState
 from pneumarm.checkup.exchanged import Exchange, What, exchanged
 from pneumarm.checkup.figures import (
@@ -22,6 +23,7 @@ from pneumarm.checkup.figures import (
     ends,
     irregularity,
     joint_figures,
+    let_in,
     ljung_box,
     quickening,
     rise,
@@ -42,8 +44,11 @@ HIGH_SUPPLY = 1.04
 can be closed."""
 RISING = 0.85
 """The supply rises if at the end of the check-up muscles fill in less than this share of the time as before."""
+LET_IN = 0.2
+"""An inlet is stuck open if, closed, it lets in so much [of the limit] while the other muscle is filled and vented:
+air that stays when the joint has gone back."""
 ZERO = 0.05
-"""A pressure sensor is not as calibrated if it reads so much more or less in a vented muscle [bar]."""
+"""A pressure sensor is not as calibrated if it reads so much more or less in a vented muscle [of the limit]."""
 ENDS = 6.0
 """A joint is not as calibrated if its ends have moved by so much [degrees]."""
 LEAP = 0.08
@@ -114,16 +119,17 @@ def _of_exchange(exchange: Exchange) -> Complaint:
 
 
 def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Complaint]:
-    test, figures, bar = checkup.joints[j], joint_figures(checkup, j), checkup.spec.counts_per_bar
+    test, figures, spec = checkup.joints[j], joint_figures(checkup, j), checkup.spec
+    limit = spec.max_pressure
     name = f"joint {j + 1}" if len(checkup.joints) > 1 else "joint"
-    rose = np.array([rise(test.muscles[m].fill) for m in range(2)]) / bar  # [muscle filled, sensor]
+    rose = np.array([rise(test.muscles[m].fill) for m in range(2)]) / spec.counts_per_bar  # [muscle filled, sensor]
     own, other = rose.diagonal(), rose[:, ::-1].diagonal()
     turned = np.array([m.turned for m in figures.muscles])
-    crossed = bool((other > FILLED).all() and (own < 0.5 * other).all())
+    crossed = bool((other > FILLED * limit).all() and (own < 0.5 * other).all())
     reversed_ = bool(turned[0] < -5 and turned[1] > 5)
     yield from _of_sensors(checkup, j, name)
     before = test.before.pressure
-    filled_by_venting = (before[-10:].mean(axis=0) - before[0]) / bar > MOVED
+    filled_by_venting = before[-10:].mean(axis=0) - before[0] > MOVED * spec.max_pressure_counts
     stays = np.array([_stays(test.muscles[m], m, checkup) for m in range(2)])
     swapped_pair = False
     for m in range(2):
@@ -148,7 +154,6 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Co
         yield Complaint("angle reversed", name, detail, "Swap the outer wires of the potentiometer")
     if crossed or swapped_pair:
         return
-    limit = checkup.spec.max_pressure
     full = np.mean([muscle.full for muscle in figures.muscles])
     if full > HIGH_SUPPLY * limit:
         detail = f"muscles fill to {full:.2f} bar before their inlets can be closed at the limit of {limit:.2f} bar"
@@ -156,7 +161,7 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Co
         yield Complaint("high supply", name, detail, remedy)
         return  # so fast nothing else can be judged
     frozen = [_is_frozen(test, m) for m in range(2)]
-    valves = list(_of_valves(figures, rose, stays, frozen, checkup, name))
+    valves = list(_of_valves(checkup, j, figures, rose, stays, frozen, name))
     stuck = [finding for finding in valves if "stuck" in finding.kind]
     if stuck:
         yield from stuck  # while air flows that should not, nothing else can be judged
@@ -175,12 +180,18 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Co
 
 
 def _of_valves(
-    figures: JointFigures, rose: Array, stays: NDArray[np.bool_], frozen: list[bool], checkup: Checkup, name: str
+    checkup: Checkup,
+    j: int,
+    figures: JointFigures,
+    rose: Array,
+    stays: NDArray[np.bool_],
+    frozen: list[bool],
+    name: str,
 ) -> Iterator[Complaint]:
-    limit = checkup.spec.max_pressure
-    own, other = rose.diagonal(), rose[::-1].diagonal()  # by its own inlet, by the other muscle's
+    spec, test, limit = checkup.spec, checkup.joints[j], checkup.spec.max_pressure
+    own = rose.diagonal()
     full = np.array([m.full for m in figures.muscles])
-    if (own < MOVED).all():
+    if (own < MOVED * limit).all():
         yield Complaint("low supply", name, "no muscle fills", "Turn the air on; check the valves' power")
         return
     if (np.maximum(full, own) < LOW_SUPPLY * limit).all():
@@ -190,13 +201,13 @@ def _of_valves(
         where = f"{name}, muscle {m + 1}"
         if frozen[m]:
             continue  # nothing is known of its valves
-        if own[m] < MOVED:
+        if own[m] < MOVED * limit:
             detail = f"it gains {own[m]:.2f} bar when its inlet opens"
             yield Complaint("inlet stuck closed", where, detail, "Check the inlet valve, its wire and its hose")
         elif muscle.full < 0.6 * own[m]:
             detail = f"it keeps {muscle.full:.2f} of {own[m]:.2f} bar when its valves close"
             yield Complaint("exhaust stuck open", where, detail, "Check the exhaust valve; or the muscle has burst")
-        elif other[m] > FILLED or muscle.leak < -LEAK:
+        elif let_in(test.muscles[1 - m], m, spec) > LET_IN * limit or (muscle.leak < -LEAK and _stands(test, spec)):
             detail = "its pressure rises while its valves are closed"
             yield Complaint(
                 "inlet stuck open", where, detail, "Check the inlet valve: it sticks, or its seat is dirty"
@@ -240,7 +251,7 @@ def _of_calibration(
 ) -> Iterator[Complaint]:
     spec = checkup.spec
     vented = spec.bar(test.before.pressure[-10:].mean(axis=0))
-    for m in np.flatnonzero(np.abs(vented) > ZERO):
+    for m in np.flatnonzero(np.abs(vented) > ZERO * spec.max_pressure):
         detail = f"vented, its sensor reads {vented[m]:.2f} bar; the zero has moved, or the spec is of another arm"
         yield Complaint("not as calibrated", f"{name}, muscle {m + 1}", detail, _AGAIN)
     moved = (ends(test) - calibrated) / spec.counts_per_degree
@@ -330,17 +341,27 @@ def _is_frozen(test: JointTest, m: int) -> bool:
     return bool(np.ptp(pressures) == 0)
 
 
+def _stands(test: JointTest, spec: ArmSpec) -> bool:
+    """Return whether the joint stands still while its muscles rest: where it sags it compresses one of them."""
+    angle = spec.degrees(test.rest.angle)
+    return bool(abs(angle[-10:].mean() - angle[:10].mean()) < _SAGS)
+
+
+_SAGS = 3.0  # degrees
+
+
 def _stays(test: MuscleTest, m: int, checkup: Checkup) -> bool:
     """Return whether muscle ``m`` keeps most of its air while its exhaust is open."""
     held = np.median(test.hold.pressure[:, m])
-    return bool(held > MOVED * checkup.spec.counts_per_bar and test.exhaust.pressure[-10:, m].mean() > 0.7 * held)
+    least = MOVED * checkup.spec.max_pressure_counts
+    return bool(held > least and test.exhaust.pressure[-10:, m].mean() > 0.7 * held)
 
 
 def _vents_up(test: MuscleTest, m: int, checkup: Checkup) -> bool:
     """Return whether the pressure of muscle ``m`` rises while its exhaust is open."""
     exhaust = test.exhaust
     gained = exhaust.pressure[-10:, m].mean() - exhaust.pressure[0, m]
-    return bool(gained > MOVED * checkup.spec.counts_per_bar)
+    return bool(gained > MOVED * checkup.spec.max_pressure_counts)
 
 
 def _filled_by_venting(test: MuscleTest, m: int, checkup: Checkup) -> bool:
@@ -350,4 +371,4 @@ def _filled_by_venting(test: MuscleTest, m: int, checkup: Checkup) -> bool:
     whose inlet is stuck open holds less.
     """
     more = test.exhaust.pressure[-10:, m].mean() - test.fill.pressure[-10:, m].mean()
-    return bool(more > -MOVED / 2 * checkup.spec.counts_per_bar)
+    return bool(more > -MOVED / 2 * checkup.spec.max_pressure_counts)

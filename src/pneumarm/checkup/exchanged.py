@@ -64,7 +64,7 @@ def _answering(muscle: Muscle, test: MuscleTest, checkup: Checkup) -> Muscle:
     """Return whose pressure sensor answers when ``muscle`` is told to fill; its own where none does clearly."""
     rose = np.array([rise(trace) for trace in _fills(test)]) / checkup.spec.counts_per_bar
     joint, m = np.unravel_index(np.argmax(rose), rose.shape)
-    foreign = rose[joint, m] > FILLED and rose[muscle] < _OWN * rose[joint, m]
+    foreign = rose[joint, m] > FILLED * checkup.spec.max_pressure and rose[muscle] < _OWN * rose[joint, m]
     return (int(joint), int(m)) if foreign else muscle
 
 

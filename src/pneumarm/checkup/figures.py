@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from pneumarm.arm import ArmSpec
 from pneumarm.arm.spec_file import SoundState
 from pneumarm.checkup.leaks import falling
-from pneumarm.checkup.measure import Array, Checkup, JointTest, Trace
+from pneumarm.checkup.measure import Array, Checkup, JointTest, MuscleTest, Trace
 
 MOVED = 0.10
-"""A pressure moved if it changed by so much [bar]; the other muscle, stretched or slackened, moves by less."""
+"""A pressure moved if it changed by so much [of the limit]."""
 FILLED = 0.35
-"""What the pressure of a filled muscle always rises by [bar], and that of one that is merely stretched never does."""
+"""What the pressure of a filled muscle always rises by [of the limit]. That of a closed one that is stretched or
+slackened may do so as well: whether it took air is told when its joint has gone back."""
 LAGS = 20
 """Readings apart up to which noise is correlated."""
 
@@ -83,10 +84,11 @@ def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
     rise = fill.pressure[:, m] - fill.pressure[0, m]
     full = float(np.median(hold.pressure[:, m]) - fill.pressure[0, m])
     fall = exhaust.pressure[:, m] - exhaust.pressure[-10:, m].mean()
-    moved = full > MOVED * bar
+    least = MOVED * checkup.spec.max_pressure_counts
+    moved = full > least
     rest = test.rest
     above = rest.pressure[:, m] - test.before.pressure[-10:, m].mean()  # its sensor may not be calibrated
-    leak, leak_error = falling(rest.time, above) if above.mean() > MOVED * bar else (np.nan, np.nan)
+    leak, leak_error = falling(rest.time, above) if above.mean() > least else (np.nan, np.nan)
     pulse = muscle.pulse
     fills = [(each.time, each.pressure[:, m]) for each in (fill, pulse, test.again[m])]
     end = int(np.searchsorted(pulse.time, settings.pulse))
@@ -110,6 +112,25 @@ def rise(fill: Trace) -> Array:
     """Return how far each pressure rose in a ``fill``, (2,) [counts]."""
     rose: Array = np.quantile(fill.pressure, 0.95, axis=0) - fill.pressure[:3].mean(axis=0)
     return rose
+
+
+def let_in(other: MuscleTest, m: int, spec: ArmSpec) -> float:
+    """Return what the pressure of muscle ``m``, closed, has gained when the ``other`` was filled and vented [bar].
+
+    A joint that turns changes the volume of the closed muscle, and so its pressure: in some arms by nearly half of
+    the limit. That goes back with the angle, and what the angle has not gone back (a joint that sticks, or that falls
+    over) keeps its share. Air that came in stays.
+    """
+    filled = len(other.fill.time) + len(other.hold.time)
+    pressure, angle = spec.bar(other.whole.pressure[:, m]), spec.degrees(other.whole.angle)
+    then = slice(filled - 10, filled), slice(-10, None)
+    turned, gone = (angle[end].mean() - angle[:3].mean() for end in then)
+    rose, left = (pressure[end].mean() - pressure[:3].mean() for end in then)
+    kept = float(np.clip(gone / turned, 0.0, 1.0)) if abs(turned) > _TURNS else 0.0
+    return float(left - kept * rose)
+
+
+_TURNS = 5.0  # degrees: a joint that turns less compresses nothing
 
 
 def onset(rises: Sequence[tuple[Array, Array]]) -> float:

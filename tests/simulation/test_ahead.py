@@ -105,7 +105,7 @@ def test_the_gradient_is_that_of_the_cost(store: Path, single: Simulation) -> No
 def test_later_steps_are_predicted_better(store: Path, single: Simulation) -> None:
     """And single ones about as well, on sequences that were not fitted."""
     with Store.open(store) as opened:
-        fitted = fit_store(opened, FitSettings(epochs=10)).simulation
+        fitted = fit_store(opened, FitSettings(epochs=10, memory=1)).simulation
         blocks = [rows.where(held_out(rows.sequence, single.held_out, single.seed)) for rows in opened.blocks()]
     apart = stretches(blocks, replace(single, held_out=0.0), STEPS)
     later = [_errors(one, apart) for one in (single, fitted)]

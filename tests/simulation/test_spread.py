@@ -26,7 +26,7 @@ def store(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(store):
-    return fit_store(store, FitSettings(history=2))
+    return fit_store(store, FitSettings(history=2, memory=1))
 
 
 def test_a_record_without_pulses_is_learned_from_as_it_is(made):

@@ -5,6 +5,10 @@
     now and then:          what the arm did since it changed -> the simulation fits it better?
                            no: all stays as it is.  yes: the agent goes on learning there, and is kept if better
 
+An agent that does not settle at some of its goals, on an arm whose recording is at hand and that is as it was then,
+learns more thoroughly: the simulation is fitted on to the recording and to the movements together, and the agent
+learns in it for longer. What keeps a joint from its rest is mostly what a recording of large movements did not show.
+
 The three questions are answered by :mod:`~pneumarm.adaptation.change`, :mod:`~pneumarm.adaptation.trial` and
 :mod:`~pneumarm.adaptation.refit`. "Now and then" is after few movements at first, and then each time that their
 number has grown by a half, up to ``every``: what a simulation gains by more data falls with their number. A change
@@ -28,13 +32,14 @@ from pneumarm.adaptation.change import (
 )
 from pneumarm.adaptation.events import Event, What
 from pneumarm.adaptation.plastic import plastic, with_plastic
-from pneumarm.adaptation.refit import Refit, RefitSettings, refit
+from pneumarm.adaptation.refit import Refit, RefitSettings, refit, refit_to_all
 from pneumarm.adaptation.trial import TrialSettings, verdict
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.agents import Acts, Adapts
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.begin import begin_states
 from pneumarm.transitions.rows import Rows
+from pneumarm.transitions.store import Store
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,12 @@ class AdaptationSettings(Settings):
     """Updates before these that learn the values of states alone, which an agent does not keep."""
     learning_rate: float = 1e-3
     """Of the policy, by Adam, at the start; falls linearly to 0."""
+    unsettled: float = 0.05
+    """Share of movements that do not settle above which an agent that is to settle learns more thoroughly."""
+    thorough_updates: int = 400
+    """Updates then."""
+    thorough_rate: float = 4e-3
+    """Learning rate then."""
     refit: RefitSettings = field(default_factory=RefitSettings)
     """How the simulation is fitted further."""
     watch: WatchSettings = field(default_factory=WatchSettings)
@@ -68,6 +79,9 @@ class AdaptationSettings(Settings):
             "updates": self.updates >= 1,
             "warm_up": self.warm_up >= 0,
             "learning_rate": 0 < self.learning_rate < math.inf,
+            "unsettled": 0 <= self.unsettled <= 1,
+            "thorough_updates": self.thorough_updates >= 0,
+            "thorough_rate": 0 < self.thorough_rate < math.inf,
         }
 
 
@@ -93,6 +107,7 @@ class Adaptation:
         self._trusted, self._trusted_version = agent, 0  # what is put back if the agent is worse
         self._old: list[float] = []  # rewards of the trusted agent
         self._new: list[float] = []  # rewards of the agent that is on trial
+        self._settled: list[bool] = []  # whether movements of the agent as it is did
         self.quantities = output_names(agent.simulation)
         """What the ratios are of."""
 
@@ -116,8 +131,12 @@ class Adaptation:
         """Error of the simulation in the last movements over that of its fit, shape (outputs,)."""
         return self._watch.ratio
 
-    def observe(self, rows: Rows, reward: float, *, judges: bool = True, sound: bool = True) -> list[list[float]]:
+    def observe(
+        self, rows: Rows, reward: float, *, judges: bool = True, sound: bool = True, settled: bool = True
+    ) -> list[list[float]]:
         """Take notice of a movement: its ``rows`` and its ``reward``; with ``judges`` an agent may be taken back.
+
+        ``settled`` tells whether it did, where it was to.
 
         A movement that is not ``sound``, of an arm with a fault, is counted and nothing else: it tells neither how
         the arm is nor what an agent is worth.
@@ -130,6 +149,7 @@ class Adaptation:
         if not sound:
             self._watch.skip()
             return [arrived.tolist(), now.tolist()]
+        self._settled.append(settled)
         if self._watch.observe(now):
             self._notice()
         if self.version == self._trusted_version:
@@ -155,6 +175,7 @@ class Adaptation:
         elif found == "worse":
             worse, means = self.version, [float(np.mean(rewards)) for rewards in (self._old, self._new)]
             self.agent, self.version, self._new = self._trusted, self._trusted_version, []
+            self._settled.clear()
             self._watch.reset()
             self._tried = self.movements
             self._add("rolled back", taken_back=worse, reward_before=means[0], reward_after=means[1])
@@ -173,27 +194,44 @@ class Adaptation:
         tried = self._tried - self._began
         return tried < 0 or made - tried >= every or made >= self._settings.growth * tried
 
-    def learn(self, rows: Rows) -> bool:
+    def learn(self, rows: Rows, recorded: Store | None = None) -> bool:
         """Adapt to ``rows``, those of the :attr:`usable` movements, the newest last; whether there is a new version.
 
-        With too few movements nothing happens.
+        ``recorded`` holds these movements and the recording that the agent was made of, where that is at hand. With
+        too few movements nothing happens.
         """
         self._tried = self.movements
-        found = refit(self.agent.simulation, self._origin.simulation, rows, self._settings.refit, self._seed)
+        tuned, now = self._settings, self.agent.simulation
+        updates, rate = tuned.updates, tuned.learning_rate
+        if recorded is not None and self._is_thorough():
+            updates, rate = tuned.thorough_updates, tuned.thorough_rate
+            found: Refit | None = refit_to_all(now, recorded, rows)
+        else:
+            found = refit(now, self._origin.simulation, rows, tuned.refit, self._seed)
         if found is None:
             return False
         if found.better:
             simulation = found.simulation
             begin = begin_states(rows, simulation.window, simulation.scaling, simulation.spec)
-            tuned = self._settings
-            self.agent = self.agent.adapted(
-                simulation, begin, tuned.updates, tuned.warm_up, tuned.learning_rate, self._seed + self.movements
-            )
+            seed = self._seed + self.movements
+            self.agent = self.agent.adapted(simulation, begin, updates, tuned.warm_up, rate, seed)
             self.version, self.versions = self.versions, self.versions + 1
             self._new = []
+            self._settled.clear()
             self._watch.reset()
         self._add("accepted" if found.better else "refused", **self._figures(found))
         return found.better
+
+    def _is_thorough(self) -> bool:
+        """Whether to learn more thoroughly: the agent fails to settle, on an arm that has not changed."""
+        failed, settings = self._settled.count(False), self._settings
+        simulation = self.agent.simulation
+        return (
+            failed > settings.unsettled * len(self._settled)
+            and settings.thorough_updates > 0
+            and self._began == 0
+            and not simulation.spread  # or what it was taught of pulses would be forgotten
+        )
 
     def _figures(self, found: Refit) -> dict[str, Any]:
         unit = np.sqrt(error_squares(self._origin.simulation))
@@ -216,6 +254,7 @@ class Adaptation:
             "trusted": self._trusted_version,
             "old": self._old,
             "new": self._new,
+            "settled": self._settled,
             "events": [asdict(event) for event in self.events],
             "watch": self._watch.get_state(),
         }
@@ -238,6 +277,7 @@ class Adaptation:
             self._began, self._tried = int(head["began"]), int(head["tried"])
             self._trusted_version = int(head["trusted"])
             self._old, self._new = list(map(float, head["old"])), list(map(float, head["new"]))
+            self._settled = list(map(bool, head["settled"]))
             self.events = [Event(**event) for event in head["events"]]
             self._watch.set_state(head["watch"])
         except (ValueError, TypeError, KeyError, IndexError) as error:

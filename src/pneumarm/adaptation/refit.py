@@ -20,6 +20,10 @@ quantities), on other movements of the policy / under random actions; 1.59 / 1.4
 
 Whether the refitted simulation is better is decided by cross-validation: each part of the movements is predicted by a
 fit to the others.
+
+Where the recording that the simulation was fitted to is at hand, and the arm is as it was then, nothing need be
+rehearsed: the fit goes on with that recording and the movements together, to single steps and to several
+(:func:`refit_to_all`).
 """
 
 import math
@@ -32,10 +36,12 @@ from pneumarm.adaptation.change import error_squares
 from pneumarm.arm.valves import VALVES
 from pneumarm.networks import LevenbergMarquardt, Network, levenberg_marquardt
 from pneumarm.settings import Settings, Valid
+from pneumarm.simulation.fit import fitted_on
 from pneumarm.simulation.quality import residue
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.simulation.spread import spread_over_periods
 from pneumarm.transitions.rows import Rows
+from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import Transitions, Window, transitions
 
 Floats = NDArray[np.float64]
@@ -128,6 +134,23 @@ def refit(now: Simulation, origin: Simulation, rows: Rows, settings: RefitSettin
     )
 
 
+def refit_to_all(now: Simulation, store: Store, rows: Rows) -> Refit:
+    """Return ``now`` fitted on to all that ``store`` holds: a recording, and the movements, whose ``rows`` are given.
+
+    It is meant for an arm that is as it was when it was recorded, and taken to be better: it knows more.
+    """
+    whole = fitted_on(now, store)
+    found = transitions(rows, now.window)
+    pressure, further = now.window.of_joints(found.target)[..., -2:], found.target[:, now.window.joint_size :]
+    reached = replace(
+        whole,
+        pressure_range=_reaching(now.pressure_range, pressure),
+        further_range=_reaching(now.further_range, further),
+    )
+    before, after = (np.sqrt(np.mean(residue(one, found)[:, now.outputs] ** 2, axis=0)) for one in (now, reached))
+    return Refit(reached, len(np.unique(found.sequence)), before, after, better=True)
+
+
 def _is_better(old: Floats, new: Floats, sequence: NDArray[np.int64], settings: RefitSettings) -> bool:
     """Whether squared errors ``new`` (n, outputs) are surely lower than ``old``, with movements as the samples."""
     gained = ((old - new) / np.maximum(old.mean(axis=0), 1e-30)).mean(axis=1)
@@ -152,7 +175,8 @@ def _scaled(simulation: Simulation, known: Transitions) -> tuple[Floats, Floats]
     """Return scaled inputs, and the changes that are to be predicted of them in errors of the fit."""
     places = simulation.outputs
     change = known.target[:, places].astype(np.float64) - known.inputs[:, places]
-    return simulation.scaling.inputs(known.inputs, simulation.window), change / np.sqrt(error_squares(simulation))
+    read = simulation.scaling.inputs(known.inputs, simulation.window) * simulation.reads  # the others keep no weight
+    return read, change / np.sqrt(error_squares(simulation))
 
 
 def _columns(simulation: Simulation) -> list[NDArray[np.int64]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumarm.adaptation import AdaptationSettings, adaptation_of
 from pneumarm.arm import Arm, ControlCycle, Controller, guarded
@@ -21,9 +22,10 @@ from pneumarm.control.versions import ADAPTED, Adapted, save_history, version_ke
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
 from pneumarm.learning import AnyAgent, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
+from pneumarm.moving.movement import MoveSettings
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
-from pneumarm.transitions import Store
+from pneumarm.transitions import KINDS, Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
 from pneumarm.transitions.store import SequenceEntry
 from pneumarm.transitions.watch import Patience, keep_watch
@@ -300,9 +302,15 @@ class Transfer:
         self._keep()  # it learns from what is stored, so that an interruption changes nothing
         made = [entry.number for entry in self._stored()][-adapting.usable :]
         blocks = list(self._store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
-        if blocks and adapting.learn(joined(blocks)):
+        if blocks and adapting.learn(joined(blocks), self._recording()):
             self._judge()
             self._keep_version(adapting.version, adapting.agent)
+
+    def _recording(self) -> Store | None:
+        """Return the store where it holds the recording that an agent that settles was made of."""
+        if not isinstance(self._arrived, Tracks) or not any(one.kind in KINDS for one in self._store.catalogue()):
+            return None
+        return self._store
 
     def _note(self, phase: Phase, movement: Movement) -> None:
         """Keep what came of a movement, and let the agent take notice of it."""
@@ -311,13 +319,23 @@ class Transfer:
             judges = self._settings.learning_rate > 0 and phase == "learning"
             recorded = movement.recorded
             sound = not self._watch.marks(recorded)
-            worth = movement.reward
+            worth, settled = movement.reward, True
             if isinstance(self._arrived, Tracks):
                 worth = self._arrived.worth(recorded.angle[1:], movement.goal)
-            info[_SQUARES] = self._adapting.observe(rows_of(recorded), worth, judges=judges, sound=sound)
+                settled = self._has_settled(recorded, movement.goal)
+            info[_SQUARES] = self._adapting.observe(
+                rows_of(recorded), worth, judges=judges, sound=sound, settled=settled
+            )
             self._judge()
         self._done.append(info)
         self._waiting.append(replace(movement.recorded, info=info))
+
+    def _has_settled(self, recorded: Recorded, goal: NDArray[np.float64]) -> bool:
+        """Return whether all joints were within a degree of the ``goal`` (joints,) for the dwell time at the end."""
+        usual = MoveSettings()
+        late = recorded.time >= recorded.time[-1] - usual.dwell
+        off = np.abs(recorded.angle[late] - goal) / self._arm.spec.counts_per_degree
+        return bool((off <= usual.tolerance).all())
 
     def _judge_arm(self, time: float) -> None:
         """Give up, with all movements stored, where what is wrong with the arm is no passing trouble.

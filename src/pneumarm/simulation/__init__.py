@@ -9,6 +9,7 @@ from pneumarm.simulation.fit import (
     by_quantity,
     fit,
     fit_store,
+    fitted_on,
     refiltered,
 )
 from pneumarm.simulation.noise import NoiseSettings
@@ -28,5 +29,6 @@ __all__ = [
     "by_quantity",
     "fit",
     "fit_store",
+    "fitted_on",
     "refiltered",
 ]

@@ -29,7 +29,7 @@ from pneumarm.networks import (
 from pneumarm.networks import importance as importance_of
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.ahead import fitted_ahead, stretches
-from pneumarm.simulation.history import USUAL, chosen_history
+from pneumarm.simulation.history import LONGEST, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
 from pneumarm.simulation.spread import spread_over_periods
@@ -63,7 +63,11 @@ class FitSettings(Settings):
     """What a person may choose of a fit."""
 
     history: int | None = None
-    """Observations in the state (thesis eq. 3.5: 3); by default 3, or more where more say more of this arm."""
+    """Observations that the networks read (thesis eq. 3.5: 3); by default 3, or more where more say more of this
+    arm."""
+    memory: int | None = None
+    """Observations in the state, for a policy to see; by default 8 where predictions are fitted ahead, for agents
+    that settle, and else no more than the networks read (thesis)."""
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
     hidden: int = 10
@@ -96,6 +100,7 @@ class FitSettings(Settings):
     def _valid(self) -> Valid:
         return {
             "history": self.history is None or self.history >= 1 or "1 or more",
+            "memory": self.memory is None or self.memory >= 1 or "1 or more",
             "approximator": self.approximator in ("network", "least-squares"),
             "hidden": 1 <= self.hidden <= 1000,
             "epochs": self.epochs >= 1,
@@ -114,10 +119,15 @@ class FitSettings(Settings):
         return replace(self, ahead=0.0, spread=False) if usual else self
 
     def of_arm(self, store: Store) -> "FitSettings":
-        """Return the settings with the history that suits the arm of ``store`` where none is asked for."""
-        if self.history is not None:
-            return self
-        return replace(self, history=chosen_history(store, store.spec, self.sensors))
+        """Return the settings with the history and memory that suit the arm of ``store`` where none is asked for."""
+        history = self.history or chosen_history(store, store.spec, self.sensors)
+        settles = self.ahead > 0 and self.approximator == "network"
+        return replace(self, history=history, memory=self.memory or (LONGEST if settles else history))
+
+    @property
+    def observations(self) -> int:
+        """Observations in the state."""
+        return max(self.history or USUAL, self.memory or 0)
 
 
 SINGLE_STEPS = FitSettings().of_single_steps()
@@ -216,16 +226,18 @@ def fit(
     change = training.target[:, places].astype(np.float64) - training.observation[:, places]
     spread = change.std(axis=0)
     spread[spread == 0] = 1.0
-    x = scaling.inputs(training.inputs, window).astype(np.float32)
+    read = columns(window, settings.history or USUAL)
+    x = scaling.inputs(training.inputs, window).astype(np.float32)[:, read]
     y = change / spread
-    outputs = [window.input_names()[place].removesuffix("[k]") for place in places]
+    names = window.input_names()
+    outputs = [names[place].removesuffix("[k]") for place in places]
     linear = least_squares(x, y)
     # The targets are in units of the change's spread, the simulation's are in those of the observation.
     factor = spread / scaling.observation_scale[places]
     factors = [factor] if settings.one_network else np.split(factor, len(factor))
     fits: list[Fit] = []
     if settings.approximator == "least-squares":
-        simulation = replace(simulation, networks=(_rescaled(linear, factor),))
+        simulation = replace(simulation, networks=(_widened_to(_rescaled(linear, factor), read, window.input_size),))
     else:
         spreads = settings.spread and simulation.commands == "valves"
         again = max(1, round(_AGAIN * settings.epochs)) if spreads else 0
@@ -237,7 +249,7 @@ def fit(
         def part(number: int) -> Callable[[int, int], None]:
             return _part_of(progress, int(ends[number]) - networks * epochs[number], int(ends[-1]))
 
-        simulation, fits = _fitted(simulation, x, y, factor, settings, part(0))
+        simulation, fits = _fitted(simulation, x, read, y, factor, settings, part(0))
         if ahead > 1:
             report, units = part(1), networks * _EPOCHS_AHEAD
             long_enough = stretches(recorded, simulation, ahead)
@@ -253,7 +265,8 @@ def fit(
             before = [_rescaled(one, 1 / each) for one, each in zip(simulation.networks, factors, strict=True)]
             simulation, fits = _fitted(
                 simulation,
-                scaling.inputs(inputs, window).astype(np.float32),
+                scaling.inputs(inputs, window).astype(np.float32)[:, read],
+                read,
                 more / spread,
                 factor,
                 replace(settings, epochs=again),
@@ -268,7 +281,7 @@ def fit(
         held_out=errors,
         training=statistics(simulation, training),
         generalisation=None if generalisation is None else statistics(simulation, generalisation),
-        importance=importance_of(linear, x, y, window.input_names(), outputs),
+        importance=importance_of(linear, x, y, [names[one] for one in read], outputs),
         outputs=outputs,
         curves=[one.mse for one in fits],
         converged=[one.converged for one in fits],
@@ -290,6 +303,7 @@ def _part_of(progress: Callable[[int, int], None] | None, before: int, total: in
 def _fitted(
     simulation: Simulation,
     x: NDArray[np.float32],
+    read: NDArray[np.int64],
     y: NDArray[np.float64],
     factor: NDArray[np.float64],
     settings: FitSettings,
@@ -298,15 +312,19 @@ def _fitted(
 ) -> tuple[Simulation, list[Fit]]:
     """Return ``simulation`` with networks fitted to ``x`` and ``y``, whose units are ``factor`` of its own.
 
-    They begin as they were ``before``, or at random.
+    ``x`` are the inputs that the networks ``read``. They begin as they were ``before``, or at random.
     """
-    joints = simulation.window.joints
+    joints, size = simulation.window.joints, simulation.window.input_size
     targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
     chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * joints, settings.seed)
+    before = [replace(one, hidden_weights=one.hidden_weights[read]) for one in before]
     fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0
     factors = np.split(factor, len(fits))
-    networks = [_rescaled(_without(one.network, still), scale) for one, scale in zip(fits, factors, strict=True)]
+    networks = [
+        _widened_to(_rescaled(_without(one.network, still), scale), read, size)
+        for one, scale in zip(fits, factors, strict=True)
+    ]
     return replace(simulation, networks=tuple(networks)), fits
 
 
@@ -333,7 +351,7 @@ def _unfitted(
 
 
 def _window(spec: ArmSpec, settings: FitSettings) -> Window:
-    return Window.of(spec, settings.history or USUAL, settings.sensors)
+    return Window.of(spec, settings.observations, settings.sensors)
 
 
 def _commands(training: Transitions, window: Window) -> Commands:
@@ -394,6 +412,18 @@ def _without(network: Network, inputs: NDArray[np.bool_]) -> Network:
     if not inputs.any():
         return network
     return replace(network, hidden_weights=np.where(inputs[:, None], 0.0, network.hidden_weights))
+
+
+def _widened_to(network: Network, read: NDArray[np.int64], size: int) -> Network:
+    """Return a ``network`` of the inputs ``read`` as one of ``size`` inputs, with no weight on the others."""
+
+    def widened(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        whole = np.zeros((size, weights.shape[1]))
+        whole[read] = weights
+        return whole
+
+    direct = None if network.direct is None else widened(network.direct)
+    return replace(network, hidden_weights=widened(network.hidden_weights), direct=direct)
 
 
 def _rescaled(network: Network, factor: NDArray[np.float64]) -> Network:
@@ -523,10 +553,11 @@ def fitted_on(simulation: Simulation, store: Store, ahead: float = FitSettings.a
     spread = change.std(axis=0)
     spread[spread == 0] = 1.0
     factor = spread / simulation.scaling.observation_scale[places]
-    factors = np.split(factor, len(simulation.networks))
+    factors, read = np.split(factor, len(simulation.networks)), np.flatnonzero(simulation.reads)
     fitted, _ = _fitted(
         simulation,
-        simulation.scaling.inputs(training.inputs, window).astype(np.float32),
+        simulation.scaling.inputs(training.inputs, window).astype(np.float32)[:, read],
+        read,
         change / spread,
         factor,
         FitSettings(epochs=_EPOCHS_ON, one_network=len(factors) == 1, seed=seed),

@@ -19,6 +19,7 @@ from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transit
 USUAL = 3
 """Observations in a state (thesis eq. 3.5)."""
 LONGEST = 8
+"""Observations in a state at most."""
 _WORTH = 0.07
 """Part by which the angle's error must fall for more observations than usual."""
 _AS_GOOD = 0.02
@@ -54,14 +55,14 @@ def _error(data: Transitions, window: Window, history: int, apart: NDArray[np.bo
     """Return the error of a linear model of how the angles change, the geometric mean of all joints [counts]."""
     place = np.arange(0, window.joint_size, len(QUANTITIES))
     change = (data.target - data.observation)[:, place].astype(np.float64)
-    x = data.inputs[:, _columns(window, history)].astype(np.float64)
+    x = data.inputs[:, columns(window, history)].astype(np.float64)
     spread = x[~apart].std(axis=0)
     x = (x - x[~apart].mean(axis=0)) / np.where(spread > 0, spread, 1.0)
     error = least_squares(x[~apart], change[~apart])(x[apart]) - change[apart]
     return float(np.exp(np.log(np.maximum(error.std(axis=0), np.finfo(float).tiny)).mean()))
 
 
-def _columns(window: Window, history: int) -> NDArray[np.int64]:
+def columns(window: Window, history: int) -> NDArray[np.int64]:
     """Return the columns of a window's inputs that a window with a shorter ``history`` has."""
     observed, commanded = window.history * window.observation_size, window.command_size
     earlier = observed + np.arange((history - 1) * commanded)

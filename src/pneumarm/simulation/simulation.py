@@ -140,6 +140,13 @@ class Simulation:
         return places if self.velocity == "network" else places[~derived]
 
     @property
+    def reads(self) -> NDArray[np.bool_]:
+        """Which inputs some network reads, shape (input_size,): an agent may see more of the past than they do."""
+        weights = [w for one in self.networks for w in (one.hidden_weights, one.direct) if w is not None]
+        found: NDArray[np.bool_] = np.any(np.concatenate(weights, axis=1) != 0, axis=1)
+        return found
+
+    @property
     def measured(self) -> NDArray[np.bool_]:
         """Which outputs a sensor stands behind: no pressures that are estimated, or of a muscle that is not there."""
         places = self.outputs

@@ -68,7 +68,7 @@ class ServoController:
     At the turning points of a swing a joint stands still too. It is at rest only where it will stay with closed
     valves, which its simulation foresees, or where it has stayed for as long. A joint that goes on swinging about its
     goal is left alone until it is at rest, or goes on being damped: :class:`~.two_ways.TwoWays` learns which. It
-    learns, too, whether a joint does not come near its goal that way, as where friction lets go or air leaks: then its
+    learns, too, whether a joint stays off its goal that way, as where friction lets go or air leaks: then its
     policy acts in every period, which changes more valves and keeps nearer.
     Integral action goes on while a joint swings near its goal, unless valves stay as they are for whole periods.
 
@@ -120,7 +120,7 @@ class ServoController:
         self._begin: float | None = None
         self._fresh = True
         self._rest = [_Rest(spec.period) for _ in range(spec.joints)]
-        self._actively, self._share = fine, spec.period / _SWINGING
+        self._actively, self._share = fine and not single, spec.period / _SWINGING
         self._arrived = round(_ARRIVED / spec.period)
         self._spread = None if spec.pulses else Spread(spec.joints)
 

@@ -27,7 +27,7 @@ from pneumarm.arm.virtual import (
 )
 from pneumarm.checkup import CheckupSettings, Known, calibrate, diagnose, ends, joint_figures, measure
 from pneumarm.checkup.diagnose import WORN
-from pneumarm.checkup.figures import LAGS, autocorrelation, irregularity, ljung_box, onset
+from pneumarm.checkup.figures import LAGS, autocorrelation, dropped, irregularity, ljung_box, onset
 from pneumarm.checkup.measure import JointTest, MuscleTest, Trace
 from pneumarm.cli import main
 from pneumarm.commands import asking
@@ -280,6 +280,17 @@ def test_a_joint_that_springs_off_its_end_stop_is_not_worn_and_a_worn_one_is():
     places, off = irregular(1.0)
     assert abs(places[off > WORN] - 15).max() < 8
     assert places[off > WORN].size
+
+
+def test_air_that_cools_is_no_leap_and_a_sensor_beside_the_valve_leaps():
+    for step in (0.005, 0.02):
+        time = np.arange(-0.25, 0.5, step)
+        since = np.maximum(time - 0.007, 0.0)  # when the valve has closed
+        filled = 400 * np.minimum((time + 0.25) / 0.257, 1)
+        cooling, leap = 60 * (1 - np.exp(-since / 0.08)), 60 * np.exp(-since / 0.003)
+        assert dropped(time, filled - cooling) < 15
+        assert dropped(time, filled + leap - cooling) > 25  # read every 20 ms, the last may be before the end
+    assert dropped(time[:3], filled[:3]) == 0
 
 
 def test_what_cannot_be_linearised_is_refused():

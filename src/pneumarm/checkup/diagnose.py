@@ -52,7 +52,7 @@ ZERO = 0.05
 ENDS = 6.0
 """A joint is not as calibrated if its ends have moved by so much [degrees]."""
 LEAP = 0.08
-"""A sensor is at the valve's side if its reading leaps by so much [bar] when the valve opens and falls back."""
+"""A sensor is at the valve's side if its reading drops by so much [of the limit] at once when the valve closes."""
 LOGARITHMIC = 1.3
 """A potentiometer is logarithmic if one half of the sweep turns it so many times further than the other half."""
 WORN = 0.4
@@ -217,8 +217,8 @@ def _of_valves(
             yield Complaint(
                 "exhaust stuck closed", where, detail, "Check the exhaust valve, its wire and its silencer"
             )
-        elif muscle.leap > max(LEAP, _CLEAR * muscle.noise / checkup.spec.counts_per_bar):
-            detail = f"its reading leaps by {muscle.leap:.2f} bar while air flows and falls back when it stops"
+        elif muscle.leap > max(LEAP * limit, _CLEAR * muscle.noise / checkup.spec.counts_per_bar):
+            detail = f"its reading leaps by {muscle.leap:.2f} bar while air flows and drops at once when it stops"
             remedy = "Move the pressure sensor to the far end of the muscle (thesis A.1.1)"
             yield Complaint("pressure at the valve's side", where, detail, remedy)
 

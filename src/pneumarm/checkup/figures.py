@@ -43,7 +43,7 @@ class MuscleFigures:
     noise: float
     """Standard deviation of the pressure's reading at rest [counts]."""
     leap: float
-    """By how much the reading falls within 0.06 s after a pulse of air has ended [bar]."""
+    """By how much the reading drops at once when a pulse of air has ended [bar]."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,6 @@ def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
     leak, leak_error = falling(rest.time, above) if above.mean() > least else (np.nan, np.nan)
     pulse = muscle.pulse
     fills = [(each.time, each.pressure[:, m]) for each in (fill, pulse, test.again[m])]
-    end = int(np.searchsorted(pulse.time, settings.pulse))
-    settled = np.median(pulse.pressure[_window(pulse.time, settings.pulse + 0.05, 0.05), m])
-    peak = pulse.pressure[_window(pulse.time, settings.pulse - 0.01, 0.04), m].max() if end else settled
     return MuscleFigures(
         full=full / bar,
         fill_time=_first(fill.time, rise > 0.63 * full) if moved else float("nan"),
@@ -104,7 +101,7 @@ def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
         leak_error=float(100 * leak_error),
         turned=float(fill.angle[-1] - fill.angle[0]) / checkup.spec.counts_per_degree,
         noise=float(np.std(detrended(rest.time, rest.pressure[:, m]))),
-        leap=float(peak - settled) / bar,
+        leap=dropped(pulse.time - settings.pulse, pulse.pressure[:, m]) / bar,
     )
 
 
@@ -112,6 +109,28 @@ def rise(fill: Trace) -> Array:
     """Return how far each pressure rose in a ``fill``, (2,) [counts]."""
     rose: Array = np.quantile(fill.pressure, 0.95, axis=0) - fill.pressure[:3].mean(axis=0)
     return rose
+
+
+def dropped(time: Array, pressure: Array) -> float:
+    """Return by how much a ``pressure`` drops at once when the inlet closes, shortly after 0 s.
+
+    Air that cools, and a muscle that is stretched or goes on shortening, change it slowly: what it was is compared
+    with where a straight line through what comes after the drop began.
+    """
+    drops = [0.0]
+    for peak in np.flatnonzero(_window(time, -0.01, 0.04)):
+        after = np.flatnonzero(_window(time, time[peak] + _GONE, _SLOWLY))
+        if len(after) < _LINE:
+            after = np.flatnonzero(time >= time[peak] + _GONE)[:_LINE]
+        if len(after) >= _LINE:
+            _, began = np.polyfit(time[after] - time[peak], pressure[after], 1)
+            drops.append(float(pressure[peak] - began))
+    return max(drops)
+
+
+_GONE = 0.012  # s: when a leap is over (thesis figure A.1: after 10 ms)
+_SLOWLY = 0.045  # s: in which nothing else bends much
+_LINE = 4  # readings for a straight line
 
 
 def let_in(other: MuscleTest, m: int, spec: ArmSpec) -> float:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.checkup import CASES, complaints_of
+from benchmarks.checkup import CASES, complaints_of, played
 from scipy import signal, stats
 
 from faulty_arm import FAULTS, FaultyArm, logarithmic
@@ -128,6 +128,30 @@ def test_air_that_a_turning_joint_compresses_is_not_let_in_by_an_inlet(seed):
     stuck = Compressed(seed)
     stuck.arm.faults = (StuckValve(muscle=1, position="open"),)
     assert [(f.kind, f.where) for f in diagnose(measure(stuck))] == [("inlet stuck open", "joint, muscle 1")]
+
+
+@pytest.mark.parametrize("name", [None, "noise", "potentiometer worn at 10 degrees", "sensor at the valve's side"])
+def test_the_same_is_said_in_whatever_units_sensors_count(name):
+    """The same arm at a third of the pressure, with a converter of two bits more."""
+    checkup = measure(VirtualArm(draw_parameters(3), seed=3)) if name is None else played(CASES[name], 3)[0]
+
+    def finer(part):
+        if isinstance(part, Trace):
+            return replace(part, angle=4 * part.angle, pressure=4 * part.pressure)
+        if isinstance(part, tuple):
+            return tuple(finer(each) for each in part)
+        return replace(part, **{name: finer(value) for name, value in vars(part).items()})
+
+    spec = replace(
+        checkup.spec,
+        counts_per_degree=4 * checkup.spec.counts_per_degree,
+        counts_per_bar=12 * checkup.spec.counts_per_bar,
+        max_pressure=checkup.spec.max_pressure / 3,
+        angle_range=tuple(4 * end for end in checkup.spec.angle_range),
+    )
+    told = [(f.kind, f.where) for f in diagnose(replace(checkup, spec=spec, joints=finer(checkup.joints)))]
+    assert told == [(f.kind, f.where) for f in diagnose(checkup)]
+    assert {kind for kind, _ in told} == ({CASES[name].told} if name else set())
 
 
 def test_the_check_up_is_gentle_and_leaves_the_arm_vented_and_closed():

@@ -33,8 +33,11 @@ from pneumarm.checkup.measure import Array, Checkup, JointTest, MuscleTest
 
 WHITE = 0.25
 """Noise whose autocorrelation at any of the first lags exceeds this is not white."""
-NOISY = 3.5
-"""Readings are noisy whose standard deviation at rest exceeds so many counts (thesis A.1.3: 4 is relatively high)."""
+NOISY_ANGLE = 0.31
+"""An angle is noisy whose standard deviation at rest exceeds so many degrees (thesis A.1.3: 4 counts, which are 0.35
+degrees and 0.024 bar of its arm, are relatively high)."""
+NOISY_PRESSURE = 0.02
+"""A pressure is noisy whose standard deviation at rest exceeds so much of the limit."""
 LEAK = 12.0
 """A muscle leaks if it loses more than so many percent of its pressure a minute, where it has no sound."""
 LOW_SUPPLY = 0.75
@@ -282,10 +285,12 @@ def _of_sensors(checkup: Checkup, j: int, name: str) -> Iterator[Complaint]:
 
 
 def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Complaint]:
-    test = checkup.joints[j]
-    for what, values in (
-        ("angle", test.rest.angle),
-        *((f"pressure {m + 1}", test.rest.pressure[:, m]) for m in (0, 1)),
+    test, spec = checkup.joints[j], checkup.spec
+    degree = "degrees", spec.counts_per_degree, NOISY_ANGLE
+    bar = "bar", spec.counts_per_bar, NOISY_PRESSURE * spec.max_pressure
+    for what, values, (unit, counts, most) in (
+        ("angle", test.rest.angle, degree),
+        *((f"pressure {m + 1}", test.rest.pressure[:, m], bar) for m in (0, 1)),
     ):
         clean = detrended(test.rest.time, values)
         correlation = autocorrelation(clean)
@@ -295,8 +300,8 @@ def _of_noise(checkup: Checkup, j: int, name: str) -> Iterator[Complaint]:
             detail = f"at rest its readings {worst} apart have a correlation of {correlation[worst]:.2f}"
             remedy = "Look for hum of the mains, a bad ground, or a filter; medians of such readings help little"
             yield Complaint("noise not white", f"{name}, {what}", detail, remedy)
-        elif clean.std() > NOISY and not (what == "angle" and len(_worn(test, checkup)[0])):
-            detail = f"at rest its readings vary by {clean.std():.1f} counts, independently of each other"
+        elif clean.std() > most * counts and not (what == "angle" and len(_worn(test, checkup)[0])):
+            detail = f"at rest its readings vary by {clean.std() / counts:.2g} {unit}, independently of each other"
             remedy = "Let the board take the median of more conversions (thesis A.1.3); check ground and shield"
             yield Complaint("noise", f"{name}, {what}", detail, remedy)
 

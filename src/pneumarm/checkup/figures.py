@@ -216,10 +216,19 @@ def _first(time: Array, reached: NDArray[np.bool_]) -> float:
 
 
 def detrended(time: Array, values: Array) -> Array:
-    """Return ``values`` without what changes slowly: creep, heat and leak (thesis A.1.3: "we detrend this data")."""
-    scaled = time / time[-1]
-    return values - np.polyval(np.polyfit(scaled, values, 4), scaled)
+    """Return ``values`` without what changes slowly: creep, heat and leak (thesis A.1.3: "we detrend this data").
 
+    Piece by piece: what a muscle that leaks much loses, and how its joint falls, is no polynomial for long.
+    """
+    pieces = max(1, round((time[-1] - time[0]) / _PIECE))
+    clean = np.empty(len(values))
+    for piece in np.array_split(np.arange(len(values)), pieces):
+        scaled = np.linspace(-1.0, 1.0, len(piece))
+        clean[piece] = values[piece] - np.polyval(np.polyfit(scaled, values[piece], 4), scaled)
+    return clean
+
+
+_PIECE = 5.0  # s
 
 _NOTHING = 1e-6
 """A variance below this [counts^2] is that of rounding."""

@@ -145,7 +145,7 @@ def _extremes(checkup: Checkup) -> dict[str, float]:
     return {
         "leak [%/min]": max(m.leak for m in figures.muscles),
         "full muscle [of the limit]": max(m.full for m in figures.muscles) / checkup.spec.max_pressure,
-        "leap [bar]": max(m.leap for m in figures.muscles),
+        "leap [of the limit]": max(m.leap for m in figures.muscles) / checkup.spec.max_pressure,
         "halves": max(figures.halves, 1 / figures.halves),
         "irregularity [degrees]": figures.worst,
         "fill time at the end [of that before]": quickening(checkup.joints[0], checkup),

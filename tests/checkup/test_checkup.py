@@ -232,6 +232,18 @@ def test_a_beginning_is_found_between_readings_and_not_from_too_few():
     assert np.isnan(onset([(time[::5], time[::5])]))
 
 
+def test_both_muscles_that_leak_are_named_and_what_leaks_too_much_to_be_measured():
+    def told(*faults):
+        found = diagnose(measure(VirtualArm(draw_parameters(6), seed=6, faults=faults)))
+        assert {finding.kind for finding in found} == {"leak"}
+        return {finding.where: finding.told_by for finding in found}
+
+    both = told(Leak(muscle=1, factor=40.0), Leak(muscle=2, factor=40.0))
+    assert list(both) == ["joint, muscle 1", "joint, muscle 2"]
+    assert all("% of its pressure a minute" in detail for detail in both.values())
+    assert "before 8 s are over" in told(Leak(muscle=2, factor=1000.0))["joint, muscle 2"]
+
+
 def test_a_leak_is_told_by_the_sound_state_of_the_calibration(tmp_path, capsys):
     file, plan = tmp_path / "arm.toml", tmp_path / "leak.toml"
     assert run(capsys, "arm", "calibrate", "virtual:seed=6", "--out", file)[0] == 0

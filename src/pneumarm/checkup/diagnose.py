@@ -170,7 +170,7 @@ def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Co
         yield from stuck  # while air flows that should not, nothing else can be judged
         return
     yield from valves
-    yield from _of_leaks(figures, name, sound, j)
+    yield from _of_leaks(checkup, figures, name, sound, j)
     if (quicker := quickening(test, checkup)) < RISING:
         detail = f"at the end of the check-up muscles fill in {100 * quicker:.0f} % of the time that they took before"
         remedy = "Check whether the reducer leaks: its buffer fills up while no air is used (thesis A.1.1)"
@@ -226,11 +226,18 @@ def _of_valves(
             yield Complaint("pressure at the valve's side", where, detail, remedy)
 
 
-def _of_leaks(figures: JointFigures, name: str, sound: SoundState | None, j: int) -> Iterator[Complaint]:
+def _of_leaks(
+    checkup: Checkup, figures: JointFigures, name: str, sound: SoundState | None, j: int
+) -> Iterator[Complaint]:
+    remedy = "Look for the leak with soap water: clamps, hose, exhaust valve"
+    for number, muscle in enumerate(figures.muscles, 1):
+        if np.isnan(muscle.leak) and muscle.full > FILLED * checkup.spec.max_pressure:
+            detail = f"closed, it has lost its {muscle.full:.2f} bar before {checkup.settings.settle:.0f} s are over"
+            yield Complaint("leak", f"{name}, muscle {number}", detail, remedy)
     now = np.array([[muscle.leak, muscle.leak_error] for muscle in figures.muscles]).T / 100
     if np.isnan(now).any():
         return
-    leaks = (now[0] > LEAK / 100) & (now[0] >= now[0].max())  # where one sags, the other is stretched
+    leaks = (now[0] > LEAK / 100) & (now[0] > _ALIKE * now[0].max())
     then = np.zeros_like(now)
     if sound is not None:
         then = np.array([sound.leak[j], sound.leak_error[j]])
@@ -245,8 +252,12 @@ def _of_leaks(figures: JointFigures, name: str, sound: SoundState | None, j: int
             )
         elif sound is not None:
             detail += f", instead of {100 * then[0, m]:.1f} % when calibrated"
-        remedy = "Look for the leak with soap water: clamps, hose, exhaust valve"
         yield Complaint("leak", f"{name}, muscle {m + 1}", detail, remedy)
+
+
+_ALIKE = 0.5
+"""Both muscles leak where one loses more than so many times what the other does; one that only sags because the other
+leaks loses less."""
 
 
 def _of_calibration(
@@ -312,7 +323,8 @@ _LIKELY = 90.0
 
 
 def _of_potentiometer(checkup: Checkup, test: JointTest, figures: JointFigures, name: str) -> Iterator[Complaint]:
-    if not np.isnan(figures.halves) and not 1 / LOGARITHMIC < figures.halves < LOGARITHMIC:
+    emptied = any(np.isnan(muscle.leak) for muscle in figures.muscles)  # while the joint was moved in steps, too
+    if not emptied and not np.isnan(figures.halves) and not 1 / LOGARITHMIC < figures.halves < LOGARITHMIC:
         detail = (
             f"the upper half of the pressure difference turns it {figures.halves:.2f} times as far as the lower half"
         )

@@ -12,16 +12,16 @@ import pytest
 from numpy.typing import NDArray
 
 import pneumarm
-from pneumarm.adaptation import AdaptationSettings, RefitSettings
+from pneumarm.adaptation import Adaptation, AdaptationSettings, RefitSettings
 from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.virtual import StuckValve, VirtualArm
 from pneumarm.control import TransferSettings, put_back, read_history, transfer, transfer_into
 from pneumarm.errors import ArmFailure, UnusableInput
-from pneumarm.learning import Agent, AnyAgent, PolicyAgent, PolicySettings, train
+from pneumarm.learning import Adapts, Agent, AnyAgent, PolicyAgent, PolicySettings, fingerprint, train
 from pneumarm.learning.servo import ServoSettings
 from pneumarm.simulation import Simulation
 from pneumarm.task import begin_states
-from pneumarm.transitions import KINDS, Store
+from pneumarm.transitions import KINDS, Store, collect
 
 SHORT = TransferSettings(episodes=12, test_episodes=6)
 
@@ -144,13 +144,58 @@ def test_a_policy_that_was_interrupted_while_adapting_goes_on_as_if_nothing_had_
     assert transfer_into(folder, policy, VirtualArm(seed=4), POLICY, seed=1) == whole  # there is nothing left to do
 
 
-def test_who_settles_holds_each_goal_and_adapts_to_all_of_that(small_run: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def servo(small_run: Path) -> AnyAgent:
+    """An agent that has learned too little to settle everywhere."""
     simulation = Simulation.load(small_run / "simulation.safetensors")
     with Store.open(small_run / "transitions.db") as store:
         begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec)
-    servo = train(
-        simulation, begin, ServoSettings(agents=1, updates=60, arms=32, hidden=(16,), validation_movements=32)
-    ).agent
+    settings = ServoSettings(agents=1, updates=60, arms=32, hidden=(16,), validation_movements=32)
+    return train(simulation, begin, settings).agent
+
+
+@pytest.mark.parametrize("thorough", [True, False])
+def test_who_does_not_settle_learns_on_from_the_recording_and_its_movements(
+    servo: AnyAgent, tmp_path: Path, thorough: bool
+) -> None:
+    never = RefitSettings(gain=0.99)  # by movements alone
+    adaptation = AdaptationSettings(first=4, unsettled=0.0 if thorough else 1.0, thorough_updates=30, refit=never)
+    settings = TransferSettings(episodes=12, test_episodes=8, hold=1.0, adaptation=adaptation)
+    arm = VirtualArm(seed=4)
+    with Store.for_arm(tmp_path / "transitions.db", arm.spec) as store:
+        collect(arm, store, 2500, 1)
+        moved = transfer(servo, arm, store, settings, seed=1)
+    assert moved.adapted is not None
+    made = [event for event in moved.adapted.events if event.what == "accepted"]
+    assert bool(made) == thorough
+    assert (fingerprint(moved.agent) != fingerprint(servo)) == (moved.adapted.version > 0)
+    for event in made:
+        assert (np.array(event.figures["after"]) < np.array(event.figures["before"])).mean() > 0.5
+
+
+def test_of_versions_that_learned_thoroughly_the_better_ones_stay(servo: AnyAgent, small_run: Path) -> None:
+    assert isinstance(servo, Adapts)
+    with Store.open(small_run / "transitions.db") as store:
+        rows = next(iter(store.blocks(kinds=KINDS)))
+        first = rows.where(rows.sequence < np.unique(rows.sequence)[8])
+        for worse in (False, True):
+            adapting = Adaptation(servo, AdaptationSettings(first=4, thorough_updates=3), seed=1)
+            for worth in np.linspace(-2.0, -1.0, 8):
+                adapting.observe(first, float(worth), settled=False)
+            assert adapting.learn(first, store)
+            for number, worth in enumerate(np.linspace(-3.0, -1.5, 6) if worse else np.linspace(-1.5, -0.5, 6)):
+                adapting.prefer()
+                assert (adapting.version, number) == (1, number)  # too early to tell
+                adapting.observe(first, float(worth), settled=False)
+            again = Adaptation(servo, AdaptationSettings(first=4, thorough_updates=3), seed=1)
+            again.set_state(adapting.get_state())
+            for one in adapting, again:
+                one.prefer()
+                assert one.version == (0 if worse else 1)
+                assert (one.events[-1].what == "rolled back") == worse
+
+
+def test_who_settles_holds_each_goal_and_adapts_to_all_of_that(servo: AnyAgent, tmp_path: Path) -> None:
     for hold, folder in ((1.5, tmp_path / "held"), (0.0, tmp_path / "ended")):
         settings = TransferSettings(episodes=9, test_episodes=2, hold=hold, adaptation=POLICY.adaptation)
         transfer_into(folder, servo, VirtualArm(seed=4), settings, seed=1)

@@ -41,6 +41,8 @@ from pneumarm.task.begin import begin_states
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 
+_COMPARED = 6  # movements of either version for it to be preferred
+
 
 @dataclass(frozen=True)
 class AdaptationSettings(Settings):
@@ -108,6 +110,7 @@ class Adaptation:
         self._old: list[float] = []  # rewards of the trusted agent
         self._new: list[float] = []  # rewards of the agent that is on trial
         self._settled: list[bool] = []  # whether movements of the agent as it is did
+        self._thorough = False  # whether its newest version learned thoroughly
         self.quantities = output_names(agent.simulation)
         """What the ratios are of."""
 
@@ -173,12 +176,27 @@ class Adaptation:
         if found == "confirmed":
             self._trust()
         elif found == "worse":
-            worse, means = self.version, [float(np.mean(rewards)) for rewards in (self._old, self._new)]
-            self.agent, self.version, self._new = self._trusted, self._trusted_version, []
-            self._settled.clear()
-            self._watch.reset()
+            self._put_back()
             self._tried = self.movements
-            self._add("rolled back", taken_back=worse, reward_before=means[0], reward_after=means[1])
+
+    def prefer(self) -> None:
+        """Of a version that learned thoroughly and the one before it, go on with what was better on average.
+
+        So much learning changes an agent for better or worse, more than a trial that is to be sure finds out in time.
+        """
+        if self._thorough and self.version != self._trusted_version and len(self._new) >= _COMPARED <= len(self._old):
+            if np.mean(self._new) < np.mean(self._old):
+                self._put_back()
+            else:
+                self._trust()
+
+    def _put_back(self) -> None:
+        """Go on with the trusted agent."""
+        worse, means = self.version, [float(np.mean(rewards)) for rewards in (self._old, self._new)]
+        self.agent, self.version, self._new = self._trusted, self._trusted_version, []
+        self._settled.clear()
+        self._watch.reset()
+        self._add("rolled back", taken_back=worse, reward_before=means[0], reward_after=means[1])
 
     def _trust(self) -> None:
         """Count the agent as proven."""
@@ -203,7 +221,8 @@ class Adaptation:
         self._tried = self.movements
         tuned, now = self._settings, self.agent.simulation
         updates, rate = tuned.updates, tuned.learning_rate
-        if recorded is not None and self._is_thorough():
+        thorough = recorded is not None and self._is_thorough()
+        if recorded is not None and thorough:
             updates, rate = tuned.thorough_updates, tuned.thorough_rate
             found: Refit | None = refit_to_all(now, recorded, rows)
         else:
@@ -215,7 +234,7 @@ class Adaptation:
             begin = begin_states(rows, simulation.window, simulation.scaling, simulation.spec)
             seed = self._seed + self.movements
             self.agent = self.agent.adapted(simulation, begin, updates, tuned.warm_up, rate, seed)
-            self.version, self.versions = self.versions, self.versions + 1
+            self.version, self.versions, self._thorough = self.versions, self.versions + 1, thorough
             self._new = []
             self._settled.clear()
             self._watch.reset()
@@ -255,6 +274,7 @@ class Adaptation:
             "old": self._old,
             "new": self._new,
             "settled": self._settled,
+            "thorough": self._thorough,
             "events": [asdict(event) for event in self.events],
             "watch": self._watch.get_state(),
         }
@@ -277,7 +297,7 @@ class Adaptation:
             self._began, self._tried = int(head["began"]), int(head["tried"])
             self._trusted_version = int(head["trusted"])
             self._old, self._new = list(map(float, head["old"])), list(map(float, head["new"]))
-            self._settled = list(map(bool, head["settled"]))
+            self._settled, self._thorough = list(map(bool, head["settled"])), bool(head["thorough"])
             self.events = [Event(**event) for event in head["events"]]
             self._watch.set_state(head["watch"])
         except (ValueError, TypeError, KeyError, IndexError) as error:

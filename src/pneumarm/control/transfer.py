@@ -261,7 +261,7 @@ class Transfer:
         movements, total = settings.movements(phase), sum(settings.movements(each) for each in PHASES)
         made = sum(info[_PHASE] == phase for info in self._done)
         if phase == "after" and settings.episodes > 0 and made == 0:
-            self._adapt()
+            self._adapt(last=True)
         moving, controller = self.agent, self._controller(phase)
         for number in range(made, movements):
             if learns:
@@ -294,10 +294,15 @@ class Transfer:
             self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity, hold
         )
 
-    def _adapt(self) -> None:
-        """Let the agent adapt where that is due."""
+    def _adapt(self, last: bool = False) -> None:
+        """Let the agent adapt where that is due; the ``last`` time that version stays which was better."""
         adapting = self._adapting
-        if adapting is None or self._settings.learning_rate == 0 or not adapting.is_due():
+        if adapting is None or self._settings.learning_rate == 0:
+            return
+        if due := adapting.is_due() or last:
+            adapting.prefer()
+            self._judge()
+        if not due or not adapting.is_due():
             return
         self._keep()  # it learns from what is stored, so that an interruption changes nothing
         made = [entry.number for entry in self._stored()][-adapting.usable :]

@@ -150,9 +150,9 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adap
         db = Path(folder) / "arm.db"
         how = recorded(name, db, seed) if monitor else _recorded(name, db, seed, "off")
         made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
-        single, _ = fitted(db, seed)
+        single, begin_single = fitted(db, seed)
     servo = train(made.simulation, begin, seed=seed).agent
-    reaching = train(single.simulation, begin, PolicySettings(), seed).agent
+    reaching = train(single.simulation, begin_single, PolicySettings(), seed).agent
     settings = MoveTrialSettings(goals=goals)
     tried = moved_by(servo, name, settings, seed)
     later = moved_by(adapted(servo, name, seed), name, settings, seed) if adapts else None

@@ -120,6 +120,10 @@ def test_where_single_pulses_leave_a_joint_off_its_policy_acts_in_every_period(
     active = read(controller, np.full(90, GOAL - 0.3 * degree))
     np.testing.assert_array_equal(active, [[0.5, -0.5]] * 90)
     assert GOAL < asked[45] < asked[89] <= GOAL + 4 * degree  # integral action goes on, and is bounded
+    again = agent.knowing(controller.ways).controller()  # another one need not learn that again
+    monkeypatch.setattr(again._actor, "pulses", pulses)
+    np.testing.assert_array_equal(read(again, np.full(90, GOAL - 0.3 * degree)), active)
+    assert agent.controller().ways == agent.knowing((1.0,) * 8).controller().ways  # of an arm with two joints
     near = agent.controller()
     monkeypatch.setattr(near._actor, "pulses", pulses)
     for _ in range(4):

@@ -21,7 +21,7 @@ from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import ADAPTED, Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
-from pneumarm.learning import AnyAgent, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
+from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
@@ -178,6 +178,7 @@ class Transfer:
             self._learning = _Learning(agent, settings.learning_rate, seed)
         self._watch = watch or monitor_of(agent, self._arm)
         self._patience = Patience(arm.spec.name, "movements")
+        self._ways: tuple[float, ...] = ()
         self._waiting: list[Recorded] = []
         self._broken: list[Recorded] = []
         self._resume()
@@ -208,6 +209,7 @@ class Transfer:
                 self._adapting.set_state(state)
             if not self._done:
                 self._keep_version(0, self._arrived)
+        self._ways = tuple(json.loads(self._state(_WAYS) or b"[]"))
 
     def _warm_up(self) -> None:
         """Have everything compiled before the arm moves, and put the monitor where it was."""
@@ -271,6 +273,7 @@ class Transfer:
             movement = self._move(controller, not learns, number)
             if self._learning is not None and learns and number >= (1 - settings.averaged) * movements:
                 self._learning.remember()
+            self._ways = getattr(controller, "ways", ())
             self._note(phase, movement)
             self._count(phase)
             if len(self._waiting) == _TOGETHER or number == movements - 1:
@@ -282,7 +285,12 @@ class Transfer:
         """Return what moves the arm in ``phase``."""
         if self._learning is not None and phase == "learning":
             return AgentController(self._arrived, self._learning.learner)
-        return controller_of(self.agent)
+        return controller_of(self._knowing())
+
+    def _knowing(self) -> AnyAgent:
+        """Return the agent as it is now, with what its controllers have learned of the joints of the arm."""
+        agent = self.agent
+        return agent.knowing(self._ways) if self._ways and isinstance(agent, Knows) else agent
 
     def _move(self, controller: Controller, test: bool, number: int) -> Movement:
         """Bring the arm to a begin state and make movement ``number`` of a test or of learning."""
@@ -361,6 +369,7 @@ class Transfer:
     def _keep(self) -> None:
         """Store the movements that wait, with the state of everything after them."""
         state = {"arm": self._arm.get_state(), "watch": self._watch.get_state()}
+        state[_WAYS] = json.dumps(self._ways).encode()
         state[_COUNTS] = json.dumps({phase: counts.as_dict() for phase, counts in self._counted.items()}).encode()
         keep_watch(self._store, self._watch, self._number)
         if self._learning is not None:
@@ -387,7 +396,7 @@ class Transfer:
         phases = {name: [info for info in self._done if info[_PHASE] == name] for name in PHASES}
         return Transferred(
             movements={str(name): of_rows(rows, self._arrived.window.joints) for name, rows in phases.items()},
-            agent=self.agent,
+            agent=self._knowing(),
             learning_rate=0.0 if self._learning is None else self._learning.learning_rate,
             adapted=adapted,
             condition=Condition(tuple(self._watch.findings), self._store.marked_rows(self._number), self._counted),
@@ -396,6 +405,7 @@ class Transfer:
 
 _PHASE = "phase"  # place of a movement's phase beside its figures in the store
 _SQUARES = "squares"  # place of a movement's errors beside its figures in the store
+_WAYS = "ways"  # place of what controllers have learned of the joints, among the states in the store
 _COUNTS = "counts"  # place of what was counted, among the states in the store
 
 

@@ -128,6 +128,14 @@ class Tracks(Protocol):
 
 
 @runtime_checkable
+class Knows(Protocol):
+    """An agent whose controllers learn in which ways the joints of its arm are best treated: their ``ways``."""
+
+    def knowing(self, ways: tuple[float, ...]) -> Self:
+        """Return the agent with the ``ways`` of a controller, which the next one begins with."""
+
+
+@runtime_checkable
 class Adapts(Acts, Saved, Protocol):
     """An agent that adapts between movements: its simulation is fitted anew, and it goes on learning in that."""
 

@@ -50,6 +50,10 @@ class ServoAgent(NetworkAgent):
             controller.act(reading)
         return ServoController(self)
 
+    def knowing(self, ways: tuple[float, ...]) -> Self:
+        """Return the servo with what its controller has learned of the joints of its arm."""
+        return replace(self, settings=replace(self.settings, ways=ways))
+
     def worth(self, angle: NDArray[np.float64], goal: NDArray[np.float64]) -> float:
         """Return minus the mean price of the errors from ``goal`` (joints,) at ``angle`` (n, joints) [counts]."""
         tolerance = self.settings.tolerance * self.spec.counts_per_degree

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,6 +50,7 @@ _TAUGHT_BY = 2.0  # most tolerances of an error that corrections of a moving ref
 _DONE = 0.7  # share of an error that pulses of a joint with one muscle may leave, for the next not to be more
 _SWINGING = 0.6  # s in which an error is added to what is asked for while a joint swings near its goal
 _CLOSE, _KEPT = 2.5, 1.2  # tolerances of an error, for that, and most that is then added
+_KNOWN = 4  # numbers that are learned of a joint
 _ARRIVED = 0.5  # s after a joint was first near its goal, from which on it is noted how near it stays
 _FARTHER = 4.0  # most that is added where the policy acts in every period
 _COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an error that count, most that is added
@@ -119,10 +121,16 @@ class ServoController:
         self._reference: Reference | None = None
         self._begin: float | None = None
         self._fresh = True
-        self._rest = [_Rest(spec.period) for _ in range(spec.joints)]
+        known = wanted.ways if len(wanted.ways) == _KNOWN * spec.joints else ()
+        self._rest = [_Rest(spec.period, known[_KNOWN * j : _KNOWN * (j + 1)]) for j in range(spec.joints)]
         self._actively, self._share = fine and not single, spec.period / _SWINGING
         self._arrived = round(_ARRIVED / spec.period)
         self._spread = None if spec.pulses else Spread(spec.joints)
+
+    @property
+    def ways(self) -> tuple[float, ...]:
+        """What was learned of the joints of this arm, as in :attr:`.ServoSettings.ways`."""
+        return tuple(error for rest in self._rest for ways in (rest.damped, rest.active) for error in ways.known)
 
     def reset(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts], to be held; the arm is at rest with its valves closed."""
@@ -302,8 +310,8 @@ class Spread:
 class _Rest:
     """How one joint is nearly at rest."""
 
-    def __init__(self, period: float) -> None:
-        self.damped, self.active = TwoWays(period, _DAMPED), TwoWays(period, _ACTIVE)
+    def __init__(self, period: float, known: Sequence[float]) -> None:
+        self.damped, self.active = TwoWays(period, _DAMPED, known[:2]), TwoWays(period, _ACTIVE, known[2:])
         self.near = 0  # turns since it first was near this goal
         self.leave()
 

@@ -67,6 +67,9 @@ class ServoSettings(TaskSettings):
     """Mean error, in tolerances, below which a still arm with a constant goal is left alone with closed valves."""
     alert: float = 0.25
     """Mean error, in tolerances, from which on it no longer is."""
+    ways: tuple[float, ...] = ()
+    """How far off its goals each joint of the arm was on average, in tolerances: swinging and left alone, swinging
+    and damped, moved by single pulses, moved in every period. Learned on the arm; by default nothing is known."""
     validation_movements: int = 400
     """Movements in simulation on which the best agent is chosen."""
 
@@ -94,5 +97,6 @@ class ServoSettings(TaskSettings):
             "reading_noise": 0 <= self.reading_noise < math.inf,
             "quiet": 0 <= self.quiet <= self.alert,
             "alert": 0 <= self.alert < math.inf,
+            "ways": all(0 <= error < math.inf for error in self.ways),
             "validation_movements": self.validation_movements >= 1,
         }

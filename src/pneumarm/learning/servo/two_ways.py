@@ -5,6 +5,8 @@ treated one way and the other. The first way is what is done before anything is 
 first leaves the joint further off than is hoped of the second.
 """
 
+from collections.abc import Sequence
+
 _TRIED = 1.0  # s that one way is tried for
 _BEFORE = 0.5  # share of it that may be owed to what was before
 _MOST = 5.0  # tolerances of an error that count
@@ -14,12 +16,20 @@ _LEARNED, _FORGOTTEN = 0.3, 0.02  # share of what is known of a way that a try o
 class TwoWays:
     """What is known of both ways; it is kept from movement to movement."""
 
-    def __init__(self, period: float, hoped: float) -> None:
-        """Begin to learn, with a control ``period`` [s]; the second is ``hoped`` to be so many tolerances off."""
+    def __init__(self, period: float, hoped: float, known: Sequence[float] = ()) -> None:
+        """Begin to learn, with a control ``period`` [s]; the second is ``hoped`` to be so many tolerances off.
+
+        ``known`` is what was :attr:`known` before, if anything was.
+        """
         self._hoped = hoped
-        self._off = [0.0, hoped]  # mean errors [tolerances]
+        self._off = list(known) or [0.0, hoped]
         self._turns = max(4, round(_TRIED / period))
         self._errors: list[float] = []
+
+    @property
+    def known(self) -> tuple[float, ...]:
+        """Mean errors of both ways [tolerances]."""
+        return tuple(self._off)
 
     @property
     def second(self) -> bool:

@@ -91,7 +91,7 @@ def test_the_command_to_move_by_is_ready_to_be_called() -> None:
         ("\n# nothing but words\n", 0, "standard input: held no goal"),
         ("# first\n\nten\n5deg\n", 0, "line 3 of standard input: goal 'ten'"),
         ("5deg\nten\n0deg\n", 1, "line 2 of standard input: goal 'ten'"),
-        ("5deg\n90deg\n", 1, "line 2 of standard input: goal '90deg': joint 1 has been seen to reach"),
+        ("5deg\n90deg\n", 1, "line 2 of standard input: goal '90deg': goals of joint 1 lie from"),
     ],
 )
 def test_a_line_that_is_no_goal_is_named_and_what_was_done_is_told(
@@ -157,11 +157,11 @@ def test_track_tells_of_the_error(controller: Path, capsys: pytest.CaptureFixtur
     ("arguments", "words"),
     [
         (("move", "FILE", *ARM), "no goal"),
-        (("move", "FILE", *ARM, "90deg"), "seen to reach"),
-        (("move", "FILE", *ARM, "1000"), "seen to reach"),
-        (("move", "FILE", *ARM, "20"), "goal '20' in counts (degrees are 20deg): joint 1 has been seen to reach"),
+        (("move", "FILE", *ARM, "90deg"), "often enough to be known"),
+        (("move", "FILE", *ARM, "1000"), "often enough to be known"),
+        (("move", "FILE", *ARM, "20"), "goal '20' in counts (degrees are 20deg): goals of joint 1 lie from"),
         (("move", "FILE", *ARM, "10deg,5deg"), "expected 1 angle"),
-        (("move", "FILE", *ARM, "0.5m,0.5m"), "the hand has been seen to reach"),
+        (("move", "FILE", *ARM, "0.5m,0.5m"), "goals of the hand lie at x"),
         (("move", "FILE", *ARM, "ten"), "expected an angle"),
         (("move", "FILE", *ARM, "--holt", "2", "10deg"), "holt"),
         (("move", "FILE", *ARM, "--hold", "0", "10deg"), "hold"),

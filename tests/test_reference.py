@@ -69,7 +69,7 @@ def test_files_of_something_else_are_refused(tmp_path: Path, content: str) -> No
 def test_what_leaves_the_range_is_refused() -> None:
     seen = np.array([[300.0, 700.0]])
     check_reachable(parse_reference("sine:1Hz,15deg", ONE), 5, seen, ONE)
-    with pytest.raises(UnusableInput, match=r"seen to reach -18\.6 to 16\.6"):
+    with pytest.raises(UnusableInput, match=r"its goals lie from -18\.6 to 16\.6"):
         check_reachable(parse_reference("sine:1Hz,17deg", ONE), 5, seen, ONE)
 
 

@@ -118,7 +118,7 @@ def test_mistakes_are_told(env: ArmFollow) -> None:
     for wrong in (np.array([2.0, 0.0]), np.zeros(3), np.array([np.nan, 0.0])):
         with pytest.raises(UnusableInput, match="shares of -1 to 1"):
             env.step(wrong)
-    with pytest.raises(UnusableInput, match="seen to reach"):
+    with pytest.raises(UnusableInput, match="goals of joint"):
         env.reset(options={"goal_deg": 80})
     with pytest.raises(UnusableInput, match="expected sine"):
         env.reset(options={"reference": "sinus"})

@@ -67,7 +67,7 @@ def test_a_joint_alone_reaches_places_near_its_arc() -> None:
 
 def test_what_is_out_of_reach_is_refused_with_what_can_be_reached_and_that_is_a_goal() -> None:
     for text in ("0.3m,0.2m", "0.5m,-0.5m", "0m,0m"):
-        with pytest.raises(UnusableInput, match=r"seen to reach x from -0.*m to 0.*m and y from") as refused:
+        with pytest.raises(UnusableInput, match=r"hand lie at x from -0.*m to 0.*m and y from") as refused:
             goal_of(text, arm(2), RANGE[:2])
         nearest = str(refused.value).rpartition("about ")[2]
         assert goal_of(nearest, arm(2), RANGE[:2]).xy is not None

@@ -112,13 +112,13 @@ def seen(
         if not low <= goal[j] <= high:
             lowest, highest = spec.degrees([low, high])
             raise UnusableInput(
-                f"{called}: joint {j + 1} has been seen to reach {lowest:.1f}deg to {highest:.1f}deg "
-                f"({low:.0f} to {high:.0f} counts); choose an angle in between"
+                f"{called}: goals of joint {j + 1} lie from {lowest:.1f}deg to {highest:.1f}deg ({low:.0f} to "
+                f"{high:.0f} counts), where it was often enough to be known; choose an angle in between"
             )
     if not known.contain(goal):
         towards = spec.degrees(0.99 * known.within(goal) + 0.01 * known.middle)
         raise UnusableInput(
-            f"{called}: each joint has been seen to reach this, but not all of them together; towards it they "
+            f"{called}: each joint was there often enough to be known, but not all of them together; towards it they "
             f"reach {','.join(f'{one:.1f}deg' for one in towards)}"
         )
     return goal

@@ -56,8 +56,9 @@ def angles_for(xy: Array, spec: ArmSpec, goals: Goals, near: Array, called: str)
         nearest = _INSIDE * drawn[np.argmin(off)] + (1 - _INSIDE) * goals.middle
         x, y = hand(spec.degrees(nearest), spec.links)
         raise UnusableInput(
-            f"{called}: the hand has been seen to reach x from {left:.3f}m to {right:.3f}m and y from {low:.3f}m to "
-            f"{high:.3f}m, though not all of that; the nearest is about {x:.3f}m,{y:.3f}m"
+            f"{called}: goals of the hand lie at x from {left:.3f}m to {right:.3f}m and y from {low:.3f}m to "
+            f"{high:.3f}m, though not all over that, where it was often enough to be known; the nearest is about "
+            f"{x:.3f}m,{y:.3f}m"
         )
     return np.asarray(found[np.argmin(((found - near) ** 2).sum(axis=1))])
 

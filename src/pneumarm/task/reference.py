@@ -52,10 +52,10 @@ def check_reachable(reference: Reference, seconds: float, goal_range: NDArray[np
     for j, (low, high) in enumerate(goal_range):
         if angles[:, j].min() < low or angles[:, j].max() > high:
             lowest, highest = spec.degrees([angles[:, j].min(), angles[:, j].max()])
-            seen = spec.degrees([low, high])
+            known = spec.degrees([low, high])
             raise UnusableInput(
-                f"the reference asks joint {j + 1} for {lowest:.1f} to {highest:.1f} degrees; the arm has been seen "
-                f"to reach {seen[0]:.1f} to {seen[1]:.1f}; choose a smaller one"
+                f"the reference asks joint {j + 1} for {lowest:.1f} to {highest:.1f} degrees; its goals lie from "
+                f"{known[0]:.1f} to {known[1]:.1f}, where it was often enough to be known; choose a smaller one"
             )
 
 

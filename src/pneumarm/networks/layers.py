@@ -103,6 +103,8 @@ def weighted_sums(weights, x, out):  # type: ignore[no-untyped-def]
         for i in range(np.uint64(0), blocks, np.uint64(4)):
             j, k, m = i + one, i + two, i + three
             a, b, c, d = weights[i, o], weights[j, o], weights[k, o], weights[m, o]
+            if a == b == c == d == np.float32(0.0):  # an observation that is not read
+                continue
             for e in range(n):
                 out[o, e] += a * x[i, e] + b * x[j, e] + (c * x[k, e] + d * x[m, e])
         for i in range(blocks, inputs):

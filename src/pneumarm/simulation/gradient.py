@@ -134,8 +134,9 @@ def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
         row = sooner[i]
         for u in range(slope.shape[0]):
             weight = simulation.hidden[i, u]
-            for e in range(n):
-                row[e] += weight * slope[u, e]
+            if weight != np.float32(0.0):  # what is not read
+                for e in range(n):
+                    row[e] += weight * slope[u, e]
     for o in range(simulation.direct.shape[0]):
         for i in range(last):
             weight = simulation.direct[o, i]

@@ -138,6 +138,8 @@ def test_the_same_is_said_in_whatever_units_sensors_count(name):
     def finer(part):
         if isinstance(part, Trace):
             return replace(part, angle=4 * part.angle, pressure=4 * part.pressure)
+        if isinstance(part, float):
+            return part
         if isinstance(part, tuple):
             return tuple(finer(each) for each in part)
         return replace(part, **{name: finer(value) for name, value in vars(part).items()})
@@ -309,13 +311,27 @@ def test_a_joint_that_springs_off_its_end_stop_is_not_worn_and_a_worn_one_is():
         moved = degrees + contact * np.exp(-0.5 * ((degrees - 15) / 3) ** 2) * random.normal(size=len(time))
         counts = np.round(spec.counts_per_degree * moved + random.normal(0, 0.5, len(time)) + 512)
         trace = Trace(time, counts, np.zeros((len(time), 2)))
-        muscle = MuscleTest(trace, trace[-1:], trace[-1:], trace + trace[-1:], ())
+        muscle = MuscleTest(trace, trace[-1:], trace[-1:], trace + trace[-1:], 0.0, ())
         return irregularity(JointTest(trace, (muscle, muscle), trace, trace, (trace, trace)), spec)
 
     assert irregular(0.0)[1].max() < WORN / 2
     places, off = irregular(1.0)
     assert abs(places[off > WORN] - 15).max() < 8
     assert places[off > WORN].size
+
+
+def test_a_pulse_is_over_while_air_still_flows_fast():
+    pulses = [measure(arm, CheckupSettings(rest=1.0)).joints[0].muscles[0] for arm in (FaultyArm(3), _fast(3))]
+    assert pulses[0].pulsed == CheckupSettings().pulse
+    assert 0.01 <= pulses[1].pulsed < 0.2
+    for test in pulses:
+        taken = test.pulse.pressure[test.pulse.time <= test.pulsed, 0].max()
+        assert taken < 0.5 * test.fill.pressure[:, 0].max()
+
+
+def _fast(seed):
+    """An arm whose pressures rise three times as fast as they do."""
+    return FaultyArm(seed, pressure=lambda p: 166 * (1 - np.clip(1 - p / 166, 0, 1) ** 3))
 
 
 def test_air_that_cools_is_no_leap_and_a_sensor_beside_the_valve_leaps():

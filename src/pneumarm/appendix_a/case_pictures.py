@@ -38,7 +38,8 @@ def opening(cases: Sequence[Case]) -> Figure:
     figure, axes = panels(1, len(cases), 2.6, sharey=True)
     for place, case in zip(axes[0], cases, strict=True):
         checkup = _checked(case)
-        trace, pulse = checkup.joints[_JOINT].muscles[0].pulse, checkup.settings.pulse
+        tested = checkup.joints[_JOINT].muscles[0]
+        trace, pulse = tested.pulse, tested.pulsed
         shown = trace.time < pulse + _AROUND
         place.axvspan(0, 1e3 * pulse, color=PALE, lw=0)
         place.plot(1e3 * trace.time[shown], case.spec.bar(trace.pressure[shown, 0]), color=DARK, lw=1)

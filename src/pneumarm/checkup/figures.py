@@ -78,7 +78,7 @@ def joint_figures(checkup: Checkup, joint: int) -> JointFigures:
 
 
 def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
-    settings, bar = checkup.settings, checkup.spec.counts_per_bar
+    bar = checkup.spec.counts_per_bar
     muscle = test.muscles[m]
     fill, hold, exhaust = muscle.fill, muscle.hold, muscle.exhaust
     rise = fill.pressure[:, m] - fill.pressure[0, m]
@@ -90,7 +90,8 @@ def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
     above = rest.pressure[:, m] - test.before.pressure[-10:, m].mean()  # its sensor may not be calibrated
     leak, leak_error = falling(rest.time, above) if above.mean() > least else (np.nan, np.nan)
     pulse = muscle.pulse
-    fills = [(each.time, each.pressure[:, m]) for each in (fill, pulse, test.again[m])]
+    pulsing = pulse[: int(np.searchsorted(pulse.time, muscle.pulsed))]
+    fills = [(each.time, each.pressure[:, m]) for each in (fill, pulsing, test.again[m]) if len(each.time) >= _FEWEST]
     return MuscleFigures(
         full=full / bar,
         fill_time=_first(fill.time, rise > 0.63 * full) if moved else float("nan"),
@@ -101,7 +102,7 @@ def _muscle_figures(checkup: Checkup, test: JointTest, m: int) -> MuscleFigures:
         leak_error=float(100 * leak_error),
         turned=float(fill.angle[-1] - fill.angle[0]) / checkup.spec.counts_per_degree,
         noise=float(np.std(detrended(rest.time, rest.pressure[:, m]))),
-        leap=dropped(pulse.time - settings.pulse, pulse.pressure[:, m]) / bar,
+        leap=dropped(pulse.time - muscle.pulsed, pulse.pressure[:, m]) / bar,
     )
 
 

@@ -37,7 +37,7 @@ class CheckupSettings(Settings):
     exhaust: float = 2.0
     """Time that it is vented [s]."""
     pulse: float = 0.25
-    """Length of the short pulse [s]."""
+    """Length of the short pulse [s]; shorter on an arm that fills so fast that little air would flow by then."""
     settle: float = 8.0
     """Time that closed muscles rest before noise and leak are measured [s]."""
     rest: float = 45.0
@@ -89,6 +89,8 @@ class MuscleTest:
     """The exhaust is open from its first reading on."""
     pulse: Trace
     """The pulse, on a clock of its own, and what comes after it."""
+    pulsed: float
+    """Length of the pulse [s]."""
     everywhere: tuple[Trace, ...]
     """Fill, hold and exhaust as the sensors of each joint saw them, this one's among them."""
 
@@ -215,6 +217,9 @@ def _timing(guard: GuardedArm, settings: CheckupSettings) -> Timing:
     return Timing(timed(guard.read), timed(set_and_read), periods)
 
 
+_FLOWING = 0.4  # of what a muscle is filled with: until then air flows nearly as fast as at first
+
+
 class _Bench:
     """Moves an arm for its check-up."""
 
@@ -261,13 +266,20 @@ class _Bench:
         hold = self.watch(self.valves(joint, 0, 0), wanted.hold)
         exhaust = self.watch(self.alone(joint, muscle, -1), wanted.exhaust)
         self.vent()
-        pulse = self.watch(self.alone(joint, muscle), wanted.pulse)
+        pulsed = self._while_filling(fill, joint, muscle)
+        pulse = self.watch(self.alone(joint, muscle), pulsed)
         after = self.watch(self.valves(joint, 0, 0), wanted.hold)
         self.vent()
         begin = fill[0].time
         filled, held, vented = (_trace(readings, joint, begin) for readings in (fill, hold, exhaust))
         everywhere = [_trace(fill + hold + exhaust, each, begin) for each in range(self.guard.spec.joints)]
-        return MuscleTest(filled, held, vented, _trace(pulse + after, joint), tuple(everywhere))
+        return MuscleTest(filled, held, vented, _trace(pulse + after, joint), pulsed, tuple(everywhere))
+
+    def _while_filling(self, fill: list[Reading], joint: int, muscle: int) -> float:
+        """Return the length of a pulse [s] at whose end the muscle, which took a ``fill``, still takes much air."""
+        pressure = np.array([reading.pressure[joint, muscle] for reading in fill]) - fill[0].pressure[joint, muscle]
+        reached = fill[int(np.argmax(pressure > _FLOWING * pressure.max()))].time - fill[0].time
+        return float(np.clip(reached, 2 * self.settings.step, self.settings.pulse))
 
     def rest(self) -> list[Reading]:
         """Fill all muscles, close them, let them settle, and read."""

@@ -42,6 +42,7 @@ from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 
 _COMPARED = 6  # movements of either version for it to be preferred
+_GROWTH = 2.0  # from one thorough adaptation to the next: what was learned needs movements to be judged by
 
 
 @dataclass(frozen=True)
@@ -210,7 +211,8 @@ class Adaptation:
         if every == 0 or self.movements == self._tried or made < min(self._settings.first, every):
             return False
         tried = self._tried - self._began
-        return tried < 0 or made - tried >= every or made >= self._settings.growth * tried
+        growth = max(self._settings.growth, _GROWTH) if self._thorough else self._settings.growth
+        return tried < 0 or made - tried >= every or made >= growth * tried
 
     def learn(self, rows: Rows, recorded: Store | None = None) -> bool:
         """Adapt to ``rows``, those of the :attr:`usable` movements, the newest last; whether there is a new version.

@@ -41,6 +41,7 @@ from pneumarm.task.begin import begin_states
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 
+_FAILED = 2  # fewest movements that did not settle, for an agent to learn thoroughly: one may be chance
 _COMPARED = 6  # movements of either version for it to be preferred
 _GROWTH = 2.0  # from one thorough adaptation to the next: what was learned needs movements to be judged by
 
@@ -62,7 +63,8 @@ class AdaptationSettings(Settings):
     learning_rate: float = 1e-3
     """Of the policy, by Adam, at the start; falls linearly to 0."""
     unsettled: float = 0.05
-    """Share of movements that do not settle above which an agent that is to settle learns more thoroughly."""
+    """Share of movements, and two at least, that do not settle above which an agent that is to settle learns more
+    thoroughly."""
     thorough_updates: int = 400
     """Updates then."""
     thorough_rate: float = 4e-3
@@ -248,7 +250,8 @@ class Adaptation:
         failed, settings = self._settled.count(False), self._settings
         simulation = self.agent.simulation
         return (
-            failed > settings.unsettled * len(self._settled)
+            failed >= _FAILED
+            and failed > settings.unsettled * len(self._settled)
             and settings.thorough_updates > 0
             and self._began == 0
             and not simulation.spread  # or what it was taught of pulses would be forgotten

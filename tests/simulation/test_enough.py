@@ -39,6 +39,8 @@ def test_the_verdict_says_what_was_gained() -> None:
     assert Enough(0.3, 0.1).verdict == "collect as much again: the second half lowers the simulation's error by 30%"
     assert Enough(0.04, 0.1).verdict.endswith("lowers the simulation's error by 4%, less than 10%")
     assert Enough(-0.01, 0.1).verdict.endswith("lowers the simulation's error not at all")
+    assert not Enough(0.04, 0.1, wider=0.3).enough
+    assert "30% of the range of angles" in Enough(0.04, 0.1, wider=0.3).verdict
 
 
 def test_little_gain_is_not_enough_where_most_of_the_error_is_noise() -> None:

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from stand_ins import FirstOrderArm
 
-from pneumarm.arm import ArmSpec
+from pneumarm.arm import ArmSpec, guarded, open_arm
 from pneumarm.arm.valves import to_actions
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.transitions import WHOLE_PERIODS, CollectBegin, CollectSettings, Store, collect
-from pneumarm.transitions.collect import random_actions
+from pneumarm.transitions.collect import End, end_of, random_actions
 from pneumarm.transitions.rows import joined
 
 SHORT = CollectSettings(
-    actions=100, pulses=0.0, inlets=0.5, lean=0.0, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2)
+    actions=100, pulses=0.0, inlets=0.5, lean=0.0, ends=0.0, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2)
 )
 
 
@@ -152,7 +152,7 @@ class Killed(FirstOrderArm):
         return super().read()
 arm = Killed()
 begin = CollectBegin(deflate=0.5, inflate=0.5, settle=0.2)
-settings = CollectSettings(actions=100, pulses=0.0, inlets=0.5, lean=0.0, begin=begin)
+settings = CollectSettings(actions=100, pulses=0.0, inlets=0.5, lean=0.0, ends=0.0, begin=begin)
 with (Store.append_to(path) if path.exists() else Store.create(path, arm.spec)) as store:
     collect(arm, store, 2000, settings=settings)
 """
@@ -327,6 +327,48 @@ def test_goals_are_drawn_from_the_sensors_range_by_default(tmp_path):
     low, high = ArmSpec().angle_range
     assert goals.min() < low + 0.1 * (high - low)
     assert goals.max() > high - 0.1 * (high - low)
+
+
+def ends_alone(arm):
+    """Return the angles (2,) [counts] at which the first joint rests where one muscle alone is full."""
+    found, moved = [], guarded(arm)
+    moved.make_ready()
+    for valves in ([[-1, 1]], [[1, -1]]):
+        moved.set_valves(np.array(valves))
+        moved.wait(8.0)
+        moved.set_valves(np.zeros((1, 2)))
+        moved.wait(1.0)
+        found.append(moved.read().angle[0])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", ["virtual:seed=3", "virtual:wide,seed=33", "virtual:wide,seed=12"])
+def test_fast_arms_and_slow_ones_are_seen_wherever_they_can_be(tmp_path, name):
+    """Arm 33 takes 3.4 s to fill, arm 12 takes 2.6 s, arm 3 less than one."""
+    with open_arm(name) as arm, Store.create(tmp_path / "db", arm.spec) as store:
+        collect(arm, store, 4000)
+        low, high = ends_alone(arm)
+        first, last = store.percentiles()[0]
+    assert first < low + 0.06 * (high - low)
+    assert last > high - 0.06 * (high - low)
+
+
+def test_sequences_from_an_end_come_at_equal_distances_and_take_all_ends_in_turn():
+    made = [end_of(number, 0.25, 2) for number in range(32)]
+    assert [number for number, end in enumerate(made) if end] == list(range(0, 32, 4))
+    assert len({(*end.sides.tolist(), end.stays) for end in made if end}) == 8
+    assert not any(end_of(number, 0.0, 1) for number in range(100))
+    assert all(end_of(number, 1.0, 1) for number in range(100))
+
+
+def test_muscles_lean_to_the_end_that_a_sequence_goes_to():
+    settings, spec = CollectSettings(inlets=0.5, actions=2000), ArmSpec(pulses=False)
+    for stays, side in ((True, 1), (False, -1)):
+        end = End(np.array([1]), stays)
+        _, made = random_actions(spec, settings, np.random.default_rng(0), end)
+        mean = np.array(made.commands).mean(axis=0)
+        assert (side * mean[0] > [0.2, -0.7]).all()
+        assert (side * mean[0] < [0.7, -0.2]).all()
 
 
 @pytest.mark.parametrize("joints", [1, 2])

@@ -199,13 +199,21 @@ def overview(run: RunData) -> Section:
     )
 
 
+def _ranges(data: CoverageData, spec: ArmSpec) -> str:
+    """Say over which angles goals lie, those that are not rare."""
+    angles = spec.degrees(np.percentile(data.observation[:, :, 0], (1, 99), axis=0)).T
+    found = (f"from {low:.0f}° to {high:.0f}°{of_joint(i, len(angles))}" for i, (low, high) in enumerate(angles))
+    return f"All but 2% of the angles lie {', '.join(found)}; goals beyond them are refused."
+
+
 def collected(data: CoverageData, spec: ArmSpec) -> Section:
     """Return what the collected data covers."""
     occupied = int(data.cells_holding[1:].sum())
     text = [
         f"The filter divides observations and actions into {data.cells:,} cells and keeps at most {data.per_cell} "
         f"transitions of each, so that the simulation is fitted to all states alike (thesis section 3.2.3). "
-        f"{occupied:,} cells are occupied; the others were not reached, most of them because the arm cannot be there."
+        f"{occupied:,} cells are occupied. The others were not reached: most angles go with few pressures, "
+        "and a recording does not say which of the others this arm can be in. " + _ranges(data, spec)
     ]
     if len(data.growth) > 1:
         share = figures.new_share(data.growth)

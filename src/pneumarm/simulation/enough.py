@@ -27,6 +27,11 @@ _MUCH = 0.1
 """An error that is lower by this part is worth collecting as much again."""
 _LEFT = 0.1
 """So is an error of the networks alone, without the sensors' noise, of this part of how the arm changes in a step."""
+_WIDER = 0.2
+"""So is a range of angles whose second half made it wider by more than this part of it: what lies beyond is unknown,
+and its errors are in no recording."""
+_REACHED = 0.2, 99.8
+"""Percentiles of the angles between which that range lies: wherever the joint was more than once or twice."""
 _HELD_OUT = 0.25
 """Share of the sequences that the errors are measured on."""
 _SETTINGS = replace(SINGLE_STEPS, epochs=15)
@@ -48,6 +53,8 @@ class Enough:
     """By which part its second half lowered the one-step error, the geometric mean over what networks predict."""
     error: float
     """The one-step error that is left, as a part of how the arm changes in a step; the noise of readings included."""
+    wider: float = 0.0
+    """By which part of the range its second half made that wider, of the joint of which it is most."""
 
     @property
     def unknown(self) -> float:
@@ -60,8 +67,8 @@ class Enough:
 
     @property
     def enough(self) -> bool:
-        """Whether both are little."""
-        return self.gain < _MUCH and self.unknown < _LEFT
+        """Whether all are little."""
+        return self.gain < _MUCH and self.unknown < _LEFT and self.wider < _WIDER
 
     @property
     def verdict(self) -> str:
@@ -71,6 +78,11 @@ class Enough:
             return f"enough: the second half of the recording lowers the simulation's error {little}"
         if self.gain >= _MUCH:
             return f"collect as much again: the second half lowers the simulation's error by {self.gain:.0%}"
+        if self.wider >= _WIDER:
+            return (
+                f"collect as much again: {self.wider:.0%} of the range of angles was reached in the second half "
+                "alone, there may be more"
+            )
         return (
             "collect as much again: the sensors are noisy, and behind the noise the simulation's error still is "
             f"{self.unknown:.0%} of how the arm changes in a step"
@@ -178,7 +190,9 @@ def enough_data(store: Store) -> Enough | None:
         for filtered in (half, whole)
     ]
     before, after = map(_error, results)
-    return Enough(1 - after / before, after)
+    ranges = (store.percentiles(_REACHED, chosen) for chosen in (None, partial(np.isin, test_elements=first)))
+    whole_range, first_range = (np.ptp(one, axis=1) for one in ranges)
+    return Enough(1 - after / before, after, float((1 - first_range / np.maximum(whole_range, 1.0)).max()))
 
 
 def _error(result: FitResult) -> float:

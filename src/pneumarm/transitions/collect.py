@@ -22,7 +22,7 @@ import time as wall_clock
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,11 +59,35 @@ class CollectBegin(BeginState):
     inflate: float = 1.2
     """Longest time that a muscle is inflated again [s] (thesis section 3.2.2: 1.2)."""
 
+    def reach_end(self, arm: GuardedArm, sides: NDArray[np.int64]) -> None:
+        """Bring every joint to one of its ends, that of higher angles where its side (joints,) is +1, and wait.
+
+        One muscle is filled and the other emptied until the joints hardly move any more, but no longer than that
+        takes slow ones: a muscle that fills alone shortens, so that it needs more air than one of two that fill.
+        """
+        arm.make_ready()
+        begun = last = arm.read()
+        arm.set_valves(np.stack([sides, -sides], axis=1))
+        piece, passed = self.inflate / 2, 0.0
+        while passed < _SLOWEST * self.inflate:
+            arm.wait(piece)
+            passed += piece
+            now = arm.read()
+            moved, way = np.abs(now.angle - last.angle), np.abs(now.angle - begun.angle)
+            if passed >= self.deflate and (moved <= _HARDLY * way + arm.spec.angle_unit).all():
+                break
+            last = now
+        arm.set_valves(np.zeros(arm.applied.shape, np.int8))
+        arm.wait(self.settle)
+
 
 _USUAL_RATE = 30.0  # Hz; at higher ones as many seconds as there, at lower ones as many periods
 _LONGEST_PULSES = 4  # most periods in a row in which a muscle gets the same pulse
 _ACTIONS, _HELD = 200, 10  # of a sequence; most periods for which an action is held
 _FULL, _EMPTY = 4 / 3, 4.0  # times of nine tenths of the way in which muscles are full or empty
+_SLOWEST = 4.0  # times of filling after which a joint is taken to be at its end, whatever it does
+_HARDLY = 0.03  # share of its way; a joint that moves less in half a time of filling is at its end
+_FAR = 1.0, 3.0  # how far muscles lean in sequences from an end, in the logarithm of the odds
 _SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse sequence
 
 
@@ -90,6 +114,9 @@ class CollectSettings(Settings):
     lean: float = 1.0
     """How far each muscle leans to inlets or to outlets for a whole sequence, drawn up to this in the logarithm of
     their odds (the thesis: 0); so one muscle goes up while the other goes down, as far as they can."""
+    ends: float = 0.25
+    """Share of the sequences that begin at an end of the range (the thesis: 0): one muscle of each joint is full, the
+    other empty. Both lean further than in the others, in turn to stay there and to go over to the other end."""
     begin: CollectBegin | None = None
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5); by
     default by times that this arm's muscles take to fill and to empty."""
@@ -104,6 +131,7 @@ class CollectSettings(Settings):
             "pulses": 0 <= self.pulses <= 1,
             "sparse": 0 <= self.sparse <= 1,
             "lean": 0 <= self.lean <= 10,
+            "ends": 0 <= self.ends <= 1,
             "inlets": self.inlets is None or 0 < self.inlets < 1 or "above 0 and below 1",
         }
 
@@ -131,7 +159,7 @@ def _periods(usual: int, period: float) -> int:
     return max(usual, round(usual / (_USUAL_RATE * period)))
 
 
-WHOLE_PERIODS = CollectSettings(pulses=0.0, inlets=0.5, lean=0.0, begin=CollectBegin())
+WHOLE_PERIODS = CollectSettings(pulses=0.0, inlets=0.5, lean=0.0, ends=0.0, begin=CollectBegin())
 """As in the thesis: every valve that opens is open for whole control periods, on any arm for the same times."""
 
 
@@ -323,8 +351,12 @@ class _Collection:
         cycle = ControlCycle(arm, self._settings.close_while_computing)
         before, start = Counts.now(cycle), arm.read().time
         assert self._settings.begin is not None
-        self._settings.begin.reach(arm, random)
-        kind, actor, info = self._actor(random)
+        end = None if self._controller is not None else end_of(self.number, self._settings.ends, arm.spec.joints)
+        if end is None:
+            self._settings.begin.reach(arm, random)
+        else:
+            self._settings.begin.reach_end(arm, end.sides)
+        kind, actor, info = self._actor(random, end)
         actions = self._settings.actions or 0
         remaining = iter(range(actions if most is None else min(actions, most)))
 
@@ -342,11 +374,11 @@ class _Collection:
         self._tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start)
         self._keep(Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info), whole=True)
 
-    def _actor(self, random: np.random.Generator) -> tuple[str, Controller, Mapping[str, object]]:
+    def _actor(self, random: np.random.Generator, end: "End | None") -> tuple[str, Controller, Mapping[str, object]]:
         """Return the kind of the next sequence, what acts in it, and what else is kept with it."""
         spec = self._arm.spec
         if self._controller is None:
-            kind, actor = random_actions(spec, self._settings, random)
+            kind, actor = random_actions(spec, self._settings, random, end)
             return kind, actor, {}
         span = np.asarray(spec.angle_range if self._goals is None else self._goals, np.float64)
         low, high = np.broadcast_to(span, (spec.joints, 2)).T
@@ -389,21 +421,50 @@ class _Collection:
         )
 
 
-def random_actions(spec: ArmSpec, settings: CollectSettings, random: np.random.Generator) -> tuple[str, Trajectory]:
-    """Return one of the kinds of random sequences: its name and its commands."""
-    kind, commands = _random_commands(spec, settings, random)
+class End(NamedTuple):
+    """Where a sequence begins at an end of the range, and where it goes to from there."""
+
+    sides: NDArray[np.int64]
+    """+1 for joints at the end of higher angles, -1 for the others, shape (joints,)."""
+    stays: bool
+    """Whether the muscles lean to this end, or to the other one."""
+
+    def lean(self, random: np.random.Generator) -> NDArray[np.float64]:
+        """Return how far each muscle leans to inlets, shape (joints, 2)."""
+        towards = self.sides if self.stays else -self.sides
+        return np.stack([towards, -towards], axis=1) * random.uniform(*_FAR, (len(towards), 2))
+
+
+def end_of(number: int, share: float, joints: int) -> End | None:
+    """Return at which end sequence ``number`` begins; None where it is none of the ``share`` that does.
+
+    They come at equal distances from the first sequence on, so that few sequences have their share of them, too, and
+    who watches the arm soon knows its ends. Sides are taken in turn, all of several joints with all of the others.
+    """
+    turn = math.floor(number * share)
+    if math.floor((number - 1) * share) == turn:
+        return None
+    sides = np.array([1 if turn >> joint & 1 else -1 for joint in range(joints)])
+    return End(sides, bool(turn >> joints & 1))
+
+
+def random_actions(
+    spec: ArmSpec, settings: CollectSettings, random: np.random.Generator, end: End | None = None
+) -> tuple[str, Trajectory]:
+    """Return one of the kinds of random sequences: its name and its commands; from an ``end`` if it begins there."""
+    kind, commands = _random_commands(spec, settings, random, end)
     commands[..., spec.muscles :] = 0.0
     return kind, Trajectory(commands)
 
 
 def _random_commands(
-    spec: ArmSpec, settings: CollectSettings, random: np.random.Generator
+    spec: ArmSpec, settings: CollectSettings, random: np.random.Generator, end: End | None
 ) -> tuple[str, NDArray[np.float64]]:
     """Return the name and the commands (actions, joints, 2) of a sequence of joints with two muscles."""
     settings = settings.for_period(spec.period)
     assert settings.actions is not None
     assert settings.longest_hold is not None
-    valves = _random_valves((settings.actions, spec.joints, 2), settings, random)
+    valves = _random_valves((settings.actions, spec.joints, 2), settings, random, end)
     drawn = np.tile(np.arange(settings.actions)[:, None], spec.joints)  # which action each step and joint does
     kind = "zero-velocity"
     if random.random() < settings.velocity_share:
@@ -412,28 +473,29 @@ def _random_commands(
             lengths = random.integers(1, settings.longest_hold, size=settings.actions, endpoint=True)
             drawn[:, joint] = np.repeat(drawn[:, joint], lengths)[: settings.actions]
     if settings.pulses and spec.pulses and random.random() < settings.pulses:
-        return _random_pulses(spec, settings, random)
+        return _random_pulses(spec, settings, random, end)
     return kind, valves[drawn, np.arange(spec.joints)].astype(np.float64)
 
 
 def _random_valves(
-    shape: tuple[int, int, int], settings: CollectSettings, random: np.random.Generator
+    shape: tuple[int, int, int], settings: CollectSettings, random: np.random.Generator, end: End | None
 ) -> NDArray[np.int64]:
     """Return valves (steps, joints, 2), each closed with a probability of a third, and else an inlet or an outlet."""
     inlets = 0.5 if settings.inlets is None else settings.inlets
-    odds = inlets / (1 - inlets) * np.exp(random.uniform(-settings.lean, settings.lean, shape[1:]))
+    lean = random.uniform(-settings.lean, settings.lean, shape[1:]) if end is None else end.lean(random)
+    odds = inlets / (1 - inlets) * np.exp(lean)
     side = np.where(random.random(shape) < odds / (1 + odds), 1, -1)
     return np.where(random.random(shape) < 1 / 3, 0, side)
 
 
 def _random_pulses(
-    spec: ArmSpec, settings: CollectSettings, random: np.random.Generator
+    spec: ArmSpec, settings: CollectSettings, random: np.random.Generator, end: End | None
 ) -> tuple[str, NDArray[np.float64]]:
     """Return a sequence of pulses, every muscle for itself: some repeated over a few periods, or few short ones."""
     shortest = min(spec.shortest_pulse / spec.period, 1.0)
     actions = settings.actions or 0
     shape = (actions, spec.joints, 2)
-    valves, shares = _random_valves(shape, settings, random), random.uniform(shortest, 1.0, shape)
+    valves, shares = _random_valves(shape, settings, random, end), random.uniform(shortest, 1.0, shape)
     if random.random() < settings.sparse:
         opened = random.random(shape) < _SPARSE
         return "sparse", (valves * opened).astype(np.float64) * np.maximum(shares**2, shortest)

@@ -191,8 +191,8 @@ def test_its_goals_are_angles_at_which_it_stands(tmp_path):
         ((low, high),) = arm.spec.degrees(held_range(store.blocks, seen, arm.spec.period))
         full = min(arm.parameters.air.supply, arm.parameters.max_pressure)
         vented, filled = (float(np.degrees(resting_angle(arm.parameters, [[p, 0.0]]))[0]) for p in (0.0, full))
-    assert arm.spec.degrees(seen)[0, 0] < vented - 0.8  # as far as it swings
-    assert vented - 0.5 < low < vented + 6
+    assert arm.spec.degrees(seen)[0, 0] < vented - 2  # as far as it swings
+    assert vented - 1 < low < vented + 6
     assert filled - 10 < high < filled + 1
 
 

@@ -114,9 +114,10 @@ class CollectSettings(Settings):
     lean: float = 1.0
     """How far each muscle leans to inlets or to outlets for a whole sequence, drawn up to this in the logarithm of
     their odds (the thesis: 0); so one muscle goes up while the other goes down, as far as they can."""
-    ends: float = 0.25
+    ends: float = 0.0
     """Share of the sequences that begin at an end of the range (the thesis: 0): one muscle of each joint is full, the
-    other empty. Both lean further than in the others, in turn to stay there and to go over to the other end."""
+    other empty. Both lean further than in the others, in turn to stay there and to go over to the other end. With
+    0.25 goals lie wherever the arm can be, which takes longer to learn well."""
     begin: CollectBegin | None = None
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5); by
     default by times that this arm's muscles take to fill and to empty."""
@@ -159,7 +160,7 @@ def _periods(usual: int, period: float) -> int:
     return max(usual, round(usual / (_USUAL_RATE * period)))
 
 
-WHOLE_PERIODS = CollectSettings(pulses=0.0, inlets=0.5, lean=0.0, ends=0.0, begin=CollectBegin())
+WHOLE_PERIODS = CollectSettings(pulses=0.0, inlets=0.5, lean=0.0, begin=CollectBegin())
 """As in the thesis: every valve that opens is open for whole control periods, on any arm for the same times."""
 
 

@@ -29,6 +29,7 @@ GUARDED = {
     "arm/serial/board.py": "a controller, which does what it is asked behind the guard",
     "arm/virtual/arm.py": "an arm that sets its own valves on closing and resting",
     "arm/cycle.py": "takes a GuardedArm",
+    "transitions/collect.py": "takes a GuardedArm",
     "transitions/fill_times.py": "takes a GuardedArm",
     "arm/serial/emulate.py": "warms up the arm of an emulated board, before anybody can reach it",
     "experiments/valves_closed/inflation.py": "guards its arm",

@@ -84,8 +84,8 @@ class AdaptationSettings(Settings):
             "updates": self.updates >= 1,
             "warm_up": self.warm_up >= 0,
             "learning_rate": 0 < self.learning_rate < math.inf,
-            "unsettled": 0 <= self.unsettled <= 1,
-            "thorough_updates": self.thorough_updates >= 0,
+            "unsettled": 0 <= self.unsettled <= 1 or "0 to 1",
+            "thorough_updates": self.thorough_updates >= 0 or "0 or more",
             "thorough_rate": 0 < self.thorough_rate < math.inf,
         }
 
@@ -155,7 +155,7 @@ class Adaptation:
         if not sound:
             self._watch.skip()
             return [arrived.tolist(), now.tolist()]
-        self._settled.append(settled)
+        self._settled = [*self._settled, settled][-self._settings.trial.remembered :]
         if self._watch.observe(now):
             self._notice()
         if self.version == self._trusted_version:
@@ -225,10 +225,10 @@ class Adaptation:
         self._tried = self.movements
         tuned, now = self._settings, self.agent.simulation
         updates, rate = tuned.updates, tuned.learning_rate
-        thorough = recorded is not None and self._is_thorough()
-        if recorded is not None and thorough:
+        recording = recorded if self._is_thorough() else None
+        if recording is not None:
             updates, rate = tuned.thorough_updates, tuned.thorough_rate
-            found: Refit | None = refit_to_all(now, recorded, rows)
+            found: Refit | None = refit_to_all(now, recording, rows)
         else:
             found = refit(now, self._origin.simulation, rows, tuned.refit, self._seed)
         if found is None:
@@ -238,7 +238,7 @@ class Adaptation:
             begin = begin_states(rows, simulation.window, simulation.scaling, simulation.spec)
             seed = self._seed + self.movements
             self.agent = self.agent.adapted(simulation, begin, updates, tuned.warm_up, rate, seed)
-            self.version, self.versions, self._thorough = self.versions, self.versions + 1, thorough
+            self.version, self.versions, self._thorough = self.versions, self.versions + 1, recording is not None
             self._new = []
             self._settled.clear()
             self._watch.reset()

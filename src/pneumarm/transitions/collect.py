@@ -132,7 +132,7 @@ class CollectSettings(Settings):
             "pulses": 0 <= self.pulses <= 1,
             "sparse": 0 <= self.sparse <= 1,
             "lean": 0 <= self.lean <= 10,
-            "ends": 0 <= self.ends <= 1,
+            "ends": 0 <= self.ends <= 1 or "0 to 1",
             "inlets": self.inlets is None or 0 < self.inlets < 1 or "above 0 and below 1",
         }
 

@@ -97,6 +97,6 @@ class ServoSettings(TaskSettings):
             "reading_noise": 0 <= self.reading_noise < math.inf,
             "quiet": 0 <= self.quiet <= self.alert,
             "alert": 0 <= self.alert < math.inf,
-            "ways": all(0 <= error < math.inf for error in self.ways),
+            "ways": all(0 <= error < math.inf for error in self.ways) or "0 or more each",
             "validation_movements": self.validation_movements >= 1,
         }

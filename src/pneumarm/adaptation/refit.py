@@ -27,6 +27,8 @@ rehearsed: the fit goes on with that recording and the movements together, to si
 """
 
 import math
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -207,15 +209,16 @@ def _outputs_fitted(simulation: Simulation, known: Transitions, ridge: float) ->
 def _all_fitted(simulation: Simulation, x: Floats, y: Floats, settings: RefitSettings) -> tuple[Network, ...]:
     """Return the networks fitted to ``x`` and ``y``, anchored where they are."""
     solver = LevenbergMarquardt(epochs=settings.epochs, decay=settings.anchor / len(x), anchored=True)
-    unit, fitted = _unit(simulation), []
-    for network, of_it in zip(simulation.networks, _columns(simulation), strict=True):
+    unit, read = _unit(simulation), np.flatnonzero(simulation.reads)
+    seen = np.ascontiguousarray(x[:, read])
+
+    def fitted(network: Network, of_it: NDArray[np.int64]) -> Network:
         scale = unit[of_it]
-        scaled = replace(
-            network, output_weights=network.output_weights / scale, output_bias=network.output_bias / scale
-        )
-        one = levenberg_marquardt(x, y[:, of_it], scaled, solver).network
-        fitted.append(replace(one, output_weights=one.output_weights * scale, output_bias=one.output_bias * scale))
-    return tuple(fitted)
+        start = network.reading(read).times(1 / scale)
+        return levenberg_marquardt(seen, y[:, of_it], start, solver).network.times(scale).widened(read, x.shape[1])
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as threads:  # kernels, which release Python's lock
+        return tuple(threads.map(fitted, simulation.networks, _columns(simulation)))
 
 
 def rehearse(simulation: Simulation, known: Transitions, count: int, random: np.random.Generator) -> Transitions:

@@ -1,6 +1,6 @@
 """A multilayer network with one hidden layer: tansig hidden units, linear outputs (thesis section 4.2.6)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,3 +31,28 @@ class Network:
         y: NDArray[np.float64] = np.tanh(x @ self.hidden_weights + self.hidden_bias) @ self.output_weights
         y += self.output_bias
         return y if self.direct is None else y + x @ self.direct
+
+    def reading(self, inputs: NDArray[np.int64]) -> "Network":
+        """Return it as a network of those ``inputs`` alone, in their order."""
+        direct = None if self.direct is None else self.direct[inputs]
+        return replace(self, hidden_weights=self.hidden_weights[inputs], direct=direct)
+
+    def widened(self, inputs: NDArray[np.int64], size: int) -> "Network":
+        """Return it, which reads ``inputs`` of ``size`` ones, as a network of all, with no weight on the others."""
+
+        def wide(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+            whole = np.zeros((size, weights.shape[1]))
+            whole[inputs] = weights
+            return whole
+
+        direct = None if self.direct is None else wide(self.direct)
+        return replace(self, hidden_weights=wide(self.hidden_weights), direct=direct)
+
+    def times(self, factor: NDArray[np.float64]) -> "Network":
+        """Return it with outputs that are ``factor`` (outputs,) times as large."""
+        return replace(
+            self,
+            output_weights=self.output_weights * factor,
+            output_bias=self.output_bias * factor,
+            direct=None if self.direct is None else self.direct * factor,
+        )

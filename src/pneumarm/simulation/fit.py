@@ -237,7 +237,7 @@ def fit(
     factors = [factor] if settings.one_network else np.split(factor, len(factor))
     fits: list[Fit] = []
     if settings.approximator == "least-squares":
-        simulation = replace(simulation, networks=(_widened_to(_rescaled(linear, factor), read, window.input_size),))
+        simulation = replace(simulation, networks=(linear.times(factor).widened(read, window.input_size),))
     else:
         spreads = settings.spread and simulation.commands == "valves"
         again = max(1, round(_AGAIN * settings.epochs)) if spreads else 0
@@ -262,7 +262,7 @@ def fit(
             inputs = np.concatenate([training.inputs, pulses.inputs])
             following = np.concatenate([simulation.predict(training.inputs), pulses.target])
             more = (following - inputs[:, : window.observation_size])[:, places]
-            before = [_rescaled(one, 1 / each) for one, each in zip(simulation.networks, factors, strict=True)]
+            before = [one.times(1 / each) for one, each in zip(simulation.networks, factors, strict=True)]
             simulation, fits = _fitted(
                 simulation,
                 scaling.inputs(inputs, window).astype(np.float32)[:, read],
@@ -317,12 +317,12 @@ def _fitted(
     joints, size = simulation.window.joints, simulation.window.input_size
     targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
     chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * joints, settings.seed)
-    before = [replace(one, hidden_weights=one.hidden_weights[read]) for one in before]
+    before = [one.reading(read) for one in before]
     fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0
     factors = np.split(factor, len(fits))
     networks = [
-        _widened_to(_rescaled(_without(one.network, still), scale), read, size)
+        _without(one.network, still).times(scale).widened(read, size)
         for one, scale in zip(fits, factors, strict=True)
     ]
     return replace(simulation, networks=tuple(networks)), fits
@@ -412,28 +412,6 @@ def _without(network: Network, inputs: NDArray[np.bool_]) -> Network:
     if not inputs.any():
         return network
     return replace(network, hidden_weights=np.where(inputs[:, None], 0.0, network.hidden_weights))
-
-
-def _widened_to(network: Network, read: NDArray[np.int64], size: int) -> Network:
-    """Return a ``network`` of the inputs ``read`` as one of ``size`` inputs, with no weight on the others."""
-
-    def widened(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        whole = np.zeros((size, weights.shape[1]))
-        whole[read] = weights
-        return whole
-
-    direct = None if network.direct is None else widened(network.direct)
-    return replace(network, hidden_weights=widened(network.hidden_weights), direct=direct)
-
-
-def _rescaled(network: Network, factor: NDArray[np.float64]) -> Network:
-    """Return the network whose outputs are ``factor`` (outputs,) times as large."""
-    return replace(
-        network,
-        output_weights=network.output_weights * factor,
-        output_bias=network.output_bias * factor,
-        direct=None if network.direct is None else network.direct * factor,
-    )
 
 
 def _widened(spec: ArmSpec, window: Window, transitions: Transitions) -> ArmSpec:
@@ -562,7 +540,7 @@ def fitted_on(simulation: Simulation, store: Store, ahead: float = FitSettings.a
         factor,
         FitSettings(epochs=_EPOCHS_ON, one_network=len(factors) == 1, seed=seed),
         lambda done, total: None,
-        [_rescaled(one, 1 / each) for one, each in zip(simulation.networks, factors, strict=True)],
+        [one.times(1 / each) for one, each in zip(simulation.networks, factors, strict=True)],
     )
     steps = round(ahead / simulation.spec.period)
     if steps > 1:

@@ -151,11 +151,11 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adap
         how = recorded(name, db, seed) if monitor else _recorded(name, db, seed, "off")
         made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
         single, begin_single = fitted(db, seed)
-    servo = train(made.simulation, begin, seed=seed).agent
+        servo = train(made.simulation, begin, seed=seed).agent
+        settings = MoveTrialSettings(goals=goals)
+        tried = moved_by(servo, name, settings, seed)
+        later = moved_by(adapted(servo, name, db, seed), name, settings, seed) if adapts else None
     reaching = train(single.simulation, begin_single, PolicySettings(), seed).agent
-    settings = MoveTrialSettings(goals=goals)
-    tried = moved_by(servo, name, settings, seed)
-    later = moved_by(adapted(servo, name, seed), name, settings, seed) if adapts else None
     with open_arm(name, seed) as opened:
         reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), seed)
     return {
@@ -202,13 +202,9 @@ def _moving_figures(tried: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def adapted(agent: AnyAgent, name: str, seed: int) -> AnyAgent:
-    """Return ``agent`` after the movements of a default run on the arm ``name``."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        open_arm(name, seed) as opened,
-        Store.for_arm(Path(folder) / "arm.db", opened.spec) as store,
-    ):
+def adapted(agent: AnyAgent, name: str, db: Path, seed: int) -> AnyAgent:
+    """Return ``agent`` after the movements of a default run on the arm ``name``; ``db`` holds its recording."""
+    with open_arm(name, seed) as opened, Store.for_arm(db, opened.spec) as store:
         watch = monitor_of(agent, opened, "warn")
         return transfer(agent, opened, store, RunTransferSettings(), seed=seed, watch=watch).agent
 

@@ -1,8 +1,10 @@
 """Arms that are controlled at every second or third of their periods."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from tests.plain_arms import throttled
+from tests.plain_arms import PlainArm, throttled
 
 from pneumarm.arm import guarded, open_arm
 from pneumarm.arm.slower import SlowerArm, usual_turns
@@ -23,6 +25,40 @@ def test_arms_by_name_are_controlled_at_such_rates_unless_told_otherwise():
             assert 1 / arm.spec.period == pytest.approx(rate)
     with open_arm("virtual:wide,seed=30") as arm, open_arm("virtual:wide,seed=30,rate=85") as faster:
         assert arm.spec.period == pytest.approx(3 * faster.spec.period, rel=0.01)
+
+
+def test_an_arm_without_pulses_has_its_own_periods_for_pulses():
+    alone = throttled()
+    alone.spec = replace(alone.spec, pulses=False)
+    arm = SlowerArm(alone, 3)
+    own = alone.spec.period
+    assert (arm.spec.pulses, arm.spec.shortest_pulse, arm.spec.pulse_step) == (True, own, own)
+    asked = np.array([[0.1, 0.2], [-0.45, 0.6], [-0.9, 1.0]])
+    np.testing.assert_allclose(arm.spec.possible(asked), np.array([[0, 1], [-1, 2], [-3, 3]]) / 3)
+    assert SlowerArm(alone, 1).spec == alone.spec
+
+
+def test_valves_of_an_arm_without_pulses_change_at_its_own_periods_only():
+    changed = []
+
+    class Noted(PlainArm):
+        def set_valves(self, valves):
+            changed.append(self.read().time)
+            super().set_valves(valves)
+
+    inner = throttled()
+    inner.__class__ = Noted
+    inner.spec = replace(inner.spec, pulses=False)
+    with guarded(SlowerArm(inner, 3)) as arm:
+        begin = due = arm.read().time
+        for share in (0.3, 0.5, 0.8):
+            arm.decide(np.array([[share, -share]]))
+            due += arm.spec.period
+            arm.end_pulses(due)
+            arm.wait_until(due)
+    turns = (np.array(changed[:-1]) - begin) / inner.spec.period
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-6)
+    assert {1, 3, 5, 8} <= set(np.round(turns).astype(int))
 
 
 @pytest.mark.parametrize("every", ["0", "-1", "two"])

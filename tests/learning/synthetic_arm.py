@@ -1,5 +1,7 @@
 """A made-up arm that is easy to control, as a simulation and as rows of a store: nothing has to be fitted."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from pneumarm.arm import ArmSpec
@@ -38,6 +40,12 @@ def synthetic_simulation(joints: int = 1, history: int = 3, hidden: int = 10, di
         goal_range=np.tile([350.0, 670.0], (joints, 1)),
         pressure_range=np.tile([[0.0, 200.0], [0.0, 200.0]], (joints, 1, 1)),
     )
+
+
+def in_steps(simulation: Simulation, steps: int) -> Simulation:
+    """Return ``simulation`` of an arm whose pulses are so many ``steps`` of its period, or fewer."""
+    step = simulation.spec.period / steps
+    return replace(simulation, spec=replace(simulation.spec, shortest_pulse=step, pulse_step=step))
 
 
 def _network(window: Window, linear: dict[int, float], hidden: int, seed: int, direct: bool) -> Network:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_arm import synthetic_simulation
+from synthetic_arm import in_steps, synthetic_simulation
 
 from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.agent import ServoAgent, servo_sizes
@@ -20,9 +20,11 @@ COMPILER = shutil.which("cc")
 
 
 @pytest.mark.skipif(COMPILER is None, reason="needs a C compiler")
-@pytest.mark.parametrize("joints", [1, 2])
-def test_c_decides_as_the_original_on_10_000_states(joints: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("joints", "steps"), [(1, 0), (2, 0), (1, 3)])
+def test_c_decides_as_the_original_on_10_000_states(joints: int, steps: int, tmp_path: Path) -> None:
     simulation, settings, random = synthetic_simulation(joints), ServoSettings(), np.random.default_rng(joints)
+    if steps:
+        simulation = in_steps(simulation, steps)
     weights = initial_weights(servo_sizes(simulation, settings), 3.0, random)
     agent = ServoAgent(simulation, weights, settings)
     source, library = tmp_path / "agent.c", tmp_path / "agent.so"

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_arm import synthetic_simulation
+from synthetic_arm import in_steps, synthetic_simulation
 
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.as_onnx import as_onnx
@@ -32,11 +32,13 @@ def raw_of(agent: ServoAgent | PolicyAgent, scaled: np.ndarray) -> np.ndarray:
     return raw.astype(np.float32)
 
 
-@pytest.mark.parametrize(("joints", "history"), [(1, 3), (2, 3), (1, 1)])
-def test_a_servo_as_onnx_decides_as_the_original(joints: int, history: int) -> None:
+@pytest.mark.parametrize(("joints", "history", "steps"), [(1, 3, 0), (2, 3, 0), (1, 1, 0), (1, 3, 3)])
+def test_a_servo_as_onnx_decides_as_the_original(joints: int, history: int, steps: int) -> None:
     pytest.importorskip("onnx")
     runtime = pytest.importorskip("onnxruntime")
     simulation, settings = synthetic_simulation(joints, history), ServoSettings()
+    if steps:
+        simulation = in_steps(simulation, steps)
     random = np.random.default_rng(joints)
     agent = ServoAgent(simulation, initial_weights(servo_sizes(simulation, settings), 3.0, random), settings)
     actor, previews = ServoActor(agent), len(agent.task.inputs.steps)

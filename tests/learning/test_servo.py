@@ -119,11 +119,22 @@ def test_a_valve_that_stays_open_is_cheaper_than_one_that_pulses():
 
 
 @pytest.mark.parametrize(
-    ("size", "shortest", "pulse"),
-    [(0.04, 0.1, 0.0), (0.06, 0.1, 0.1), (0.5, 0.1, 0.5), (0.97, 0.1, 1.0), (0.4, 1.0, 0.0), (0.6, 1.0, 1.0)],
+    ("size", "shortest", "step", "pulse"),
+    [
+        (0.04, 0.1, 0, 0.0),
+        (0.06, 0.1, 0, 0.1),
+        (0.5, 0.1, 0, 0.5),
+        (0.97, 0.1, 0, 1.0),
+        (0.4, 1.0, 0, 0.0),
+        (0.6, 1.0, 0, 1.0),
+        (0.15, 1 / 3, 1 / 3, 0.0),
+        (0.45, 1 / 3, 1 / 3, 1 / 3),
+        (0.75, 1 / 3, 1 / 3, 2 / 3),
+        (0.9, 1 / 3, 1 / 3, 1.0),
+    ],
 )
-def test_pulses_are_none_or_as_long_as_the_valve_needs(size: float, shortest: float, pulse: float):
-    assert rounded(np.float32(size), np.float32(shortest)) == pytest.approx(pulse)
+def test_pulses_are_none_or_as_long_as_the_valve_needs(size: float, shortest: float, step: float, pulse: float):
+    assert rounded(np.float32(size), np.float32(shortest), np.float32(step)) == pytest.approx(pulse)
 
 
 def test_on_the_way_to_a_goal_that_stays_short_pulses_are_none_and_long_ones_whole():

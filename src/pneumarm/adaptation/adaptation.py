@@ -35,14 +35,16 @@ from pneumarm.adaptation.plastic import plastic, with_plastic
 from pneumarm.adaptation.refit import Refit, RefitSettings, refit, refit_to_all
 from pneumarm.adaptation.trial import TrialSettings, verdict
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.agents import Acts, Adapts
+from pneumarm.learning.agents import Acts, Adapts, Tracks
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.begin import begin_states
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 
+_SETTLED = "settled", "settled_before"  # of the state
 _FAILED = 2  # fewest movements that did not settle, for an agent to learn thoroughly: one may be chance
-_COMPARED = 6  # movements of either version for it to be preferred
+COMPARED = 6
+"""Movements that a version of an agent that settles and the one before it must have made, for one to be preferred."""
 _GROWTH = 2.0  # from one thorough adaptation to the next: what was learned needs movements to be judged by
 
 
@@ -113,6 +115,7 @@ class Adaptation:
         self._old: list[float] = []  # rewards of the trusted agent
         self._new: list[float] = []  # rewards of the agent that is on trial
         self._settled: list[bool] = []  # whether movements of the agent as it is did
+        self._settled_before: list[bool] = []  # of the trusted agent, while another is on trial
         self._thorough = False  # whether its newest version learned thoroughly
         self.quantities = output_names(agent.simulation)
         """What the ratios are of."""
@@ -183,11 +186,13 @@ class Adaptation:
             self._tried = self.movements
 
     def prefer(self) -> None:
-        """Of a version that learned thoroughly and the one before it, go on with what was better on average.
+        """Of a version of an agent that settles and the one before it, go on with what was better on average.
 
-        So much learning changes an agent for better or worse, more than a trial that is to be sure finds out in time.
+        What it learned in a simulation changes how it comes to rest for better or worse, by more than a trial that is
+        to be sure finds out in time.
         """
-        if self._thorough and self.version != self._trusted_version and len(self._new) >= _COMPARED <= len(self._old):
+        compared = self.version != self._trusted_version and len(self._new) >= COMPARED <= len(self._old)
+        if compared and isinstance(self._origin, Tracks):
             if np.mean(self._new) < np.mean(self._old):
                 self._put_back()
             else:
@@ -197,7 +202,7 @@ class Adaptation:
         """Go on with the trusted agent."""
         worse, means = self.version, [float(np.mean(rewards)) for rewards in (self._old, self._new)]
         self.agent, self.version, self._new = self._trusted, self._trusted_version, []
-        self._settled.clear()
+        self._settled, self._settled_before = self._settled_before, []  # it fails as often as it did
         self._watch.reset()
         self._add("rolled back", taken_back=worse, reward_before=means[0], reward_after=means[1])
 
@@ -205,7 +210,7 @@ class Adaptation:
         """Count the agent as proven."""
         remembered = self._settings.trial.remembered
         self._trusted, self._trusted_version = self.agent, self.version
-        self._old, self._new = self._new[-remembered:], []
+        self._old, self._new, self._settled_before = self._new[-remembered:], [], []
 
     def is_due(self) -> bool:
         """Whether to :meth:`learn` now."""
@@ -240,7 +245,9 @@ class Adaptation:
             self.agent = self.agent.adapted(simulation, begin, updates, tuned.warm_up, rate, seed)
             self.version, self.versions, self._thorough = self.versions, self.versions + 1, recording is not None
             self._new = []
-            self._settled.clear()
+            if not self._settled_before:
+                self._settled_before = self._settled
+            self._settled = []
             self._watch.reset()
         self._add("accepted" if found.better else "refused", **self._figures(found))
         return found.better
@@ -278,7 +285,7 @@ class Adaptation:
             "trusted": self._trusted_version,
             "old": self._old,
             "new": self._new,
-            "settled": self._settled,
+            **dict(zip(_SETTLED, (self._settled, self._settled_before), strict=True)),
             "thorough": self._thorough,
             "events": [asdict(event) for event in self.events],
             "watch": self._watch.get_state(),
@@ -302,7 +309,8 @@ class Adaptation:
             self._began, self._tried = int(head["began"]), int(head["tried"])
             self._trusted_version = int(head["trusted"])
             self._old, self._new = list(map(float, head["old"])), list(map(float, head["new"]))
-            self._settled, self._thorough = list(map(bool, head["settled"])), bool(head["thorough"])
+            self._settled, self._settled_before = (list(map(bool, head[name])) for name in _SETTLED)
+            self._thorough = bool(head["thorough"])
             self.events = [Event(**event) for event in head["events"]]
             self._watch.set_state(head["watch"])
         except (ValueError, TypeError, KeyError, IndexError) as error:

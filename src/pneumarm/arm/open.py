@@ -230,7 +230,7 @@ def _from_python(place: str, every: str | None) -> Arm:
     if every is not None and not every.isdecimal():
         raise UnusableInput(f"arm python:{place}: expected every=1 or more of its periods, not {every!r}")
     arm = _made_by(place)
-    turns = int(every) if every is not None else usual_turns(arm.spec.period) if arm.spec.pulses else 1
+    turns = int(every) if every is not None else usual_turns(arm.spec.period)
     return arm if turns == 1 else SlowerArm(arm, turns)
 
 

@@ -100,6 +100,9 @@ class ArmSpec(Settings):
     shortest_pulse: float = 0.003
     """Shortest time that a valve is open [s]; what is shorter is rounded to none or to this (thesis section 2.2:
     valves switch at 330 Hz)."""
+    pulse_step: float = 0.0
+    """Pulses last for a multiple of this time [s], as where an arm without pulses is controlled at every third of its
+    periods; 0: for any time from the shortest on."""
     velocity_sensor: bool = False
     """Whether readings carry the velocity that the arm measures itself, as a board does that samples faster
     (thesis sections 5.1 and 7.3)."""
@@ -127,6 +130,7 @@ class ArmSpec(Settings):
             "velocity_sensor": isinstance(self.velocity_sensor, bool),
             "pulses": isinstance(self.pulses, bool),
             "shortest_pulse": _positive(self.shortest_pulse),
+            "pulse_step": 0 <= self.pulse_step <= self.shortest_pulse or "0 to ``shortest_pulse``",
             "period": _positive(self.period),
             "counts_per_degree": _positive(self.counts_per_degree),
             "counts_per_bar": _positive(self.counts_per_bar),
@@ -175,6 +179,9 @@ class ArmSpec(Settings):
         """Return the pulses (joints, 2) nearest to ``command`` that the arm can carry out, shares of a period."""
         shortest = min(self.shortest_pulse / self.period, 1.0) if self.pulses else 1.0
         share = np.abs(command)
+        if self.pulses and self.pulse_step > 0:
+            step = self.pulse_step / self.period
+            share = np.minimum(np.round(share / step) * step, 1.0)
         rounded = np.where(2 * share < shortest, 0.0, np.maximum(share, shortest))
         return np.sign(command) * rounded + 0.0  # no -0.0
 

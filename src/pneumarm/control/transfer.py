@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.adaptation import AdaptationSettings, adaptation_of
+from pneumarm.adaptation import COMPARED, AdaptationSettings, adaptation_of
 from pneumarm.arm import Arm, ControlCycle, Controller, guarded
 from pneumarm.arm.counts import Counts
 from pneumarm.arm.seam import check_pressures
@@ -263,11 +263,11 @@ class Transfer:
         movements, total = settings.movements(phase), sum(settings.movements(each) for each in PHASES)
         made = sum(info[_PHASE] == phase for info in self._done)
         if phase == "after" and settings.episodes > 0 and made == 0:
-            self._adapt(last=True)
+            self._adapt(0)
         moving, controller = self.agent, self._controller(phase)
         for number in range(made, movements):
             if learns:
-                self._adapt()
+                self._adapt(movements - number)
             if moving is not self.agent and self._adapting is not None:
                 moving, controller = self.agent, self._controller(phase)
             movement = self._move(controller, not learns, number)
@@ -302,15 +302,18 @@ class Transfer:
             self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity, hold
         )
 
-    def _adapt(self, last: bool = False) -> None:
-        """Let the agent adapt where that is due; the ``last`` time that version stays which was better."""
+    def _adapt(self, left: int) -> None:
+        """Let the agent adapt where that is due, with so many movements of learning ``left``.
+
+        Of one that settles a version is made only if enough are left to tell whether it is better.
+        """
         adapting = self._adapting
         if adapting is None or self._settings.learning_rate == 0:
             return
-        if due := adapting.is_due() or last:
+        if adapting.is_due() or left == 0:
             adapting.prefer()
             self._judge()
-        if not due or not adapting.is_due():
+        if not adapting.is_due() or (left < COMPARED and isinstance(self._arrived, Tracks)):
             return
         self._keep()  # it learns from what is stored, so that an interruption changes nothing
         made = [entry.number for entry in self._stored()][-adapting.usable :]

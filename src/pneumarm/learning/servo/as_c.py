@@ -27,7 +27,8 @@ def as_c(agent: ServoAgent) -> str:
         "LAYERS": len(sizes) - 1,
         "WIDEST": max(input_size(seen), *sizes),
     }
-    shares = {"DEAD": made.dead, "SHORTEST": made.shortest, "WHOLE": min(float(WHOLE), 1 - made.shortest / 2)}
+    whole = min(float(WHOLE), 1 - made.shortest / 2)
+    shares = {"DEAD": made.dead, "SHORTEST": made.shortest, "STEP": made.step, "WHOLE": whole}
     lines = [
         f"/* For {_safe(agent.spec.name)}, {1 / agent.spec.period:g} Hz, {agent.spec.counts_per_degree:g} counts per "
         f"degree, {agent.spec.counts_per_bar:g} counts per bar. */",

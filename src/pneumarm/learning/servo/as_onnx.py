@@ -70,7 +70,11 @@ def _pulses(graph: Graph, agent: ServoAgent, x: str, said: str) -> str:
     over = graph.node("Greater", pressures, made.inlet.ravel())
     closed = graph.node("And", graph.node("Greater", v, 0.0), over)
     size = graph.node("Clip", graph.node("Where", closed, 0.0, size), 0.0, 1.0)
-    pulse = graph.node("Max", size, shortest)
-    pulse = graph.node("Where", graph.node("Greater", size, whole), 1.0, pulse)
-    pulse = graph.node("Where", graph.node("Less", size, shortest / 2), 0.0, pulse)
+    if made.step > 0:
+        steps = graph.node("Round", graph.node("Div", size, made.step))
+        pulse = graph.node("Min", graph.node("Mul", steps, made.step), 1.0)
+    else:
+        pulse = graph.node("Max", size, shortest)
+        pulse = graph.node("Where", graph.node("Greater", size, whole), 1.0, pulse)
+        pulse = graph.node("Where", graph.node("Less", size, shortest / 2), 0.0, pulse)
     return graph.node("Mul", graph.node("Sign", v), pulse)

@@ -37,6 +37,8 @@ class CommandParameters(NamedTuple):
     """Share of the policy's output around 0 that keeps a valve closed."""
     shortest: float
     """Shortest pulse, in periods."""
+    step: float
+    """Pulses are a multiple of it, in periods; 0: any."""
     leak: float
     """Share of the gradient that passes where the command does not change."""
     inlet: NDArray[np.float32]
@@ -55,7 +57,8 @@ def command_parameters(simulation: Simulation, dead: float, shortest: float, coa
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     inlet = (spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:]
     inlet, slow = np.ascontiguousarray(inlet, np.float32), _FAST * spec.period
-    return CommandParameters(float(dead), float(shortest), _LEAK, inlet, float(coarse), NEAR, slow)
+    step = spec.pulse_step / spec.period if spec.pulses else 0.0
+    return CommandParameters(float(dead), float(shortest), step, _LEAK, inlet, float(coarse), NEAR, slow)
 
 
 def shortest_share(spec: ArmSpec) -> float:
@@ -67,8 +70,10 @@ def shortest_share(spec: ArmSpec) -> float:
 
 
 @part
-def rounded(size, shortest):  # type: ignore[no-untyped-def]
+def rounded(size, shortest, step):  # type: ignore[no-untyped-def]
     """Return a pulse of ``size`` periods as the valve can make it: none, or between ``shortest`` and the period."""
+    if step > _ZERO:
+        return min(np.round(size / step) * step, _ONE)
     if size < np.float32(0.5) * shortest:
         return _ZERO
     if size > min(WHOLE, _ONE - np.float32(0.5) * shortest):
@@ -89,7 +94,7 @@ def write_commands(parameters, x, underway, said, slope, command):  # type: igno
     ``x`` (size, n) are the states, in which the pressures are read; ``underway`` (joints, n) tells which joints are
     on their way to a goal that stays; ``said`` is replaced by its hyperbolic tangent.
     """
-    dead, shortest = np.float32(parameters.dead), np.float32(parameters.shortest)
+    dead, shortest, step = np.float32(parameters.dead), np.float32(parameters.shortest), np.float32(parameters.step)
     leak, coarse = np.float32(parameters.leak), np.float32(parameters.coarse)
     stretch = _ONE / (_ONE - dead)
     for c in range(command.shape[0]):
@@ -103,7 +108,7 @@ def write_commands(parameters, x, underway, said, slope, command):  # type: igno
             moves = _ZERO < size < _ONE
             if v > _ZERO and x[place, e] > limit:
                 size, moves = _ZERO, False
-            pulse = rounded(min(max(size, _ZERO), _ONE), shortest)
+            pulse = rounded(min(max(size, _ZERO), _ONE), shortest, step)
             if underway[joint, e]:
                 pulse = coarsened(pulse, coarse)
             command[c, e] = pulse if v > _ZERO else -pulse

@@ -109,7 +109,6 @@ class ServoController:
         )
         self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(self._slowly, self._waited, self._foreseen))
         self._foresight = Foresight(agent.simulation) if fine else None
-        self._shortest = agent.task.commands.shortest
         self._after = slice(*(round(time / spec.period) for time in _AFTER))
         self._stays = _STAYS * tolerance + _STAYS_NOISE * noise
         self._lain = _LAIN * tolerance + _LAIN_NOISE * noise
@@ -266,8 +265,7 @@ class ServoController:
         """
         if self._foresight is None:
             return command[joint]
-        size = _SHARES[:, None] * np.abs(command[joint])
-        size = np.where(size < self._shortest / 2, 0.0, np.maximum(size, self._shortest))
+        size = self.spec.possible(_SHARES[:, None] * np.abs(command[joint]))
         tried = np.zeros((len(size), *command.shape))
         tried[:, joint] = np.copysign(size, command[joint])
         angle = self._foresight.angles(state, tried.reshape(len(tried), -1), self._after.stop)[:, self._after, joint]

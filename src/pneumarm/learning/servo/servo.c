@@ -89,7 +89,10 @@ static float servo_pulse(float said, float pressure, float limit)
     if (v > 0 && pressure > limit)
         size = 0;
     size = size < 0 ? 0 : size > 1 ? 1 : size;
-    if (size < 0.5f * SERVO_SHORTEST)
+    if (SERVO_STEP > 0) {
+        size = SERVO_STEP * (float)(int)(size / SERVO_STEP + 0.5f);
+        size = size > 1 ? 1 : size;
+    } else if (size < 0.5f * SERVO_SHORTEST)
         size = 0;
     else if (size > SERVO_WHOLE)
         size = 1;

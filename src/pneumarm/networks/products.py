@@ -14,6 +14,8 @@ from pneumarm.kernels import kernel
 
 _TILE = 4
 """Sums along one side of the piece of a result that is held in registers; tables are padded to a multiple of it."""
+_COLUMNS = 32
+"""Columns of a matrix that is solved that are worked on at a time."""
 _ROWS = 512
 """Rows whose products are in memory at once: few enough for the cache."""
 _REORDERED = {"contract", "reassoc"}
@@ -188,20 +190,24 @@ def _add_tiles(a, b, total):  # type: ignore[no-untyped-def]
 def solve_positive(matrix, right):  # type: ignore[no-untyped-def]
     """Replace ``right`` (n,) by the solution of ``matrix`` times it, and ``matrix`` (n, n) by its Cholesky factor.
 
-    Returns whether the symmetric matrix, of which the lower half is read, is positive definite.
+    Returns whether the symmetric matrix, of which the lower half is read, is positive definite. Columns are worked
+    on a few at a time, so that the rows that all others are multiplied by stay in the cache.
     """
     n = matrix.shape[0]
-    for j in range(n):
-        for i in range(j, n):
-            dot = 0.0
-            for k in range(j):
-                dot += matrix[i, k] * matrix[j, k]
-            matrix[i, j] -= dot
-        if not matrix[j, j] > 0:
-            return False
-        pivot = np.sqrt(matrix[j, j])
-        for i in range(j, n):
-            matrix[i, j] /= pivot
+    for first in range(0, n, _COLUMNS):
+        last = min(first + _COLUMNS, n)
+        _subtract_dots(matrix, first, last)
+        for j in range(first, last):
+            for i in range(j, n):
+                dot = 0.0
+                for k in range(first, j):
+                    dot += matrix[i, k] * matrix[j, k]
+                matrix[i, j] -= dot
+            if not matrix[j, j] > 0:
+                return False
+            pivot = np.sqrt(matrix[j, j])
+            for i in range(j, n):
+                matrix[i, j] /= pivot
     for i in range(n):
         for k in range(i):
             right[i] -= matrix[i, k] * right[k]
@@ -211,3 +217,33 @@ def solve_positive(matrix, right):  # type: ignore[no-untyped-def]
         for k in range(i):
             right[k] -= matrix[i, k] * right[i]
     return True
+
+
+@kernel(fastmath=_REORDERED)
+def _subtract_dots(matrix, first, last):  # type: ignore[no-untyped-def]
+    """Subtract from each entry in columns ``first`` to ``last`` the product of its two rows in the columns before.
+
+    Two by four sums at a time, as in :func:`_add_tiles`.
+    """
+    n = matrix.shape[0]
+    for i in range(first, n, 2):
+        a0, a1 = matrix[i], matrix[min(i + 1, n - 1)]
+        for j in range(first, min(last, i + 2), _TILE):
+            b0, b1 = matrix[j], matrix[min(j + 1, n - 1)]
+            b2, b3 = matrix[min(j + 2, n - 1)], matrix[min(j + 3, n - 1)]
+            s00 = s01 = s02 = s03 = s10 = s11 = s12 = s13 = 0.0
+            for k in range(first):
+                x, y = a0[k], a1[k]
+                s00 += x * b0[k]
+                s01 += x * b1[k]
+                s02 += x * b2[k]
+                s03 += x * b3[k]
+                s10 += y * b0[k]
+                s11 += y * b1[k]
+                s12 += y * b2[k]
+                s13 += y * b3[k]
+            for c, (upper, lower) in enumerate(((s00, s10), (s01, s11), (s02, s12), (s03, s13))):
+                if j + c < last:
+                    a0[j + c] -= upper
+                    if i + 1 < n:
+                        a1[j + c] -= lower

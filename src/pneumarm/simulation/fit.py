@@ -46,6 +46,8 @@ _LARGEST_EPOCH = 3e10
 """Rows times weights squared; more than 500,000 rows of one joint, and 48,000 of two."""
 _ROWS_A_WEIGHT = 20
 """Rows that a network is fitted to at least, for each of its weights, where there are so many."""
+_FEWEST_A_WEIGHT = 8
+"""Rows for each of its weights without which a network reads no more than the usual observations."""
 _AGAIN = 0.25
 """Share of the epochs in which it is taught what pulses do on average where none were recorded."""
 _LONGEST_AHEAD = 10.0
@@ -120,9 +122,17 @@ class FitSettings(Settings):
 
     def of_arm(self, store: Store) -> "FitSettings":
         """Return the settings with the history and memory that suit the arm of ``store`` where none is asked for."""
-        history = self.history or chosen_history(store, store.spec, self.sensors)
+        history = self.history or min(chosen_history(store, store.spec, self.sensors), self._longest(store))
         settles = self.ahead > 0 and self.approximator == "network"
         return replace(self, history=history, memory=self.memory or (LONGEST if settles else history))
+
+    def _longest(self, store: Store) -> int:
+        """Return how many observations networks may read that are fitted to ``store``, in sound time."""
+        for history in range(LONGEST, USUAL, -1):
+            weights = _weights(Window.of(store.spec, history, self.sensors).input_size, self, store.joints)
+            if store.transitions >= _FEWEST_A_WEIGHT * weights and store.transitions * weights**2 <= _LARGEST_EPOCH:
+                return history
+        return USUAL
 
     @property
     def observations(self) -> int:
@@ -316,7 +326,7 @@ def _fitted(
     """
     joints, size = simulation.window.joints, simulation.window.input_size
     targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
-    chosen = _rows_to_fit(len(x), (x.shape[1] + 2) * settings.hidden * joints, settings.seed)
+    chosen = _rows_to_fit(len(x), _weights(x.shape[1], settings, joints), settings.seed)
     before = [one.reading(read) for one in before]
     fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0
@@ -390,6 +400,11 @@ def _fit_networks(
 
     with ThreadPoolExecutor(min(len(targets), os.cpu_count() or 1)) as threads:
         return list(threads.map(one, range(len(targets))))
+
+
+def _weights(inputs: int, settings: FitSettings, joints: int) -> int:
+    """Return how many weights a network has, about."""
+    return (inputs + 2) * settings.hidden * joints
 
 
 def _rows_to_fit(rows: int, weights: int, seed: int) -> slice | NDArray[np.int64]:

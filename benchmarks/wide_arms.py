@@ -8,7 +8,8 @@ has adapted to as many movements as in a run, and the agent for reaching reaches
 an interrupted benchmark goes on. Settings come from the environment:
 
 PNEUMARM_WIDE_ARMS       names of arms divided by blanks, or seeds of wide arms, such as the default, 6000-6009;
-                         5000-5299 are held out. python:tests.friction_arms:joint_1 and so on have other physics
+                         5000-5299 are held out. python:benchmarks.strangers:one_1, python:tests.friction_arms:joint_1
+                         and so on have other physics; numbers of strangers from 1000 on are held out
 PNEUMARM_WIDE_GOALS      40 to settle at, and as many to reach
 PNEUMARM_WIDE_FOLDER     where rows are kept; runs/wide_arms by default
 PNEUMARM_WIDE_PROCESSES  2

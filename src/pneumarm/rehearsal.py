@@ -5,6 +5,7 @@ compiled here goes to the same cache on the disk (:mod:`pneumarm.kernels`), and 
 else comes of a rehearsal: a run without one gives the same results, later.
 """
 
+import hashlib
 import json
 import os
 import subprocess
@@ -36,7 +37,6 @@ from pneumarm.task import begin_states
 from pneumarm.transitions import FEWEST_TRANSITIONS, Store
 from pneumarm.transitions.rows import Recorded
 
-_REHEARSED = CACHE_FOLDER / "rehearsed"
 _SEQUENCE = 100  # rows of a made-up sequence
 _PLANNED = 4  # movements
 _PATIENCE = 600.0
@@ -44,6 +44,18 @@ _PATIENCE = 600.0
 machine of 2 cores)."""
 _ENDING = 10.0
 """For so long [s] a process that was killed is waited for; the system keeps one that hangs in a disk."""
+
+
+def installed(package: Path) -> str:
+    """Return a name for the sources below ``package`` where they lie and as old as they are.
+
+    Numba knows a source by its place and its time, so the same sources in another folder are compiled again.
+    """
+    newest = max(path.stat().st_mtime_ns for path in package.rglob("*.py"))
+    return hashlib.sha256(f"{package.resolve()} {newest}".encode()).hexdigest()[:16]
+
+
+_REHEARSED = CACHE_FOLDER / f"rehearsed-{installed(Path(__file__).parent)}"
 
 
 @dataclass(frozen=True)

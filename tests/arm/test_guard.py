@@ -4,6 +4,7 @@ import pytest
 from children import python
 from pneumarm.arm import GuardedArm, Reading
 from pneumarm.arm.guard import HELD, MOST_REPLACED, Interventions
+from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
 
 
@@ -28,6 +29,19 @@ def test_a_muscle_that_fell_below_the_limit_is_free_again(smallest_arm):
         safe.set_valves([[1, 0]])
         assert safe.applied[0, 0] == expected
     assert safe.peak_pressure[0, 0] == 170
+
+
+def test_what_was_over_the_limit_says_nothing_of_a_state_that_is_restored():
+    with GuardedArm(VirtualArm(seed=1)) as safe:
+        state = safe.get_state()
+        safe.set_valves([[1, 0]])
+        safe.wait(5.0)
+        safe.read()
+        safe.set_valves([[1, 0]])
+        assert safe.applied.tolist() == [[0, 0]]
+        safe.set_state(state)
+        safe.set_valves([[1, 0]])
+        assert safe.applied.tolist() == [[1, 0]]
 
 
 def test_a_long_inflation_is_watched_every_period(smallest_arm):

@@ -213,6 +213,18 @@ def test_who_settles_holds_each_goal_and_adapts_to_all_of_that(servo: AnyAgent, 
             assert min(lasted) < 1.4
 
 
+@pytest.mark.parametrize(("episodes", "learns"), [(8, False), (13, False), (14, True)])
+def test_who_settles_makes_no_version_that_its_arm_could_not_try(
+    servo: AnyAgent, episodes: int, learns: bool, tmp_path: Path
+) -> None:
+    """It is due after ten movements, two of a test among them."""
+    adaptation = AdaptationSettings(first=10, updates=1)
+    settings = TransferSettings(episodes=episodes, test_episodes=2, hold=0.5, adaptation=adaptation)
+    transfer_into(tmp_path / "moved", servo, VirtualArm(seed=4), settings, seed=1)
+    events = {event.what for event in read_history(tmp_path / "moved").events}
+    assert bool(events & {"accepted", "refused"}) == learns
+
+
 def _watch_of(folder: Path) -> bytes | None:
     with Store.open(folder / "transitions.db") as store:
         return store.state("watch")

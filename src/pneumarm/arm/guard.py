@@ -438,6 +438,7 @@ class GuardedArm(Arm):
         self.arm.set_state(state)
         self.applied = self._valves = np.zeros_like(self._valves)
         self._closing, self._times_pulses = {}, False
+        self._over = self._outward = None  # of another state, which nobody has read
         self._inflation = _Inflation(self.spec.max_inflation, self.applied.size)
         self._inflating, self._time, self._replaced, self._undecided = False, -math.inf, 0, 0.0
 

@@ -159,7 +159,7 @@ def _read_json(path: Path) -> dict[str, Any]:
 def _summary(run: RunData) -> list[str]:
     spec = run.spec
     joints = f"{spec.joints} joint{'s' if spec.joints > 1 else ''}"
-    text = [f"{spec.name}: {joints}, {1 / spec.period:.3g} Hz, pressures up to {spec.max_pressure:g} bar."]
+    text = [f"{spec.name}: {joints}, {1 / spec.period:.3g} Hz, pressures up to {spec.max_pressure:.3g} bar."]
     if not spec.pressure_sensors:
         text.append(
             "Its pressures are not measured: wherever they are shown, they are estimated from what the valves were "

@@ -60,16 +60,14 @@ def test_the_gradient_is_that_of_the_price(joints: int, history: int, direct: bo
     assert (found[0] - found[1]) / 2e-5 == pytest.approx(np.linalg.norm(gradient), rel=0.01)
 
 
-def test_an_empty_muscle_is_taught_to_fill_and_slack_is_judged_by_its_price():
+def test_an_empty_muscle_is_taught_to_fill():
     one = learner(synthetic_simulation())
     one._prepare(np.random.default_rng(1), np.ones(SMALL.arms, bool))
     # Near the goal, and with nothing to pay for but slack.
     prices = one.task.prices._replace(change=0.0, far=0.0, slack=3.0, cocontraction=3.0, stiffness=0.5)
     inputs = one.task.inputs._replace(tolerances=one.task.inputs.tolerances / 1000)
     one.task = one.task._replace(prices=prices, inputs=inputs, past_the_limit=0.0)
-    price = learn_once(one.task, one.net, one.tape)
-    assert price > 0
-    assert price == pytest.approx(one._pressures().mean() / len(one.tape.slope), rel=1e-3)
+    assert learn_once(one.task, one.net, one.tape) > 0
     simulation = one.task.simulation
     simulation.highest[:] = simulation.lowest  # now all predictions are cut off
     for passes in (0.0, 0.2):

@@ -7,7 +7,8 @@
 
 An agent that does not settle at some of its goals, on an arm whose recording is at hand and that is as it was then,
 learns more thoroughly: the simulation is fitted on to the recording and to the movements together, and the agent
-learns in it for longer. What keeps a joint from its rest is mostly what a recording of large movements did not show.
+is made anew in it, for joints that are kept stiffer; later on, whichever was better learns in it for longer. What
+keeps a joint from its rest is mostly what a recording of large movements did not show.
 
 The three questions are answered by :mod:`~pneumarm.adaptation.change`, :mod:`~pneumarm.adaptation.trial` and
 :mod:`~pneumarm.adaptation.refit`. "Now and then" is after few movements at first, and then each time that their
@@ -35,7 +36,7 @@ from pneumarm.adaptation.plastic import plastic, with_plastic
 from pneumarm.adaptation.refit import Refit, RefitSettings, refit, refit_to_all
 from pneumarm.adaptation.trial import TrialSettings, verdict
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.agents import Acts, Adapts, Tracks
+from pneumarm.learning.agents import Acts, Adapts, Stiffens, Tracks
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.begin import begin_states
 from pneumarm.transitions.rows import Rows
@@ -117,6 +118,8 @@ class Adaptation:
         self._settled: list[bool] = []  # whether movements of the agent as it is did
         self._settled_before: list[bool] = []  # of the trusted agent, while another is on trial
         self._thorough = False  # whether its newest version learned thoroughly
+        self._stiff = self._trusted_stiff = False  # whether the agent, and the trusted one, were made anew
+        self._anew = False  # whether any was
         self.quantities = output_names(agent.simulation)
         """What the ratios are of."""
 
@@ -202,6 +205,7 @@ class Adaptation:
         """Go on with the trusted agent."""
         worse, means = self.version, [float(np.mean(rewards)) for rewards in (self._old, self._new)]
         self.agent, self.version, self._new = self._trusted, self._trusted_version, []
+        self._stiff = self._trusted_stiff
         self._settled, self._settled_before = self._settled_before, []  # it fails as often as it did
         self._watch.reset()
         self._add("rolled back", taken_back=worse, reward_before=means[0], reward_after=means[1])
@@ -209,7 +213,7 @@ class Adaptation:
     def _trust(self) -> None:
         """Count the agent as proven."""
         remembered = self._settings.trial.remembered
-        self._trusted, self._trusted_version = self.agent, self.version
+        self._trusted, self._trusted_version, self._trusted_stiff = self.agent, self.version, self._stiff
         self._old, self._new, self._settled_before = self._new[-remembered:], [], []
 
     def is_due(self) -> bool:
@@ -242,7 +246,10 @@ class Adaptation:
             simulation = found.simulation
             begin = begin_states(rows, simulation.window, simulation.scaling, simulation.spec)
             seed = self._seed + self.movements
-            self.agent = self.agent.adapted(simulation, begin, updates, tuned.warm_up, rate, seed)
+            if recording is not None and not self._anew and isinstance(self.agent, Stiffens):
+                self.agent, self._stiff, self._anew = self.agent.stiffer().anew(simulation, begin, seed), True, True
+            else:
+                self.agent = self.agent.adapted(simulation, begin, updates, tuned.warm_up, rate, seed)
             self.version, self.versions, self._thorough = self.versions, self.versions + 1, recording is not None
             self._new = []
             if not self._settled_before:
@@ -287,6 +294,7 @@ class Adaptation:
             "new": self._new,
             **dict(zip(_SETTLED, (self._settled, self._settled_before), strict=True)),
             "thorough": self._thorough,
+            "stiff": [self._stiff, self._trusted_stiff, self._anew],
             "events": [asdict(event) for event in self.events],
             "watch": self._watch.get_state(),
         }
@@ -311,6 +319,7 @@ class Adaptation:
             self._old, self._new = list(map(float, head["old"])), list(map(float, head["new"]))
             self._settled, self._settled_before = (list(map(bool, head[name])) for name in _SETTLED)
             self._thorough = bool(head["thorough"])
+            self._stiff, self._trusted_stiff, self._anew = map(bool, head["stiff"])
             self.events = [Event(**event) for event in head["events"]]
             self._watch.set_state(head["watch"])
         except (ValueError, TypeError, KeyError, IndexError) as error:
@@ -321,6 +330,10 @@ class Adaptation:
         if numbers.size != 2 * size or not np.isfinite(numbers).all():
             raise UnusableInput("the state of the adaptation is damaged or of another agent; begin another folder")
         self.agent, self._trusted = (with_plastic(self._origin, part) for part in np.split(numbers, 2))
+        if self._stiff and isinstance(self.agent, Stiffens):
+            self.agent = self.agent.stiffer()
+        if self._trusted_stiff and isinstance(self._trusted, Stiffens):
+            self._trusted = self._trusted.stiffer()
 
 
 def adaptation_of(agent: Acts, settings: AdaptationSettings, seed: int = 0) -> Adaptation | None:

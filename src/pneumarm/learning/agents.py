@@ -3,7 +3,7 @@
 Whatever kind an agent is of, it is tested, transferred, saved, loaded and used as a controller by the same commands.
 What only some can do is asked for by the class that says so, never by the kind: :class:`Learns`,
 :class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`,
-:class:`Tracks`.
+:class:`Stiffens`, :class:`Tracks`.
 """
 
 import hashlib
@@ -133,6 +133,17 @@ class Knows(Protocol):
 
     def knowing(self, ways: tuple[float, ...]) -> Self:
         """Return the agent with the ``ways`` of a controller, which the next one begins with."""
+
+
+@runtime_checkable
+class Stiffens(Protocol):
+    """An agent that can be made anew for joints that are kept stiffer, which swing less and are slower."""
+
+    def stiffer(self) -> Self:
+        """Return the agent with joints to be kept stiffer wherever it learns from now on."""
+
+    def anew(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
+        """Return the agent trained from the beginning in ``simulation``, from states ``begin``."""
 
 
 @runtime_checkable

@@ -13,7 +13,7 @@ from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.inputs import input_size, seen_parameters
 from pneumarm.learning.servo.price import PriceParameters, prices_of_errors
-from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
+from pneumarm.learning.servo.settings import SOFT, STIFF, USUAL_PERIOD, ServoSettings
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
@@ -73,6 +73,17 @@ class ServoAgent(NetworkAgent):
         tuned = replace(self.settings, updates=updates, learning_rate=learning_rate)
         return self.revised(simulation, tuned_servo(self.policy, simulation, begin, tuned, seed))
 
+    def stiffer(self) -> Self:
+        """Return the servo with muscles to keep more pressure where it learns on, unless another one was asked for."""
+        wanted = self.settings.stiffness
+        return replace(self, settings=replace(self.settings, stiffness=STIFF if wanted in (None, SOFT) else wanted))
+
+    def anew(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
+        """Return the servo trained from the beginning in ``simulation``."""
+        from pneumarm.learning.servo.training import train_servo  # which imports this module
+
+        return self.revised(simulation, train_servo(simulation, begin, self.settings, seed).agent.policy)
+
 
 def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:
     """Return what does not change while a servo learns or acts."""
@@ -93,7 +104,7 @@ def servo_task(simulation: Simulation, settings: ServoSettings) -> ServoTask:
             change=change,
             slack=both * settings.slack,
             cocontraction=both * settings.cocontraction,
-            stiffness=settings.stiffness,
+            stiffness=SOFT if settings.stiffness is None else settings.stiffness,
         ),
         lowest=((lowest - offset) / scale).astype(np.float32),
         to_share=(scale / np.maximum(highest - lowest, 1e-9)).astype(np.float32),

@@ -28,7 +28,7 @@ _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
 _SWINGS = 3  # from one side of the goal to the other, after which the joint swings
 _DAMPED = 0.7  # tolerances that a joint is hoped to be off by where it swings and goes on being damped ...
-_ACTIVE = 0.4  # ... and where its policy acts in every period
+_ACTIVE, _ACTIVE_WHOLE = 0.4, 0.7  # ... and where its policy acts in every period; for whole ones
 _SWING, _FAR_SWING = 0.5, 4.0  # tolerances to either side that count as one, where noise is no larger; one muscle
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
@@ -86,7 +86,8 @@ class ServoController:
         self._middle = agent.goal_range.mean(axis=1)
         self._actor = agent.actor()
         self._tracker = StateTracker(agent.window, agent.scaling)
-        tolerance = wanted.tolerance * spec.counts_per_degree * (1.0 if spec.pulses else _COARSE)
+        self._unit = wanted.tolerance * spec.counts_per_degree
+        tolerance = self._unit * (1.0 if spec.pulses else _COARSE)
         self._tolerance = tolerance
         self._near, self._still, self._most = NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
         noise = float((wanted.reading_noise * agent.simulation.error_std[:, 0]).max())
@@ -121,8 +122,9 @@ class ServoController:
         self._begin: float | None = None
         self._fresh = True
         known = wanted.ways if len(wanted.ways) == _KNOWN * spec.joints else ()
-        self._rest = [_Rest(spec.period, known[_KNOWN * j : _KNOWN * (j + 1)]) for j in range(spec.joints)]
-        self._actively, self._share = fine and not single, spec.period / _SWINGING
+        hoped = _ACTIVE if spec.pulses else _ACTIVE_WHOLE
+        self._rest = [_Rest(spec.period, hoped, known[_KNOWN * j : _KNOWN * (j + 1)]) for j in range(spec.joints)]
+        self._actively, self._share = (fine or not spec.pulses) and not single, spec.period / _SWINGING
         self._arrived = round(_ARRIVED / spec.period)
         self._spread = None if spec.pulses else Spread(spec.joints)
 
@@ -230,7 +232,7 @@ class ServoController:
             rest.near += abs(off) <= self._near or rest.near > 0
             if rest.near and self._actively:
                 if rest.near > self._arrived:
-                    rest.active.see(off / self._tolerance)
+                    rest.active.see(off / self._unit)
                 if rest.active.second:
                     rest.swings = 0
                     rest.stir(_FARTHER * self._tolerance, off * self._share if abs(off) < self._close else 0.0)
@@ -268,7 +270,8 @@ class ServoController:
         size = self.spec.possible(_SHARES[:, None] * np.abs(command[joint]))
         tried = np.zeros((len(size), *command.shape))
         tried[:, joint] = np.copysign(size, command[joint])
-        angle = self._foresight.angles(state, tried.reshape(len(tried), -1), self._after.stop)[:, self._after, joint]
+        given = tried.reshape(len(tried), 1, -1)
+        angle = self._foresight.angles(state, given, self._after.stop)[:, self._after, joint]
         rest = self._rest[joint]
         short = _WANTED * rest.error + _BESIDES * rest.bias - (angle - angle[0])
         chosen: NDArray[np.float64] = tried[np.abs(short).mean(axis=1).argmin(), joint]
@@ -281,7 +284,7 @@ class ServoController:
         """
         if self._foresight is None or not asked.any():
             return np.ones(asked.size, bool)
-        closed = np.zeros((1, 2 * asked.size))
+        closed = np.zeros((1, 1, 2 * asked.size))
         moved = np.ptp(self._foresight.angles(state, closed, self._foreseen)[0], axis=0)
         return ~asked | (moved <= self._stays)
 
@@ -308,8 +311,8 @@ class Spread:
 class _Rest:
     """How one joint is nearly at rest."""
 
-    def __init__(self, period: float, known: Sequence[float]) -> None:
-        self.damped, self.active = TwoWays(period, _DAMPED, known[:2]), TwoWays(period, _ACTIVE, known[2:])
+    def __init__(self, period: float, active: float, known: Sequence[float]) -> None:
+        self.damped, self.active = TwoWays(period, _DAMPED, known[:2]), TwoWays(period, active, known[2:])
         self.near = 0  # turns since it first was near this goal
         self.leave()
 

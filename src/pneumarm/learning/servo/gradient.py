@@ -175,15 +175,6 @@ def prices_of_pressures(task, tape, t, joint, row):  # type: ignore[no-untyped-d
         row[0, e], row[1, e], row[2, e] = price, by_one * to_share[0], by_two * to_share[1]
 
 
-@kernel
-def prices_of_all_pressures(task, tape, total):  # type: ignore[no-untyped-def]
-    """Add to ``total`` (n,) the prices of the pressures in the movements on ``tape``."""
-    for t in range(1, tape.x.shape[0]):
-        for joint in range(tape.reference.shape[1]):
-            prices_of_pressures(task, tape, t, joint, tape.row)
-            total += tape.row[0]
-
-
 @kernel(fastmath=FASTMATH)
 def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost a step to ``net.gradient``, after :func:`move_forward`; return the cost."""

@@ -8,6 +8,8 @@ from pneumarm.task.settings import TaskSettings
 
 USUAL_PERIOD = 1 / 30
 """Control period [s] (the thesis: 30 Hz) that prices and limits which count control periods are given for."""
+SOFT, STIFF = 0.25, 0.45
+"""Stiffnesses that are tried where none is asked for."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +45,15 @@ class ServoSettings(TaskSettings):
     """Price of an error for each tolerance, besides the logarithmic one of being out of precision."""
     change: float = 0.15
     """Price of opening or closing a valve, at 30 Hz; at other rates as much in errors times seconds."""
-    stiffness: float = 0.25
+    stiffness: float | None = None
     """Share of the range of pressures that both muscles are to keep where a goal stays, as far as its angle allows;
     on average, or somewhat more, while a reference moves.
 
-    Pressure in both makes a joint stiff, damps it, and makes a pulse move it less.
+    Pressure in both makes a joint stiff, damps it, and makes a pulse move it less; it also takes more air to move. By
+    default every other agent keeps 0.25, which is fast, and the others 0.45, and the better one in simulation is
+    chosen; one that then does not settle on its arm is made anew with the higher one.
     """
-    slack: float = 2.0
+    slack: float = 6.0
     """Price of the pressure that a muscle is short of that, by the whole range of pressures."""
     cocontraction: float = 6.0
     """Price of the mean pressure of a joint's muscles while its reference moves, as far as it is below that share or
@@ -90,7 +94,7 @@ class ServoSettings(TaskSettings):
             "change": 0 <= self.change < math.inf,
             "slack": 0 <= self.slack < math.inf or "0 or more",
             "cocontraction": 0 <= self.cocontraction < math.inf or "0 or more",
-            "stiffness": 0 <= self.stiffness <= 1 or "0 to 1",
+            "stiffness": self.stiffness is None or 0 <= self.stiffness <= 1 or "0 to 1",
             "dead": 0 <= self.dead < 1,
             "coarse": self.coarse is None or 0 <= self.coarse <= 0.5 or "0 to 0.5 periods",
             "known": 0 <= self.known <= 1,

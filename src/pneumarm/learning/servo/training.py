@@ -13,12 +13,11 @@ from pneumarm.learning.servo.gradient import (
     errors_of,
     learn_once,
     move_forward,
-    prices_of_all_pressures,
     tape,
 )
 from pneumarm.learning.servo.price import prices_of_errors
 from pneumarm.learning.servo.references import draw_references
-from pneumarm.learning.servo.settings import USUAL_PERIOD, ServoSettings
+from pneumarm.learning.servo.settings import SOFT, STIFF, USUAL_PERIOD, ServoSettings
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
 from pneumarm.networks.layers import adam, initial_weights, split, trainable
 from pneumarm.simulation.simulation import Simulation
@@ -81,6 +80,8 @@ class ServoLearner(Learner[ServoAgent]):
         policy: NDArray[np.float32] | None = None,
     ) -> None:
         super().__init__()
+        if settings.stiffness is None:
+            settings = replace(settings, stiffness=(SOFT, STIFF)[number % 2])
         self.simulation, self.settings, self._begin = simulation, settings, begin
         self._seed, self._number = seed, number
         self.task = servo_task(simulation, settings)
@@ -131,7 +132,8 @@ class ServoLearner(Learner[ServoAgent]):
     def validate(self, episodes: int) -> Movements:
         """Return movements in which references are followed, the same for all learners.
 
-        ``reward`` is what they cost, negative; ``success`` whether they stayed within tolerance in the last third.
+        ``reward`` is what errors and changes of valves cost, negative: what pressures cost only shapes learning, and
+        soft and stiff joints are compared. ``success`` whether they stayed within tolerance in the last third.
         """
         joints, steps = self.simulation.window.joints, len(self.tape.slope)
         parts = []
@@ -147,7 +149,7 @@ class ServoLearner(Learner[ServoAgent]):
             made.actions[:], made.switches[:] = steps, changes.T
             prices = self.task.prices
             cost = prices_of_errors(prices, error).sum(axis=(0, 1))
-            made.reward[:] = -cost - prices.change * changes.sum(axis=0) - self._pressures()
+            made.reward[:] = -cost - prices.change * changes.sum(axis=0)
             made.success[:] = (np.abs(error[-steps // 3 :]) <= 1).all(axis=(0, 1))
             parts.append(made)
         return Movements(*(np.concatenate(columns)[:episodes] for columns in zip(*parts, strict=True)))
@@ -197,7 +199,8 @@ class ServoLearner(Learner[ServoAgent]):
         another question on an arm that is hard to keep from swinging than on a slow one.
         """
         paid, share = (1.0, 1.0) if self.price_all_along else (min(self.share / _FREE, 1.0), self.share)
-        rise = _STEEPEST_LAST[self._number % len(_STEEPEST_LAST)] / _STEEPEST
+        turn = self._number + self._number // 2  # of four agents every pair is one of stiffness and limit
+        rise = _STEEPEST_LAST[turn % len(_STEEPEST_LAST)] / _STEEPEST
         return self.task._replace(
             commands=self.task.commands._replace(coarse=0.0),  # a policy that learns with coarse ones does worse
             prices=self.task.prices._replace(change=paid * self.task.prices.change),
@@ -213,12 +216,6 @@ class ServoLearner(Learner[ServoAgent]):
         window, scaling = self.simulation.window, self.simulation.scaling
         offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
         return angle * scale[:, :1] + offset[:, :1]
-
-    def _pressures(self) -> NDArray[np.float64]:
-        """Return the price of the pressures in the movements on the tape, shape (n,)."""
-        total = np.zeros(self.settings.arms)
-        prices_of_all_pressures(self.task, self.tape, total)
-        return total
 
     def _valve_changes(self) -> NDArray[np.int64]:
         """Return how often valves opened or closed in the movements on the tape, shape (joints, n)."""

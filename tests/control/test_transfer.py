@@ -17,8 +17,9 @@ from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.virtual import StuckValve, VirtualArm
 from pneumarm.control import TransferSettings, put_back, read_history, transfer, transfer_into
 from pneumarm.errors import ArmFailure, UnusableInput
-from pneumarm.learning import Adapts, Agent, AnyAgent, PolicyAgent, PolicySettings, train
+from pneumarm.learning import Agent, AnyAgent, PolicyAgent, PolicySettings, train
 from pneumarm.learning.servo import ServoAgent, ServoSettings
+from pneumarm.learning.servo.settings import SOFT, STIFF
 from pneumarm.simulation import Simulation
 from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, Store, collect
@@ -177,7 +178,7 @@ def test_who_does_not_settle_learns_on_from_the_recording_and_its_movements(
 
 
 def test_of_versions_that_learned_thoroughly_the_better_ones_stay(servo: AnyAgent, small_run: Path) -> None:
-    assert isinstance(servo, Adapts)
+    assert isinstance(servo, ServoAgent)
     with Store.open(small_run / "transitions.db") as store:
         rows = next(iter(store.blocks(kinds=KINDS)))
         first = rows.where(rows.sequence < np.unique(rows.sequence)[8])
@@ -195,6 +196,9 @@ def test_of_versions_that_learned_thoroughly_the_better_ones_stay(servo: AnyAgen
             for one in adapting, again:
                 one.prefer()
                 assert one.version == (0 if worse else 1)
+                assert isinstance(one.agent, ServoAgent)
+                assert one.agent.settings.stiffness == (SOFT if worse else STIFF)  # it was made anew
+                assert (one.agent.policy != servo.policy).any() != worse
                 assert (one.events[-1].what == "rolled back") == worse
 
 

@@ -74,7 +74,7 @@ class ServoAgent(NetworkAgent):
         return self.revised(simulation, tuned_servo(self.policy, simulation, begin, tuned, seed))
 
     def stiffer(self) -> Self:
-        """Return the servo with muscles to keep more pressure where it learns on, unless another one was asked for."""
+        """Return the servo with muscles to keep more pressure where it learns on, unless another was asked for."""
         wanted = self.settings.stiffness
         return replace(self, settings=replace(self.settings, stiffness=STIFF if wanted in (None, SOFT) else wanted))
 

@@ -42,7 +42,7 @@ def test_it_foresees_what_the_simulation_says(joints: int, history: int):
     observation = np.tile([500.0, 0.0, 80.0, 110.0], joints) + random.normal(0, 3, 4 * joints)
     sigma = np.concatenate([np.tile(observation, history), np.zeros((history - 1) * window.command_size)])
     commands = np.vstack([np.zeros(2 * joints), random.uniform(-1, 1, 2 * joints)])
-    foreseen = Foresight(simulation).angles(scaled_state(sigma, window, simulation.scaling), commands[:, None], 4)
+    foreseen = Foresight(simulation).angles(scaled_state(sigma, window, simulation.scaling), commands, 4)
     for command, angles in zip(commands, foreseen, strict=True):
         state, given = sigma.copy(), command
         for angle in angles:

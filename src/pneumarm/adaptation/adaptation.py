@@ -329,11 +329,13 @@ class Adaptation:
         size = plastic(self._origin).size
         if numbers.size != 2 * size or not np.isfinite(numbers).all():
             raise UnusableInput("the state of the adaptation is damaged or of another agent; begin another folder")
-        self.agent, self._trusted = (with_plastic(self._origin, part) for part in np.split(numbers, 2))
-        if self._stiff and isinstance(self.agent, Stiffens):
-            self.agent = self.agent.stiffer()
-        if self._trusted_stiff and isinstance(self._trusted, Stiffens):
-            self._trusted = self._trusted.stiffer()
+        now, trusted = np.split(numbers, 2)
+        self.agent, self._trusted = self._restored(now, self._stiff), self._restored(trusted, self._trusted_stiff)
+
+    def _restored(self, numbers: NDArray[np.float64], stiff: bool) -> Adapts:
+        """Return the agent that had these ``numbers`` of :func:`plastic` and was made anew to be ``stiff``, or not."""
+        origin = self._origin
+        return with_plastic(origin.stiffer() if stiff and isinstance(origin, Stiffens) else origin, numbers)
 
 
 def adaptation_of(agent: Acts, settings: AdaptationSettings, seed: int = 0) -> Adaptation | None:

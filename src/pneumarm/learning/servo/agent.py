@@ -74,12 +74,15 @@ class ServoAgent(NetworkAgent):
         return self.revised(simulation, tuned_servo(self.policy, simulation, begin, tuned, seed))
 
     def stiffer(self) -> Self:
-        """Return the servo with muscles to keep more pressure where it learns on, unless another was asked for."""
+        """Return the servo to keep :data:`.STIFF` of the range of pressures where it learns on.
+
+        One of which another stiffness than the usual :data:`.SOFT` was asked for stays as it is.
+        """
         wanted = self.settings.stiffness
         return replace(self, settings=replace(self.settings, stiffness=STIFF if wanted in (None, SOFT) else wanted))
 
     def anew(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
-        """Return the servo trained from the beginning in ``simulation``."""
+        """Return the servo trained from the beginning in ``simulation``; how coarse its commands are stays."""
         from pneumarm.learning.servo.training import train_servo  # which imports this module
 
         return self.revised(simulation, train_servo(simulation, begin, self.settings, seed).agent.policy)

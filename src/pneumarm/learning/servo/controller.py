@@ -28,7 +28,7 @@ _SURE = 0.065  # tolerances of noise that may be left in that average
 _ANSWERED = 3.0  # as many times the noise that is left is an error
 _SWINGS = 3  # from one side of the goal to the other, after which the joint swings
 _DAMPED = 0.7  # tolerances that a joint is hoped to be off by where it swings and goes on being damped ...
-_ACTIVE, _ACTIVE_WHOLE = 0.4, 0.7  # ... and where its policy acts in every period; for whole ones
+_ACTIVE, _ACTIVE_WHOLE = 0.4, 0.7  # ... and where its policy acts in every period; where valves know no shorter ones
 _SWING, _FAR_SWING = 0.5, 4.0  # tolerances to either side that count as one, where noise is no larger; one muscle
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
@@ -270,8 +270,7 @@ class ServoController:
         size = self.spec.possible(_SHARES[:, None] * np.abs(command[joint]))
         tried = np.zeros((len(size), *command.shape))
         tried[:, joint] = np.copysign(size, command[joint])
-        given = tried.reshape(len(tried), 1, -1)
-        angle = self._foresight.angles(state, given, self._after.stop)[:, self._after, joint]
+        angle = self._foresight.angles(state, tried.reshape(len(tried), -1), self._after.stop)[:, self._after, joint]
         rest = self._rest[joint]
         short = _WANTED * rest.error + _BESIDES * rest.bias - (angle - angle[0])
         chosen: NDArray[np.float64] = tried[np.abs(short).mean(axis=1).argmin(), joint]
@@ -284,7 +283,7 @@ class ServoController:
         """
         if self._foresight is None or not asked.any():
             return np.ones(asked.size, bool)
-        closed = np.zeros((1, 1, 2 * asked.size))
+        closed = np.zeros((1, 2 * asked.size))
         moved = np.ptp(self._foresight.angles(state, closed, self._foreseen)[0], axis=0)
         return ~asked | (moved <= self._stays)
 

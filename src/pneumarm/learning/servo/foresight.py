@@ -18,12 +18,12 @@ class Foresight:
         self._state = simulation_state(self._parameters, random_states(0, 1)[0])
         self._scale = window.of_joints(scaling.observation_scale)[:, 0]
         self._offset = window.of_joints(scaling.observation_offset)[:, 0]
-        self.angles(np.zeros(window.state_size, np.float32), np.zeros((1, 1, window.command_size)), 1)
+        self.angles(np.zeros(window.state_size, np.float32), np.zeros((1, window.command_size)), 1)
 
     def angles(self, state: NDArray[np.float32], commands: ArrayLike, steps: int) -> NDArray[np.float64]:
         """Return the angles (n, steps, joints) [counts] in the periods after the scaled ``state`` (state_size,).
 
-        In the first of them each of the ``commands`` (n, given, 2 joints) is given, and none in the others.
+        In the first of them each of the ``commands`` (n, 2 joints) is given, and none in the others.
         """
         commands = np.asarray(commands, np.float32)
         angle = np.zeros((len(commands), steps, len(self._scale)), np.float32)
@@ -33,12 +33,12 @@ class Foresight:
 
 @kernel
 def _roll(simulation, state, begin, commands, angle):  # type: ignore[no-untyped-def]
-    closed = np.zeros(commands.shape[2], np.float32)
+    closed = np.zeros(commands.shape[1], np.float32)
     for c in range(commands.shape[0]):
         for i in range(begin.shape[0]):
             state.x[i] = begin[i]
         for step in range(angle.shape[1]):
-            command = commands[c, step] if step < commands.shape[1] else closed
+            command = commands[c] if step == 0 else closed
             put_command(simulation, state.x, command)
             predict_change(simulation, state)
             push(simulation, state.x, state.change, command)

@@ -333,7 +333,7 @@ class Adaptation:
         self.agent, self._trusted = self._restored(now, self._stiff), self._restored(trusted, self._trusted_stiff)
 
     def _restored(self, numbers: NDArray[np.float64], stiff: bool) -> Adapts:
-        """Return the agent that had these ``numbers`` of :func:`plastic` and was made anew to be ``stiff``, or not."""
+        """Return the agent that had these ``numbers`` of :func:`plastic` and was made anew, ``stiff``, or not."""
         origin = self._origin
         return with_plastic(origin.stiffer() if stiff and isinstance(origin, Stiffens) else origin, numbers)
 

@@ -9,7 +9,7 @@ from pneumarm.task.settings import TaskSettings
 USUAL_PERIOD = 1 / 30
 """Control period [s] (the thesis: 30 Hz) that prices and limits which count control periods are given for."""
 SOFT, STIFF = 0.25, 0.45
-"""Stiffnesses that are tried where none is asked for, in shares of the range of pressures (docs/decisions/servo.md)."""
+"""Stiffnesses that are tried where none is asked for, shares of the range of pressures (docs/decisions/servo.md)."""
 
 
 @dataclass(frozen=True)

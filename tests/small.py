@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from pneumarm.cli import main as command_line
-from pneumarm.learning import Shaping, TrainSettings
+from pneumarm.learning import ServoSettings, Shaping, TrainSettings
 from pneumarm.run import Run, RunSettings, RunTransferSettings
 from pneumarm.simulation import FitSettings
 
@@ -25,8 +25,9 @@ SMALL = RunSettings(
 
 
 def servo_on(arm: str, folder: Path) -> dict[str, Any]:
-    """Return the results of the whole job with the default agent on ``arm``, done in ``folder``."""
-    return Run(folder, replace(SMALL, arm=arm, bound_episodes=0, method="servo", test_episodes=50)).do()
+    """Return the results of the whole job with the default agent on ``arm``, learned in short, done in ``folder``."""
+    servo = ServoSettings(updates=400)
+    return Run(folder, replace(SMALL, arm=arm, bound_episodes=0, method="servo", servo=servo, test_episodes=50)).do()
 
 
 def exit_status(arguments: list[str]) -> int | str | None:

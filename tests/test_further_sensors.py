@@ -13,7 +13,7 @@ import pneumarm.errors
 import pneumarm.gym
 from pneumarm.arm import open_arm
 from pneumarm.cli import main
-from pneumarm.learning import PolicySettings, load_agent
+from pneumarm.learning import ServoSettings, load_agent
 from pneumarm.run import Run, RunSettings, RunTransferSettings
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import Store
@@ -28,7 +28,7 @@ SETTINGS = RunSettings(
     test_episodes=100,
     bound_episodes=3,
     fit=FitSettings(epochs=6, sensors=("velocity", "temperature")),
-    policy=PolicySettings(agents=1, updates=12, arms=64, validation_episodes=50, lookahead=16),
+    servo=ServoSettings(agents=1, updates=100, arms=32, validation_movements=50),
     transfer=RunTransferSettings(episodes=12, test_episodes=5),
 )
 

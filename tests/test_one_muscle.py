@@ -15,7 +15,7 @@ from pneumarm.classical import tune
 from pneumarm.control import Monitor
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.gym import point_to_point
-from pneumarm.learning import load_agent
+from pneumarm.learning import PolicySettings, load_agent
 from pneumarm.planning import PlanSettings
 from pneumarm.planning.search import problem
 from pneumarm.run import Run
@@ -107,7 +107,9 @@ def test_its_servo_says_nothing_to_the_other_muscle(run):
 @pytest.mark.parametrize("method", ["policy", "sarsa", "batched"])
 def test_reaching_agents_have_three_actions(tmp_path, method):
     folder = tmp_path / "run"
-    results = Run(folder, replace(SMALL, arm=VIRTUAL, bound_episodes=0, method=method, transitions=3_000)).do()
+    policy = PolicySettings(updates=20, arms=64, validation_episodes=50)
+    small = replace(SMALL, arm=VIRTUAL, bound_episodes=0, method=method, policy=policy, transitions=3_000)
+    results = Run(folder, small).do()
     assert results["transfer"]["counts"]["before"]["interventions"]["nonsense"] == 0
     agent = load_agent(folder / "agent.safetensors")
     actor, random, found = agent.actor(), np.random.default_rng(2), set()

@@ -17,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from children import child, end, python
-from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
+from pneumarm.arm import ControlCycle, GuardedArm, Reading, Step, guarded, open_arm
 from pneumarm.arm.serial.emulate import serve
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import Monitor, TransferSettings, transfer_into
@@ -63,20 +63,24 @@ def test_an_arm_is_served_until_it_is_interrupted_and_leaves_nothing(tmp_path: P
 
 
 def test_a_controller_that_does_not_come_back_is_waited_for_with_the_arm_vented(tmp_path: Path) -> None:
-    thoughts = iter([0.0] * 10 + [1.5] + [0.0] * 10)  # s; the dead-man would have vented and disarmed after a quarter
-    pressures = []
+    def moved() -> tuple[GuardedArm, list[float], list[Step]]:
+        thoughts = iter([0.0] * 10 + [1.5] + [0.0] * 10)  # s; the dead-man would have vented after a quarter
+        pressures = []
 
-    def decide(reading: Reading) -> NDArray[np.int8] | None:
-        thought = next(thoughts, None)
-        if thought is None:
-            return None
-        pressures.append(float(reading.pressure[0, 0]))
-        sleep(thought)
-        return np.array([[1, 0]], np.int8)
+        def decide(reading: Reading) -> NDArray[np.int8] | None:
+            thought = next(thoughts, None)
+            if thought is None:
+                return None
+            pressures.append(float(reading.pressure[0, 0]))
+            sleep(thought)
+            return np.array([[1, 0]], np.int8)
 
-    with port(tmp_path / "arm.port"), open_arm(f"serial:{tmp_path / 'arm.port'}") as arm:
-        guard = guarded(arm)
-        steps = list(ControlCycle(guard).run(decide))
+        with open_arm(f"serial:{tmp_path / 'arm.port'}") as arm:
+            guard = guarded(arm)
+            return guard, pressures, list(ControlCycle(guard).run(decide))
+
+    with port(tmp_path / "arm.port"):
+        guard, pressures, steps = persistent(moved)
     assert len(steps) == 22
     assert pressures[10] > 40  # it was inflated,
     assert pressures[11] < 5  # and is empty when the controller is back,

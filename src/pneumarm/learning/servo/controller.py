@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.reference import Reference, constant
-from pneumarm.arm.seam import Reading, checked
+from pneumarm.arm.seam import ArmSpec, Reading, checked
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.correction import Correction, features_of
@@ -29,6 +29,7 @@ _ANSWERED = 3.0  # as many times the noise that is left is an error
 _SWINGS = 3  # from one side of the goal to the other, after which the joint swings
 _DAMPED = 0.7  # tolerances that a joint is hoped to be off by where it swings and goes on being damped ...
 _ACTIVE, _ACTIVE_WHOLE = 0.4, 0.7  # ... and where its policy acts in every period; where valves know no shorter ones
+_COUNTS_WHOLE = 2.0  # most tolerances of an error that count there: one late arrival says nothing of rest
 _SWING, _FAR_SWING = 0.5, 4.0  # tolerances to either side that count as one, where noise is no larger; one muscle
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _STILL = 0.3  # tolerances that the average of half of them may differ from that of the other half
@@ -122,8 +123,7 @@ class ServoController:
         self._begin: float | None = None
         self._fresh = True
         known = wanted.ways if len(wanted.ways) == _KNOWN * spec.joints else ()
-        hoped = _ACTIVE if spec.pulses else _ACTIVE_WHOLE
-        self._rest = [_Rest(spec.period, hoped, known[_KNOWN * j : _KNOWN * (j + 1)]) for j in range(spec.joints)]
+        self._rest = [_Rest(spec, known[_KNOWN * j : _KNOWN * (j + 1)]) for j in range(spec.joints)]
         self._actively, self._share = (fine or not spec.pulses) and not single, spec.period / _SWINGING
         self._arrived = round(_ARRIVED / spec.period)
         self._spread = None if spec.pulses else Spread(spec.joints)
@@ -310,8 +310,13 @@ class Spread:
 class _Rest:
     """How one joint is nearly at rest."""
 
-    def __init__(self, period: float, active: float, known: Sequence[float]) -> None:
-        self.damped, self.active = TwoWays(period, _DAMPED, known[:2]), TwoWays(period, active, known[2:])
+    def __init__(self, spec: ArmSpec, known: Sequence[float]) -> None:
+        period, ways = spec.period, known[2:]
+        self.damped = TwoWays(period, _DAMPED, known[:2])
+        if spec.pulses:
+            self.active = TwoWays(period, _ACTIVE, ways)
+        else:
+            self.active = TwoWays(period, _ACTIVE_WHOLE, ways, _COUNTS_WHOLE)
         self.near = 0  # turns since it first was near this goal
         self.leave()
 

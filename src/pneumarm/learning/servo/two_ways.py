@@ -9,19 +9,18 @@ from collections.abc import Sequence
 
 _TRIED = 1.0  # s that one way is tried for
 _BEFORE = 0.5  # share of it that may be owed to what was before
-_MOST = 5.0  # tolerances of an error that count
 _LEARNED, _FORGOTTEN = 0.3, 0.02  # share of what is known of a way that a try of it replaces, and one of the other
 
 
 class TwoWays:
     """What is known of both ways; it is kept from movement to movement."""
 
-    def __init__(self, period: float, hoped: float, known: Sequence[float] = ()) -> None:
+    def __init__(self, period: float, hoped: float, known: Sequence[float] = (), most: float = 5.0) -> None:
         """Begin to learn, with a control ``period`` [s]; the second is ``hoped`` to be so many tolerances off.
 
-        ``known`` is what was :attr:`known` before, if anything was.
+        ``known`` is what was :attr:`known` before, if anything was; ``most`` tolerances of an error count at most.
         """
-        self._hoped = hoped
+        self._hoped, self._most = hoped, most
         self._off = list(known) or [0.0, hoped]
         self._turns = max(4, round(_TRIED / period))
         self._errors: list[float] = []
@@ -43,7 +42,7 @@ class TwoWays:
 
     def see(self, error: float) -> None:
         """Note the ``error`` [tolerances] of a joint that is treated in the better way."""
-        self._errors.append(min(abs(error), _MOST))
+        self._errors.append(min(abs(error), self._most))
         if len(self._errors) == self._turns:
             late = self._errors[round(_BEFORE * self._turns) :]
             way, mean = self.second, sum(late) / len(late)

@@ -312,6 +312,7 @@ def test_an_agent_of_another_library_is_tested_and_transferred(
     assert (out / "adapted.safetensors").read_bytes() == file.read_bytes()  # it cannot learn here
 
 
+@pytest.mark.long
 def test_the_commands_and_the_program_of_the_readme_run(tmp_path: Path) -> None:
     found = commands("sh")
     assert len(found) >= 7

@@ -150,6 +150,7 @@ def killed_in(stage: str, folder: Path, after: float) -> None:
         end(process, signal.SIGKILL)
 
 
+@pytest.mark.long
 def test_a_run_killed_in_every_stage_ends_as_if_nothing_had_happened(small_run: Path, tmp_path: Path) -> None:
     folder = tmp_path / "killed"
     for stage, after in zip(STAGES, (0.1, 0.3, 0.3, 0.05, 0.2, 0.1), strict=True):

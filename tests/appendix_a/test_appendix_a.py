@@ -17,6 +17,7 @@ from pneumarm.control import Monitor
 from pneumarm.transitions import WHOLE_PERIODS, Store, collect
 
 
+@pytest.mark.long
 def test_every_error_is_revealed_and_named(capsys, tmp_path):
     with pytest.raises(SystemExit) as ended:
         main(

@@ -99,7 +99,7 @@ def test_of_two_ways_the_second_is_taken_where_it_is_seen_to_be_nearer():
     worse = seconds(TwoWays(PERIOD, 0.7), 1.5, 4.0, 120)
     assert any(worse)
     assert np.mean(worse) < 0.1
-    late = [TwoWays(PERIOD, 0.7, most=most) for most in (5.0, 2.0)]
+    late = [TwoWays(PERIOD, 0.7, most=most) for most in (5.0, 1.5)]
     assert [seconds(ways, 4.0, 0.5, 1.0)[-1] for ways in late] == [True, False]  # one goal come to late is not enough
     assert all(seconds(ways, 4.0, 0.5, 5.0)[-1] for ways in late)
 

@@ -149,6 +149,16 @@ def test_a_stop_vents_and_stays_until_it_is_released(played: Played) -> None:
     assert "release" in played.screen.state["notice"]
 
 
+def test_a_stop_outlasts_a_board_that_has_vented_by_itself(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pneumarm.live.session.behind", lambda *_: played.virtual)  # which has no board
+
+    def not_heard() -> None:
+        raise ArmFailure("this computer was too busy")
+
+    played.run((0.1, Goal([15.0])), (1.0, not_heard), (2.0, Stop()), (3.0, not_heard), (4.0, Goal([0.0])), until=5.0)
+    assert [mode for _, mode, _ in played.modes][1:] == ["relaxed", "stopped", "stopped", "stopped"]
+
+
 def test_hold_stays_where_the_arm_is_and_relax_lets_the_air_out(played: Played) -> None:
     played.run((0.1, Goal([20.0])), (0.4, Hold()), (4.0, Relax()), until=7.0)
     assert played.arm.at(3.9) == pytest.approx(played.arm.at(0.45), abs=6)

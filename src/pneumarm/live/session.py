@@ -274,7 +274,10 @@ class Session:
         self._tell()
 
     def _only_vented(self, why: str) -> bool:
-        """Take up an arm again that its board has vented because this computer was too slow to be heard."""
+        """Take up an arm again that its board has vented because this computer was too slow to be heard.
+
+        Who has stopped it meant that it stays so.
+        """
         board = behind(self.arm, SerialArm)
         if board is None:
             return False
@@ -282,7 +285,8 @@ class Session:
             board.make_ready()
         except (PneumarmError, OSError):
             return False
-        self._vent_all(Mode.RELAXED, why)
+        if self.mode is not Mode.STOPPED:
+            self._vent_all(Mode.RELAXED, why)
         return True
 
     def _wait_for_release(self) -> None:

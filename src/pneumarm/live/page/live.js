@@ -15,6 +15,14 @@ function send(order) {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(order));
 }
 
+// No stop is lost: without a connection it is sent as soon as there is one.
+let toStop = false;
+function stop() {
+  toStop = socket?.readyState !== WebSocket.OPEN;
+  if (toStop) notify("Not connected: the stop is sent as soon as this page is. Use the switch at the arm.");
+  send({ do: "stop" });
+}
+
 const writes = () => state !== null && state.writer === state.you;
 
 function beat() {
@@ -36,6 +44,7 @@ function connect() {
     if (message.frame?.angle) showFrame(message.frame);
     if (message.state) {
       showState(message.state);
+      if (first && toStop) stop();
       if (first && message.state.writer === null) send({ do: "take" });
       first = false;
       again = 500;
@@ -298,15 +307,16 @@ const paper = new Paper($("paper"), (seconds, values) => {
 
 // On pressing, not on letting go: a stop is to be quick.
 const stopped = () => state?.mode === "stopped" || state?.mode === "failed";
-$("stop").addEventListener("pointerdown", () => { if (!stopped()) send({ do: "stop" }); else pressedStopped = true; });
+$("stop").addEventListener("pointerdown", () => { if (!stopped()) stop(); else pressedStopped = true; });
 let pressedStopped = false;
 $("stop").addEventListener("click", (event) => {
-  if (event.detail === 0) send({ do: stopped() ? "release" : "stop" }); // by the keyboard
+  if (event.detail === 0 && !stopped()) stop(); // by the keyboard
+  else if (event.detail === 0) send({ do: "release" });
   else if (pressedStopped) send({ do: "release" });
   pressedStopped = false;
 });
 addEventListener("keydown", (event) => {
-  if (event.key === "Escape" && !stopped()) send({ do: "stop" });
+  if (event.key === "Escape" && !stopped()) stop();
 });
 $("hold").onclick = () => send({ do: "hold" });
 $("relax").onclick = () => send({ do: "relax" });

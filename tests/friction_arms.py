@@ -7,6 +7,7 @@ bend before it slips (P. R. Dahl, 1968; C. Canudas de Wit et al., IEEE Trans. Au
 """
 
 import math
+from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -136,7 +137,7 @@ class FrictionArm(Arm):
         self._pressure = np.full((joints, 2), _ATMOSPHERE)
         self._valves = np.zeros((joints, 2))
         self._dead = np.array([[muscle.dead for muscle in pair] for pair in self._muscles])
-        self._told: list[tuple[float, NDArray[np.float64]]] = []
+        self._told: deque[tuple[float, NDArray[np.float64]]] = deque()  # what not all valves have answered yet
 
     def read(self) -> Reading:
         low, high = self.spec.angle_range
@@ -150,7 +151,7 @@ class FrictionArm(Arm):
         return Reading(self._time, *said)
 
     def set_valves(self, valves: NDArray[np.int8]) -> None:
-        self._told = [*self._told[-8:], (self._time, np.array(valves, np.float64))]
+        self._told.append((self._time, np.array(valves, np.float64)))
 
     def wait(self, seconds: float) -> None:
         end = self._time + seconds
@@ -159,6 +160,8 @@ class FrictionArm(Arm):
             for since, valves in self._told:
                 answered = self._time >= since + self._dead - _CHUNK / 2
                 self._valves = np.where(answered, valves, self._valves)
+            while self._told and (self._time >= self._told[0][0] + self._dead - _CHUNK / 2).all():
+                self._told.popleft()
             for j, joint in enumerate(self._joints):
                 _advance(
                     joint, self._muscles[j], self._valves[j], self._state[j], self._pressure[j], self._supply, step

@@ -1,4 +1,4 @@
-"""A store becomes a dataset of LeRobot, which is imported again, or of Minari, as their formats say."""
+"""A store becomes what LeRobot, Minari and Rerun read, and a dataset of LeRobot is imported again."""
 
 import json
 import sys
@@ -140,6 +140,26 @@ def test_a_dataset_of_minari_is_opened_by_minari(exportable: Path, tmp_path: Pat
         assert dataset.action_space.contains(found.actions[0])
 
 
+def test_the_viewer_of_rerun_reads_it_in_degrees_and_bar(exportable: Path, tmp_path: Path) -> None:
+    chunk = pytest.importorskip("rerun.chunk", reason="rerun is not installed: pip install --editable '.[rerun]'")
+    with Store.open(exportable) as store:
+        exported = export_recording(store, tmp_path / "arm.rrd")
+        rows, spec = joined(store.blocks()), store.spec
+    assert (exported.rows, exported.mapping) == (len(rows), None)
+    reader = chunk.RrdReader(tmp_path / "arm.rrd")
+    assert len(reader.recordings()) == len(reader.blueprints()) == 1
+    series = dict[str, list[Any]]()
+    for one in reader.stream().to_chunks():
+        if not one.is_static:
+            batch = one.to_record_batch()
+            values = batch.column(batch.schema.names.index("Scalars:scalars")).to_pylist()
+            series.setdefault(one.entity_path, []).extend(values)
+    assert {f"/{name}" for name in rows.measured} <= set(series)
+    np.testing.assert_allclose(np.ravel(series["/joint_1/angle"]), spec.degrees(rows.angle)[:, 0])
+    np.testing.assert_allclose(series["/joint_1/pressure"], spec.bar(rows.pressure)[:, 0])
+    np.testing.assert_array_equal(series["/joint_1/valves"], rows.command[:, 0])
+
+
 def test_what_is_there_is_not_overwritten_and_what_is_missing_is_named(
     exportable: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,8 +168,10 @@ def test_what_is_there_is_not_overwritten_and_what_is_missing_is_named(
             (tmp_path / name).mkdir()
             with pytest.raises(UnusableInput, match="exists already"):
                 export_recording(store, tmp_path / name)
-        for name, library in (("b.parquet", "pyarrow"), ("b.lerobot", "pyarrow"), ("b.minari", "h5py")):
+        missing = {"b.parquet": "pyarrow", "b.lerobot": "pyarrow", "b.minari": "h5py", "b.rerun": "rerun"}
+        for name, library in missing.items():
             monkeypatch.setitem(sys.modules, library, None)
+            file = tmp_path / name.replace(".rerun", ".rrd")
             with pytest.raises(UnusableInput, match=rf"needs {library}: pip install 'pneumarm\[{name[2:]}\]'"):
-                export_recording(store, tmp_path / name)
-            assert not (tmp_path / name).exists()
+                export_recording(store, file)
+            assert not file.exists()

@@ -19,7 +19,7 @@ from pneumarm.transitions.schema import is_store
 
 
 def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Json = False) -> None:
-    """Export a recording (CSV, Parquet, LeRobot, Minari) or an agent (ONNX, C) for other programs.
+    """Export a recording (CSV, Parquet, LeRobot, Minari, Rerun) or an agent (ONNX, C) for other programs.
 
     Parameters
     ----------
@@ -27,8 +27,9 @@ def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Jso
         The store, or the agent.
     out
         What to write. Of a store: .csv or .parquet (beside it lies arm.csv.toml, by which it is imported again),
-        .lerobot (a folder, LeRobot's format v3.0) or .minari (a folder). Of an agent: .onnx, its network and scaling,
-        or .c, the same as C99 that needs no library, of one that settles, holds and tracks.
+        .lerobot (a folder, LeRobot's format v3.0), .minari (a folder) or .rrd (to be looked at with Rerun). Of an
+        agent: .onnx, its network and scaling, or .c, the same as C99 that needs no library, of one that settles,
+        holds and tracks.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """

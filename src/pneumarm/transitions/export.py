@@ -1,8 +1,9 @@
-"""Export a store for other programs: CSV, Parquet, a dataset of LeRobot or of Minari.
+"""Export a store for other programs: CSV, Parquet, a dataset of LeRobot or of Minari, a recording for Rerun.
 
 A row is a reading and the command that followed it, all in sensor units as they are stored: counts, counts/ms,
-m/s2, Celsius. Marked rows are left out, which leaves a gap in the times. Beside the file, or in the dataset of
-LeRobot, lies the mapping with which ``pneumarm import`` reads it; whether a sequence began at rest is not in it.
+m/s2, Celsius; only for Rerun, which is looked at, in degrees and bar. Marked rows are left out, which leaves a gap in
+the times. Beside the file, or in the dataset of LeRobot, lies the mapping with which ``pneumarm import`` reads it;
+whether a sequence began at rest is not in it.
 """
 
 import csv
@@ -20,10 +21,11 @@ from pneumarm.files import as_toml, require_folder, write_text, written_whole
 from pneumarm.transitions.lerobot import export_lerobot
 from pneumarm.transitions.minari import export_minari
 from pneumarm.transitions.recording import mapping_beside
+from pneumarm.transitions.rerun import export_rerun
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 
-FORMATS = (".csv", ".parquet", ".lerobot", ".minari")
+FORMATS = (".csv", ".parquet", ".lerobot", ".minari", ".rrd")
 """What can be written, by the end of the file's name."""
 _ANYTHING = (-1e9, 1e9)
 """Range in the mapping: what was recorded has been checked."""
@@ -53,6 +55,8 @@ def export_recording(store: Store, path: Path) -> Exported:
         raise UnusableInput(f"{path}: a store is exported to a name that ends in {' or '.join(FORMATS)}")
     if path.suffix == ".minari":
         return Exported(**export_minari(store, path), mapping=None)
+    if path.suffix == ".rrd":
+        return Exported(**export_rerun(store, path), mapping=None)
     if path.suffix == ".lerobot":
         counts = export_lerobot(store, path, _mapping(store, "episode_index", "observation.time"))
         return Exported(**counts, mapping=str(mapping_beside(path)))

@@ -62,11 +62,13 @@ def _send(library: Any, recording: Any, rows: Rows, store: Store, first: int) ->
 
 
 def _blueprint(views: Any, store: Store) -> Any:
-    """Return what stands where on the screen: a row a joint, what further sensors said below."""
+    """Return what stands where on the screen: joint beside joint, and below what further sensors said."""
     words = {"angle": "angle [degrees]", "pressure": "pressure [bar]", "valves": "valves: in +1, out -1"}
     joints = []
-    for here in (f"joint_{j}" for j in range(1, store.joints + 1)):
-        shown = (views.TimeSeriesView(origin=f"{here}/{what}", name=said) for what, said in words.items())
-        joints.append(views.Vertical(*shown, name=here.replace("_", " ")))
-    further = [views.TimeSeriesView(origin=name, name=name) for name in store.further]
-    return views.Blueprint(views.Vertical(views.Horizontal(*joints), *further))
+    for joint in range(1, store.joints + 1):
+        origins = {f"joint_{joint}/{what}": f"joint {joint}, {said}" for what, said in words.items()}
+        joints.append(views.Vertical(*(views.TimeSeriesView(origin=at, name=said) for at, said in origins.items())))
+    further = [views.TimeSeriesView(origin=name, name=name.replace("_", " ")) for name in store.further]
+    if not further:
+        return views.Blueprint(views.Horizontal(*joints))
+    return views.Blueprint(views.Vertical(views.Horizontal(*joints), views.Horizontal(*further), row_shares=[3, 1]))

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
 from live.chromium import program
 
@@ -21,6 +21,9 @@ FLAGS = [
 ]
 WIDTHS = {400: 860, 800: 1000, 1280: 860}
 """Of the windows in which pages are looked at, with their heights."""
+
+PATIENCE = 120_000
+"""What a page does not show after so long [ms] it never will; a machine with much else to do takes a minute."""
 
 
 def keep(page: Page, name: str) -> None:
@@ -55,6 +58,13 @@ def opened_browser() -> Iterator[Browser]:
             yield browser
         finally:
             browser.close()
+
+
+def window(browser: Browser, width: int = 1280, **options: object) -> BrowserContext:
+    """Return a window ``width`` pixels wide, with nothing of others in it."""
+    context = browser.new_context(viewport={"width": width, "height": WIDTHS[width]}, **options)  # type: ignore[arg-type]
+    context.set_default_timeout(PATIENCE)
+    return context
 
 
 def too_wide(page: Page) -> int:

@@ -16,7 +16,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from children import python
-from live.browser import WIDTHS, emptiness, keep, opened_browser, smallest_text, too_wide
+from live.browser import PATIENCE, WIDTHS, emptiness, keep, opened_browser, smallest_text, too_wide
 from live.chromium import missing
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import Leak
@@ -108,6 +108,7 @@ def browser() -> Iterator[Browser]:
 
 def shown(browser: Browser, file: Path, width: int, **options: object) -> Page:
     page = browser.new_page(viewport={"width": width, "height": WIDTHS[width]}, **options)  # type: ignore[arg-type]
+    page.set_default_timeout(PATIENCE)
     page.goto(file.as_uri())
     return page
 

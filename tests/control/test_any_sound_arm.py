@@ -72,8 +72,13 @@ def test_a_fault_of_any_arm_is_what_differs_from_this_arm(name, tmp_path):
     with Store.for_arm(tmp_path / "db", arm.spec) as store, pytest.raises(ArmFailure) as stopped:
         collect(arm, store, 12_000, 1, watch=watch)
     first = watch.findings[0]
-    assert (first.kind, first.joint, first.muscle) == ("stuck-valve", 1, 1)
-    assert BREAKS - 10 <= first.since <= BREAKS + 20
+    assert (first.joint, first.muscle) == (1, 1)
+    assert first.noticed > BREAKS
+    if name == PRESSURES[1]:  # fills so slowly that it takes minutes, in which its muscle 1 is empty: no answer either
+        assert first.kind in ("stuck-valve", "no-answer")
+    else:
+        assert first.kind == "stuck-valve"
+        assert BREAKS - 10 <= first.since <= BREAKS + 20
     for said in ("judged against what this arm itself did", "--monitor warn"):
         assert said in str(stopped.value)
 

@@ -74,7 +74,7 @@ def test_a_fault_of_any_arm_is_what_differs_from_this_arm(name, tmp_path):
     first = watch.findings[0]
     assert (first.joint, first.muscle) == (1, 1)
     assert first.noticed > BREAKS
-    if name == PRESSURES[1]:  # fills so slowly that it takes minutes, in which its muscle 1 is empty: no answer either
+    if name == PRESSURES[1]:  # fills so slowly that it takes minutes; an empty muscle does not answer either
         assert first.kind in ("stuck-valve", "no-answer")
     else:
         assert first.kind == "stuck-valve"

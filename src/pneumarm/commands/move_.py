@@ -9,7 +9,7 @@ from pneumarm.commands.common import AnyStore, Json, OwnMethod, Settings
 from pneumarm.commands.goals import read_goals
 from pneumarm.commands.recorder import recorder
 from pneumarm.console import live, say, show, table
-from pneumarm.control.named import open_tracking, remarks_on
+from pneumarm.control.named import open_tracking
 from pneumarm.errors import MovementFailed, UnusableInput
 from pneumarm.moving import Moved, MoveSettings, move
 
@@ -35,9 +35,8 @@ def move_(
     Parameters
     ----------
     controller
-        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation:
-        turn by turn to reach the goal, like an agent trained by ``--task reach``, and closes the valves there. It
-        learns nothing; to settle and to stay is what the default agent is trained for and the others are tuned for.
+        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation,
+        turn by turn, and learns nothing.
     goals
         20deg (from the middle of the range) or 650 (counts); of several joints 20deg,-5deg; x and y of the hand from
         the first hinge 0.20m,-0.30m, where the arm's spec has its links; - for standard input, one a line, where
@@ -53,8 +52,6 @@ def move_(
     """
     with open_arm(arm, seed) as opened:
         mover, spec, known = open_tracking(controller, opened, settings.tolerance, method=method)
-        for line in remarks_on(controller):
-            say(line)
         wanted = read_goals(goals, spec, known)
         made: list[Moved] = []
         unusable: UnusableInput | None = None

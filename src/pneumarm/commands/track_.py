@@ -3,8 +3,8 @@
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import AnyStore, Json, OwnMethod
 from pneumarm.commands.recorder import recorder
-from pneumarm.console import live, say, show
-from pneumarm.control.named import open_tracking, remarks_on
+from pneumarm.console import live, show
+from pneumarm.control.named import open_tracking
 from pneumarm.moving import SECONDS, Tracked, check_seconds, track
 from pneumarm.task.reference import check_reachable, parse_reference
 
@@ -27,9 +27,8 @@ def track_(
     Parameters
     ----------
     controller
-        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation:
-        to reach a goal, and a new one whenever the reference is a degree away. It sees neither the speed nor the
-        future of a reference, which the default agent and tuned controllers do.
+        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation,
+        turn by turn, and learns nothing.
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     reference
@@ -48,8 +47,6 @@ def track_(
     """
     with open_arm(arm, seed) as opened:
         mover, spec, goals = open_tracking(controller, opened, method=method)
-        for line in remarks_on(controller):
-            say(line)
         wanted = parse_reference(reference, spec, known_ahead=not unforeseen)
         lasting = seconds if seconds is not None else wanted.duration or SECONDS
         check_seconds(lasting)

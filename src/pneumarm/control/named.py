@@ -15,7 +15,7 @@ from pneumarm.files import kind_of
 from pneumarm.learning import AnyAgent, Tracks
 from pneumarm.learning.agents import goals_of
 from pneumarm.moving import Holding, at_period
-from pneumarm.planning.agent import PlanAgent
+from pneumarm.planning.servo import PlannedServo
 from pneumarm.simulation.simulation import KIND as SIMULATION
 from pneumarm.transitions.goals import Goals
 
@@ -49,7 +49,7 @@ def open_tracking(
             f"or plan:SIM; there is no file {path}"
         )
     if name.startswith(_PLAN):
-        return tracking_for(PlanAgent.load(path), arm, tolerance)
+        return tracking_for(PlannedServo.load(path), arm, tolerance)
     if is_tuned(path):
         return tracking_for(load_tuned(path), arm, tolerance)
     if kind_of(path) == SIMULATION:
@@ -59,19 +59,8 @@ def open_tracking(
     return tracking_for(open_agent(path, method), arm, tolerance)
 
 
-def remarks_on(name: str) -> list[str]:
-    """Return the lines that are told before the controller called ``name`` moves an arm: what it is not for."""
-    if not name.startswith(_PLAN):
-        return []
-    return [
-        f"{name}: plans turn by turn to reach each goal, in few actions and switches, and closes the valves there; "
-        "it sees neither speed nor future of a reference, is not made to settle as the default agent is, and learns "
-        "nothing"
-    ]
-
-
 def tracking_for(
-    made: AnyAgent | Tuned, arm: Arm, tolerance: float = 1.0
+    made: AnyAgent | PlannedServo | Tuned, arm: Arm, tolerance: float = 1.0
 ) -> tuple[TrackingController, ArmSpec, Goals]:
     """Return what was trained or tuned as a controller for ``arm``, the arm's spec, and the goals it knows.
 
@@ -87,7 +76,7 @@ def tracking_for(
             at_period(arm, made.spec.period)
         return made.controller(), arm.spec, Goals.of(made.goal_range)
     check_fit(made, arm)
-    if isinstance(made, Tracks):
+    if isinstance(made, PlannedServo | Tracks):
         return made.controller(), arm.spec, goals_of(made)
     warm_up(made)
     return Holding(AgentController(made), arm.spec, made.goal_range, tolerance), arm.spec, goals_of(made)

@@ -491,7 +491,7 @@ def transfer_into(
     return moved.results()
 
 
-def check_fit(agent: AnyAgent, arm: Arm) -> None:
+def check_fit(agent: AnyAgent | SimulationAgent, arm: Arm) -> None:
     """Raise UnusableInput where ``agent`` was not trained for an arm like this."""
     for name in ("joints", "muscles", "counts_per_degree", "counts_per_bar", "angle_range", "period"):
         trained, found = getattr(agent.spec, name), getattr(arm.spec, name)

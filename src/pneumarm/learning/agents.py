@@ -211,7 +211,7 @@ class SimulationAgent:
         return self.simulation.goals
 
 
-def goals_of(agent: AnyAgent) -> Goals:
+def goals_of(agent: AnyAgent | SimulationAgent) -> Goals:
     """Return the goals that ``agent`` is to reach: those that it knows, or all within its range."""
     known: Goals | NDArray[np.float64] = getattr(agent, "goals", agent.goal_range)
     return Goals.of(known)

@@ -1,4 +1,4 @@
-"""An agent that has learned nothing but the simulation: it plans in it, every turn anew.
+"""An agent that has learned nothing but the simulation: it plans in it, every turn anew, to reach goals.
 
 It can be tested in a simulation, act step by step, and be put onto an arm. Its file is that of its simulation. It
 decides as :func:`~pneumarm.planning.planner.simulated_planner` does, and does not learn on an arm.
@@ -50,10 +50,20 @@ class PlanAgent(SimulationAgent):
             UnusableInput: ``path`` is no simulation, or one of continuous commands.
 
         """
-        simulation = Simulation.load(path)
-        if not simulation.valves:
-            raise UnusableInput(f"{path}: was fitted to continuous commands; a plan needs a simulation of valves")
-        return cls(simulation)
+        return cls(simulation_of_valves(path))
+
+
+def simulation_of_valves(path: Path) -> Simulation:
+    """Return the simulation in ``path``.
+
+    Raises:
+        UnusableInput: it is none, or one of continuous commands.
+
+    """
+    simulation = Simulation.load(path)
+    if not simulation.valves:
+        raise UnusableInput(f"{path}: was fitted to continuous commands; a plan needs a simulation of valves")
+    return simulation
 
 
 class PlanActor:

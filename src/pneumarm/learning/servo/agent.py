@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.commands import command_parameters, shortest_share
-from pneumarm.learning.servo.controller import ServoController
+from pneumarm.learning.servo.controller import ServoController, ready_controller
 from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.inputs import input_size, seen_parameters
+from pneumarm.learning.servo.predictive import PLANS, PredictiveControl
 from pneumarm.learning.servo.price import PriceParameters, prices_of_errors
 from pneumarm.learning.servo.settings import SOFT, STIFF, USUAL_PERIOD, ServoSettings
+from pneumarm.networks.layers import trainable
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
-from pneumarm.transitions.watch import made_up_readings
 
 KIND = "pneumarm servo"
 _PAST_THE_LIMIT = 0.2  # share of the gradient, see ServoTask
@@ -44,11 +45,7 @@ class ServoAgent(NetworkAgent):
 
     def controller(self) -> ServoController:
         """Return it as a controller of an arm, which settles, holds and tracks; all that it needs is compiled."""
-        controller = ServoController(self)
-        controller.reset(self.goal_range.mean(axis=1))
-        for reading in made_up_readings(self.spec):
-            controller.act(reading)
-        return ServoController(self)
+        return ready_controller(self)
 
     def knowing(self, ways: tuple[float, ...]) -> Self:
         """Return the servo with what its controller has learned of the joints of its arm."""
@@ -63,6 +60,13 @@ class ServoAgent(NetworkAgent):
     def actor(self) -> ServoActor:
         """Return it acting state by state."""
         return ServoActor(self)
+
+    def predictive(self) -> PredictiveControl | None:
+        """Return what plans with its policy's proposals; None where it is not to plan."""
+        if not self.settings.planned:
+            return None
+        policy = trainable(self.policy.copy(), self.sizes, PLANS)
+        return PredictiveControl(self.simulation, self.task, self.settings.planned, policy)
 
     def adapted(
         self, simulation: Simulation, begin: BeginStates, updates: int, warm_up: int, learning_rate: float, seed: int

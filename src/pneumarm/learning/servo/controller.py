@@ -1,11 +1,9 @@
 """A servo as a controller of an arm: it settles at goals, holds them and follows references."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +11,19 @@ from numpy.typing import NDArray
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.arm.seam import ArmSpec, Reading, checked
 from pneumarm.errors import UnusableInput
+from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.correction import Correction, features_of
 from pneumarm.learning.servo.foresight import Foresight
+from pneumarm.learning.servo.gradient import ServoTask
+from pneumarm.learning.servo.predictive import PredictiveControl
+from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.servo.two_ways import TwoWays
+from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.forecast import Forecast
 from pneumarm.task.tracker import StateTracker
-
-if TYPE_CHECKING:
-    from pneumarm.learning.servo.agent import ServoAgent
+from pneumarm.transitions.watch import made_up_readings
+from pneumarm.transitions.window import Window
 
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
 _SURE = 0.065  # tolerances of noise that may be left in that average
@@ -55,11 +57,50 @@ _KNOWN = 4  # numbers that are learned of a joint
 _ARRIVED = 0.5  # s after a joint was first near its goal, from which on it is noted how near it stays
 _FARTHER = 4.0  # most that is added where the policy acts in every period
 _COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an error that count, most that is added
+_FOLLOWED, _LEARNED = 0.3, 0.7  # tolerances that plans are hoped to be off a moving reference by; see TwoWays
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
+class Servo(Protocol):
+    """What moves an arm by a :class:`ServoController`: a policy, plans, or both."""
+
+    @property
+    def simulation(self) -> Simulation:
+        """Of its arm."""
+
+    @property
+    def spec(self) -> ArmSpec:
+        """The arm that it is for."""
+
+    @property
+    def window(self) -> Window:
+        """Of its state."""
+
+    @property
+    def scaling(self) -> Scaling:
+        """Of its state."""
+
+    @property
+    def goal_range(self) -> NDArray[np.float64]:
+        """Goals that it reaches, shape (joints, 2) [counts]."""
+
+    @property
+    def settings(self) -> ServoSettings:
+        """Tolerances and prices."""
+
+    @property
+    def task(self) -> ServoTask:
+        """The same, for kernels."""
+
+    def actor(self) -> ServoActor | None:
+        """Return its policy, if it has one."""
+
+    def predictive(self) -> PredictiveControl | None:
+        """Return what plans, if it is to."""
+
+
 class ServoController:
-    """Maps readings to pulses with a :class:`~.agent.ServoAgent`.
+    """Maps readings to pulses with a :class:`Servo`.
 
     Where the goal stays the same and a joint is nearly at rest near to it, it moves by single pulses, as much of what
     the policy asks for as its error takes by the simulation, and looks at what each did before the next, unless a
@@ -75,17 +116,22 @@ class ServoController:
     policy acts in every period, which changes more valves and keeps nearer.
     Integral action goes on while a joint swings near its goal, unless valves stay as they are for whole periods.
 
+    A moving reference is followed by the policy or by plans (:mod:`~.predictive`), whichever keeps nearer to it.
+
     A joint with one muscle has little damping and moves less by a pulse. So it gets several pulses before the next
     look, twice as many each time that those before did little. It has come to rest only once its readings hardly
     differ for a while; until then it is damped by what the agent does in every period, and integral action goes
     further.
     """
 
-    def __init__(self, agent: ServoAgent) -> None:
+    def __init__(self, agent: Servo) -> None:
         spec, wanted = agent.spec, agent.settings
         self.spec, self.goal_range = spec, agent.goal_range
         self._middle = agent.goal_range.mean(axis=1)
         self._actor = agent.actor()
+        self._predictive = agent.predictive()
+        self._previews = agent.task.inputs.steps
+        self._ahead = int(self._previews.max()) if self._predictive is None else self._predictive.ahead
         self._tracker = StateTracker(agent.window, agent.scaling)
         self._unit = wanted.tolerance * spec.counts_per_degree
         tolerance = self._unit * (1.0 if spec.pulses else _COARSE)
@@ -146,6 +192,7 @@ class ServoController:
         self._reference, self._begin = reference, None
         self._forecast = Forecast(self.spec.period)
         self._before: NDArray[np.float64] | None = None
+        self._followed = TwoWays(self.spec.period, _FOLLOWED, learned=_LEARNED)
         self._correction = Correction(self.spec.joints, _TAUGHT_BY * self._tolerance)
         self._pulse = np.zeros((self.spec.joints, 2))  # the last of each joint
         for rest in self._rest:
@@ -162,22 +209,29 @@ class ServoController:
         if self._fresh:
             self._tracker.reset()
             self._angles.clear()
+            if self._predictive is not None:
+                self._predictive.reset()
             self._fresh = False
         if self._begin is None:
             self._begin = reading.time
         state = self._tracker.reading(reading)
         self._angles.append(np.asarray(reading.angle, np.float64))
         path = self._path(reading.time - self._begin)
-        moves = np.ptp(path, axis=0) > 0
-        steps = self._actor.task.inputs.steps
-        preview = path[1 + steps]
+        moves = np.ptp(path[: 3 + self._previews.max()], axis=0) > 0
         acts = self._which_act(path[1], ~moves, state)
         features = features_of(path, self._middle)
         self._correction.learn(np.where(moves, path[1] - reading.angle, 0.0), features[0])
-        bias = np.where(moves, self._correction.of(features[steps]), [rest.bias for rest in self._rest])
+        wanted = path[1:-1] + np.where(moves, self._correction.of(features), [rest.bias for rest in self._rest])
         calm = np.array([rest.calm for rest in self._rest])
         active = np.array([rest.active.second for rest in self._rest])
-        command = self._actor.pulses(state, preview + bias, ~moves & ~calm & ~active)
+        planned = self._is_planned(moves, path[1] - reading.angle)
+        if not acts.any():
+            command = np.zeros((self.spec.joints, 2))
+        elif self._predictive is not None and (planned or self._actor is None):
+            command = self._predictive.pulses(state, wanted)
+        else:
+            assert self._actor is not None
+            command = self._actor.pulses(state, wanted[self._previews], ~moves & ~calm & ~active)
         command[calm[:, None] & (command < 0) & (reading.pressure < self._empty)] = 0.0
         command[~acts] = 0.0
         for j in np.flatnonzero(calm & acts & np.any(command != 0, axis=1)):
@@ -191,7 +245,7 @@ class ServoController:
     def _path(self, time: float) -> NDArray[np.float64]:
         """Return what was asked for a period ago, is now, and will be in each to come that matters, (n, joints)."""
         assert self._reference is not None
-        ahead = np.arange(1, 2 + int(self._actor.task.inputs.steps.max()))
+        ahead = np.arange(1, 2 + self._ahead)
         now = self._reference.at(time)
         if self._reference.known_ahead:
             coming = np.array([self._reference.at(time + k * self.spec.period) for k in ahead])
@@ -200,6 +254,20 @@ class ServoController:
             coming = self._forecast.ahead(ahead)
         before, self._before = now if self._before is None else self._before, now
         return np.concatenate([[before, now], coming])
+
+    def _is_planned(self, moves: NDArray[np.bool_], off: NDArray[np.float64]) -> bool:
+        """Return whether commands are planned now: where a reference ``moves`` (joints,) and that keeps nearer to it.
+
+        ``off`` (joints,) is how far the joints are from it [counts].
+        """
+        if not moves.any():
+            self._followed.leave()
+            return False
+        before = self._followed.second
+        self._followed.see(float(np.abs(off[moves]).max() / self._unit))
+        if self._followed.second != before:  # what one way falls short by says nothing of the other
+            self._correction.forget()
+        return self._followed.second
 
     def _which_act(
         self, now: NDArray[np.float64], stays: NDArray[np.bool_], state: NDArray[np.float32]
@@ -286,6 +354,15 @@ class ServoController:
         closed = np.zeros((1, 2 * asked.size))
         moved = np.ptp(self._foresight.angles(state, closed, self._foreseen)[0], axis=0)
         return ~asked | (moved <= self._stays)
+
+
+def ready_controller(agent: Servo) -> ServoController:
+    """Return a controller of ``agent`` that waits for nothing to be compiled."""
+    controller = ServoController(agent)
+    controller.reset(agent.goal_range.mean(axis=1))
+    for reading in made_up_readings(agent.spec):
+        controller.act(reading)
+    return ServoController(agent)
 
 
 class Spread:

@@ -42,6 +42,10 @@ class Correction:
         change = _STEP * error[:, None] * features / np.maximum(self._largest, self._least)
         self._weights = np.where(taught[:, None], self._weights + change, _FORGOTTEN * self._weights)
 
+    def forget(self) -> None:
+        """Forget what was learned."""
+        self._weights[:] = 0.0
+
     def of(self, features: Array) -> Array:
         """Return the corrections (n, joints) [counts] at times with the ``features`` (n, joints, 3)."""
         return np.clip((self._weights * features).sum(axis=-1), -2 * self._taught_by, 2 * self._taught_by)

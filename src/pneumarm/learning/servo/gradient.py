@@ -176,44 +176,58 @@ def prices_of_pressures(task, tape, t, joint, row):  # type: ignore[no-untyped-d
 
 
 @kernel(fastmath=FASTMATH)
+def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
+    """Return the price of all arms at step ``t``; set ``tape.sooner`` to ``share`` of its derivatives.
+
+    They are those by the state and the command of step ``t``; ``tape.later``, which is used up, are those of the
+    steps that follow, by the state after it.
+    """
+    simulation, later, sooner, row = task.simulation, tape.later, tape.sooner, tape.row
+    commanded, joints, n = 2 * simulation.joints, simulation.joints, tape.row.shape[1]
+    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    total = 0.0
+    for joint in range(joints):
+        errors_at(task, tape, t + 1, joint, row[0])
+        total += price_of_error(task.prices, row[0], row[1])
+        scale = task.inputs.tolerances[joint] * share
+        for e in range(n):
+            later[4 * joint, e] += row[1, e] * scale
+        prices_of_pressures(task, tape, t + 1, joint, row)
+        for e in range(n):
+            total += row[0, e]
+            later[4 * joint + 2, e] += row[1, e] * share
+            later[4 * joint + 3, e] += row[2, e] * share
+    tape.work.hidden[:] = tape.hidden[t]
+    tape.work.free[:] = tape.free[t]
+    step_back(simulation, later, sooner, tape.work)
+    for c in range(commanded):
+        command, before = tape.x[t, first + c], row[0]
+        before[:] = _ZERO
+        if simulation.history > 1:
+            before[:] = tape.x[t, first - (simulation.history - 1) * commanded + c]
+        total += price_of_changes(task.prices, command, before, row[1], row[2])
+        for e in range(n):
+            sooner[first + c, e] += row[1, e] * share
+        if simulation.history > 1:
+            for e in range(n):
+                sooner[first - (simulation.history - 1) * commanded + c, e] += row[2, e] * share
+    return total
+
+
+@kernel(fastmath=FASTMATH)
 def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost a step to ``net.gradient``, after :func:`move_forward`; return the cost."""
     simulation = task.simulation
-    commanded, joints = 2 * simulation.joints, simulation.joints
+    commanded = 2 * simulation.joints
     first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
     steps, n = tape.slope.shape[0], tape.slope.shape[2]
     share = np.float32(1.0 / (steps * n))
-    steepest = np.float32(task.steepest) * share * task.inputs.tolerances.max()
-    later, sooner, row = tape.later, tape.sooner, tape.row
+    later, sooner = tape.later, tape.sooner
     later[:] = _ZERO
     total = 0.0
     for back in range(steps):
         t = steps - 1 - back
-        for joint in range(joints):
-            errors_at(task, tape, t + 1, joint, row[0])
-            total += price_of_error(task.prices, row[0], row[1])
-            scale = task.inputs.tolerances[joint] * share
-            for e in range(n):
-                later[4 * joint, e] += row[1, e] * scale
-            prices_of_pressures(task, tape, t + 1, joint, row)
-            for e in range(n):
-                total += row[0, e]
-                later[4 * joint + 2, e] += row[1, e] * share
-                later[4 * joint + 3, e] += row[2, e] * share
-        tape.work.hidden[:] = tape.hidden[t]
-        tape.work.free[:] = tape.free[t]
-        step_back(simulation, later, sooner, tape.work)
-        for c in range(commanded):
-            command, before = tape.x[t, first + c], row[0]
-            before[:] = _ZERO
-            if simulation.history > 1:
-                before[:] = tape.x[t, first - (simulation.history - 1) * commanded + c]
-            total += price_of_changes(task.prices, command, before, row[1], row[2])
-            for e in range(n):
-                sooner[first + c, e] += row[1, e] * share
-            if simulation.history > 1:
-                for e in range(n):
-                    sooner[first - (simulation.history - 1) * commanded + c, e] += row[2, e] * share
+        total += price_of_a_step(task, tape, t, share)
         forward(net.layers, tape.inputs[t], net.units)
         for c in range(commanded):
             for e in range(n):
@@ -222,9 +236,15 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
         backward(net, tape.inputs[t])
         through_weights(net.layers[0], net.errors[0], tape.seen)
         inputs_back(task.inputs, tape.inputs[t], tape.seen, sooner)
-        later[:] = sooner
-        cut_off(later, steepest, row[0])
+        go_sooner(task, tape, share)
     return total * share
+
+
+@kernel(fastmath=FASTMATH)
+def go_sooner(task, tape, share):  # type: ignore[no-untyped-def]
+    """Make the derivatives by a step's state those of the steps that follow the one before it, cut off."""
+    tape.later[:] = tape.sooner
+    cut_off(tape.later, np.float32(task.steepest) * share * task.inputs.tolerances.max(), tape.row[0])
 
 
 @kernel(fastmath=FASTMATH)
@@ -256,4 +276,16 @@ def errors_of(task: ServoTask, tape: Tape) -> NDArray[np.float32]:
     return difference
 
 
-__all__ = ["ServoTask", "Tape", "Trainable", "errors_of", "learn_once", "move_back", "move_forward", "tape"]
+__all__ = [
+    "ServoTask",
+    "Tape",
+    "Trainable",
+    "errors_of",
+    "go_sooner",
+    "learn_once",
+    "move_back",
+    "move_forward",
+    "price_of_a_step",
+    "prices_of_pressures",
+    "tape",
+]

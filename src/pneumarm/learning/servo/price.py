@@ -49,16 +49,21 @@ def prices_of_errors(prices: PriceParameters, error: NDArray[np.floating]) -> ND
 @kernel(fastmath=FASTMATH)
 def price_of_error(prices, error, slope):  # type: ignore[no-untyped-def]
     """Return the sum of the prices of the ``error`` (n,) in tolerances; set ``slope`` (n,) to its derivatives."""
-    far, flat, sharp = np.float32(prices.far), np.float32(prices.flat), _ONE / np.float32(prices.precision)
     total = _ZERO
     for e in range(error.shape[0]):
-        size = abs(error[e])
-        sign = _ONE if error[e] > _ZERO else -_ONE
-        beyond = max(size - flat, _ZERO) * sharp
-        square = _ONE + beyond * beyond
-        total += np.float32(0.5) * np.log(square) + far * size
-        slope[e] = sign * (sharp * beyond / square + far)
+        price, slope[e] = price_of_one_error(prices, error[e])
+        total += price
     return total
+
+
+@part(fastmath=FASTMATH)
+def price_of_one_error(prices, error):  # type: ignore[no-untyped-def]
+    """Return the price of an ``error`` in tolerances and its slope."""
+    far, flat, sharp = np.float32(prices.far), np.float32(prices.flat), _ONE / np.float32(prices.precision)
+    size, sign = abs(error), _ONE if error > _ZERO else -_ONE
+    beyond = max(size - flat, _ZERO) * sharp
+    square = _ONE + beyond * beyond
+    return np.float32(0.5) * np.log(square) + far * size, sign * (sharp * beyond / square + far)
 
 
 @part

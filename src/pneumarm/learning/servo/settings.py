@@ -71,6 +71,9 @@ class ServoSettings(TaskSettings):
     """Mean error, in tolerances, below which a still arm with a constant goal is left alone with closed valves."""
     alert: float = 0.25
     """Mean error, in tolerances, from which on it no longer is."""
+    planned: int = 20
+    """How often plans for the next half second are made better in the simulation, at every turn, where a moving
+    reference is followed more closely by plans than by the policy alone; 0: the policy alone."""
     ways: tuple[float, ...] = ()
     """How far off its goals each joint of the arm was on average, in tolerances: swinging and left alone, swinging
     and damped, moved by single pulses, moved in every period. Learned on the arm; by default nothing is known."""
@@ -101,6 +104,7 @@ class ServoSettings(TaskSettings):
             "reading_noise": 0 <= self.reading_noise < math.inf,
             "quiet": 0 <= self.quiet <= self.alert,
             "alert": 0 <= self.alert < math.inf,
+            "planned": 0 <= self.planned <= 10_000 or "0 to 10,000",
             "ways": all(0 <= error < math.inf for error in self.ways) or "0 or more each",
             "validation_movements": self.validation_movements >= 1,
         }

@@ -9,18 +9,29 @@ from collections.abc import Sequence
 
 _TRIED = 1.0  # s that one way is tried for
 _BEFORE = 0.5  # share of it that may be owed to what was before
-_LEARNED, _FORGOTTEN = 0.3, 0.02  # share of what is known of a way that a try of it replaces, and one of the other
+_LEARNED, _FORGOTTEN = (
+    0.3,
+    0.02,
+)  # share of what is known of a way that a try of it replaces, and one of the other
 
 
 class TwoWays:
     """What is known of both ways; it is kept from movement to movement."""
 
-    def __init__(self, period: float, hoped: float, known: Sequence[float] = (), most: float = 5.0) -> None:
+    def __init__(
+        self,
+        period: float,
+        hoped: float,
+        known: Sequence[float] = (),
+        most: float = 5.0,
+        learned: float = _LEARNED,
+    ) -> None:
         """Begin to learn, with a control ``period`` [s]; the second is ``hoped`` to be so many tolerances off.
 
-        ``known`` is what was :attr:`known` before, if anything was; ``most`` tolerances of an error count at most.
+        ``known`` is what was :attr:`known` before, if anything was; ``most`` tolerances of an error count at most. A
+        try replaces the share ``learned`` of what is known of a way.
         """
-        self._hoped, self._most = hoped, most
+        self._hoped, self._most, self._learned = hoped, most, learned
         self._off = list(known) or [0.0, hoped]
         self._turns = max(4, round(_TRIED / period))
         self._errors: list[float] = []
@@ -46,7 +57,7 @@ class TwoWays:
         if len(self._errors) == self._turns:
             late = self._errors[round(_BEFORE * self._turns) :]
             way, mean = self.second, sum(late) / len(late)
-            self._off[way] += _LEARNED * (mean - self._off[way])
+            self._off[way] += self._learned * (mean - self._off[way])
             self._off[not way] += _FORGOTTEN * (self._hoped - self._off[not way])
             self.leave()
 

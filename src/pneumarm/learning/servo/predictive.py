@@ -1,0 +1,229 @@
+"""Model predictive control: at every turn the commands of the next half second, made better in the simulation.
+
+    u = (u_k, ..., u_{k+H-1}),   s_{i+1} = simulation(s_i, u_i),   cost = sum_i price(s_{i+1}, r_{i+1}, u_i, u_{i-1})
+    u <- clip(u - rate Adam(d cost / d u), -1, 1);   u_k of the cheapest plan is given, and the next turn plans anew
+
+Prices are those that a servo learns by, but the cheapest plan is found with valve changes counted, not by their
+smooth stand-in. Several plans are made better side by side, since there are many local minima: what is left of the
+plan of the turn before, what the policy would do (where there is one), and both with random changes.
+
+Receding horizon: J. B. Rawlings, D. Q. Mayne and M. M. Diehl, Model Predictive Control, 2nd edition, 2017; the
+gradient: A. E. Bryson and Y.-C. Ho, Applied Optimal Control, 1975, chapter 7.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.kernels import kernel
+from pneumarm.learning.servo.commands import rounded
+from pneumarm.learning.servo.gradient import (
+    ServoTask,
+    Trainable,
+    go_sooner,
+    move_forward,
+    price_of_a_step,
+    prices_of_pressures,
+    tape,
+)
+from pneumarm.learning.servo.price import price_of_one_error
+from pneumarm.learning.servo.settings import USUAL_PERIOD
+from pneumarm.networks.tansig import FASTMATH
+from pneumarm.simulation.gradient import step_all
+from pneumarm.simulation.simulation import Simulation
+
+_HORIZON = 0.55  # s
+PLANS = 8
+"""Plans that are made better side by side: as many as go into one vector instruction."""
+_RATE = 0.15  # of Adam at the beginning [periods]; falls linearly
+_CHANGES = 0.05, 0.6  # standard deviations of random changes, of the plan changed least and most [periods]
+_STEEPEST = 400.0  # where derivatives are cut off, at the usual period; see ServoTask
+_ONE, _ZERO = np.float32(1.0), np.float32(0.0)
+_MEAN, _SQUARE, _TINY = np.float32(0.8), np.float32(0.95), np.float32(1e-4)  # of Adam
+
+
+class Plans(NamedTuple):
+    """``n`` plans of some ``steps``, and what makes them better."""
+
+    commands: NDArray[np.float32]
+    """As wished for, before they are rounded to what valves can do, shape (steps, 2 joints, n) [periods]."""
+    gradient: NDArray[np.float32]
+    """Same shape."""
+    mean: NDArray[np.float32]
+    """Adam's average of the gradient, same shape."""
+    square: NDArray[np.float32]
+    """Adam's average of its square, same shape."""
+    cost: NDArray[np.float32]
+    """Shape (n,)."""
+    best: NDArray[np.float32]
+    """The cheapest commands of each so far, shape (steps, 2 joints, n)."""
+    least: NDArray[np.float32]
+    """Their costs, shape (n,)."""
+    there: NDArray[np.float32]
+    """1 for a muscle that is there, else 0, shape (2 joints,)."""
+
+
+def plans_of(steps: int, there: NDArray[np.float32], n: int) -> Plans:
+    """Return room for ``n`` plans of ``steps`` for the muscles that are ``there`` (2 joints,)."""
+    shape = steps, there.size, n
+    commands, gradient, mean, square, best = (np.zeros(shape, np.float32) for _ in range(5))
+    return Plans(commands, gradient, mean, square, np.zeros(n, np.float32), best, np.zeros(n, np.float32), there)
+
+
+@kernel(fastmath=FASTMATH)
+def play(task, plans, tape):  # type: ignore[no-untyped-def]
+    """Play the commands from ``tape.x[0]`` on."""
+    simulation, how = task.simulation, task.commands
+    commanded = 2 * simulation.joints
+    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    shortest, step, leak = np.float32(how.shortest), np.float32(how.step), np.float32(how.leak)
+    for t in range(plans.commands.shape[0]):
+        x = tape.x[t]
+        for c in range(commanded):
+            place, limit = 4 * (c // 2) + 2 + c % 2, how.inlet[c // 2, c % 2]
+            for e in range(x.shape[1]):
+                wished = plans.commands[t, c, e] * plans.there[c]
+                stopped = wished > _ZERO and x[place, e] > limit
+                pulse = _ZERO if stopped else rounded(abs(wished), shortest, step)
+                x[first + c, e] = pulse if wished > _ZERO else -pulse
+                tape.slope[t, c, e] = leak if stopped else plans.there[c]
+        step_all(simulation, x, tape.x[t + 1], tape.work)
+        tape.hidden[t] = tape.work.hidden
+        tape.free[t] = np.maximum(tape.work.free, np.float32(task.past_the_limit))
+
+
+@kernel(fastmath=FASTMATH)
+def price(task, plans, tape):  # type: ignore[no-untyped-def]
+    """Set ``plans.cost`` to what the movements on ``tape`` cost; valve changes are counted."""
+    simulation, cost = task.simulation, plans.cost
+    commanded = 2 * simulation.joints
+    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    before = -(simulation.history - 1) * commanded  # the command of the period before
+    change = np.float32(task.prices.change)
+    cost[:] = _ZERO
+    for t in range(tape.slope.shape[0]):
+        for joint in range(simulation.joints):
+            scale = task.inputs.tolerances[joint]
+            prices_of_pressures(task, tape, t + 1, joint, tape.row)
+            for e in range(cost.shape[0]):
+                error = (tape.x[t + 1, 4 * joint, e] - tape.reference[t + 1, joint, e]) * scale
+                cost[e] += price_of_one_error(task.prices, error)[0] + tape.row[0, e]
+        for c in range(commanded):
+            for e in range(cost.shape[0]):
+                now, then = tape.x[t, first + c, e], tape.x[t, first + before + c, e]
+                opened, found = np.sign(now), np.trunc(then)
+                cost[e] += change * ((opened != found) + (np.trunc(now) != opened))
+
+
+@kernel(fastmath=FASTMATH)
+def slopes_by_commands(task, plans, tape):  # type: ignore[no-untyped-def]
+    """Set ``plans.gradient`` to the derivatives of what the movements on ``tape`` cost, after :func:`play`."""
+    simulation = task.simulation
+    commanded = 2 * simulation.joints
+    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    steps = tape.slope.shape[0]
+    tape.later[:] = _ZERO
+    for back in range(steps):
+        t = steps - 1 - back
+        price_of_a_step(task, tape, t, _ONE)
+        for c in range(commanded):
+            for e in range(tape.slope.shape[2]):
+                plans.gradient[t, c, e] = tape.sooner[first + c, e] * tape.slope[t, c, e]
+                tape.sooner[first + c, e] = _ZERO
+        go_sooner(task, tape, _ONE)
+
+
+@kernel(fastmath=FASTMATH)
+def improve(task, plans, tape, times, rate):  # type: ignore[no-untyped-def]
+    """Make each plan better so many ``times``, and play the cheapest of all that there were, as all plans."""
+    plans.mean[:] = _ZERO
+    plans.square[:] = _ZERO
+    play(task, plans, tape)
+    price(task, plans, tape)
+    plans.best[:] = plans.commands
+    plans.least[:] = plans.cost
+    for number in range(times):
+        slopes_by_commands(task, plans, tape)
+        unbias, unbias_square = _ONE - _MEAN ** np.float32(number + 1), _ONE - _SQUARE ** np.float32(number + 1)
+        step = np.float32(rate * (1.0 - number / times)) / unbias
+        for t in range(plans.commands.shape[0]):
+            for c in range(plans.commands.shape[1]):
+                commands, gradient = plans.commands[t, c], plans.gradient[t, c]
+                mean, square = plans.mean[t, c], plans.square[t, c]
+                for e in range(commands.shape[0]):
+                    mean[e] = _MEAN * mean[e] + (_ONE - _MEAN) * gradient[e]
+                    square[e] = _SQUARE * square[e] + (_ONE - _SQUARE) * gradient[e] * gradient[e]
+                    moved = commands[e] - step * mean[e] / (np.sqrt(square[e] / unbias_square) + _TINY)
+                    commands[e] = min(max(moved, -_ONE), _ONE)
+        play(task, plans, tape)
+        price(task, plans, tape)
+        for e in range(plans.cost.shape[0]):
+            if plans.cost[e] < plans.least[e]:
+                plans.least[e] = plans.cost[e]
+                plans.best[:, :, e] = plans.commands[:, :, e]
+    cheapest = plans.least.argmin()
+    for e in range(plans.least.shape[0]):
+        plans.commands[:, :, e] = plans.best[:, :, cheapest]
+    play(task, plans, tape)
+
+
+class PredictiveControl:
+    """Plans turn by turn; what it needs is compiled when it is made.
+
+    Args:
+        simulation: that is planned in.
+        task: prices, and what valves can do.
+        times: how often plans are made better in a turn.
+        policy: a network of ``n`` samples that proposes plans; None: plans begin with closed valves.
+
+    """
+
+    def __init__(self, simulation: Simulation, task: ServoTask, times: int, policy: Trainable | None = None) -> None:
+        window, scaling, period = simulation.window, simulation.scaling, simulation.spec.period
+        self._task = task._replace(steepest=_STEEPEST * USUAL_PERIOD / period)
+        self._times, self._policy, self._window = times, policy, window
+        self._steps = max(round(_HORIZON / period), 2)
+        self.ahead = self._steps + int(task.inputs.steps.max()) - 1
+        """Periods to come for which it has to know what is wanted."""
+        self._tape = tape(task, self._steps, PLANS)
+        self._tape.x[0, window.input_size + window.joints] = 1
+        there = np.ones((window.joints, 2), np.float32)
+        there[:, 1] = simulation.spec.muscles > 1
+        self._plans = plans_of(self._steps, there.ravel(), PLANS)
+        self._offset = window.of_joints(scaling.observation_offset)[:, 0]
+        self._scale = window.of_joints(scaling.observation_scale)[:, 0]
+        changes = np.concatenate([[0.0], np.geomspace(*_CHANGES, PLANS // 2 - 1)])
+        self._changes = np.tile(changes, 2).astype(np.float32)
+        self.reset()
+        self.pulses(np.zeros(window.state_size, np.float32), np.zeros((1 + self.ahead, window.joints)))
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew: nothing is left of a plan."""
+        self._random = np.random.default_rng(0)
+        self._left = np.zeros(self._plans.commands.shape[:2], np.float32)
+
+    def pulses(self, state: NDArray[np.float32], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pulses (joints, 2) in the scaled ``state`` (state_size,).
+
+        ``wanted`` (1 + ahead, joints) is what is asked for now and in the periods to come [counts].
+        """
+        here, plans, muscles = self._tape, self._plans, self._window.command_size
+        here.x[0, : state.size] = state[:, None]
+        asked = ((wanted - self._offset) / self._scale).astype(np.float32)[..., None]
+        here.reference[...] = asked[: self._steps + 1]
+        commands = here.x[:-1, state.size : state.size + muscles, 0]
+        proposed = np.zeros_like(self._left)
+        if self._policy is not None:
+            here.preview[...] = asked[np.arange(self._steps)[:, None] + self._task.inputs.steps]
+            move_forward(self._task, self._policy, here)
+            proposed[:] = commands
+        plans.commands[..., : PLANS // 2] = self._left[..., None]
+        plans.commands[..., PLANS // 2 :] = proposed[..., None]
+        plans.commands[...] += self._changes * self._random.standard_normal(plans.commands.shape, np.float32)
+        np.clip(plans.commands, -1.0, 1.0, out=plans.commands)
+        improve(self._task, plans, here, self._times, _RATE)
+        self._left[:-1] = plans.commands[1:, :, 0]
+        self._left[-1] = 0.0
+        return commands[0].astype(np.float64).reshape(-1, 2)

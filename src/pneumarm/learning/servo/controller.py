@@ -225,10 +225,8 @@ class ServoController:
         calm = np.array([rest.calm for rest in self._rest])
         active = np.array([rest.active.second for rest in self._rest])
         planned = self._is_planned(moves, path[1] - reading.angle)
-        if not acts.any():
-            command = np.zeros((self.spec.joints, 2))
-        elif self._predictive is not None and (planned or self._actor is None):
-            command = self._predictive.pulses(state, wanted)
+        if self._predictive is not None and (planned or self._actor is None):
+            command = self._predictive.pulses(state, wanted) if acts.any() else np.zeros((self.spec.joints, 2))
         else:
             assert self._actor is not None
             command = self._actor.pulses(state, wanted[self._previews], ~moves & ~calm & ~active)

@@ -99,7 +99,7 @@ def price(task, plans, tape):  # type: ignore[no-untyped-def]
     simulation, cost = task.simulation, plans.cost
     commanded = 2 * simulation.joints
     first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
-    before = -(simulation.history - 1) * commanded  # the command of the period before
+    lag = (simulation.history - 1) * commanded  # to the command of the period before, where states hold it
     change = np.float32(task.prices.change)
     cost[:] = _ZERO
     for t in range(tape.slope.shape[0]):
@@ -111,8 +111,8 @@ def price(task, plans, tape):  # type: ignore[no-untyped-def]
                 cost[e] += price_of_one_error(task.prices, error)[0] + tape.row[0, e]
         for c in range(commanded):
             for e in range(cost.shape[0]):
-                now, then = tape.x[t, first + c, e], tape.x[t, first + before + c, e]
-                opened, found = np.sign(now), np.trunc(then)
+                now = tape.x[t, first + c, e]
+                opened, found = np.sign(now), np.trunc(tape.x[t, first - lag + c, e]) if lag else _ZERO
                 cost[e] += change * ((opened != found) + (np.trunc(now) != opened))
 
 

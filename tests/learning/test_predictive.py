@@ -17,6 +17,9 @@ from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.simulation import Simulation
 
 STEPS = 9
+SIMULATION = synthetic_simulation()
+BEGIN = synthetic_begin_states(SIMULATION)
+SMALL = ServoSettings(arms=8, agents=1, validation_movements=8)
 
 
 def drawn(simulation: Simulation, n: int = PLANS) -> tuple[ServoTask, Plans, Tape]:
@@ -106,6 +109,22 @@ def test_it_says_the_same_again():
     np.testing.assert_array_equal(*told)
 
 
+def test_what_a_plan_gains_is_asked_without_a_trace():
+    agent = ServoLearner(SIMULATION, BEGIN, SMALL, 0, 0).agent()
+    plan, state = agent.predictive(), BEGIN.states[0]
+    assert plan is not None
+    wanted = 520 + 80 * np.sin(0.2 * np.arange(1 + plan.ahead))[:, None]
+    told = []
+    for asks in (False, True):
+        plan.reset()
+        told.append([])
+        for _ in range(3):
+            if asks:
+                assert plan.gains(state, wanted) > 0.5  # of a policy that has learned nothing
+            told[-1].append(plan.pulses(state, wanted))
+    np.testing.assert_array_equal(*told)
+
+
 def test_a_simulation_that_is_planned_in_settles_holds_and_tracks():
     simulation = synthetic_simulation()
     simulation = replace(simulation, error_std=simulation.error_std / 4)
@@ -119,15 +138,12 @@ def test_a_simulation_that_is_planned_in_settles_holds_and_tracks():
 
 
 def test_plans_are_followed_where_they_keep_nearer_than_the_policy():
-    """A policy that has learned nothing is off by degrees; after a second its arm is moved by plans."""
-    simulation = synthetic_simulation()
-    untrained = ServoLearner(
-        simulation, synthetic_begin_states(simulation), ServoSettings(arms=8, agents=1, validation_movements=8), 0, 0
-    ).agent()
+    """A policy that has learned nothing is off by degrees, as its simulation and its arm say."""
+    untrained = ServoLearner(SIMULATION, BEGIN, SMALL, 0, 0).agent()
     sine = Reference(lambda time: np.array([520 + 80 * np.sin(np.pi * time)]))
 
     def error(agent: ServoAgent) -> float:
-        return float(track(SimulationArm(simulation, seed=2), agent.controller(), sine, 6).rms_error[0])
+        return float(track(SimulationArm(SIMULATION, seed=2), agent.controller(), sine, 6).rms_error[0])
 
     alone = error(replace(untrained, settings=replace(untrained.settings, planned=0)))
     assert error(untrained) < 0.7 * alone

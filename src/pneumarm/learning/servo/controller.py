@@ -58,6 +58,7 @@ _ARRIVED = 0.5  # s after a joint was first near its goal, from which on it is n
 _FARTHER = 4.0  # most that is added where the policy acts in every period
 _COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an error that count, most that is added
 _FOLLOWED, _LEARNED = 0.3, 0.7  # tolerances that plans are hoped to be off a moving reference by; see TwoWays
+_GAINED = 0.12  # tolerances nearer by a plan than by the policy, in the simulation, for plans to be tried first
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
@@ -193,6 +194,7 @@ class ServoController:
         self._forecast = Forecast(self.spec.period)
         self._before: NDArray[np.float64] | None = None
         self._followed = TwoWays(self.spec.period, _FOLLOWED, learned=_LEARNED)
+        self._moved = 0  # turns in which the reference has moved
         self._correction = Correction(self.spec.joints, _TAUGHT_BY * self._tolerance)
         self._pulse = np.zeros((self.spec.joints, 2))  # the last of each joint
         for rest in self._rest:
@@ -224,7 +226,7 @@ class ServoController:
         wanted = path[1:-1] + np.where(moves, self._correction.of(features), [rest.bias for rest in self._rest])
         calm = np.array([rest.calm for rest in self._rest])
         active = np.array([rest.active.second for rest in self._rest])
-        planned = self._is_planned(moves, path[1] - reading.angle)
+        planned = self._is_planned(moves, path[1] - reading.angle, state, wanted)
         if self._predictive is not None and (planned or self._actor is None):
             command = self._predictive.pulses(state, wanted) if acts.any() else np.zeros((self.spec.joints, 2))
         else:
@@ -253,14 +255,27 @@ class ServoController:
         before, self._before = now if self._before is None else self._before, now
         return np.concatenate([[before, now], coming])
 
-    def _is_planned(self, moves: NDArray[np.bool_], off: NDArray[np.float64]) -> bool:
+    def _is_planned(
+        self,
+        moves: NDArray[np.bool_],
+        off: NDArray[np.float64],
+        state: NDArray[np.float32],
+        wanted: NDArray[np.float64],
+    ) -> bool:
         """Return whether commands are planned now: where a reference ``moves`` (joints,) and that keeps nearer to it.
 
-        ``off`` (joints,) is how far the joints are from it [counts].
+        ``off`` (joints,) is how far the joints are from it [counts]; the rest as of
+        :meth:`.PredictiveControl.pulses`. Before anything was seen the simulation is believed.
         """
+        if self._predictive is None:
+            return False
         if not moves.any():
             self._followed.leave()
             return False
+        self._moved += 1
+        if self._moved == (1 if self._reference is not None and self._reference.known_ahead else self._arrived):
+            off_by_policy = 2 * _FOLLOWED if self._predictive.gains(state, wanted) > _GAINED else 0.0
+            self._followed = TwoWays(self.spec.period, _FOLLOWED, (off_by_policy, _FOLLOWED), learned=_LEARNED)
         before = self._followed.second
         self._followed.see(float(np.abs(off[moves]).max() / self._unit))
         if self._followed.second != before:  # what one way falls short by says nothing of the other

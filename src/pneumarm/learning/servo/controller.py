@@ -274,8 +274,9 @@ class ServoController:
             return False
         self._moved += 1
         if self._moved == (1 if self._reference is not None and self._reference.known_ahead else self._arrived):
-            off_by_policy = 2 * _FOLLOWED if self._predictive.gains(state, wanted) > _GAINED else 0.0
-            self._followed = TwoWays(self.spec.period, _FOLLOWED, (off_by_policy, _FOLLOWED), learned=_LEARNED)
+            gains = self._predictive.gains(state, wanted)
+            by_policy = max(2 * _FOLLOWED, gains) if gains > _GAINED else 0.0
+            self._followed = TwoWays(self.spec.period, _FOLLOWED, (by_policy, _FOLLOWED), learned=_LEARNED)
         before = self._followed.second
         self._followed.see(float(np.abs(off[moves]).max() / self._unit))
         if self._followed.second != before:  # what one way falls short by says nothing of the other

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from benchmarks.baselines.table import below, by_method, curves, floor, line, po
 from pneumarm.errors import UnusableInput
 from pneumarm.statistics import summarise
 
-WANTED = Wanted(movements=40, tests=300, steps=1_000)
+WANTED = Wanted(movements=40, tests=300, steps=1_000, planned=40, adapting=0, minutes=0)
 LEVELS = {"open loop": 40, "planning": 39, "policy": 38, "ppo": 35}
 
 
@@ -44,7 +45,7 @@ def test_rows_come_back_and_one_that_was_cut_short_is_measured_again(tmp_path: P
     assert list(read_rows(file, WANTED)) == [(1, "open loop", 0)]
     append(file, ROWS[1])
     assert read_rows(file, WANTED) == {(r["arm"], r["method"], r["seed"]): r for r in ROWS[:2]}
-    assert read_rows(file, Wanted(movements=41, tests=300, steps=1_000)) == {}
+    assert read_rows(file, replace(WANTED, movements=41)) == {}
 
 
 def test_methods_are_asked_for_by_name(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pneumarm.learning import AnyAgent, LearnSettings, TrainSettings, test, train
+from pneumarm.learning.online.settings import Team
 from pneumarm.planning import PlanAgent
 from pneumarm.simulation import Simulation
 from pneumarm.task import BeginStates
@@ -15,6 +16,8 @@ from pneumarm.task import BeginStates
 PLANNING = "planning"
 """In the learned simulation: needs no training."""
 OURS = ("policy", "batched", "sarsa")
+TEAMS: dict[str, Team] = {"sarsa own": "own", "sarsa one": "one"}
+"""The thesis' agents of several joints, each paid for its own joint, or one for all."""
 STABLE = ("ppo", "dqn", "qr-dqn")
 """Of stable-baselines3 and sb3-contrib."""
 QUANTILES = 25
@@ -37,11 +40,18 @@ def learn(method: str, simulation: Simulation, begin: BeginStates, seed: int, st
     """Train an agent; everything is compiled before the clock runs."""
     if method == PLANNING:
         return Learned(PlanAgent(simulation), 0.0, 0.0, [])
-    if method in OURS:
-        settings = LearnSettings(method=method).chosen
+    if method in (*OURS, *TEAMS):
+        settings = settings_of(method)
         train(simulation, begin, shortened(settings), seed)
         return timed(lambda: train(simulation, begin, settings, seed).agent)
     return learn_stable(method, simulation, begin, seed, steps)
+
+
+def settings_of(method: str) -> Any:
+    """Return the settings that a method of ours trains with."""
+    if method in TEAMS:
+        return TrainSettings(team=TEAMS[method])
+    return LearnSettings(method=method).chosen
 
 
 def shortened(settings: Any) -> Any:
@@ -77,7 +87,7 @@ def learn_stable(method: str, simulation: Simulation, begin: BeginStates, seed: 
     many = PointToPointVector(simulation, begin, 8, threads=1, autoreset_mode=AutoresetMode.SAME_STEP)
     vector = StableVector(many, 1 / 50)
     vector.reset()
-    vector.step(np.zeros(8, np.int64))  # compiles
+    vector.step(np.zeros((8, simulation.window.joints), np.int64))  # compiles
     networks = {"net_arch": [64, 64], **({"n_quantiles": QUANTILES} if method == "qr-dqn" else {})}
     model = kind("MlpPolicy", vector, seed=seed, device="cpu", policy_kwargs=networks, **_STABLE[method])
     test(imported(model, simulation), simulation, begin, 1)

@@ -59,6 +59,7 @@ from pneumarm.simulation import Simulation
 from pneumarm.task import BeginStates, Movement
 from pneumarm.task.movements import Movements, of_rows
 from pneumarm.transitions import Store
+from pneumarm.transitions.goals import Goals
 
 BOUNDS: dict[str, Baseline] = {"open loop": "open_loop", "closed loop": "closed_loop"}
 METHODS = (*BOUNDS, PLANNING, *OURS, *STABLE)
@@ -178,7 +179,7 @@ def measured(folder: Path, arm: str, method: str, seed: int, wanted: Wanted) -> 
             learned = replace(learned, agent=load_agent(agent))  # what is measured is what anyone could use
         row |= {"wall": learned.wall, "cpu": learned.cpu, "curve": learned.curve}
         row["simulation"] = tested(learned.agent, simulation, begin, wanted.tests)
-        rows, p99 = greedy_movements(learned.agent, arm, simulation, wanted.movements)
+        rows, p99 = greedy_movements(learned.agent, arm, simulation.goals, wanted.movements)
         made = of_rows((one.row() for one in rows), simulation.spec.joints)
         if wanted.adapting and isinstance(learned.agent, Adapts | Learns):
             row["adapted"] = told(adapted(folder, learned.agent, arm, wanted))
@@ -236,15 +237,13 @@ def tested(agent: AnyAgent, simulation: Simulation, begin: BeginStates, episodes
     return test(agent, simulation, begin, episodes, SEED).results()
 
 
-def greedy_movements(
-    agent: AnyAgent, arm: str, simulation: Simulation, movements: int
-) -> tuple[list[Movement], float]:
+def greedy_movements(agent: AnyAgent, arm: str, goals: Goals, movements: int) -> tuple[list[Movement], float]:
     """Return movements on a virtual arm as on arrival, and the 99th percentile of a decision's time [ms]."""
     controller = Timed(agent)
     controller.reset(agent.goal_range.mean(axis=1))
     with open_virtual(arm) as opened:
         controller.act(opened.read())  # compiles
     with open_virtual(arm) as opened:
-        draws = drawn(simulation.goals, SEED, range(movements))
+        draws = drawn(goals, SEED, range(movements))
         made = list(make_movements(opened, controller, agent.settings, draws, velocity=agent.window.velocity))
     return made, 1e3 * float(np.quantile(controller.seconds[1:], 0.99))

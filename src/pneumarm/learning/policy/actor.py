@@ -38,7 +38,7 @@ class PolicyActor:
         self._single = lanes(mind, sizes, random_states(0, 1))
         self._lanes = lanes(mind, sizes, np.zeros((settings.lookahead, 4), np.uint64))
         self._samples = np.zeros(settings.lookahead, np.int64)
-        several = window.joints > 1 and settings.lookahead > 0
+        several = window.joints > 1 and settings.lookahead > 0 and settings.nodes > 0
         self._foresight = Foresight(simulation, settings) if several else None
         self._decided = False
         self._state_size = mind.inputs.state_size

@@ -33,7 +33,7 @@ class Foresight:
     def __init__(self, simulation: Simulation, settings: PolicySettings) -> None:
         joints = simulation.window.joints
         actions = int(possible_actions(simulation.spec.muscles).sum()) ** joints
-        self._search = _Search(simulation, settings) if settings.nodes and actions <= _MOST_ACTIONS else None
+        self._search = _Search(simulation, settings) if actions <= _MOST_ACTIONS else None
         self._horizon = settings.horizon
         self._courses = np.empty((_MOST, self._horizon, joints), np.int64)
         self._last = self._courses[0, :0]

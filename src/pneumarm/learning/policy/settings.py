@@ -36,7 +36,7 @@ class PolicySettings(FleetSettings):
     """Longest of these movements [steps]."""
     nodes: int = 20_000
     """With several joints: states of the simulation that may be kept in the search for a plan, which is compared with
-    what the policy would do; 0: no plans."""
+    what the policy would do; 0: each joint looks ahead for itself."""
     practice: int = 4
     """With several joints: there are so many times as many updates."""
     clear: float = 0.001

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simple_simulation import QUIET, simulation
 
 from pneumarm.arm.valves import CLOSED
 from pneumarm.learning import PolicyAgent, PolicySettings
@@ -16,6 +15,7 @@ from pneumarm.networks.layers import weight_count
 from pneumarm.random import random_states
 from pneumarm.task import BeginStates
 from pneumarm.task.movements import Movements
+from simple_simulation import QUIET, simulation
 
 SETTINGS = PolicySettings(hidden=(4,), lookahead=48, nodes=5_000, noise=QUIET, cutoff=40)
 IN_OUT, OUT_IN = 6, 2

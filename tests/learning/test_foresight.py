@@ -50,6 +50,19 @@ def test_plans_bring_two_joints_to_goals_that_the_policy_does_not_know() -> None
     assert planned.reward.mean() > alone.reward.mean() + 10
 
 
+def test_an_arm_that_does_not_move_is_not_told_the_same_for_ever() -> None:
+    agent = untrained(2)
+    actor, state = agent.actor(), np.zeros(agent.window.state_size)
+    actor.begin(state, [560.0, 440.0])
+    told = []
+    for _ in range(20):
+        told.append(actor.act())
+        actor.follow(state)
+    for joint in np.array(told).T:
+        changes = np.flatnonzero(np.diff(joint, prepend=-1, append=-1))
+        assert np.diff(changes).max() <= SETTINGS.patience + 1
+
+
 def test_one_joint_decides_as_without_plans() -> None:
     agent = untrained(1)
     np.testing.assert_array_equal(moved(agent, 0).reward, moved(agent, SETTINGS.nodes).reward)

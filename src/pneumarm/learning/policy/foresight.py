@@ -14,9 +14,10 @@ noise, each stands in for the other.
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.valves import possible_actions, to_actions
+from pneumarm.arm.valves import ACTIONS, possible_actions, to_actions
 from pneumarm.kernels import kernel
 from pneumarm.learning.policy.acting import Lanes, Mind, copy_all, judge_all
+from pneumarm.learning.policy.proximal import FORBIDDEN
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.fleet import gained_by, take_alive
@@ -45,19 +46,26 @@ class Foresight:
         self._last = self._last[:0]
 
     def improve(self, mind: Mind, single: Lanes, lanes: Lanes, samples: NDArray[np.int64]) -> None:
-        """Set ``single.actions`` (1, joints), which are what the policy would do, to what is best."""
+        """Set ``single.actions`` (1, joints), which are what the policy would do, to what is best.
+
+        What the policy may not do, no course begins with: where the arm sticks the simulation may drift on.
+        """
         before, courses = single.fleet.actions[0], self._courses
+        allowed = single.bias[:, 0].reshape(len(before), ACTIONS) > FORBIDDEN
+        joints = np.arange(len(before))
+        goes_on = before[0] >= 0 and bool(allowed[joints, before].all())
         courses[...] = _POLICY
         courses[0, :1] = single.actions
         known = [self._last]
         if self._search is not None:
-            known.append(self._search.plan(single.fleet.x[: mind.inputs.state_size, 0], before)[: self._horizon])
+            state = single.fleet.x[: mind.inputs.state_size, 0]
+            known.append(self._search.plan(state, before, goes_on)[: self._horizon])
         count = 1
         for course in known:
-            if len(course):
+            if len(course) and allowed[joints, course[0]].all():
                 courses[count, : len(course)] = course
                 count += 1
-        if before[0] >= 0:
+        if goes_on:
             for periods in _HELD:
                 courses[count, : min(periods, self._horizon)] = before
                 count += 1
@@ -83,12 +91,15 @@ class _Search:
         self._actions = to_actions(self._problem.commands)
         """Actions of each joint by those of the whole arm, shape (9**joints, joints)."""
 
-    def plan(self, state: NDArray[np.float32], before: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the actions (n, joints) of the best plan from the scaled ``state`` after the actions ``before``."""
+    def plan(self, state: NDArray[np.float32], before: NDArray[np.int64], may_hold: bool) -> NDArray[np.int64]:
+        """Return the actions (n, joints) of the best plan from the scaled ``state`` after the actions ``before``.
+
+        Unless it ``may_hold``, the plan begins with others than these.
+        """
         self._model.put(state)
         same = np.flatnonzero((self._actions == before).all(axis=1))
         last = int(same[0]) if same.size else -1  # none before the first
-        found = self._find(self._model.world, self._model.states, self._problem, self._tree, last)
+        found = self._find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
         actions: NDArray[np.int64] = self._actions[found.actions]
         return actions
 

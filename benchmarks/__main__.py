@@ -23,6 +23,7 @@ LONG = (
     "moving",
     "moving_pictures",
     "baselines",
+    "parts",
     "sensors",
     "serial",
     "sound_arms",

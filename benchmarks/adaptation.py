@@ -182,7 +182,8 @@ class Bench:
         """Return the policy trained on an arm as drawn, or after a ``change``; train it where there is none."""
         file = self.folder / (f"{seed}.agent" if change is None else f"{change}-{seed}-{self.collected}.agent")
         if not file.exists():
-            simulation, begin = prepared(self.folder, seed) if change is None else self.prepared_anew(seed, change)
+            named = f"virtual:seed={seed}"
+            simulation, begin = prepared(self.folder, named) if change is None else self.prepared_anew(seed, change)
             train(simulation, begin, PolicySettings(), 1).agent.save(file)
         return PolicyAgent.load(file)
 

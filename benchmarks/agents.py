@@ -11,6 +11,7 @@ PNEUMARM_AGENTS_FOLDER     where collected stores and simulations are kept; a te
 Seconds of training are wall time with validation; decision times are processor time at the 99th percentile.
 """
 
+import re
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -24,11 +25,13 @@ from numpy.typing import NDArray
 from benchmarks import _environment as environment
 from pneumarm.arm import ControlCycle, Reading, guarded, open_arm
 from pneumarm.control import AgentController, drawn, make_movements
+from pneumarm.experiments import there_and_back
+from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent, LearnSettings, PolicySettings, Training, test, train
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
-from pneumarm.transitions import KINDS, WHOLE_PERIODS, Store, collect
+from pneumarm.transitions import KINDS, Store
 
 TRANSITIONS = 200_000
 SEED_OF_MOVEMENTS = 0
@@ -53,7 +56,7 @@ def measure() -> Iterator[str]:
     yield HEADER
     with environment.kept_folder("PNEUMARM_AGENTS_FOLDER") as folder:
         for arm in arms:
-            simulation, begin = prepared(folder, arm)
+            simulation, begin = prepared(folder, f"virtual:seed={arm}")
             degrees = simulation.spec.degrees
             for seed in seeds:
                 for method in methods:
@@ -70,19 +73,33 @@ def measure() -> Iterator[str]:
         yield total(method, each, failures[method])
 
 
-def prepared(folder: Path, arm: int) -> tuple[Simulation, BeginStates]:
-    """Return the simulation of a virtual arm and its begin states; collect and fit where that is not done yet."""
-    db, file = folder / f"{arm}.db", folder / f"{arm}.sim"
-    if not db.exists():
-        with open_arm(f"virtual:seed={arm}", arm) as opened, Store.for_arm(db, opened.spec) as store:
-            collect(opened, store, TRANSITIONS, arm, settings=WHOLE_PERIODS)
+def prepared(folder: Path, arm: str, minutes: float = 0.0) -> tuple[Simulation, BeginStates]:
+    """Return the simulation of an arm and its begin states; collect and fit where that is not done yet.
+
+    It is recorded for so many ``minutes`` of its time, or for :data:`TRANSITIONS`.
+    """
+    db, seed = store_of(folder, arm), seed_of(arm)
+    file = db.with_suffix(".sim")
+    if not file.exists():
+        there_and_back.collected(db, arm, seed, Recipe(minutes=minutes) if minutes else Recipe(TRANSITIONS))
+        with Store.open(db) as store:
+            fit_store(store, replace(SINGLE_STEPS, seed=seed)).simulation.save(file)
+    simulation = Simulation.load(file)
     with Store.open(db) as store:
-        if not file.exists():
-            fit_store(store, replace(SINGLE_STEPS, seed=arm)).simulation.save(file)
-        simulation = Simulation.load(file)
         return simulation, begin_states(
             store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec
         )
+
+
+def store_of(folder: Path, arm: str) -> Path:
+    """Return where what was recorded on ``arm`` is kept."""
+    return folder / f"{re.sub(r'[^0-9A-Za-z.]+', '-', arm)}.db"
+
+
+def seed_of(arm: str) -> int:
+    """Return the seed that the arm's name holds, and 0 where it holds none."""
+    found = re.search(r"\bseed=(\d+)", arm)
+    return int(found[1]) if found else 0
 
 
 def train_by(method: str, simulation: Simulation, begin: BeginStates, seed: int) -> Training[Any]:

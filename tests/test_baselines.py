@@ -2,17 +2,28 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks.baselines import METHODS, Wanted, append, each, read_rows
-from benchmarks.baselines.table import below, by_method, curves, floor, line, pooled, write_page
+from benchmarks.baselines.table import (
+    and_adapted,
+    below,
+    bound_of,
+    by_method,
+    curves,
+    floor,
+    line,
+    pooled,
+    write_page,
+)
 
 from pneumarm.errors import UnusableInput
 from pneumarm.statistics import summarise
 
-WANTED = Wanted(movements=40, tests=300, steps=1_000)
+WANTED = Wanted(movements=40, tests=300, steps=1_000, planned=40, adapting=0, minutes=0)
 LEVELS = {"open loop": 40, "planning": 39, "policy": 38, "ppo": 35}
 
 
@@ -44,7 +55,7 @@ def test_rows_come_back_and_one_that_was_cut_short_is_measured_again(tmp_path: P
     assert list(read_rows(file, WANTED)) == [(1, "open loop", 0)]
     append(file, ROWS[1])
     assert read_rows(file, WANTED) == {(r["arm"], r["method"], r["seed"]): r for r in ROWS[:2]}
-    assert read_rows(file, Wanted(movements=41, tests=300, steps=1_000)) == {}
+    assert read_rows(file, replace(WANTED, movements=41)) == {}
 
 
 def test_methods_are_asked_for_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,6 +75,28 @@ def test_the_distance_is_paired_by_arm_and_movement() -> None:
     ]
     np.testing.assert_array_equal(lost, np.concatenate(expected))
     assert below(found["ppo"], found["open loop"][:1]) is None
+    few = [one | {"reward": one["reward"][:5]} for one in found["open loop"]]
+    np.testing.assert_array_equal(below(found["planning"], few)[:5], lost_by_planning(5))
+
+
+def lost_by_planning(movements: int) -> np.ndarray:
+    return np.subtract(row(1, "open loop")["reward"], row(1, "planning")["reward"])[:movements]
+
+
+def test_the_bound_of_an_arm_is_the_better_planner() -> None:
+    lower = [one | {"method": "closed loop", "reward": [20.0] * 40} for one in ROWS if one["method"] == "open loop"]
+    lower[1]["reward"] = [60.0] * 40
+    best = bound_of(by_method(ROWS + lower))
+    assert [(one["arm"], one["method"]) for one in best] == [(1, "open loop"), (2, "closed loop")]
+
+
+def test_what_an_agent_does_after_it_has_adapted_is_a_row_of_its_own() -> None:
+    first = row(1, "policy") | {"adapted": None}
+    assert and_adapted(first) == [first]
+    later = {name: [1.0] * 40 for name in ("reward", "success", "actions", "switches")}
+    before, after = and_adapted(first | {"adapted": later})
+    assert before["reward"] == first["reward"]
+    assert (after["method"], after["reward"], after["arm"]) == ("policy adapted", [1.0] * 40, 1)
 
 
 def test_the_table_tells_every_method_and_the_floor() -> None:

@@ -7,10 +7,16 @@ in the simulation those of ``pneumarm test --seed 0``, on the arm those of the t
 ``pneumarm transfer --seed 0``. Methods of other libraries train through our Gymnasium environment on the same
 simulation, where stable-baselines3 and sb3-contrib are installed (the extra ``stable-baselines``).
 
-PNEUMARM_BASELINES_ARMS       seeds of virtual arms, by default those of the held-out arms, "1001,...,1010"
+PNEUMARM_BASELINES_ARMS       virtual arms by seeds, by default those of the held-out arms, "1001,...,1010", or by
+                              names divided by blanks, such as "virtual:joints=2,seed=1001 virtual:joints=2,seed=1002"
+PNEUMARM_BASELINES_MINUTES    minutes of an arm's time that it is recorded for; by default 200,000 transitions
 PNEUMARM_BASELINES_SEEDS      how many agents each method trains, 3
-PNEUMARM_BASELINES_METHODS    "open loop,closed loop,planning,policy,batched,sarsa,ppo,dqn,qr-dqn:1"; ":1" trains one
+PNEUMARM_BASELINES_METHODS    "open loop,closed loop,planning,policy,batched,sarsa,ppo,dqn,qr-dqn:1"; ":1" trains one;
+                              "sarsa own" and "sarsa one" are other teams of the thesis' agents, for several joints
 PNEUMARM_BASELINES_MOVEMENTS  greedy movements on the arm for each agent, 500
+PNEUMARM_BASELINES_PLANNED    how many of them are planned with the true physics; by default all
+PNEUMARM_BASELINES_ADAPTING   movements in which agents that learn on the arm then adapt, before they make the others
+                              again; 0: they do not
 PNEUMARM_BASELINES_TESTS      movements in the simulation, 10,000; a tenth of them for what plans or looks ahead
 PNEUMARM_BASELINES_STEPS      steps that the methods of other libraries train for, 450,000
 PNEUMARM_BASELINES_FOLDER     what was measured so far, from where a killed run goes on: "runs/baselines"
@@ -21,12 +27,13 @@ arms of its own; one with all arms then makes the table of what is there.
 
 Training is timed after everything is compiled: wall time, and processor time of all threads together. Baselines of
 other libraries run on one thread. p99 is the processor time of a decision at the 99th percentile; wall time where the
-true physics is planned with.
+true physics is planned with. What planning is ahead by is told of the movements that are planned.
 """
 
-import functools
 import json
 import os
+import shutil
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -36,23 +43,27 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _environment as environment
-from benchmarks._trials import HELD_OUT
-from benchmarks.agents import Timed, prepared
-from benchmarks.baselines.learning import OURS, PLANNING, STABLE, learn
-from benchmarks.baselines.table import HEADER, Row, curves, floor, line, pooled, write_page
-from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from benchmarks._trials import HELD_OUT, names_of
+from benchmarks.agents import Timed, prepared, store_of
+from benchmarks.baselines.learning import OURS, PLANNING, STABLE, TEAMS, learn
+from benchmarks.baselines.table import HEADER, Row, and_adapted, curves, floor, line, pooled, write_page
+from pneumarm.arm import open_arm
+from pneumarm.arm.virtual import VirtualArm
 from pneumarm.console import jsonable, peak_memory
-from pneumarm.control import drawn, make_movements
+from pneumarm.control import TransferSettings, drawn, make_movements, transfer
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import AnyAgent, load_agent, test, test_ahead
+from pneumarm.learning import Adapts, AnyAgent, Learns, load_agent, test, test_ahead
 from pneumarm.planning import PlanAgent
-from pneumarm.planning.bound import BoundSettings, Planned, measure_bound
+from pneumarm.planning.bound import Baseline, BoundSettings, Planned, measure_bound
 from pneumarm.simulation import Simulation
 from pneumarm.task import BeginStates, Movement
-from pneumarm.task.movements import of_rows
+from pneumarm.task.movements import Movements, of_rows
+from pneumarm.transitions import Store
+from pneumarm.transitions.goals import Goals
 
-BOUNDS = {"open loop": "open_loop", "closed loop": "closed_loop"}
+BOUNDS: dict[str, Baseline] = {"open loop": "open_loop", "closed loop": "closed_loop"}
 METHODS = (*BOUNDS, PLANNING, *OURS, *STABLE)
+"""Those by default; :data:`TEAMS` are others."""
 SEED = 0
 """Of begin states, goals and the arm's noise, the same for all."""
 
@@ -64,16 +75,23 @@ class Wanted:
     movements: int
     tests: int
     steps: int
+    planned: int
+    adapting: int
+    minutes: float
 
 
 def measure() -> Iterator[str]:
     began = time.perf_counter()
+    movements = environment.whole("PNEUMARM_BASELINES_MOVEMENTS", 500)
     wanted = Wanted(
-        environment.whole("PNEUMARM_BASELINES_MOVEMENTS", 500),
+        movements,
         environment.whole("PNEUMARM_BASELINES_TESTS", 10_000),
         environment.whole("PNEUMARM_BASELINES_STEPS", 450_000),
+        min(environment.whole("PNEUMARM_BASELINES_PLANNED", movements), movements),
+        environment.whole("PNEUMARM_BASELINES_ADAPTING", 0, 0),
+        environment.whole("PNEUMARM_BASELINES_MINUTES", 0, 0),
     )
-    arms = environment.seeds("PNEUMARM_BASELINES_ARMS", HELD_OUT)
+    arms = names_of(environment.text("PNEUMARM_BASELINES_ARMS", HELD_OUT), "virtual:seed=")
     folder = environment.folder("PNEUMARM_BASELINES_FOLDER", "runs/baselines")
     methods = dict(each(environment.text("PNEUMARM_BASELINES_METHODS", ",".join(METHODS) + ":1")))
     if missing := unavailable(methods):
@@ -88,8 +106,9 @@ def measure() -> Iterator[str]:
                 if (row := done.get((arm, method, seed))) is None:
                     row = measured(folder, arm, method, seed, wanted)
                     append(folder / "baselines.jsonl", row)
-                rows.append(row)
-                yield line(row)
+                for one in and_adapted(row):
+                    rows.append(one)
+                    yield line(one)
     yield ""
     yield from pooled(rows)
     yield from floor(rows)
@@ -105,9 +124,10 @@ def each(methods: str) -> Iterator[tuple[str, int]]:
     """Give methods with the number of their agents; what needs no training is there once."""
     for entry in methods.split(","):
         name, _, seeds = entry.strip().partition(":")
-        if name not in METHODS:
-            raise UnusableInput(f"no method is called {name!r}; there are {', '.join(METHODS)}")
-        yield name, int(seeds or environment.whole("PNEUMARM_BASELINES_SEEDS", 3)) if name in (*OURS, *STABLE) else 1
+        if name not in (*METHODS, *TEAMS):
+            raise UnusableInput(f"no method is called {name!r}; there are {', '.join((*METHODS, *TEAMS))}")
+        learns = name in (*OURS, *TEAMS, *STABLE)
+        yield name, int(seeds or environment.whole("PNEUMARM_BASELINES_SEEDS", 3)) if learns else 1
 
 
 def unavailable(methods: dict[str, int]) -> str:
@@ -121,7 +141,7 @@ def unavailable(methods: dict[str, int]) -> str:
     return ""
 
 
-def read_rows(file: Path, wanted: Wanted) -> dict[tuple[int, str, int], Row]:
+def read_rows(file: Path, wanted: Wanted) -> dict[tuple[str, str, int], Row]:
     """Return the rows that were measured before by arm, method and seed."""
     found = {}
     for text in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
@@ -143,40 +163,68 @@ def append(file: Path, row: Row) -> None:
         os.fsync(opened.fileno())
 
 
-def measured(folder: Path, arm: int, method: str, seed: int, wanted: Wanted) -> Row:
+def measured(folder: Path, arm: str, method: str, seed: int, wanted: Wanted) -> Row:
     """Return the row of an agent: what its training took, and what came of it in the simulation and on the arm."""
-    simulation, begin = prepared(folder, arm)
-    row: Row = {"arm": arm, "method": method, "seed": seed, "wanted": vars(wanted)}
+    simulation, begin = prepared(folder, arm, wanted.minutes)
+    row: Row = {"arm": arm, "method": method, "seed": seed, "wanted": vars(wanted), "adapted": None}
     if method in BOUNDS:
-        planned = bound(folder, arm, wanted.movements)[BOUNDS[method]]
+        planned = bound(folder, arm, BOUNDS[method], wanted)
         made, p99 = planned.made, planned.results()["decision_ms"]["p99"]
-        row |= {"wall": 0.0, "cpu": 0.0, "curve": [], "simulation": None}
+        row |= {"wall": 0.0, "cpu": 0.0, "curve": [], "simulation": None, "unproven": planned.unproven}
     else:
         learned = learn(method, simulation, begin, seed, wanted.steps)
         if method != PLANNING:
-            agent = folder / f"{arm}-{method}-{seed}.agent"
+            agent = folder / f"{store_of(folder, arm).stem}-{method.replace(' ', '-')}-{seed}.agent"
             learned.agent.save(agent)
             learned = replace(learned, agent=load_agent(agent))  # what is measured is what anyone could use
         row |= {"wall": learned.wall, "cpu": learned.cpu, "curve": learned.curve}
         row["simulation"] = tested(learned.agent, simulation, begin, wanted.tests)
-        rows, p99 = greedy_movements(learned.agent, arm, wanted.movements)
-        made = of_rows(one.row() for one in rows)
-    return row | {
+        rows, p99 = greedy_movements(learned.agent, arm, simulation.goals, wanted.movements)
+        made = of_rows((one.row() for one in rows), simulation.spec.joints)
+        if wanted.adapting and isinstance(learned.agent, Adapts | Learns):
+            row["adapted"] = told(adapted(folder, learned.agent, arm, wanted))
+    return row | told(made) | {"p99_ms": p99, "memory_mb": peak_memory()}
+
+
+def told(made: Movements) -> Row:
+    """Return what a row tells of movements, each of them; switches are those of all joints together."""
+    return {
         "reward": made.reward.tolist(),
         "success": made.success.astype(int).tolist(),
         "actions": made.actions.tolist(),
         "switches": made.all_switches.tolist(),
-        "p99_ms": p99,
-        "memory_mb": peak_memory(),
     }
 
 
-@functools.cache
-def bound(folder: Path, arm: int, movements: int) -> dict[str, Planned]:
-    """Return what planning with the true physics achieves in the movements of every baseline."""
-    simulation, _ = prepared(folder, arm)
-    settings = BoundSettings(episodes=movements)
-    return dict(measure_bound(VirtualArm(draw_parameters(arm)), simulation.goal_range, settings, seed=SEED))
+def bound(folder: Path, arm: str, baseline: Baseline, wanted: Wanted) -> Planned:
+    """Return what planning with the true physics achieves in the first movements of every baseline."""
+    simulation, _ = prepared(folder, arm, wanted.minutes)
+    settings = BoundSettings(episodes=wanted.planned)
+    with open_virtual(arm) as opened:
+        return measure_bound(opened, simulation.goals, settings, seed=SEED, baselines=(baseline,))[baseline]
+
+
+def open_virtual(arm: str) -> VirtualArm:
+    """Return the virtual arm of this name.
+
+    Raises:
+        UnusableInput: it is another kind of arm.
+
+    """
+    opened = open_arm(arm, SEED)
+    if not isinstance(opened, VirtualArm):
+        opened.close()
+        raise UnusableInput(f"{arm}: is no virtual arm, which a table of baselines needs")
+    return opened
+
+
+def adapted(folder: Path, agent: AnyAgent, arm: str, wanted: Wanted) -> Movements:
+    """Return the movements of an agent on the arm again after it has learned there; the recording stays as it was."""
+    settings = TransferSettings(episodes=wanted.adapting, test_episodes=wanted.movements)
+    with tempfile.TemporaryDirectory() as temporary, open_virtual(arm) as opened:
+        copy = Path(shutil.copy(store_of(folder, arm), temporary))
+        with Store.append_to(copy) as store:
+            return transfer(agent, opened, store, settings, seed=SEED).movements["after"]
 
 
 def tested(agent: AnyAgent, simulation: Simulation, begin: BeginStates, episodes: int) -> dict[str, Any]:
@@ -189,13 +237,13 @@ def tested(agent: AnyAgent, simulation: Simulation, begin: BeginStates, episodes
     return test(agent, simulation, begin, episodes, SEED).results()
 
 
-def greedy_movements(agent: AnyAgent, arm: int, movements: int) -> tuple[list[Movement], float]:
+def greedy_movements(agent: AnyAgent, arm: str, goals: Goals, movements: int) -> tuple[list[Movement], float]:
     """Return movements on a virtual arm as on arrival, and the 99th percentile of a decision's time [ms]."""
     controller = Timed(agent)
     controller.reset(agent.goal_range.mean(axis=1))
-    with VirtualArm(draw_parameters(arm), seed=SEED) as opened:
+    with open_virtual(arm) as opened:
         controller.act(opened.read())  # compiles
-    with VirtualArm(draw_parameters(arm), seed=SEED) as opened:
-        draws = drawn(agent.goal_range, SEED, range(movements))
+    with open_virtual(arm) as opened:
+        draws = drawn(goals, SEED, range(movements))
         made = list(make_movements(opened, controller, agent.settings, draws, velocity=agent.window.velocity))
     return made, 1e3 * float(np.quantile(controller.seconds[1:], 0.99))

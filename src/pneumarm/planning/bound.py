@@ -4,7 +4,7 @@ Thesis section 5.5.1: "We do not know what an optimal controller can achieve." W
 computed, see :mod:`pneumarm.planning.planner`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -103,6 +103,7 @@ def measure_bound(
     seed: int = 0,
     reward: Reward = Reward(),
     simulation: Simulation | None = None,
+    baselines: Sequence[Baseline] = ("open_loop", "closed_loop"),
     progress: Callable[[float, float], None] | None = None,
 ) -> dict[Baseline, Planned]:
     """Return what the planners achieve on fresh arms like ``parameters_of``.
@@ -114,12 +115,12 @@ def measure_bound(
         seed: of begin states, goals and noise; begin states and goals are those of a transfer with the same seed.
         reward: what is paid.
         simulation: of this arm, to plan with as well.
+        baselines: of the true physics that are measured.
         progress: called with what is done and the total.
 
     """
-    baselines: list[Baseline] = ["open_loop", "closed_loop"]
     if simulation is not None:
-        baselines.append("simulated")
+        baselines = [*baselines, "simulated"]
     spec, total, results = parameters_of.spec, len(baselines) * settings.episodes, {}
     for number, baseline in enumerate(baselines):
         parameters = parameters_of.parameters

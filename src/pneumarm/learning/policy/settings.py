@@ -34,6 +34,11 @@ class PolicySettings(FleetSettings):
     """Simulated movements by which a decision that is not clear is made on the arm; 0: as the policy says."""
     horizon: int = 25
     """Longest of these movements [steps]."""
+    nodes: int = 20_000
+    """With several joints: states of the simulation that may be kept in the search for a plan, which is compared with
+    what the policy would do; 0: each joint looks ahead for itself."""
+    practice: int = 4
+    """With several joints: there are so many times as many updates."""
     clear: float = 0.001
     """Actions less probable than this are not looked at; where only one is left the decision is clear."""
     fillings: float = 2.0
@@ -53,6 +58,8 @@ class PolicySettings(FleetSettings):
             "rest": 0 <= self.rest <= 60 or "0 to 60 s",
             "lookahead": 0 <= self.lookahead <= 65_536,
             "horizon": self.horizon >= 1,
+            "nodes": 0 <= self.nodes <= 10_000_000,
+            "practice": self.practice >= 1,
             "clear": 0 <= self.clear < 1,
             "fillings": 0 <= self.fillings <= 100 or "0 to 100",
         }

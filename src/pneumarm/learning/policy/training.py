@@ -28,7 +28,7 @@ _WEIGHTS, _ARMS, _ORDER, _VALIDATION = 0, 1, 2, 3  # streams of random numbers
 _FIRST_OUTPUT = 0.01  # the first policy chooses by its bonus for holding alone
 _WIDER = 4.0  # times as wide the tolerances of several joints are when training begins ...
 _CHEAPER = 0.2  # ... and this share of its price is what a switch costs,
-_EASING = 0.6  # until both are what they are, at this share of the training
+_EASING = 0.08  # until both are what they are, at this share of the training
 _VALUE_RATE = 4e-3  # of a policy's training, whose values begin at random, too
 
 
@@ -36,7 +36,7 @@ def train_policy(
     simulation: Simulation, begin_states: BeginStates, settings: PolicySettings, seed: int = 0, **how: Any
 ) -> Training[PolicyAgent]:
     """Train policies and return the best; ``how`` as of :func:`~pneumarm.learning.fleet.train_fleet`."""
-    settings = patient(settings, simulation)
+    settings = practised(patient(settings, simulation), simulation)
     return train_fleet(lambda n: PolicyLearner(simulation, begin_states, settings, seed, n), settings, seed, **how)
 
 
@@ -51,6 +51,12 @@ def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     with guarded(SimulationArm(simulation)) as arm:
         longest = settings.fillings * sum(find_fill_times(arm))
     return replace(settings, cutoff=max(settings.cutoff, round(longest / simulation.spec.period)))
+
+
+def practised(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
+    """Return ``settings`` with as many updates as the joints of this arm need."""
+    several = simulation.spec.joints > 1
+    return replace(settings, updates=settings.updates * settings.practice) if several else settings
 
 
 class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):

@@ -1,0 +1,145 @@
+"""What several joints could do together from where they are, and which of it is best.
+
+A policy that decides joint by joint sees neither that an action of all joints, held for ten periods, brings all of
+them to their goals at the same time, nor that what it does already would: each switch costs as much as eight actions
+(thesis section 5.4.1). So what it would do is compared with other *courses*: the best plan that a search in the
+simulation finds, the course that was taken last, and going on as before for some periods more. Each is followed in
+many copies of the simulated arm with the noise of the simulation, and after its end the policy goes on greedily. What
+has the highest mean return is done, for one period; then all is compared again.
+
+A plan alone trusts the simulation to be right for ten periods, and a policy to be right everywhere; compared in the
+noise, each stands in for the other.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumarm.arm.valves import ACTIONS, possible_actions, to_actions
+from pneumarm.kernels import kernel
+from pneumarm.learning.policy.acting import Lanes, Mind, copy_all, judge_all
+from pneumarm.learning.policy.proximal import FORBIDDEN
+from pneumarm.learning.policy.settings import PolicySettings
+from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.fleet import gained_by, take_alive
+
+_POLICY = -1  # in a course: what the policy says
+_HELD = (1, 3, 6, 12)  # periods for which the last actions may go on
+_MOST = 3 + len(_HELD)  # courses: that of the policy, the plan, the last one, and these
+_MOST_ACTIONS = 1_000  # of the whole arm, among which a plan can be sought in time
+
+
+class Foresight:
+    """Compares courses of several joints in a movement; for one joint looking ahead action by action is enough."""
+
+    def __init__(self, simulation: Simulation, settings: PolicySettings) -> None:
+        joints = simulation.window.joints
+        actions = int(possible_actions(simulation.spec.muscles).sum()) ** joints
+        self._search = _Search(simulation, settings) if actions <= _MOST_ACTIONS else None
+        self._horizon = settings.horizon
+        self._courses = np.empty((_MOST, self._horizon, joints), np.int64)
+        self._last = self._courses[0, :0]
+
+    def begin(self, goal: NDArray[np.float64]) -> None:
+        """Begin a movement to ``goal`` (joints,) [counts]."""
+        if self._search is not None:
+            self._search.goal[:] = goal
+        self._last = self._last[:0]
+
+    def improve(self, mind: Mind, single: Lanes, lanes: Lanes, samples: NDArray[np.int64]) -> None:
+        """Set ``single.actions`` (1, joints), which are what the policy would do, to what is best.
+
+        What the policy may not do, no course begins with: where the arm sticks the simulation may drift on.
+        """
+        before, courses = single.fleet.actions[0], self._courses
+        allowed = single.bias[:, 0].reshape(len(before), ACTIONS) > FORBIDDEN
+        joints = np.arange(len(before))
+        goes_on = before[0] >= 0 and bool(allowed[joints, before].all())
+        courses[...] = _POLICY
+        courses[0, :1] = single.actions
+        known = [self._last]
+        if self._search is not None:
+            state = single.fleet.x[: mind.inputs.state_size, 0]
+            known.append(self._search.plan(state, before, goes_on)[: self._horizon])
+        count = 1
+        for course in known:
+            if len(course) and allowed[joints, course[0]].all():
+                courses[count, : len(course)] = course
+                count += 1
+        if goes_on:
+            for periods in _HELD:
+                courses[count, : min(periods, self._horizon)] = before
+                count += 1
+        best = courses[compare(mind, single, lanes, samples, courses[:count], self._horizon)]
+        single.actions[0] = best[0]
+        self._last = best[1:][best[1:, 0] != _POLICY].copy()
+
+
+class _Search:
+    """Seeks plans in the simulation, by the states that an actor sees."""
+
+    def __init__(self, simulation: Simulation, settings: PolicySettings) -> None:
+        from pneumarm.planning.planner import SimulationModel  # planning stands above agents
+        from pneumarm.planning.search import PlanSettings, find, problem, tree
+
+        joints, plan = simulation.window.joints, PlanSettings(nodes=settings.nodes)
+        self._model = SimulationModel(simulation, plan)
+        reward, muscles = settings.reward.on(simulation.spec), simulation.spec.muscles
+        self._problem = problem(np.zeros(joints), reward, plan, self._model.uncertainty, muscles)
+        self.goal = self._problem.goal
+        """Shape (joints,) [counts]."""
+        self._tree, self._find = tree(plan, joints), find
+        self._actions = to_actions(self._problem.commands)
+        """Actions of each joint by those of the whole arm, shape (9**joints, joints)."""
+
+    def plan(self, state: NDArray[np.float32], before: NDArray[np.int64], may_hold: bool) -> NDArray[np.int64]:
+        """Return the actions (n, joints) of the best plan from the scaled ``state`` after the actions ``before``.
+
+        Unless it ``may_hold``, the plan begins with others than these.
+        """
+        self._model.put(state)
+        same = np.flatnonzero((self._actions == before).all(axis=1))
+        last = int(same[0]) if same.size else -1  # none before the first
+        found = self._find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
+        actions: NDArray[np.int64] = self._actions[found.actions]
+        return actions
+
+
+@kernel
+def compare(mind, single, lanes, samples, courses, horizon):  # type: ignore[no-untyped-def]
+    """Return which of the ``courses`` (m, steps, joints) from the arm of ``single`` has the highest mean return."""
+    n, count = lanes.total.shape[0], courses.shape[0]
+    for e in range(n):
+        samples[e] = e // count  # equal noise for all courses
+    copy_all(mind, lanes, single.fleet, samples)
+    follow_all(mind, lanes, courses, horizon)
+    best, highest = 0, -np.inf
+    for place in range(count):
+        total = 0.0
+        for e in range(place, n, count):
+            total += lanes.total[e]
+        mean = total / ((n - place + count - 1) // count)
+        if mean > highest:
+            highest, best = mean, place
+    return best
+
+
+@kernel
+def follow_all(mind, lanes, courses, horizon):  # type: ignore[no-untyped-def]
+    """Let lane ``e`` follow course ``e % m`` of (m, steps, joints), then the policy; sum up ``lanes.total``."""
+    steps, left = courses.shape[1], lanes.total.shape[0]
+    for k in range(horizon):
+        judge_all(mind, lanes)
+        for e in range(lanes.total.shape[0]):
+            course = e % courses.shape[0]
+            if k < steps and courses[course, k, 0] >= 0:
+                for joint in range(lanes.actions.shape[1]):
+                    lanes.actions[e, joint] = courses[course, k, joint]
+        take_alive(mind.environment, mind.limits, lanes.fleet, lanes.actions, lanes.alive, lanes.is_reached)
+        for e in range(lanes.total.shape[0]):
+            if lanes.alive[e]:
+                lanes.total[e] += gained_by(mind.environment.task, lanes.fleet, e, lanes.is_reached[e])
+                if lanes.is_reached[e]:
+                    lanes.alive[e] = False
+                    left -= 1
+        if left == 0:
+            break

@@ -1,0 +1,91 @@
+"""Several joints: what the policy would do is compared with plans, in the simulation; one joint is left as it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pneumarm.arm.valves import CLOSED
+from pneumarm.learning import PolicyAgent, PolicySettings
+from pneumarm.learning.policy.acting import lanes
+from pneumarm.learning.policy.agent import policy_sizes
+from pneumarm.learning.policy.foresight import compare
+from pneumarm.learning.policy.training import practised
+from pneumarm.networks.layers import weight_count
+from pneumarm.random import random_states
+from pneumarm.task import BeginStates
+from pneumarm.task.movements import Movements
+from simple_simulation import QUIET, simulation
+
+SETTINGS = PolicySettings(hidden=(4,), lookahead=48, nodes=5_000, noise=QUIET, cutoff=40)
+IN_OUT, OUT_IN = 6, 2
+"""Actions that fill muscle 1 and empty muscle 2, and the other way round."""
+
+
+def untrained(joints: int) -> PolicyAgent:
+    """Return an agent to which all actions are equal; it takes the first that it may."""
+    made = simulation(joints)
+    return PolicyAgent(made, np.zeros(weight_count(policy_sizes(made.window, SETTINGS)), np.float32), SETTINGS)
+
+
+def at_rest(joints: int) -> BeginStates:
+    """Return the one state in the middle of everything."""
+    window = simulation(joints).window
+    return BeginStates(window, np.zeros((1, window.state_size), np.float32), np.full((1, joints), 500.0))
+
+
+def moved(agent: PolicyAgent, nodes: int) -> Movements:
+    found = replace(agent, settings=replace(agent.settings, nodes=nodes)).test_ahead(
+        agent.simulation, at_rest(agent.window.joints), 12, (0,)
+    )
+    assert found is not None
+    return found
+
+
+def test_plans_bring_two_joints_to_goals_that_the_policy_does_not_know() -> None:
+    agent = untrained(2)
+    alone, planned = moved(agent, 0), moved(agent, SETTINGS.nodes)
+    np.testing.assert_array_equal(alone.goal, planned.goal)
+    assert planned.success.all()
+    assert planned.reward.mean() > alone.reward.mean() + 10
+
+
+def test_an_arm_that_does_not_move_is_not_told_the_same_for_ever() -> None:
+    agent = untrained(2)
+    actor, state = agent.actor(), np.zeros(agent.window.state_size)
+    actor.begin(state, [560.0, 440.0])
+    told = []
+    for _ in range(20):
+        told.append(actor.act())
+        actor.follow(state)
+    for joint in np.array(told).T:
+        changes = np.flatnonzero(np.diff(joint, prepend=-1, append=-1))
+        assert np.diff(changes).max() <= SETTINGS.patience + 1
+
+
+def test_one_joint_decides_as_without_plans() -> None:
+    agent = untrained(1)
+    np.testing.assert_array_equal(moved(agent, 0).reward, moved(agent, SETTINGS.nodes).reward)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_the_course_of_the_highest_return_is_found_wherever_it_stands(place: int) -> None:
+    agent = untrained(2)
+    mind, noise = agent.mind(at_rest(2)), np.zeros((12, 4), np.uint64)
+    single, many = lanes(mind, agent.sizes, random_states(0, 1)), lanes(mind, agent.sizes, noise)
+    single.fleet.goal[0] = 560.0, 440.0
+    single.fleet.x[mind.limits.goal_place : mind.limits.goal_place + 2, 0] = 0.15, -0.15  # 60 of 400 counts
+    towards, away, waiting = (IN_OUT, OUT_IN), (OUT_IN, IN_OUT), (CLOSED, CLOSED)
+    courses = np.array([np.tile(one, (20, 1)) for one in (away, waiting, waiting)])
+    courses[place] = towards
+    if place != 0:
+        courses[0] = away
+    assert compare(mind, single, many, np.zeros(12, np.int64), courses, 20) == place
+    totals = [many.total[k::3].mean() for k in range(3)]
+    assert totals[place] == max(totals) > 20
+
+
+def test_several_joints_practise_more() -> None:
+    settings = PolicySettings(updates=10, practice=3)
+    assert practised(settings, simulation(1)) == settings
+    assert practised(settings, simulation(2)).updates == 30

@@ -26,8 +26,8 @@ from pneumarm.transitions.goals import Goals
 from pneumarm.transitions.window import Window
 
 
-class Acts(Protocol):
-    """An agent that acts."""
+class OfAnArm(Protocol):
+    """What was made to move an arm."""
 
     @property
     def spec(self) -> ArmSpec:
@@ -48,6 +48,10 @@ class Acts(Protocol):
     @property
     def settings(self) -> TaskSettings:
         """Its task, and how it was trained."""
+
+
+class Acts(OfAnArm, Protocol):
+    """An agent that acts."""
 
     def actor(self) -> Acting:
         """Return it acting step by step, as well as it can."""

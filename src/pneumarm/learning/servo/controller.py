@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.arm.seam import ArmSpec, Reading, checked
 from pneumarm.errors import UnusableInput
+from pneumarm.learning.agents import OfAnArm
 from pneumarm.learning.servo.actor import ServoActor
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.correction import Correction, features_of
@@ -19,11 +20,10 @@ from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.predictive import PredictiveControl
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.servo.two_ways import TwoWays
-from pneumarm.simulation.simulation import Scaling, Simulation
+from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.forecast import Forecast
 from pneumarm.task.tracker import StateTracker
 from pneumarm.transitions.watch import made_up_readings
-from pneumarm.transitions.window import Window
 
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
 _SURE = 0.065  # tolerances of noise that may be left in that average
@@ -62,28 +62,12 @@ _GAINED = 0.12  # tolerances nearer by a plan than by the policy, in the simulat
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
-class Servo(Protocol):
+class Servo(OfAnArm, Protocol):
     """What moves an arm by a :class:`ServoController`: a policy, plans, or both."""
 
     @property
     def simulation(self) -> Simulation:
         """Of its arm."""
-
-    @property
-    def spec(self) -> ArmSpec:
-        """The arm that it is for."""
-
-    @property
-    def window(self) -> Window:
-        """Of its state."""
-
-    @property
-    def scaling(self) -> Scaling:
-        """Of its state."""
-
-    @property
-    def goal_range(self) -> NDArray[np.float64]:
-        """Goals that it reaches, shape (joints, 2) [counts]."""
 
     @property
     def settings(self) -> ServoSettings:

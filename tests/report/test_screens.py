@@ -23,10 +23,13 @@ from pneumarm.arm.virtual import Leak
 from pneumarm.checkup import diagnose, measure
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import Row, sorted_rows
+from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.results import write_page
+from pneumarm.experiments.sweep import arm_folder
 from pneumarm.report import RunData, run_page
 from pneumarm.report.checkup import checkup_page
 from pneumarm.task import Movements
+from pneumarm.transitions import Store, collect
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 ROOT = Path(__file__).parents[2]
@@ -65,7 +68,14 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             )
             rows.append(Row("virtual:seed=1", trial, run, {name: random.uniform(0.5, 1) for name in names}, 0.0))
     table = sorted_rows(rows)
-    experiment = write_page(ALL_GOALS, folder, ALL_GOALS.analyse(table), table.runs, table.arms)
+    laboratory = folder / "laboratory"
+    (laboratory / ALL_GOALS.name).mkdir(parents=True)
+    recording = arm_folder(laboratory, table.arms[0])
+    recording.mkdir(parents=True)
+    with open_arm(table.arms[0]) as arm, Store.for_arm(recording / STORE, arm.spec) as store:
+        collect(arm, store, 2000)
+    analysis = ALL_GOALS.analyse(table)
+    experiment = write_page(ALL_GOALS, laboratory / ALL_GOALS.name, analysis, table.runs, table.arms)
     reports = {"report": folder / "report.html", "report of two joints": folder / "two.html"}
     found = {**reports, "check-up": folder / "checkup.html", "experiment": experiment}
     if (done := python("-m", "mkdocs", "build", "--site-dir", folder / "site", cwd=ROOT)).returncode == 0:
@@ -141,6 +151,7 @@ def test_a_page_fits_and_can_be_read(
     size, text = smallest_text(page)
     assert size >= READABLE, text
     if name != "site":
+        assert moving(page)
         widths = page.evaluate(
             "[...document.querySelectorAll('.drawing img')].map((one) => one.getBoundingClientRect().width)"
         )

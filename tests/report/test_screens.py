@@ -150,7 +150,10 @@ def test_a_page_fits_and_can_be_read(
     assert too_wide(page) <= 0
     size, text = smallest_text(page)
     assert size >= READABLE, text
-    if name != "site":
+    if name == "site":
+        shown_picture = page.evaluate("document.querySelector('picture img').currentSrc")
+        assert shown_picture.endswith("arm-narrow.svg" if width == 400 else "arm.svg")
+    else:
         assert moving(page)
         widths = page.evaluate(
             "[...document.querySelectorAll('.drawing img')].map((one) => one.getBoundingClientRect().width)"

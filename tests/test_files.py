@@ -190,7 +190,7 @@ def test_arrays_that_a_disk_has_no_room_for_are_told_of(path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(PneumarmError, match="No space left on device.*free some space") as failure:
+    with pytest.raises(PneumarmError, match=r"No space left on device.*free some space") as failure:
         write_arrays(path, "test", {}, ARRAYS)
     assert failure.value.exit_code == 1
     assert not list(path.parent.iterdir())

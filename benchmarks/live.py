@@ -46,7 +46,7 @@ def started(*command: object, expect: str) -> Iterator[tuple[subprocess.Popen[st
             yield process, line.strip()
         finally:
             process.terminate()
-            process.communicate(timeout=60)
+            process.communicate(timeout=600)  # on a machine that has much else to do
 
 
 def measure() -> Iterator[str]:

@@ -4,11 +4,16 @@ import sys
 from pathlib import Path
 
 from pneumarm.report import read_run
-from pneumarm.report.figures import movement
+from pneumarm.report.figures import movement, moving_arm
+from pneumarm.report.shown import read_shown
 from pneumarm.report.style import svg
 
 if __name__ == "__main__":
-    run = read_run(Path(sys.argv[1]))
-    shown = run.movements[-1]
+    docs, run = Path(__file__).parent, read_run(Path(sys.argv[1]))
+    moved = read_shown(Path(sys.argv[1]), begin=6.0, seconds=12.0)
+    for name, narrow in (("arm.svg", False), ("arm-narrow.svg", True)):
+        playing = moving_arm(moved.time, moved.angle, moved.wanted, moved.spec, narrow=narrow)
+        (docs / name).write_text(playing, encoding="utf-8")
+    shown = run.demonstrations[-1]
     figure = movement(shown.time, shown.angle, shown.pressure, shown.valves, shown.goal, shown.end, run.spec)
-    (Path(__file__).parent / "movement.svg").write_text(svg(figure), encoding="utf-8")
+    (docs / "movement.svg").write_text(svg(figure), encoding="utf-8")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from children import python
-from pneumarm.cli import COMMANDS, main
+from pneumarm.cli import COMMANDS, PANELS, main
 from pneumarm.learning.imported import ImportedPolicy
 from pneumarm.simulation import Simulation
 from readme import blocks, commands
@@ -333,6 +333,28 @@ def test_help_has_two_levels(capsys: pytest.CaptureFixture[str]) -> None:
     assert "(thesis" not in few
     assert "--servo.tolerance" in everything
     assert "(thesis" in everything
+
+
+def test_every_command_is_in_a_panel_of_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    placed = [name for names in PANELS.values() for name in names if not name.startswith("-")]
+    assert sorted(placed) == sorted({command.split()[0] for command in COMMANDS})
+    said = Outcome(capsys, "--help").out
+    assert [said.index(title) for title in PANELS] == sorted(said.index(title) for title in PANELS)
+    assert said.index("│ run ") < said.index("│ live ")
+
+
+def test_help_has_no_words_of_programmers(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in COMMANDS:
+        said = Outcome(capsys, *command.split(), "--help-all").out
+        for words in ("SERVERADDRESS", "--empty-", "[default: ()]", "[default: {}]", "[ARGS...]"):
+            assert words not in said, command
+
+
+def test_how_a_check_up_measures_is_told_by_help_all_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("check", "calibrate"):
+        few, everything = (Outcome(capsys, "arm", command, level).out for level in ("--help", "--help-all"))
+        assert "--measure.fill" not in few
+        assert "--measure.fill" in everything
 
 
 def test_help_says_what_reached_means(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,6 @@
 """Files are written whole or not at all, and what is read is checked before it is believed."""
 
+import errno
 import json
 import os
 import struct
@@ -10,7 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.files import read_arrays, write_arrays, write_json, write_text, written_whole
+from pneumarm.files import (
+    folder_written_whole,
+    read_arrays,
+    write_arrays,
+    write_json,
+    write_text,
+    written_whole,
+)
 
 
 @pytest.fixture
@@ -36,6 +44,16 @@ def test_arrays_and_settings_come_back(path):
     for name, array in ARRAYS.items():
         np.testing.assert_array_equal(arrays[name], array)
         assert arrays[name].dtype == array.dtype
+
+
+@pytest.mark.parametrize(("number", "code"), [(errno.ENOSPC, 1), (errno.EIO, 1), (errno.EACCES, 2)])
+def test_a_full_disk_is_not_the_fault_of_what_was_asked_for(tmp_path, number, code):
+    for writing in (written_whole, folder_written_whole):
+        with pytest.raises(PneumarmError, match="there: cannot be written") as failure, writing(tmp_path / "there"):
+            raise OSError(number, os.strerror(number))
+        assert failure.value.exit_code == code
+        assert ("free some space" in str(failure.value)) is (code == 1)
+    assert not list(tmp_path.iterdir())
 
 
 def test_another_kind_is_refused(path):
@@ -165,3 +183,14 @@ def test_errors_carry_the_exit_codes_of_the_command_line():
     assert (PneumarmError.exit_code, UnusableInput.exit_code, ArmFailure.exit_code) == (1, 2, 1)
     assert issubclass(UnusableInput, PneumarmError)
     assert issubclass(ArmFailure, PneumarmError)
+
+
+def test_arrays_that_a_disk_has_no_room_for_are_told_of(path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(PneumarmError, match=r"No space left on device.*free some space") as failure:
+        write_arrays(path, "test", {}, ARRAYS)
+    assert failure.value.exit_code == 1
+    assert not list(path.parent.iterdir())

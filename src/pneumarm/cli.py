@@ -7,8 +7,9 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
+from typing import Any
 
-from cyclopts import App, CycloptsError, UnusedCliTokensError
+from cyclopts import App, CycloptsError, Group, Parameter, UnusedCliTokensError
 
 from pneumarm import __version__
 from pneumarm.commands.config_file import take_config, take_option
@@ -142,6 +143,16 @@ COMMANDS = {
 }
 """Every command with its one-line help and an example."""
 
+PANELS = {
+    "Begin here": ("run", "live", "move", "track", "view"),
+    "Step by step": ("collect", "coverage", "fit", "analyse", "train", "test", "transfer", "versions", "report"),
+    "The arm, and other controllers": ("arm", "tune", "bound"),
+    "To other programs and places": ("import", "export", "copy"),
+    "The thesis' experiments": ("experiment", "claims", "taguchi"),
+    "This program": ("completion", "--help", "--version"),
+}
+"""Where commands are found in the help, in this order."""
+
 MOVING = (
     "run", "collect", "transfer", "move", "track", "live", "tune",
     "arm check", "arm calibrate", "arm sensors", "arm valves",
@@ -159,13 +170,35 @@ app = App(
     version=__version__,
     suppress_keyboard_interrupt=False,
     help_formatter=FewOptions(),
+    help_epilogue="Try: pneumarm live, which shows a virtual arm in the browser and has it learn, or pneumarm run.",
+    default_parameter=Parameter(negative_iterable=()),
 )
+_places: dict[str, dict[str, Any]] = {
+    name: {"group": group, "sort_key": order}
+    for group, names in ((Group(title, sort_key=place), PANELS[title]) for place, title in enumerate(PANELS))
+    for order, name in enumerate(names)
+}
 _groups = {
-    "arm": App(name="arm", help="Check an arm, calibrate it, try its valves; emulate one, flash its board."),
-    "taguchi": App(name="taguchi", help="Design of experiments."),
+    "arm": App(
+        name="arm",
+        help="Check an arm, calibrate it, try its valves; emulate one, flash its board.",
+        help_epilogue="Begin with: pneumarm arm check ARM.",
+        **_places["arm"],
+    ),
+    "taguchi": App(
+        name="taguchi",
+        help="Analyse tables of trials and runs by the design of their experiment.",
+        help_epilogue="",
+        **_places["taguchi"],
+    ),
 }
 for _group in _groups.values():
     app.command(_group)
+_USAGE = {
+    "move": "Usage: pneumarm move CONTROLLER --arm ARM [OPTIONS] GOALS...",
+    "live": "Usage: pneumarm live [CONTROLLERS...] [OPTIONS]",
+}
+"""Of commands that take any number of words."""
 for _name, (_help, _example) in COMMANDS.items():
     _file, _, _part = _name.partition(" ")
     _groups.get(_file, app).command(
@@ -173,7 +206,11 @@ for _name, (_help, _example) in COMMANDS.items():
         name=_part or _file,
         help=_help,
         help_epilogue=f"Example: {_example}",
+        usage=_USAGE.get(_name),
+        **_places.get(_name, {}),
     )
+for _name in ("--help", "--version"):
+    app[_name].group, app[_name].sort_key = _places[_name].values()
 
 
 def main(arguments: list[str] | None = None) -> None:

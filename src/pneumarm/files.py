@@ -1,5 +1,6 @@
 """Files that are written whole or not at all, and read with errors for people."""
 
+import errno
 import json
 import os
 import shutil
@@ -12,13 +13,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.errors import UnusableInput
+from pneumarm.errors import PneumarmError, UnusableInput
 
 _UMASK = os.umask(0)
 os.umask(_UMASK)  # there is no other way to ask for it
 _ENTRY = "pneumarm"
 _LARGEST_HEADER = 1 << 20
 _LARGEST_FILE = 64 << 20
+_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Errors that have nothing to do with what was asked for."""
 
 
 @contextmanager
@@ -26,7 +29,8 @@ def written_whole(path: Path) -> Iterator[Path]:
     """Give a temporary path next to ``path``; on leaving, make it durable and put it in place of ``path``.
 
     Raises:
-        UnusableInput: the parent folder is missing or cannot be written.
+        UnusableInput: the parent folder is missing or may not be written to.
+        PneumarmError: the disk is full or broken.
 
     """
     require_folder(path)
@@ -44,9 +48,17 @@ def written_whole(path: Path) -> Iterator[Path]:
             finally:
                 os.close(folder)
     except OSError as error:
-        raise UnusableInput(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise _not_written(path, error) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _not_written(path: Path, error: OSError) -> PneumarmError:
+    """Return what is said where ``path`` could not be written: the fault of the disk, or of what was asked for."""
+    words = f"{path}: cannot be written ({error.strerror or error})"
+    if error.errno in _OF_THE_DISK:
+        return PneumarmError(f"{words}; free some space, then run the same command again")
+    return UnusableInput(words)
 
 
 def require_folder(path: Path) -> None:
@@ -60,7 +72,8 @@ def folder_written_whole(folder: Path) -> Iterator[Path]:
     """Give a folder to write into, which gets the name ``folder`` when all is in it, and is removed otherwise.
 
     Raises:
-        UnusableInput: ``folder`` exists, or cannot be written.
+        UnusableInput: ``folder`` exists, or may not be written.
+        PneumarmError: the disk is full or broken.
 
     """
     require_folder(folder)
@@ -72,7 +85,7 @@ def folder_written_whole(folder: Path) -> Iterator[Path]:
         yield temporary
         temporary.rename(folder)
     except OSError as error:
-        raise UnusableInput(f"{folder}: cannot be written ({error.strerror or error})") from error
+        raise _not_written(folder, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
@@ -96,13 +109,12 @@ def write_json(path: Path, value: Any) -> None:
 
 def write_arrays(path: Path, kind: str, settings: Any, arrays: dict[str, NDArray[Any]]) -> None:
     """Write ``arrays`` and ``settings`` (JSON) to a safetensors file of the given ``kind``."""
-    from safetensors.numpy import save_file
+    from safetensors.numpy import save
 
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     # One entry: the order of several would differ from file to file.
     metadata = {_ENTRY: json.dumps({"kind": kind, "settings": settings}, allow_nan=False)}
-    with written_whole(path) as temporary:
-        save_file(contiguous, temporary, metadata=metadata)
+    write_bytes(path, save(contiguous, metadata=metadata))  # whose own errors of a disk are no OSError
 
 
 def kind_of(path: Path) -> str:

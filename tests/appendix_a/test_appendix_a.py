@@ -48,10 +48,10 @@ def test_every_error_is_revealed_and_named(capsys, tmp_path):
             assert bool(said["checkup"]) is (kind is not None)
     # A zone of 8 degrees around 5; before it is told from noise it may be called that.
     worn = [one.split() for one in told["A worn potentiometer"]["worn"]["monitor"]]
-    angles = [float(one[-5]) for one in worn if one[0] == "worn-potentiometer:"]
+    angles = [float(one[-5]) for one in worn if one[:2] == ["worn", "potentiometer:"]]
     assert angles
     assert all(abs(one - 5.0) <= 8.0 for one in angles)
-    assert {one[0] for one in worn} <= {"worn-potentiometer:", "sensor-noise:"}
+    assert {" ".join(one[:2]) for one in worn} <= {"worn potentiometer:", "sensor noise:"}
     assert told["Noise"]["healthy"]["monitor"] == []
     lost = {name: said["error"] for name, said in told["A lost buffer"].items()}
     assert lost["claims believed"]["angle"] > 1.5 * lost["driver in order"]["angle"]

@@ -127,7 +127,7 @@ def test_air_that_a_turning_joint_compresses_is_not_let_in_by_an_inlet(seed):
     assert diagnose(measure(Compressed(seed))) == []
     stuck = Compressed(seed)
     stuck.arm.faults = (StuckValve(muscle=1, position="open"),)
-    assert [(f.kind, f.where) for f in diagnose(measure(stuck))] == [("inlet stuck open", "joint, muscle 1")]
+    assert [(f.kind, f.where) for f in diagnose(measure(stuck))] == [("inlet stuck open", "joint 1, muscle 1")]
 
 
 @pytest.mark.parametrize("name", [None, "noise", "potentiometer worn at 10 degrees", "sensor at the valve's side"])
@@ -241,9 +241,9 @@ def test_both_muscles_that_leak_are_named_and_what_leaks_too_much_to_be_measured
         return {finding.where: finding.told_by for finding in found}
 
     both = told(Leak(muscle=1, factor=40.0), Leak(muscle=2, factor=40.0))
-    assert list(both) == ["joint, muscle 1", "joint, muscle 2"]
+    assert list(both) == ["joint 1, muscle 1", "joint 1, muscle 2"]
     assert all("% of its pressure a minute" in detail for detail in both.values())
-    assert "before 8 s are over" in told(Leak(muscle=2, factor=1000.0))["joint, muscle 2"]
+    assert "before 8 s are over" in told(Leak(muscle=2, factor=1000.0))["joint 1, muscle 2"]
 
 
 def test_a_leak_is_told_by_the_sound_state_of_the_calibration(tmp_path, capsys):
@@ -257,14 +257,14 @@ def test_a_leak_is_told_by_the_sound_state_of_the_calibration(tmp_path, capsys):
     _, out, _ = run(capsys, "arm", "check", f"virtual:seed=6,faults={plan}", "--json")
     assert json.loads(out)["healthy"]  # without a calibration nobody knows
     _, out, _ = run(capsys, "arm", "check", f"virtual:seed=6,faults={plan},spec={file}")
-    assert "joint, muscle 2: leak: it leaks 2." in out
+    assert "joint 1, muscle 2: leak: it leaks 2." in out
     assert "times as much as when calibrated" in " ".join(out.split())
 
 
 def test_an_arm_that_is_not_as_calibrated_is_told():
     known = calibrate(measure(FaultyArm(5))).file
     slipped, shifted = FaultyArm(5, angle=lambda a: a + 90), FaultyArm(5, pressure=lambda p: p + np.array([0, 15]))
-    for arm, where in ((slipped, "joint"), (shifted, "joint, muscle 2")):
+    for arm, where in ((slipped, "joint 1"), (shifted, "joint 1, muscle 2")):
         found = diagnose(measure(CorrectedArm(arm, known)), known.sound)
         assert [(f.kind, f.where) for f in found] == [("not as calibrated", where)]
 

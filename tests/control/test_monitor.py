@@ -270,7 +270,7 @@ def test_collecting_gives_up_on_an_arm_that_stays_broken_and_says_why(tmp_path):
     arm = VirtualArm(draw_parameters(3), seed=3, faults=[DeadPotentiometer(begin=60.0), StuckValve(begin=60.0)])
     with (
         Store.for_arm(tmp_path / "db", arm.spec) as store,
-        pytest.raises(ArmFailure, match="dead-potentiometer"),
+        pytest.raises(ArmFailure, match="dead potentiometer"),
     ):
         collect(arm, store, 20_000, 3, watch=Monitor(arm.spec), settings=WHOLE_PERIODS)
 

@@ -402,7 +402,7 @@ def test_a_transfer_gives_up_on_an_arm_that_stays_broken_and_goes_on_once_it_is_
 ) -> None:
     """What is right for collecting is right here."""
     folder = tmp_path / "t"
-    with pytest.raises(ArmFailure, match=r"stuck-valve.*for [5-9] movements now.*--monitor warn"):
+    with pytest.raises(ArmFailure, match=r"stuck valve.*for [5-9] movements now.*--monitor warn"):
         transfer_into(folder, policy, broken_valve(), WATCHED, seed=1)
     with Store.open(folder / "transitions.db") as store:
         made, marked = store.sequences, sum(store.marked_rows(1).values())

@@ -138,6 +138,7 @@ def test_a_page_is_drawn_from_rows_alone(tmp_path: Path) -> None:
     done = sweep(Toy(), tmp_path)
     page = write_page(Toy(), tmp_path / "toy", Toy().analyse(done.rows), done.rows.runs, done.rows.arms)
     assert "It does." in page.read_text()
+    assert "How the arm moved" not in page.read_text()  # no recording of it is left
     assert '"shape"' in (tmp_path / "toy" / "results.json").read_text()
 
 

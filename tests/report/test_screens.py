@@ -21,12 +21,17 @@ from live.chromium import missing
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import Leak
 from pneumarm.checkup import diagnose, measure
+from pneumarm.cli import main
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import Row, sorted_rows
+from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.results import write_page
+from pneumarm.experiments.sweep import arm_folder
 from pneumarm.report import RunData, run_page
 from pneumarm.report.checkup import checkup_page
+from pneumarm.report.run_report import write_analysis
 from pneumarm.task import Movements
+from pneumarm.transitions import Store, collect
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 ROOT = Path(__file__).parents[2]
@@ -34,7 +39,9 @@ READABLE = 11.0  # px
 LETTERS = 733.0  # px, of a figure of 7.4 inch whose smallest letters, of 8 points, are to be READABLE
 MOST_EMPTY = 0.5
 """Of a printed page that is not the last."""
-PAGES = ("report", "report of two joints", "check-up", "experiment", "site")
+DRAWN = ("report", "report of two joints", "simulation", "check-up", "experiment")
+"""Pages that begin with a picture that plays, and have others."""
+PAGES = (*DRAWN, "claims", "site")
 
 FIGURES = ("reward", "actions", "switches", "episodes", "success_rate", "gain", "met", "learning success_rate")
 """Of a row of an experiment."""
@@ -44,7 +51,8 @@ FIGURES = ("reward", "actions", "switches", "episodes", "success_rate", "gain", 
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return a page of each kind; the site only where what builds it is installed."""
     folder = tmp_path_factory.mktemp("screens")
-    (folder / "report.html").write_text(run_page(builders.run(small=True)), encoding="utf-8")
+    run = builders.run(small=True)
+    (folder / "report.html").write_text(run_page(run), encoding="utf-8")
     (folder / "two.html").write_text(run_page(two_joints()), encoding="utf-8")
     arm = open_arm("virtual:seed=3", 3)
     arm.faults = (Leak(joint=1, muscle=2, factor=30),)  # type: ignore[attr-defined]
@@ -52,7 +60,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     (folder / "checkup.html").write_text(checkup_page(checkup, diagnose(checkup)), encoding="utf-8")
     random, rows = np.random.default_rng(0), []
     for trial in ALL_GOALS.trials:
-        for run in range(1, 5):
+        for repeat in range(1, 5):
             names = (
                 "reward",
                 "actions",
@@ -63,11 +71,22 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
                 "met",
                 "learning success_rate",
             )
-            rows.append(Row("virtual:seed=1", trial, run, {name: random.uniform(0.5, 1) for name in names}, 0.0))
+            rows.append(Row("virtual:seed=1", trial, repeat, {name: random.uniform(0.5, 1) for name in names}, 0.0))
     table = sorted_rows(rows)
-    experiment = write_page(ALL_GOALS, folder, ALL_GOALS.analyse(table), table.runs, table.arms)
+    laboratory = folder / "laboratory"
+    (laboratory / ALL_GOALS.name).mkdir(parents=True)
+    recording = arm_folder(laboratory, table.arms[0])
+    recording.mkdir(parents=True)
+    with open_arm(table.arms[0]) as arm, Store.for_arm(recording / STORE, arm.spec) as store:
+        collect(arm, store, 2000)
+    analysis = ALL_GOALS.analyse(table)
+    experiment = write_page(ALL_GOALS, laboratory / ALL_GOALS.name, analysis, table.runs, table.arms)
+    with pytest.raises(SystemExit):
+        main(["claims", "--out", str(laboratory)])
     reports = {"report": folder / "report.html", "report of two joints": folder / "two.html"}
+    reports["simulation"] = write_analysis(folder, run.spec, builders.coverage(), builders.quality(), {})
     found = {**reports, "check-up": folder / "checkup.html", "experiment": experiment}
+    found["claims"] = laboratory / "claims.html"
     if (done := python("-m", "mkdocs", "build", "--site-dir", folder / "site", cwd=ROOT)).returncode == 0:
         found["site"] = folder / "site" / "index.html"
     else:
@@ -140,14 +159,18 @@ def test_a_page_fits_and_can_be_read(
     assert too_wide(page) <= 0
     size, text = smallest_text(page)
     assert size >= READABLE, text
-    if name != "site":
+    if name == "site":
+        shown_picture = page.evaluate("document.querySelector('picture img').currentSrc")
+        assert shown_picture.endswith("arm-narrow.svg" if width == 400 else "arm.svg")
+    if name in DRAWN:
+        assert moving(page)
         widths = page.evaluate(
             "[...document.querySelectorAll('.drawing img')].map((one) => one.getBoundingClientRect().width)"
         )
         assert len(widths) >= 3
         assert min(widths) >= LETTERS
         assert all(seen >= least and not cut for seen, least, cut in moving(page))
-    assert background(page) > 250 if scheme == "light" else background(page) < 60
+    assert background(page) > 240 if scheme == "light" else background(page) < 60  # of the contents, too
     page.close()
 
 

@@ -15,11 +15,10 @@ from time import monotonic, sleep
 from typing import Any, Protocol
 from urllib.parse import quote
 
+import mysqld
 import pytest
 import sqlalchemy
 
-MYSQLD = "PNEUMARM_MYSQLD"
-"""The environment variable that names a program mysqld or mariadbd; else it is looked for on the path."""
 PASSWORD = "s3cr@t/?"
 _LIMIT = 60.0  # s for whatever a server is asked to do
 
@@ -97,9 +96,8 @@ class MySQL:
     """A server of MySQL or MariaDB."""
 
     def __init__(self) -> None:
-        named = os.environ.get(MYSQLD) or shutil.which("mariadbd") or shutil.which("mysqld")
-        if named is None:
-            pytest.skip(f"neither mariadbd nor mysqld is on the path, nor named by {MYSQLD}")
+        if (named := mysqld.program()) is None:
+            pytest.skip(mysqld.missing())
         self._program, self._made = Path(named), 0
         self._folder = Path(tempfile.mkdtemp(prefix="pneumarm-mysql-"))
         with closing(socket.socket()) as free:

@@ -78,7 +78,7 @@ def sweeps(cases: Sequence[Case]) -> Figure:
         difference, turn = case.spec.bar(sweep.pressure[:, 0] - sweep.pressure[:, 1]), len(sweep.angle) // 2
         for piece, (_, color, line) in zip((slice(0, turn + 1), slice(turn, None)), looks, strict=True):
             place.plot(difference[piece], case.spec.degrees(sweep.angle[piece]), line, color=color, marker="o")
-        place.set_xlabel("pressure 1 - pressure 2 [bar]")
+        place.set_xlabel("pressure 1 − pressure 2 [bar]")
         place.set_title(case.name)
     axes[0, 0].set_ylabel("angle as read [°]")
     legend_below(figure, [key(color, line, marker="o") for _, color, line in looks], [name for name, *_ in looks])

@@ -153,7 +153,7 @@ def _pressures(checkup: Checkup, known: Known) -> tuple[Array, Array]:
                 why = "is cut off at the pressure limit" if stopped else "still rises when its time is over"
                 raise UnusableInput(
                     f"{checkup.spec.name}: joint {j + 1}, muscle {m + 1} {why}, and does not show the supply's "
-                    "pressure; turn the reducer down, or fill longer (--fill), or give --counts-per-bar instead"
+                    "pressure; turn the reducer down, or fill longer (--measure.fill), or give --counts-per-bar"
                 )
     if known.supply is None:
         return zero, np.full_like(zero, known.counts_per_bar or checkup.spec.counts_per_bar)

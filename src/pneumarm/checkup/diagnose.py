@@ -124,7 +124,7 @@ def _of_exchange(exchange: Exchange) -> Complaint:
 def _of_joint(checkup: Checkup, j: int, sound: SoundState | None) -> Iterator[Complaint]:
     test, figures, spec = checkup.joints[j], joint_figures(checkup, j), checkup.spec
     limit = spec.max_pressure
-    name = f"joint {j + 1}" if len(checkup.joints) > 1 else "joint"
+    name = f"joint {j + 1}"
     rose = np.array([rise(test.muscles[m].fill) for m in range(2)]) / spec.counts_per_bar  # [muscle filled, sensor]
     own, other = rose.diagonal(), rose[:, ::-1].diagonal()
     turned = np.array([m.turned for m in figures.muscles])

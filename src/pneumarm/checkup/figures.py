@@ -322,44 +322,62 @@ _PARABOLA = _parabola()
 
 MUSCLE_HEADER = (
     "full [bar]",
-    "fills after, in [ms]",
-    "empties after, in [ms]",
+    "filling begins [ms]",
+    "fills in [ms]",
+    "emptying begins [ms]",
+    "empties in [ms]",
     "leak [%/min]",
-    "leak when calibrated",
-    "turns [°]",
+    "when calibrated [%/min]",
+    "turns by [°]",
     "noise [counts]",
-    "leap [bar]",
+    "drop [bar]",
 )
-"""What :func:`muscle_row` gives; times are from the command to the first air, and to 63 % of the way."""
+"""What :func:`muscle_row` gives."""
+MUSCLE_WORDS = (
+    "Times are from the command: to the first air, and to 63 % of the way. The drop is what the reading loses at "
+    "once when a pulse of air has ended."
+)
+"""What that means."""
 
 
 def muscle_row(figures: JointFigures, joint: int, muscle: int, sound: SoundState | None) -> tuple[str, ...]:
     """Return the figures of a muscle as words for a table."""
     one = figures.muscles[muscle]
-    then = "-" if sound is None else f"{100 * sound.leak[joint][muscle]:.2f}"
+    times = (one.fill_delay, one.fill_time, one.exhaust_delay, one.exhaust_time)
     return (
-        f"{one.full:.2f}",
-        f"{1e3 * one.fill_delay:.0f}, {1e3 * one.fill_time:.0f}",
-        f"{1e3 * one.exhaust_delay:.0f}, {1e3 * one.exhaust_time:.0f}",
-        f"{one.leak:.2f} ± {one.leak_error:.2f}",
-        then,
-        f"{one.turned:.0f}",
-        f"{one.noise:.2f}",
-        f"{one.leap:.2f}",
+        _told(one.full, ".2f"),
+        *(_told(1e3 * time, ".0f") for time in times),
+        _NONE if np.isnan(one.leak) else f"{_told(one.leak, '.2f')}\u00a0±\u00a0{one.leak_error:.2f}",
+        _NONE if sound is None else _told(100 * sound.leak[joint][muscle], ".2f"),
+        _told(one.turned, ".0f"),
+        _told(one.noise, ".2f"),
+        _told(one.leap, ".2f"),
     )
 
 
-JOINT_HEADER = ("from [°]", "to [°]", "halves turn", "irregular by [°]", "noise [counts]")
+def _told(value: float, form: str) -> str:
+    """Return ``value`` for people: with a minus, not a hyphen, and a dash where it is not known."""
+    return _NONE if np.isnan(value) else format(value, form).replace("-", "−")
+
+
+_NONE = "–"
+
+JOINT_HEADER = ("lowest [°]", "highest [°]", "upper : lower half", "irregular by [°]", "noise [counts]")
 """What :func:`joint_row` gives."""
+JOINT_WORDS = (
+    "By a slow sweep. Upper : lower half is how many times as far the upper half of the sweep turns the joint as the "
+    "lower half does; irregular by is the largest error of the potentiometer at any place."
+)
+"""What that means."""
 
 
 def joint_row(figures: JointFigures, spec: ArmSpec) -> tuple[str, ...]:
     """Return the figures of a joint as words for a table."""
     lowest, highest = spec.degrees([figures.lowest, figures.highest])
     return (
-        f"{lowest:.0f}",
-        f"{highest:.0f}",
-        f"1 : {figures.halves:.2f}",
-        f"{figures.worst:.2f}",
-        f"{figures.angle_noise:.2f}",
+        _told(lowest, ".0f"),
+        _told(highest, ".0f"),
+        _told(figures.halves, ".2f"),
+        _told(figures.worst, ".2f"),
+        _told(figures.angle_noise, ".2f"),
     )

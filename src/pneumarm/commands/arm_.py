@@ -25,7 +25,7 @@ from pneumarm.checkup import (
 )
 from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, muscle_row
 from pneumarm.commands.asking import asked_for, missing_of
-from pneumarm.commands.common import Json, Settings
+from pneumarm.commands.common import Json, Measuring, Settings
 from pneumarm.console import say, show, table
 from pneumarm.errors import ArmUnsound, UnusableInput
 from pneumarm.files import require_folder, write_text
@@ -45,7 +45,7 @@ def check_(
     out: Path | None = None,
     strict: bool = False,
     seed: int = 0,
-    settings: Annotated[CheckupSettings, Settings] = CheckupSettings(),
+    settings: Annotated[CheckupSettings, Measuring] = CheckupSettings(),
     json: Json = False,
 ) -> None:
     """Move an arm gently, a muscle at a time, and say what is wrong with it. Its joints must be free to move.
@@ -128,7 +128,7 @@ def calibrate_(
     supply: float | None = None,
     counts_per_bar: float | None = None,
     seed: int = 0,
-    settings: Annotated[CheckupSettings, Settings] = CheckupSettings(),
+    settings: Annotated[CheckupSettings, Measuring] = CheckupSettings(),
     json: Json = False,
 ) -> None:
     """Measure what an arm's counts mean and what it does while it is sound, and write that to a file.

@@ -25,6 +25,8 @@ AnyStore = Annotated[Address, Parameter(converter=_place, n_tokens=1, accepts_ke
 """Where a store is: a path, or the address of a database on a server."""
 Settings = Parameter(name="*")
 """Marks a dataclass of settings whose fields become options."""
+Measuring = Parameter(name="measure")
+"""Marks how a check-up measures: options such as --measure.fill, which --help-all shows."""
 OwnMethod = Annotated[str | None, Parameter(name="--method")]
 """The option of commands that open an agent: MODULE:NAME of the method that trained it, whose code may run."""
 Monitoring = Annotated[

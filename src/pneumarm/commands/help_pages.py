@@ -11,6 +11,10 @@ if TYPE_CHECKING:
 HELP, HELP_ALL, CONFIG, LOG = "--help", "--help-all", "--config", "--log"
 _OPTIONS = "Parameters"
 """Title of the panel of a command's options."""
+_EMPTY = ("()", "{}")
+"""Defaults that say nothing."""
+_KINDS = {"PATH|SERVERADDRESS": "STORE", "STR": "TEXT"}
+"""What kinds of values are called, where their names are those of types."""
 _CITED = re.compile(r"\s*\(thesis[^()]*\)")
 """What cites the thesis in the words on an option."""
 
@@ -21,7 +25,7 @@ class AllOptions(DefaultFormatter):
     def __call__(self, console: "Console", options: "ConsoleOptions", panel: HelpPanel) -> None:
         """Print a panel."""
         if panel.title == _OPTIONS:
-            panel = panel.copy(entries=self.shown(panel.entries))
+            panel = panel.copy(entries=self.shown([_plain(one) for one in panel.entries]))
         super().__call__(console, options, panel)
 
     def shown(self, entries: list[HelpEntry]) -> list[HelpEntry]:
@@ -47,6 +51,12 @@ class FewOptions(AllOptions):
 def _entry(name: str, words: str, metavar: str | None = None) -> HelpEntry:
     description = InlineText.from_format(words, format="plaintext")
     return HelpEntry(positive_names=(name,), metavar=metavar, description=description)
+
+
+def _plain(entry: HelpEntry) -> HelpEntry:
+    """Return ``entry`` as it reads best."""
+    default = None if entry.default in _EMPTY else entry.default
+    return entry.copy(default=default, metavar=_KINDS.get(str(entry.metavar), entry.metavar))
 
 
 def _in_short(entry: HelpEntry) -> HelpEntry:

@@ -49,5 +49,5 @@ def side_by_side(
 def mean_and_spread(values: Array) -> str:
     """Return the mean of ``values`` (runs,) and their standard deviation where there are two."""
     digits = 0 if np.abs(values).max() >= 1000 else 2
-    spread = f" ± {values.std(ddof=1):.{digits}f}" if len(values) > 1 else ""
-    return f"{values.mean():.{digits}f}{spread}"
+    spread = f" ± {values.std(ddof=1):,.{digits}f}" if len(values) > 1 else ""
+    return f"{values.mean():,.{digits}f}{spread}".replace("-", "−")

@@ -206,7 +206,7 @@ class Factorial(Trainings):
         for name in [name for name in ours if name in self.thesis or not self.thesis]:
             found = interval(rows.samples(ours[name].results.mean(axis=0)))
             digits = 0 if abs(found.mean) >= _THOUSANDS else 2
-            theirs = f" ({self.thesis[name].mean():.{digits}f})" if self.thesis else ""
+            theirs = f" ({self.thesis[name].mean():,.{digits}f})" if self.thesis else ""
             said.append(f"{_IN_WORDS[name]} {found:.{digits}f}{theirs}")
         beside = ", in brackets the thesis'" if self.thesis else ""
         return f"Means over all trials{beside}: {'; '.join(said)}."

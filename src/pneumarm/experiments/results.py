@@ -1,22 +1,29 @@
-"""What an experiment leaves: its page and its results as JSON, drawn from the rows alone."""
+"""What an experiment leaves: its page and its results as JSON, from the rows and what was recorded of its arms."""
 
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from pneumarm.console import jsonable
+from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment
+from pneumarm.experiments.preparation import STORE
+from pneumarm.experiments.sweep import arm_folder
 from pneumarm.files import write_json, write_text
 from pneumarm.report.page import Section, Table, render
+from pneumarm.report.playing import playing
+from pneumarm.report.shown import read_shown
 
 _HYPHEN = re.compile(r"(?<!\w)-(?=\d)")
 """In the place of a minus."""
 PAGE = "page.html"
 RESULTS = "results.json"
+_SHOWN = 12.0
+"""Seconds of an arm's recording that the page plays."""
 
 
 def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: int, arms: tuple[str, ...]) -> Path:
-    """Write ``page.html`` and ``results.json`` to ``folder`` and return the path of the page."""
+    """Write ``page.html`` and ``results.json`` to ``folder``, one of a laboratory; return the path of the page."""
     claims = [
         {"claim": c.text, "thesis": c.thesis, "ours": c.ours, "verdict": c.verdict, "about": c.about}
         for c in analysis.claims
@@ -35,8 +42,23 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
         )
         sections.insert(0, Section("Claims", tables=[table]))
     page = folder / PAGE
-    write_text(page, render(experiment.words.title, summary, sections))
+    opening = [seen for arm in arms[:1] if (seen := _recorded(folder.parent, arm)) is not None]
+    write_text(page, render(experiment.words.title, summary, [*opening, *sections]))
     return page
+
+
+def _recorded(laboratory: Path, arm: str) -> Section | None:
+    """Return ``arm`` moving as it was recorded for experiments; None where no recording is left."""
+    for store in sorted(arm_folder(laboratory, arm).rglob(STORE)):
+        try:
+            shown = read_shown(store, seconds=_SHOWN)
+        except UnusableInput:
+            continue
+        caption = f"{arm}, as it was recorded to learn its simulation from."
+        return Section(
+            "How the arm moved", (), [playing(shown.time, shown.angle, None, shown.spec, caption)], opens=True
+        )
+    return None
 
 
 def _listed(arms: Sequence[str]) -> str:
@@ -52,7 +74,15 @@ def _count(claims: Sequence[Claim]) -> str:
     holding, refuted, left = (
         sum(claim.verdict == verdict for claim in claims) for verdict in ("holds", "does not hold", "open")
     )
+    why = "95 % intervals allow both"
+    if len(claims) == 1:
+        return (
+            f"Whether the claim of the thesis holds here is open: {why}."
+            if left
+            else (f"The claim of the thesis {'holds' if holding else 'does not hold'} here.")
+        )
     said = (
-        f"{holding} of {len(claims)} claims of the thesis hold here, {refuted} {'does' if refuted == 1 else 'do'} not"
+        f"Of {len(claims)} claims of the thesis {holding or 'none'} {'holds' if holding <= 1 else 'hold'} here, "
+        f"{refuted or 'none'} {'does' if refuted <= 1 else 'do'} not"
     )
-    return said + (f", and {left} {'is' if left == 1 else 'are'} open: 95 % intervals allow both." if left else ".")
+    return said + (f", and {left} {'is' if left == 1 else 'are'} open: {why}." if left else ".")

@@ -154,7 +154,7 @@ class LearnSettings(Settings):
     thesis: TrainSettings = field(default_factory=TrainSettings)
     """Of the methods sarsa and q-learning."""
     own: dict[str, Any] = field(default_factory=dict)
-    """Of hierarchy, or of a method of your own, by name."""
+    """Settings of hierarchy, or of a method of your own, as --own.NAME VALUE."""
 
     def _valid(self) -> Valid:
         _ = self.chosen  # it says what is wrong with the method or with settings of one's own

@@ -49,7 +49,7 @@ OFFERED: dict[str, Offered] = {
     "worn-potentiometer": Offered("potentiometer worn", "joint", WornPotentiometer),
     "sensor-noise": Offered("noisy sensors", "arm", SensorNoise),
     "supply-loss": Offered("supply falls to 0.5 bar", "arm", lambda **at: SupplyLoss(to=0.5, over=1.0, **at)),
-    "cold": Offered("5 °C", "arm", Cold),
+    "cold": Offered("cold: 5 °C", "arm", Cold),
 }
 """By the name that a page gives."""
 _At = tuple[str, int, int]

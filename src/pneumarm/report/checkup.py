@@ -9,7 +9,9 @@ from pneumarm.arm.spec_file import SoundState
 from pneumarm.checkup.diagnose import WHITE, WORN, Complaint
 from pneumarm.checkup.figures import (
     JOINT_HEADER,
+    JOINT_WORDS,
     MUSCLE_HEADER,
+    MUSCLE_WORDS,
     MuscleFigures,
     autocorrelation,
     detrended,
@@ -40,12 +42,8 @@ def checkup_page(checkup: Checkup, findings: Sequence[Complaint], sound: SoundSt
     ]
     of_joints = [(f"joint {j + 1}", *joint_row(figures[j], checkup.spec)) for j in joints]
     tables = [
-        Table(("", *MUSCLE_HEADER), of_muscles, "Muscles and valves; times from the command on, to 63 % of the way."),
-        Table(
-            ("", *JOINT_HEADER),
-            of_joints,
-            "Joints and their potentiometers; from and to by a slow sweep.",
-        ),
+        Table(("", *MUSCLE_HEADER), of_muscles, f"Muscles and valves. {MUSCLE_WORDS}"),
+        Table(("", *JOINT_HEADER), of_joints, f"Joints and their potentiometers. {JOINT_WORDS}"),
     ]
     return render(
         f"Check-up of {checkup.spec.name}",
@@ -53,7 +51,7 @@ def checkup_page(checkup: Checkup, findings: Sequence[Complaint], sound: SoundSt
         [
             Section("How it moves", figures=[_playing(checkup, j) for j in joints], opens=True),
             Section("Findings", [] if rows else ["None."], tables=said),
-            Section("Figures", tables=tables),
+            Section("What was measured", tables=tables),
             *[_of_joint(checkup, j) for j in joints],
         ],
     )
@@ -184,7 +182,7 @@ def potentiometer(checkup: Checkup, j: int) -> Figure:
     places, off = irregularity(test, spec)
     axes[0, 1].bar(places, off, width=0.8, color=DARK)
     axes[0, 1].axhline(WORN, color=GREY, linewidth=0.8, linestyle=":")
-    axes[0, 0].set_xlabel("pressure 1 - pressure 2 [bar]")
+    axes[0, 0].set_xlabel("pressure 1 − pressure 2 [bar]")
     axes[0, 0].set_ylabel("angle at rest [°]")
     axes[0, 0].legend()
     axes[0, 1].set_xlabel("angle [°]")

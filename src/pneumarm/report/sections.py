@@ -138,7 +138,7 @@ def arrival_words(run: RunData) -> list[str]:
             return [f"{words}."]
         seconds = float(np.median(made.actions[won])) * run.spec.period
         off = np.abs(made.angle_end - made.goal)[won].max(axis=1).mean() / run.spec.counts_per_degree
-        return [f"{words}, half of them within {seconds:.2f} s, and is {off:.1f}° off on average when it does."]
+        return [f"{words}, half of them within {seconds:.2f} s, and is {off:.2f}° off on average when it does."]
     return []
 
 
@@ -202,7 +202,8 @@ def overview(run: RunData) -> Section:
 def _ranges(data: CoverageData, spec: ArmSpec) -> str:
     """Say over which angles goals lie, those that are not rare."""
     angles = spec.degrees(np.percentile(data.observation[:, :, 0], (1, 99), axis=0)).T
-    found = (f"from {low:.0f}° to {high:.0f}°{of_joint(i, len(angles))}" for i, (low, high) in enumerate(angles))
+    ends = [[written(end, "{:.0f}°") for end in joint] for joint in angles]
+    found = (f"from {low} to {high}{of_joint(i, len(ends))}" for i, (low, high) in enumerate(ends))
     return f"All but 2% of the angles lie {', '.join(found)}; goals beyond them are refused."
 
 
@@ -227,7 +228,7 @@ def collected(data: CoverageData, spec: ArmSpec) -> Section:
         (
             Picture(
                 figures.projections(data.observation, spec),
-                "Where the observations lie (99.9% of each quantity). White was never observed "
+                "Where the observations lie (99.9% of each quantity); where it is blank there were none "
                 "(thesis section 3.2.2; no figure there).",
                 figures.projections_alt(data.observation, spec),
             ),

@@ -104,7 +104,7 @@ class BeginParameters(NamedTuple):
 def begin_parameters(
     begin: BeginStates, domain: tuple[float, float], weights: tuple[float, ...] = (1.0,)
 ) -> BeginParameters:
-    """Return ``begin`` for a kernel; ``weights`` are those of :class:`~pneumarm.learning.settings.Shaping`."""
+    """Return ``begin`` for a kernel; ``weights`` are those of :class:`~pneumarm.learning.online.settings.Shaping`."""
     cumulative = np.cumsum(weights) / np.sum(weights)
     order = np.ascontiguousarray(np.argsort(begin.angle, axis=0, kind="stable").T)
     sorted_ = np.take_along_axis(begin.angle.T, order, axis=1)

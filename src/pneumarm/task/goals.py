@@ -96,7 +96,8 @@ def goal_in_counts(
         raise UnusableInput(
             f"a goal needs {spec.joints} finite angle(s), got {goal if goal_deg is None else goal_deg}"
         )
-    unit, said = ("counts", found) if goal_deg is None else ("deg", np.ravel(goal_deg))
+    in_counts = "counts (degrees are goal_deg, or goals_deg of move)"
+    unit, said = (in_counts, found) if goal_deg is None else ("deg", np.ravel(goal_deg))
     return seen(found, spec, goals, f"goal {', '.join(f'{one:g}' for one in said)} {unit}")
 
 

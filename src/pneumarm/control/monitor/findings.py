@@ -50,7 +50,8 @@ class Finding:
         place = "" if self.joint is None else f"joint {self.joint}"
         place += "" if self.muscle is None else f", muscle {self.muscle}"
         ended = "" if self.until is None else f" until {self.until:.1f} s"
-        return f"{self.kind}{': ' + place if place else ''} ({self.detail}) since {self.since:.1f} s{ended}"
+        kind = self.kind.replace("-", " ")
+        return f"{kind}{': ' + place if place else ''} ({self.detail}) since {self.since:.1f} s{ended}"
 
     def overlaps(self, begin: float, end: float) -> bool:
         """Whether it was there at some time from ``begin`` to ``end`` [s]."""

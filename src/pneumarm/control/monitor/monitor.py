@@ -42,7 +42,7 @@ _FEWEST = 10  # residuals of which a mean square is taken seriously
 
 
 class Monitor:
-    """Watches an arm; a :class:`~pneumarm.transitions.Watch`.
+    """Watches an arm; a :class:`~pneumarm.transitions.watch.Watch`.
 
     With a ``simulation`` of the arm valves, supply and large leaks are judged by what it expects, and an arm that
     has changed is noticed. Without one the first three are judged by what the monitor itself learns of the arm while

@@ -267,19 +267,24 @@ def summary(judged: Sequence[Judged]) -> list[str]:
     order: tuple[Verdict, ...] = ("holds", "in part", "does not hold", "open", "not run")
     counts = {verdict: sum(each.verdict == verdict for each in judged) for verdict in order}
     words = {
-        "holds": "hold",
-        "in part": "hold in part",
-        "does not hold": "do not hold",
-        "open": "are open",
-        "not run": "were not tested yet",
+        "holds": ("holds", "hold"),
+        "in part": ("holds in part", "hold in part"),
+        "does not hold": ("does not hold", "do not hold"),
+        "open": ("is open", "are open"),
+        "not run": ("was not tested yet", "were not tested yet"),
     }
-    said = ", ".join(f"{count} {words[verdict]}" for verdict, count in counts.items() if count)
+
+    def told(count: int, verdict: Verdict) -> str:
+        return f"{count} {words[verdict][count != 1]}"
+
+    said = ", ".join(told(count, verdict) for verdict, count in counts.items() if count)
     claims = [claim for each in judged for _, claim in each.claims]
     holding = sum(claim.verdict == "holds" for claim in claims)
     refuted = sum(claim.verdict == "does not hold" for claim in claims)
     return [
-        f"Of {len(judged)} conclusions {said}. They rest on {len(claims)} claims: {holding} hold, {refuted} do not, "
-        f"{len(claims) - holding - refuted} are open. All of it is made from the results of the experiments."
+        f"Of {len(judged)} conclusions {said}. They rest on {len(claims)} claims: {told(holding, 'holds')}, "
+        f"{told(refuted, 'does not hold')}, {told(len(claims) - holding - refuted, 'open')}. All of it is made "
+        "from the results of the experiments."
     ]
 
 

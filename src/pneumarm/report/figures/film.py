@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.hand import link_ends
 from pneumarm.report.shown import Shown
-from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, key, legend_below, of_joint, styled
+from pneumarm.report.style import DARK, INK, LIGHT, MIDDLE, PALE, key, legend_below, of_joint, styled
 
 Array = NDArray[np.float64]
 
@@ -137,7 +137,7 @@ def _pressures(axes: Any, shown: Shown) -> None:
     for j in range(shown.spec.joints):
         for m, color in enumerate((DARK, LIGHT)):
             axes.plot(shown.time, bar[:, j, m], color=color, linestyle=_STYLES[j % len(_STYLES)], linewidth=1.1)
-    axes.set_ylabel("[bar]" if shown.spec.pressure_sensors else "estimated [bar]")
+    axes.set_ylabel("pressure\n[bar]" if shown.spec.pressure_sensors else "estimated\n[bar]")
 
 
 def _valves(axes: Any, shown: Shown) -> None:
@@ -149,7 +149,7 @@ def _valves(axes: Any, shown: Shown) -> None:
     axes.set_yticks(range(len(places)), [_muscle(j, m, shown.spec.joints) for j, m in reversed(places)])
     axes.set_ylim(-0.6, len(places) - 0.4)
     axes.grid(axis="y", visible=False)
-    axes.set_ylabel("valves", color=GREY)
+    axes.set_ylabel("valves")
 
 
 def _muscle(joint: int, muscle: int, joints: int) -> str:

@@ -1,19 +1,19 @@
 """How soon the monitor finds faults, whether it names them rightly, and how often it cries wolf.
 
-Every case is an arm of its own draw, a muscle and a moment drawn at random: in a first recording, of which the
-monitor knows nothing before, in a later one, which it judges by a simulation, or while a policy moves the arm. Arms
-are recorded, fitted and trained for as in a default run. The same arm without the fault is given the same commands
-beside it: the *contradiction* is the first reading that differs by more than noise does from what that one reads
-(CONTRADICTS). Times are watched time (the arm is not watched while it is brought to a begin state), medians and 95 %,
-from the begin of the fault and from the contradiction. *Unmarked* are readings from the contradiction on that are not
-marked, and so may be learned from.
+Every case is an arm of its own draw, a muscle and a moment drawn at random: early in a first recording, when the
+monitor hardly knows the arm, when it has watched it for a while, in a later recording, which it judges by a
+simulation, or while a policy moves the arm. Arms are recorded, fitted and trained for as in a default run. The same
+arm without the fault is given the same commands beside it: the *contradiction* is the first reading that differs by
+more than noise does from what that one reads (CONTRADICTS). Times are watched time (the arm is not watched while it
+is brought to a begin state), medians and 95 %, from the begin of the fault and from the contradiction. *Unmarked* are
+readings from the contradiction on that are not marked, and so may be learned from.
 Healthy hours are collecting from a cold morning on, and movements by a policy before, while and after it adapts.
 Settings come from the environment:
 
 PNEUMARM_FAULTS_DRAW     standard, arms like the thesis' (virtual:seed=N), by default, or wide (virtual:wide,seed=N)
 PNEUMARM_FAULTS_ARMS     seeds of them, 1 to 20 by default; held out are 1001 to 1010, and 5000 to 5299 of the wide
 PNEUMARM_FAULTS_COLLECT  usual, as a default run collects, by default, or thesis, for whole periods alone
-PNEUMARM_FAULTS_WHILE    first, later, moving: the ways of moving that are tried, all three by default
+PNEUMARM_FAULTS_WHILE    early,watched,later,moving by default: when
 PNEUMARM_FAULTS_CASES    cases of each fault, 40
 PNEUMARM_FAULTS_HOURS    healthy hours of each recording, 10, and a fifth of that of movements; 0 for none
 PNEUMARM_FAULTS_LEAKS    1 to try leak tests, too; 0 by default
@@ -69,8 +69,9 @@ from pneumarm.transitions.watch import Watch
 DRAWS = {"standard": "virtual:seed={}", "wide": "virtual:wide,seed={}"}
 """Names of the arms of a draw by their seeds."""
 COLLECT = {"usual": CollectSettings(), "thesis": WHOLE_PERIODS}
-WARM_UP = 20.0
-"""Healthy watched time before a fault [s]; then up to as long again."""
+WARM_UP = {"early": 20.0, "watched": 150.0, "later": 20.0, "moving": 20.0}
+"""Healthy watched time before a fault [s], then up to MOMENT longer."""
+MOMENT = 20.0
 PATIENCE = 60.0
 """Watched time after which a fault counts as not found [s]."""
 AFTERWARDS = 20.0
@@ -210,12 +211,14 @@ class Twins(Arm):
 class Stage:
     """Lets a fault happen to an arm and keeps what a monitor would see: a ``Watch`` that watches nothing."""
 
-    def __init__(self, twins: Twins, make: Callable[[float], Fault], random: np.random.Generator, watch: float):
+    def __init__(
+        self, twins: Twins, make: Callable[[float], Fault], random: np.random.Generator, warm: float, watch: float
+    ) -> None:
         self.turns: list[Turn] = []
         self.broke: int | None = None
         self.contradiction: int | None = None
         self._twins, self._make, self._random, self._first = twins, make, random, True
-        self._warm = WARM_UP * (1 + random.random()) / twins.spec.period
+        self._warm = (warm + MOMENT * random.random()) / twins.spec.period
         self._watch, self._patience = watch / twins.spec.period, PATIENCE / twins.spec.period
 
     @property
@@ -292,12 +295,13 @@ def play(
     agent: AnyAgent | None = None,
     draw: str = "standard",
     settings: CollectSettings = WHOLE_PERIODS,
+    warm: float = WARM_UP["early"],
 ) -> Played:
     """Let a fault happen to healthy arm ``number`` of ``draw``, that collects or that ``agent`` moves."""
     random = np.random.default_rng([seed, number])
     muscle = int(random.integers(1, 3))
     twins = Twins(opened(draw, number, seed), seed)
-    stage = Stage(twins, lambda time: kind.make(muscle, time), random, max(AFTERWARDS, kind.within))
+    stage = Stage(twins, lambda time: kind.make(muscle, time), random, warm, max(AFTERWARDS, kind.within))
     if agent is None:
         for _ in watched_steps(twins, stage, seed, settings):
             if stage.over:
@@ -328,8 +332,8 @@ def judged(played: Played, simulation: Simulation | None) -> Case:
     contradiction = math.inf if played.contradiction is None else played.contradiction
     kinds = tuple(dict.fromkeys(one.kind for one in monitor.findings[early:]))
     unmarked = 0
-    if played.contradiction is not None and found < math.inf:
-        time = np.array([turn.reading.time for turn in played.turns[played.contradiction : int(found) + 1]])
+    if contradiction <= found < math.inf:
+        time = np.array([turn.reading.time for turn in played.turns[int(contradiction) : int(found) + 1]])
         marks = marks_of(monitor.findings[early:], time, np.arange(len(time)))
         unmarked = len(time) - sum(mark.last - mark.first + 1 for mark in marks)
     since = 0.0 if found < contradiction else (found - contradiction) * period
@@ -340,7 +344,7 @@ def measure() -> Iterator[str]:
     draw = environment.choice("PNEUMARM_FAULTS_DRAW", DRAWS)
     how = environment.choice("PNEUMARM_FAULTS_COLLECT", COLLECT)
     arms = environment.seeds("PNEUMARM_FAULTS_ARMS", "1-20")
-    ways = environment.words("PNEUMARM_FAULTS_WHILE", "first,later,moving")
+    ways = environment.words("PNEUMARM_FAULTS_WHILE", ",".join(WARM_UP))
     cases = environment.whole("PNEUMARM_FAULTS_CASES", 40, least=0)
     hours = environment.whole("PNEUMARM_FAULTS_HOURS", 10, least=0)
     with environment.kept_folder("PNEUMARM_FAULTS_FOLDER") as folder:
@@ -350,7 +354,7 @@ def measure() -> Iterator[str]:
         for kind in KINDS if cases else ():
             for way in ways:
                 yield line(kind, way, [bench.case(kind, arms[i % len(arms)], i, way) for i in range(cases)])
-        for way in ways if hours else ():
+        for way in [way for way in ways if way != "watched"] if hours else ():  # early is the beginning of that
             each = (hours / 5 if way == "moving" else hours) / len(arms)
             yield false_alarms(way, [bench.healthy(arm, each, way) for arm in arms])
         if environment.whole("PNEUMARM_FAULTS_LEAKS", 0, least=0):
@@ -409,7 +413,7 @@ class Bench:
         row = self._cases.get(*key)
         if row is None:
             agent = self.agent(arm) if way == "moving" else None
-            played = play(kind, arm, case, agent, self.draw, COLLECT[self.how])
+            played = play(kind, arm, case, agent, self.draw, COLLECT[self.how], WARM_UP[way])
             made = judged(played, self.known(arm, way))
             row = self._cases.add(dict(zip(self._cases.keys, key, strict=True)) | asdict(made))
         return msgspec.convert(row, Case)
@@ -431,7 +435,7 @@ class Bench:
 
     def known(self, arm: int, way: str) -> Simulation | None:
         """Return the simulation by which a monitor judges; none in a first recording."""
-        return None if way == "first" else fitted(self.folder, arm, self.draw)
+        return None if way in ("early", "watched") else fitted(self.folder, arm, self.draw)
 
     def agent(self, arm: int) -> AnyAgent:
         """Return the default agent of an arm."""

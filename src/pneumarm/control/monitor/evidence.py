@@ -207,7 +207,7 @@ def see_by_identification(known, readings, thresholds, memory, time, angle, pres
 def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
     """Weigh a reading by a simulation; the valves chosen after it go into ``memory.command[0]``."""
     if memory.clock[1] >= memory.clock[2]:
-        expect_by_simulation(predictor, readings, memory, memory.expected, memory.angle)
+        expect_by_simulation(predictor, readings, memory)
         for m in range(memory.std.shape[0]):
             memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2] * memory.clock[3]
             memory.base[m] = memory.observed[0, m // 2, 2 + m % 2]

@@ -72,6 +72,10 @@ COLLECT = {"usual": CollectSettings(), "thesis": WHOLE_PERIODS}
 WARM_UP = {"early": 20.0, "watched": 150.0, "later": 20.0, "moving": 20.0}
 """Healthy watched time before a fault [s], then up to MOMENT longer."""
 MOMENT = 20.0
+FIRST = "early", "watched"
+"""Of a first recording: slow changes and noise are judged by a simulation alone."""
+SOON = 2.0
+"""A fault is one of the others if it is to be found in so long [s]."""
 PATIENCE = 60.0
 """Watched time after which a fault counts as not found [s]."""
 AFTERWARDS = 20.0
@@ -87,8 +91,8 @@ class Kind:
     """A kind of case."""
 
     name: str
-    make: Callable[[int, float], Fault]
-    """Makes the fault of muscle 1 or 2 and a begin."""
+    make: Callable[[int, float, ArmSpec], Fault]
+    """Makes the fault of muscle 1 or 2, of a begin and an arm."""
     found_as: tuple[str, ...]
     """How it may rightly be called."""
     within: float = 2.0
@@ -96,29 +100,36 @@ class Kind:
 
 
 KINDS = (
-    Kind("inlet stuck closed", lambda m, t: StuckValve(muscle=m, begin=t), ("stuck-valve",)),
-    Kind("inlet stuck open", lambda m, t: StuckValve(muscle=m, position="open", begin=t), ("stuck-valve",)),
-    Kind("outlet stuck closed", lambda m, t: StuckValve(muscle=m, valve="outlet", begin=t), ("stuck-valve",)),
+    Kind("inlet stuck closed", lambda m, t, s: StuckValve(muscle=m, begin=t), ("stuck-valve",)),
+    Kind("inlet stuck open", lambda m, t, s: StuckValve(muscle=m, position="open", begin=t), ("stuck-valve",)),
+    Kind("outlet stuck closed", lambda m, t, s: StuckValve(muscle=m, valve="outlet", begin=t), ("stuck-valve",)),
     Kind(
         "outlet stuck open",
-        lambda m, t: StuckValve(muscle=m, valve="outlet", position="open", begin=t),
+        lambda m, t, s: StuckValve(muscle=m, valve="outlet", position="open", begin=t),
         ("stuck-valve",),
     ),
-    Kind("inlet and outlet swapped", lambda m, t: SwappedValves(muscle=m, begin=t), ("swapped-valves",)),
-    Kind("muscles swapped", lambda m, t: SwappedMuscles(muscle=m, begin=t), ("swapped-muscles",)),
-    Kind("supply lost", lambda m, t: SupplyLoss(begin=t), ("low-supply",), 0.5),
-    Kind("supply halved", lambda m, t: SupplyLoss(to=0.5, begin=t), ("low-supply",)),
-    Kind("potentiometer dead", lambda m, t: DeadPotentiometer(begin=t), ("dead-potentiometer",), 0.067),
-    Kind("potentiometer frozen", lambda m, t: FrozenPotentiometer(begin=t), ("frozen-potentiometer",), 0.5),
-    Kind("potentiometer logarithmic", lambda m, t: LogarithmicPotentiometer(begin=t), ("changed",), 60.0),
+    Kind("inlet and outlet swapped", lambda m, t, s: SwappedValves(muscle=m, begin=t), ("swapped-valves",)),
+    Kind("muscles swapped", lambda m, t, s: SwappedMuscles(muscle=m, begin=t), ("swapped-muscles",)),
+    Kind("supply lost", lambda m, t, s: SupplyLoss(begin=t), ("low-supply",), 0.5),
+    Kind("supply halved", lambda m, t, s: SupplyLoss(to=0.5, begin=t), ("low-supply",)),
+    Kind("potentiometer dead", lambda m, t, s: DeadPotentiometer(begin=t), ("dead-potentiometer",), 0.067),
+    Kind("potentiometer frozen", lambda m, t, s: FrozenPotentiometer(begin=t), ("frozen-potentiometer",), 0.5),
+    Kind("potentiometer logarithmic", lambda m, t, s: LogarithmicPotentiometer(begin=t), ("changed",), 60.0),
     Kind(
         "potentiometer worn",
-        lambda m, t: WornPotentiometer(angle=5, height=15, contact=8, begin=t),
+        lambda m, t, s: WornPotentiometer(angle=5, height=15 * s.angle_unit, contact=8 * s.angle_unit, begin=t),
         ("worn-potentiometer",),
         60.0,
     ),
-    Kind("noise", lambda m, t: SensorNoise(angle=6, pressure=6, begin=t), ("sensor-noise",), 60.0),
-    Kind("torn hose (2000 x leak)", lambda m, t: Leak(muscle=m, factor=2000, begin=t), ("leak",), 60.0),
+    Kind(
+        "noise",
+        lambda m, t, s: SensorNoise(
+            angle=min(6 * s.angle_unit, 1e3), pressure=min(6 * s.pressure_unit, 1e3), begin=t
+        ),
+        ("sensor-noise",),
+        60.0,
+    ),
+    Kind("torn hose (2000 x leak)", lambda m, t, s: Leak(muscle=m, factor=2000, begin=t), ("leak",), 60.0),
 )
 
 
@@ -301,7 +312,7 @@ def play(
     random = np.random.default_rng([seed, number])
     muscle = int(random.integers(1, 3))
     twins = Twins(opened(draw, number, seed), seed)
-    stage = Stage(twins, lambda time: kind.make(muscle, time), random, warm, max(AFTERWARDS, kind.within))
+    stage = Stage(twins, lambda time: kind.make(muscle, time, twins.spec), random, warm, max(AFTERWARDS, kind.within))
     if agent is None:
         for _ in watched_steps(twins, stage, seed, settings):
             if stage.over:
@@ -352,7 +363,7 @@ def measure() -> Iterator[str]:
         if cases:
             yield HEADER
         for kind in KINDS if cases else ():
-            for way in ways:
+            for way in ways if kind.within <= SOON else [way for way in ways if way not in FIRST]:
                 yield line(kind, way, [bench.case(kind, arms[i % len(arms)], i, way) for i in range(cases)])
         for way in [way for way in ways if way != "watched"] if hours else ():  # early is the beginning of that
             each = (hours / 5 if way == "moving" else hours) / len(arms)
@@ -435,7 +446,7 @@ class Bench:
 
     def known(self, arm: int, way: str) -> Simulation | None:
         """Return the simulation by which a monitor judges; none in a first recording."""
-        return None if way in ("early", "watched") else fitted(self.folder, arm, self.draw)
+        return None if way in FIRST else fitted(self.folder, arm, self.draw)
 
     def agent(self, arm: int) -> AnyAgent:
         """Return the default agent of an arm."""

@@ -184,3 +184,13 @@ def times_opened(readings, h, m, valve, fills, empties):  # type: ignore[no-unty
     """
     states = readings.open[h, m, valve]
     return 0.0 if states[1] else fills * states[2] + empties * states[0]
+
+
+@part
+def independence(square, product):  # type: ignore[no-untyped-def]
+    """Return how much an error says that the ones before it have not: 1 where errors do not last.
+
+    ``square`` is the mean square of errors, ``product`` the mean product of one with the one before.
+    """
+    correlation = min(max(product / square, 0.0), 0.9)
+    return (1.0 - correlation) / (1.0 + correlation)

@@ -430,7 +430,7 @@ class Monitor:
             arrays = {name: np.array(values, np.float64) for name, values in saved["memory"].items()}
             findings = [Finding(**one) for one in saved["findings"]]
             earlier = int(saved.get("earlier", 0))
-            memory = Memory(**arrays)
+            memory = Memory(**{**self._memory._asdict(), **arrays})  # an earlier version remembered less
             same = [a.shape == b.shape for a, b in zip(memory, self._memory, strict=True)]
             further = np.array(saved.get("measured", []), np.float64).reshape(self._measured.shape)
             if not all(same) or saved["simulation"] is not (self._simulation is not None):

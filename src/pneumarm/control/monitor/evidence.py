@@ -66,6 +66,8 @@ class Thresholds(NamedTuple):
     """In a muscle that is so full an open inlet tells of its outlet alone, as a part of ``Memory.full``."""
     empty: float
     """A muscle below this is empty; how much air it takes until its pressure rises is uncertain [counts]."""
+    over: float
+    """Only a fault brings a muscle over this without being told to fill; there nothing tells which [counts]."""
     clear: float
     """Expected pressures of an empty muscle that differ by less tell nothing [counts]."""
     unsure: float
@@ -279,8 +281,10 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
                 least = max(least, memory.clear[m])
             fullness = (memory.base[m] - lowest) / (memory.full[m] - lowest)
             # A full muscle takes little, whatever is wrong; but it empties if its outlet is open.
-            full = fullness > thresholds.full and max(memory.command[0, m], memory.command[1, m]) > 0.0
+            fills = max(memory.command[0, m], memory.command[1, m]) > 0.0
+            full = fullness > thresholds.full and fills
             telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
+            telling = telling and (fills or memory.base[m] <= thresholds.over)
             if readings.leak[h, m] > 0.0:
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
             if telling:

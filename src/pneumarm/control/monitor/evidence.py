@@ -67,7 +67,8 @@ class Thresholds(NamedTuple):
     empty: float
     """A muscle below this is empty; how much air it takes until its pressure rises is uncertain [counts]."""
     over: float
-    """Only a fault brings a muscle over this without being told to fill; there nothing tells which [counts]."""
+    """Only a fault brings a muscle over this that is not told to fill; once found it is called no other name for what
+    is read there [counts]."""
     clear: float
     """Expected pressures of an empty muscle that differ by less tell nothing [counts]."""
     unsure: float
@@ -284,7 +285,8 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             fills = max(memory.command[0, m], memory.command[1, m]) > 0.0
             full = fullness > thresholds.full and fills
             telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
-            telling = telling and (fills or memory.base[m] <= thresholds.over)
+            # What has been found brings it so far by itself, and there it looks like other faults.
+            telling = telling and (fills or memory.base[m] <= thresholds.over or memory.clock[4] == 0.0)
             if readings.leak[h, m] > 0.0:
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
             if telling:

@@ -49,7 +49,7 @@ def by_name():
         ("outlet stuck closed", 4.0),
         ("inlet and outlet swapped", 2.0),
         ("muscles swapped", 2.0),
-        ("supply lost", 0.5),
+        ("supply lost", 0.7),
         ("potentiometer dead", 0.07),
         ("potentiometer frozen", 0.6),
     ],

@@ -3,7 +3,7 @@
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
@@ -21,6 +21,11 @@ def text(name: str, usual: str) -> str:
 def words(name: str, usual: str) -> list[str]:
     """Return what stands between the commas of the variable ``name``."""
     return _read(name, usual, lambda value: [_filled(one) for one in value.split(",")], "words divided by commas")
+
+
+def choice(name: str, choices: Collection[str]) -> str:
+    """Return one of the ``choices``, by default the first."""
+    return _read(name, next(iter(choices)), lambda value: _among(value, choices), f"one of {', '.join(choices)}")
 
 
 def whole(name: str, usual: int, least: int = 1) -> int:
@@ -76,6 +81,12 @@ def _filled(word: str) -> str:
     if not word:
         raise ValueError
     return word
+
+
+def _among(value: str, choices: Collection[str]) -> str:
+    if value not in choices:
+        raise ValueError
+    return value
 
 
 def _at_least(value: int, least: int) -> int:

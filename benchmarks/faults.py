@@ -1,34 +1,43 @@
 """How soon the monitor finds faults, whether it names them rightly, and how often it cries wolf.
 
-Every case is an arm of its own draw, a muscle and a moment drawn at random, while the arm is collecting, or while a
-policy moves it. The same arm without the fault is given the same commands beside it: the *contradiction* is the first
-reading that differs by more than noise does from what that one reads (CONTRADICTS). Times are watched time (the arm
-is not watched while it is brought to a begin state), from the begin of the fault and from the contradiction.
-*Unmarked* are readings from the contradiction on that are not marked, and so may be learned from.
+Every case is an arm of its own draw, a muscle and a moment drawn at random: early in a first recording, when the
+monitor hardly knows the arm, when it has watched it for a while, in a later recording, which it judges by a
+simulation, or while a policy moves the arm. Arms are recorded, fitted and trained for as in a default run. The same
+arm without the fault is given the same commands beside it: the *contradiction* is the first reading that differs by
+more than noise does from what that one reads (CONTRADICTS). Times are watched time (the arm is not watched while it
+is brought to a begin state), medians and 95 %, from the begin of the fault and from the contradiction. *Unmarked* are
+readings from the contradiction on that are not marked, and so may be learned from.
 Healthy hours are collecting from a cold morning on, and movements by a policy before, while and after it adapts.
 Settings come from the environment:
 
-PNEUMARM_FAULTS_ARMS     seeds of virtual arms, 1 to 20 by default; the held-out arms are 1001 to 1010
+PNEUMARM_FAULTS_DRAW     standard, arms like the thesis' (virtual:seed=N), by default, or wide (virtual:wide,seed=N)
+PNEUMARM_FAULTS_ARMS     seeds of them, 1 to 20 by default; held out are 1001 to 1010, and 5000 to 5299 of the wide
+PNEUMARM_FAULTS_COLLECT  usual, as a default run collects, by default, or thesis, for whole periods alone
+PNEUMARM_FAULTS_WHILE    early,watched,later,moving by default: when
 PNEUMARM_FAULTS_CASES    cases of each fault, 40
-PNEUMARM_FAULTS_HOURS    healthy hours of collecting, 10; and a fifth of that of movements
-PNEUMARM_FAULTS_FOLDER   where stores, simulations and agents are kept; a temporary folder by default
+PNEUMARM_FAULTS_HOURS    healthy hours of each recording, 10, and a fifth of that of movements; 0 for none
+PNEUMARM_FAULTS_LEAKS    1 to try leak tests, too; 0 by default
+PNEUMARM_FAULTS_FOLDER   where all that was made is kept, so that an interrupted benchmark goes on; by default a
+                         temporary folder
 """
 
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks import _environment as environment
-from pneumarm.arm import Arm, ArmSpec, ControlCycle, Reading, Step, guarded
+from benchmarks._trials import Rows, recorded
+from pneumarm.arm import Arm, ArmSpec, ControlCycle, Reading, Step, guarded, open_arm
 from pneumarm.arm.virtual import (
-    ArmParameters,
     DeadPotentiometer,
     Fault,
     FrozenPotentiometer,
@@ -41,7 +50,6 @@ from pneumarm.arm.virtual import (
     SwappedValves,
     VirtualArm,
     WornPotentiometer,
-    draw_parameters,
 )
 from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control import AgentController, TransferSettings, transfer
@@ -52,15 +60,22 @@ from pneumarm.simulation import Simulation
 from pneumarm.simulation.fit import FitSettings, fit_store
 from pneumarm.statistics import wilson
 from pneumarm.task.begin import begin_states
-from pneumarm.transitions import WHOLE_PERIODS, CollectBegin, CollectSettings, Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store
 from pneumarm.transitions.collect import random_actions
+from pneumarm.transitions.fill_times import find_fill_times
 from pneumarm.transitions.rows import Mark, Recorded
 from pneumarm.transitions.watch import Watch
 
-TRANSITIONS = 20_000
-"""Transitions that each arm's simulation is fitted to."""
-WARM_UP = 20.0
-"""Healthy watched time before a fault [s]; then up to as long again."""
+DRAWS = {"standard": "virtual:seed={}", "wide": "virtual:wide,seed={}"}
+"""Names of the arms of a draw by their seeds."""
+COLLECT = {"usual": CollectSettings(), "thesis": WHOLE_PERIODS}
+WARM_UP = {"early": 20.0, "watched": 150.0, "later": 20.0, "moving": 20.0}
+"""Healthy watched time before a fault [s], then up to MOMENT longer."""
+MOMENT = 20.0
+FIRST = "early", "watched"
+"""Of a first recording: slow changes and noise are judged by a simulation alone."""
+SOON = 2.0
+"""A fault is one of the others if it is to be found in so long [s]."""
 PATIENCE = 60.0
 """Watched time after which a fault counts as not found [s]."""
 AFTERWARDS = 20.0
@@ -76,8 +91,8 @@ class Kind:
     """A kind of case."""
 
     name: str
-    make: Callable[[int, float], Fault]
-    """Makes the fault of muscle 1 or 2 and a begin."""
+    make: Callable[[int, float, ArmSpec], Fault]
+    """Makes the fault of muscle 1 or 2, of a begin and an arm."""
     found_as: tuple[str, ...]
     """How it may rightly be called."""
     within: float = 2.0
@@ -85,29 +100,36 @@ class Kind:
 
 
 KINDS = (
-    Kind("inlet stuck closed", lambda m, t: StuckValve(muscle=m, begin=t), ("stuck-valve",)),
-    Kind("inlet stuck open", lambda m, t: StuckValve(muscle=m, position="open", begin=t), ("stuck-valve",)),
-    Kind("outlet stuck closed", lambda m, t: StuckValve(muscle=m, valve="outlet", begin=t), ("stuck-valve",)),
+    Kind("inlet stuck closed", lambda m, t, s: StuckValve(muscle=m, begin=t), ("stuck-valve",)),
+    Kind("inlet stuck open", lambda m, t, s: StuckValve(muscle=m, position="open", begin=t), ("stuck-valve",)),
+    Kind("outlet stuck closed", lambda m, t, s: StuckValve(muscle=m, valve="outlet", begin=t), ("stuck-valve",)),
     Kind(
         "outlet stuck open",
-        lambda m, t: StuckValve(muscle=m, valve="outlet", position="open", begin=t),
+        lambda m, t, s: StuckValve(muscle=m, valve="outlet", position="open", begin=t),
         ("stuck-valve",),
     ),
-    Kind("inlet and outlet swapped", lambda m, t: SwappedValves(muscle=m, begin=t), ("swapped-valves",)),
-    Kind("muscles swapped", lambda m, t: SwappedMuscles(muscle=m, begin=t), ("swapped-muscles",)),
-    Kind("supply lost", lambda m, t: SupplyLoss(begin=t), ("low-supply",), 0.5),
-    Kind("supply halved", lambda m, t: SupplyLoss(to=0.5, begin=t), ("low-supply",)),
-    Kind("potentiometer dead", lambda m, t: DeadPotentiometer(begin=t), ("dead-potentiometer",), 0.067),
-    Kind("potentiometer frozen", lambda m, t: FrozenPotentiometer(begin=t), ("frozen-potentiometer",), 0.5),
-    Kind("potentiometer logarithmic", lambda m, t: LogarithmicPotentiometer(begin=t), ("changed",), 60.0),
+    Kind("inlet and outlet swapped", lambda m, t, s: SwappedValves(muscle=m, begin=t), ("swapped-valves",)),
+    Kind("muscles swapped", lambda m, t, s: SwappedMuscles(muscle=m, begin=t), ("swapped-muscles",)),
+    Kind("supply lost", lambda m, t, s: SupplyLoss(begin=t), ("low-supply",), 0.5),
+    Kind("supply halved", lambda m, t, s: SupplyLoss(to=0.5, begin=t), ("low-supply",)),
+    Kind("potentiometer dead", lambda m, t, s: DeadPotentiometer(begin=t), ("dead-potentiometer",), 0.067),
+    Kind("potentiometer frozen", lambda m, t, s: FrozenPotentiometer(begin=t), ("frozen-potentiometer",), 0.5),
+    Kind("potentiometer logarithmic", lambda m, t, s: LogarithmicPotentiometer(begin=t), ("changed",), 60.0),
     Kind(
         "potentiometer worn",
-        lambda m, t: WornPotentiometer(angle=5, height=15, contact=8, begin=t),
+        lambda m, t, s: WornPotentiometer(angle=5, height=15 * s.angle_unit, contact=8 * s.angle_unit, begin=t),
         ("worn-potentiometer",),
         60.0,
     ),
-    Kind("noise", lambda m, t: SensorNoise(angle=6, pressure=6, begin=t), ("sensor-noise",), 60.0),
-    Kind("torn hose (2000 x leak)", lambda m, t: Leak(muscle=m, factor=2000, begin=t), ("leak",), 60.0),
+    Kind(
+        "noise",
+        lambda m, t, s: SensorNoise(
+            angle=min(6 * s.angle_unit, 1e3), pressure=min(6 * s.pressure_unit, 1e3), begin=t
+        ),
+        ("sensor-noise",),
+        60.0,
+    ),
+    Kind("torn hose (2000 x leak)", lambda m, t, s: Leak(muscle=m, factor=2000, begin=t), ("leak",), 60.0),
 )
 
 
@@ -162,7 +184,7 @@ class Twins(Arm):
 
     def fail(self, fault: Fault) -> None:
         """Let ``fault`` happen."""
-        self.sound = VirtualArm(self.arm.parameters, seed=self._seed)
+        self.sound = self.arm.like(self._seed)
         self.sound.set_state(self.arm.get_state())
         self.arm.faults = (fault,)
 
@@ -200,12 +222,14 @@ class Twins(Arm):
 class Stage:
     """Lets a fault happen to an arm and keeps what a monitor would see: a ``Watch`` that watches nothing."""
 
-    def __init__(self, twins: Twins, make: Callable[[float], Fault], random: np.random.Generator, watch: float):
+    def __init__(
+        self, twins: Twins, make: Callable[[float], Fault], random: np.random.Generator, warm: float, watch: float
+    ) -> None:
         self.turns: list[Turn] = []
         self.broke: int | None = None
         self.contradiction: int | None = None
         self._twins, self._make, self._random, self._first = twins, make, random, True
-        self._warm = WARM_UP * (1 + random.random()) / twins.spec.period
+        self._warm = (warm + MOMENT * random.random()) / twins.spec.period
         self._watch, self._patience = watch / twins.spec.period, PATIENCE / twins.spec.period
 
     @property
@@ -248,12 +272,22 @@ class Stage:
         pass
 
 
+def opened(draw: str, number: int, seed: int) -> VirtualArm:
+    """Return arm ``number`` of a draw, controlled as it usually is."""
+    arm = open_arm(DRAWS[draw].format(number), seed)
+    assert isinstance(arm, VirtualArm)
+    return arm
+
+
 def watched_steps(arm: Arm, monitor: Watch, seed: int, settings: CollectSettings = WHOLE_PERIODS) -> Iterator[Step]:
     """Collect for ever, as :func:`pneumarm.transitions.collect` does, and yield the turns that ``monitor`` saw."""
-    settings = settings.for_period(arm.spec.period)
     random, guard = np.random.default_rng([seed, 7]), guarded(arm)
+    settings = settings.for_period(arm.spec.period)
+    if not settings.complete:
+        settings = settings.for_arm(find_fill_times(guard))
+    assert settings.begin is not None
     while True:
-        (settings.begin or CollectBegin()).reach(guard, random)
+        settings.begin.reach(guard, random)
         _, actor = random_actions(arm.spec, settings, random)
         actor.reset(np.zeros(arm.spec.joints))
         left = iter(range(settings.actions or 0))
@@ -267,27 +301,29 @@ def watched_steps(arm: Arm, monitor: Watch, seed: int, settings: CollectSettings
 
 def play(
     kind: Kind,
-    arm_seed: int,
+    number: int,
     seed: int,
     agent: AnyAgent | None = None,
-    draw: Callable[[int], ArmParameters] = draw_parameters,
+    draw: str = "standard",
+    settings: CollectSettings = WHOLE_PERIODS,
+    warm: float = WARM_UP["early"],
 ) -> Played:
-    """Let a fault happen to a healthy arm, one of those of ``draw``, that collects or that ``agent`` moves."""
-    random = np.random.default_rng([seed, arm_seed])
+    """Let a fault happen to healthy arm ``number`` of ``draw``, that collects or that ``agent`` moves."""
+    random = np.random.default_rng([seed, number])
     muscle = int(random.integers(1, 3))
-    twins = Twins(VirtualArm(draw(arm_seed), seed=seed), seed)
-    stage = Stage(twins, lambda time: kind.make(muscle, time), random, max(AFTERWARDS, kind.within))
+    twins = Twins(opened(draw, number, seed), seed)
+    stage = Stage(twins, lambda time: kind.make(muscle, time, twins.spec), random, warm, max(AFTERWARDS, kind.within))
     if agent is None:
-        for _ in watched_steps(twins, stage, seed):
+        for _ in watched_steps(twins, stage, seed, settings):
             if stage.over:
                 break
     else:
-        cycle, controller, number = ControlCycle(guarded(twins)), AgentController(agent), 0
+        cycle, controller, movement = ControlCycle(guarded(twins)), AgentController(agent), 0
         while not stage.over:
-            drawn = draw_movement(agent.goal_range, seed, True, number)
+            drawn = draw_movement(agent.goal_range, seed, True, movement)
             BEGIN.reach(cycle.arm, drawn.random)
             move(cycle, controller, drawn.goal, agent.settings, stage)
-            number += 1
+            movement += 1
     assert stage.broke is not None
     return Played(twins.spec, stage.turns, stage.broke, stage.contradiction)
 
@@ -307,8 +343,8 @@ def judged(played: Played, simulation: Simulation | None) -> Case:
     contradiction = math.inf if played.contradiction is None else played.contradiction
     kinds = tuple(dict.fromkeys(one.kind for one in monitor.findings[early:]))
     unmarked = 0
-    if played.contradiction is not None and found < math.inf:
-        time = np.array([turn.reading.time for turn in played.turns[played.contradiction : int(found) + 1]])
+    if contradiction <= found < math.inf:
+        time = np.array([turn.reading.time for turn in played.turns[int(contradiction) : int(found) + 1]])
         marks = marks_of(monitor.findings[early:], time, np.arange(len(time)))
         unmarked = len(time) - sum(mark.last - mark.first + 1 for mark in marks)
     since = 0.0 if found < contradiction else (found - contradiction) * period
@@ -316,55 +352,46 @@ def judged(played: Played, simulation: Simulation | None) -> Case:
 
 
 def measure() -> Iterator[str]:
+    draw = environment.choice("PNEUMARM_FAULTS_DRAW", DRAWS)
+    how = environment.choice("PNEUMARM_FAULTS_COLLECT", COLLECT)
     arms = environment.seeds("PNEUMARM_FAULTS_ARMS", "1-20")
-    cases = environment.whole("PNEUMARM_FAULTS_CASES", 40)
-    hours = environment.number("PNEUMARM_FAULTS_HOURS", 10.0)
+    ways = environment.words("PNEUMARM_FAULTS_WHILE", ",".join(WARM_UP))
+    cases = environment.whole("PNEUMARM_FAULTS_CASES", 40, least=0)
+    hours = environment.whole("PNEUMARM_FAULTS_HOURS", 10, least=0)
     with environment.kept_folder("PNEUMARM_FAULTS_FOLDER") as folder:
-        simulations = {arm: fitted(folder, arm) for arm in arms}
-        agents = {arm: trained(folder, arm, simulations[arm]) for arm in arms}
-        lines: dict[str, list[str]] = {"collecting, with simulation": [], "collecting, rules alone": [], "moving": []}
-        for kind in KINDS:
-            collecting, alone, moving = [], [], []
-            for i in range(cases):
-                arm = arms[i % len(arms)]
-                played = play(kind, arm, i)
-                collecting.append(judged(played, simulations[arm]))
-                alone.append(judged(played, None))
-                moving.append(judged(play(kind, arm, i, agents[arm]), simulations[arm]))
-            for name, judgements in zip(lines, (collecting, alone, moving), strict=True):
-                lines[name].append(line(kind, judgements))
-        for name, table in lines.items():
-            yield f"{name}; times [s] are medians and 95 %"
+        bench = Bench(folder, draw, how)
+        if cases:
             yield HEADER
-            yield from table
-        for name, chosen in (("simulation", simulations), ("rules alone", dict.fromkeys(arms, None))):
-            yield false_alarms(f"collecting, {name}", *healthy_collecting(arms, chosen, hours))
-        yield false_alarms("movements", *healthy_movements(arms[:2], simulations, agents, hours / 5))
-    for name, factor, watch in (
-        ("3 x", 3.0, 45.0),
-        ("1.5 x", 1.5, 540.0),
-        ("healthy", 1.0, 45.0),
-        ("healthy", 1.0, 540.0),
-    ):
-        yield leaks_found(arms, name, factor, LeakTest(watch=watch))
+        for kind in KINDS if cases else ():
+            for way in ways if kind.within <= SOON else [way for way in ways if way not in FIRST]:
+                yield line(kind, way, [bench.case(kind, arms[i % len(arms)], i, way) for i in range(cases)])
+        for way in [way for way in ways if way != "watched"] if hours else ():  # early is the beginning of that
+            each = (hours / 5 if way == "moving" else hours) / len(arms)
+            yield false_alarms(way, [bench.healthy(arm, each, way) for arm in arms])
+        if environment.whole("PNEUMARM_FAULTS_LEAKS", 0, least=0):
+            for name, factor, watch in (
+                ("3 x", 3.0, 45.0),
+                ("1.5 x", 1.5, 540.0),
+                ("healthy", 1.0, 45.0),
+                ("healthy", 1.0, 540.0),
+            ):
+                yield leaks_found(draw, arms, name, factor, LeakTest(watch=watch))
 
 
-def false_alarms(what: str, found: list[Finding], hours: float) -> str:
-    """Return a line about what was ``found`` in ``hours`` watched of healthy arms."""
-    spoiling = sum(one.spoils for one in found)
-    return (
-        f"{spoiling} false alarms and {len(found) - spoiling} changes in {hours:.1f} h of healthy {what} "
-        f"{list(map(str, found))}"
-    )
+def false_alarms(way: str, found: Sequence[tuple[list[str], list[str], float]]) -> str:
+    """Return a line about what was ``found`` wrong with healthy arms: faults, changes, and hours watched of each."""
+    faults, changes, hours = zip(*found, strict=True)
+    wrong, changed = (list(chain.from_iterable(each)) for each in (faults, changes))
+    return f"{len(wrong)} false alarms and {len(changed)} changes in {sum(hours):.1f} h, {way}: {wrong + changed}"
 
 
 HEADER = (
-    f"{'fault':27}{'found':>9}{'since begin':>13}{'contradiction':>16}{'in time':>26}{'in 10 s':>9}{'unmarked':>10}"
-    f"{'early':>6}  as"
+    f"{'fault':27}{'while':8}{'found':>7}{'named':>7}{'since begin':>13}{'contradiction':>16}{'in time':>26}"
+    f"{'in 10 s':>9}{'unmarked':>10}{'early':>6}  as"
 )
 
 
-def line(kind: Kind, cases: Sequence[Case]) -> str:
+def line(kind: Kind, way: str, cases: Sequence[Case]) -> str:
     """Return a line of the table."""
     begin, contradiction, unmarked = (
         "{:.2f} {:.2f}".format(np.median(values), np.quantile(values, 0.95, method="higher"))
@@ -374,7 +401,8 @@ def line(kind: Kind, cases: Sequence[Case]) -> str:
     low, high = wilson(sum(soon), len(soon))
     names = Counter(" then ".join(one.kinds) or "nothing" for one in cases)
     return (
-        f"{kind.name:27}{f'{sum(bool(one.kinds) for one in cases)}/{len(cases)}':>9}{begin:>13}{contradiction:>16}"
+        f"{kind.name:27}{way:8}{f'{sum(bool(one.kinds) for one in cases)}/{len(cases)}':>7}"
+        f"{sum(bool(set(one.kinds) & set(kind.found_as)) for one in cases):>7}{begin:>13}{contradiction:>16}"
         f"{f'{np.mean(soon):.0%} ({low:.0%}-{high:.0%}) in {kind.within:.2g} s':>26}"
         f"{np.mean([one.since_contradiction <= LATER for one in cases]):>9.0%}{unmarked:>10}"
         f"{sum(one.early for one in cases):>6}  "
@@ -382,76 +410,110 @@ def line(kind: Kind, cases: Sequence[Case]) -> str:
     )
 
 
-def trained(folder: Path, arm: int, simulation: Simulation) -> AnyAgent:
-    """Return an agent trained in ``simulation``."""
-    file = folder / f"{arm}.agent"
-    if not file.exists():
-        with Store.open(folder / f"{arm}.db") as store:
-            begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
-        train(simulation, begin, None, 1).agent.save(file)
-    return load_agent(file)
+class Bench:
+    """Arms of a draw with all that a monitor may know of them; what was made is kept in a folder."""
+
+    def __init__(self, folder: Path, draw: str, how: str) -> None:
+        self.folder, self.draw, self.how = folder, draw, how
+        self._cases = Rows(folder / "cases.jsonl", "draw", "how", "while", "kind", "arm", "case")
+        self._healthy = Rows(folder / "healthy.jsonl", "draw", "how", "while", "arm", "hours")
+
+    def case(self, kind: Kind, arm: int, case: int, way: str) -> Case:
+        """Return what a monitor makes of a fault."""
+        key = self.draw, self.how, way, kind.name, arm, case
+        row = self._cases.get(*key)
+        if row is None:
+            agent = self.agent(arm) if way == "moving" else None
+            played = play(kind, arm, case, agent, self.draw, COLLECT[self.how], WARM_UP[way])
+            made = judged(played, self.known(arm, way))
+            row = self._cases.add(dict(zip(self._cases.keys, key, strict=True)) | asdict(made))
+        return msgspec.convert(row, Case)
+
+    def healthy(self, arm: int, hours: float, way: str) -> tuple[list[str], list[str], float]:
+        """Return what was found wrong with a healthy arm: faults, changes; and the hours that it was watched."""
+        key = self.draw, self.how, way, arm, hours
+        row = self._healthy.get(*key)
+        if row is None:
+            known = self.known(arm, way)
+            if known is not None and way == "moving":
+                found, watched = healthy_movements(self.draw, arm, known, self.agent(arm), hours)
+            else:
+                found, watched = healthy_collecting(arm, known, hours, self.draw, COLLECT[self.how])
+            told = {"faults": [str(one) for one in found if one.spoils], "watched": watched}
+            told["changes"] = [str(one) for one in found if not one.spoils]
+            row = self._healthy.add(dict(zip(self._healthy.keys, key, strict=True)) | told)
+        return row["faults"], row["changes"], row["watched"]
+
+    def known(self, arm: int, way: str) -> Simulation | None:
+        """Return the simulation by which a monitor judges; none in a first recording."""
+        return None if way in FIRST else fitted(self.folder, arm, self.draw)
+
+    def agent(self, arm: int) -> AnyAgent:
+        """Return the default agent of an arm."""
+        file = self.folder / f"{self.draw}-{arm}.agent"
+        if not file.exists():
+            simulation = fitted(self.folder, arm, self.draw)
+            with Store.open(file.with_suffix(".db")) as store:
+                begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
+            train(simulation, begin, None, 1).agent.save(file)
+        return load_agent(file)
 
 
-def fitted(folder: Path, arm: int) -> Simulation:
-    """Return the simulation of a virtual arm; collect and fit where that is not done yet."""
-    file = folder / f"{arm}.sim"
+def fitted(folder: Path, arm: int, draw: str = "standard") -> Simulation:
+    """Return the simulation of an arm; record and fit where that is not done yet."""
+    file = folder / f"{draw}-{arm}.sim"
     if not file.exists():
-        opened = VirtualArm(draw_parameters(arm), seed=arm)
-        with Store.for_arm(folder / f"{arm}.db", opened.spec) as store:
-            collect(opened, store, TRANSITIONS, arm, settings=WHOLE_PERIODS)
-            fit_store(store, FitSettings(epochs=30)).simulation.save(file)
+        file.with_suffix(".db").unlink(missing_ok=True)
+        recorded(DRAWS[draw].format(arm), file.with_suffix(".db"), arm)
+        with Store.open(file.with_suffix(".db")) as store:
+            fit_store(store, FitSettings()).simulation.save(file)
     return Simulation.load(file)
 
 
 def healthy_collecting(
-    arms: list[int], simulations: Mapping[int, Simulation | None], hours: float
+    arm: int,
+    simulation: Simulation | None,
+    hours: float,
+    draw: str = "standard",
+    settings: CollectSettings = WHOLE_PERIODS,
 ) -> tuple[list[Finding], float]:
-    """Return what was found wrong with healthy arms that collect from a cold morning on, and the hours watched."""
-    found: list[Finding] = []
-    passed = 0.0
-    for arm in arms:
-        opened = VirtualArm(draw_parameters(arm), seed=1000 + arm)
-        monitor = Monitor(opened.spec, simulations[arm])
-        for _ in watched_steps(opened, monitor, arm):
-            passed += opened.spec.period / 3600
-            if opened.time >= hours * 3600 / len(arms):
-                break
-        found += monitor.findings
-    return found, passed
+    """Return what was found wrong with a healthy arm that collects from a cold morning on, and the hours watched."""
+    healthy, passed = opened(draw, arm, 1000 + arm), 0.0
+    monitor = Monitor(healthy.spec, simulation)
+    for _ in watched_steps(healthy, monitor, arm, settings):
+        passed += healthy.spec.period / 3600
+        if healthy.time >= hours * 3600:
+            break
+    return monitor.findings, passed
 
 
 def healthy_movements(
-    arms: list[int], simulations: dict[int, Simulation], agents: dict[int, AnyAgent], hours: float
+    draw: str, arm: int, simulation: Simulation, agent: AnyAgent, hours: float
 ) -> tuple[list[Finding], float]:
-    """Return what was found wrong with healthy arms that a policy moves and adapts to, and the hours that took."""
-    found: list[Finding] = []
-    seconds = 0.0
-    for arm in arms:
-        opened = VirtualArm(draw_parameters(arm), seed=2000 + arm)
-        monitor = Monitor(opened.spec, simulations[arm])
-        episodes = max(1, round(hours * 3600 / len(arms) / 5.5))
-        settings = TransferSettings(episodes=episodes // 2, test_episodes=max(1, episodes // 4))
-        with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", opened.spec) as store:
-            transfer(agents[arm], opened, store, settings, seed=arm, watch=monitor)
-        found += monitor.findings
-        seconds += opened.time
-    return found, seconds / 3600
+    """Return what was found wrong with a healthy arm that a policy moves and adapts to, and the hours that took."""
+    healthy = opened(draw, arm, 2000 + arm)
+    monitor = Monitor(healthy.spec, simulation)
+    episodes = max(1, round(hours * 3600 / 5.5))
+    settings = TransferSettings(episodes=episodes // 2, test_episodes=max(1, episodes // 4))
+    with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", healthy.spec) as store:
+        transfer(agent, healthy, store, settings, seed=arm, watch=monitor)
+    return monitor.findings, healthy.time / 3600
 
 
-def leaks_found(arms: list[int], name: str, factor: float, test: LeakTest) -> str:
+def leaks_found(draw: str, arms: list[int], name: str, factor: float, test: LeakTest) -> str:
     """Return a line about leak tests of arms that have been tested when they were healthy."""
     right = wrong = 0
     seconds = 0.0
     for arm in arms:
-        opened = VirtualArm(draw_parameters(arm), seed=arm)
-        for _ in watched_steps(opened, Monitor(opened.spec), arm):
-            if opened.time > 300:
+        tested = opened(draw, arm, arm)
+        for _ in watched_steps(tested, Monitor(tested.spec), arm):
+            if tested.time > 300:
                 break
-        healthy = leak_test(opened, LeakTest(watch=540.0))
+        healthy = leak_test(tested, LeakTest(watch=540.0))
         muscle = arm % 2
         if factor != 1.0:
-            opened.faults = (Leak(muscle=muscle + 1, factor=factor, begin=opened.time),)
-        now = leak_test(opened, test)
+            tested.faults = (Leak(muscle=muscle + 1, factor=factor, begin=tested.time),)
+        now = leak_test(tested, test)
         leaks = leaking(healthy, now, test)[0]
         right, wrong, seconds = right + int(leaks[muscle]), wrong + int(leaks[1 - muscle]), now.seconds
     return f"leak test of {seconds:.0f} s, {name}: {right} of {len(arms)} found, {wrong} of the other muscle"

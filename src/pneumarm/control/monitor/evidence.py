@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.velocity import derived_velocity
 from pneumarm.control.monitor.expectation import expect_by_simulation
+from pneumarm.control.monitor.hypotheses import independence
 from pneumarm.control.monitor.identification import (
     EXPERIENCE,
     expect_by_identification,
@@ -43,6 +44,9 @@ FREEDOM = 4.0
 ZONES = 32
 """Parts of the range of an angle by which residuals are kept."""
 _FAR = 2.5  # standard deviations of a pressure that is worth telling of
+_REMEMBERED = 3000.0  # residuals after which earlier ones count less in how long they last ...
+_AT_FIRST = 1000.0  # ... and for how many not lasting at all counts at the beginning
+_LASTING = 2.0  # a residual that counts in this: a fault makes large ones
 _VISITS = 30.0  # residuals that the mean square of a zone is over, at most
 _LARGEST = 5.0  # a residual that counts in these figures
 
@@ -62,6 +66,9 @@ class Thresholds(NamedTuple):
     """In a muscle that is so full an open inlet tells of its outlet alone, as a part of ``Memory.full``."""
     empty: float
     """A muscle below this is empty; how much air it takes until its pressure rises is uncertain [counts]."""
+    over: float
+    """Only a fault brings a muscle over this that is not told to fill; once found it is called no other name for what
+    is read there [counts]."""
     clear: float
     """Expected pressures of an empty muscle that differ by less tell nothing [counts]."""
     unsure: float
@@ -147,6 +154,9 @@ class Memory(NamedTuple):
     """Part of the evidence of a reading that is new, shape (muscles,): an error that lasts proves little."""
     angle: NDArray[np.float64]
     """Angles expected of a healthy arm, shape (joints,) [counts]."""
+    lasting: NDArray[np.float64]
+    """Residuals of pressures: how many, mean square, mean product of one with the one before, the last one; shape
+    (muscles, 4)."""
 
 
 def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
@@ -175,6 +185,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
         surprise=np.zeros((2 * joints, 4)),
         trust=np.ones(2 * joints),
         angle=np.zeros(joints),
+        lasting=np.tile([_AT_FIRST, 1.0, 0.0, 0.0], (2 * joints, 1)),
     )
 
 
@@ -207,12 +218,13 @@ def see_by_identification(known, readings, thresholds, memory, time, angle, pres
 def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
     """Weigh a reading by a simulation; the valves chosen after it go into ``memory.command[0]``."""
     if memory.clock[1] >= memory.clock[2]:
-        expect_by_simulation(predictor, readings, memory, memory.expected, memory.angle)
+        expect_by_simulation(predictor, readings, memory)
         for m in range(memory.std.shape[0]):
             memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2] * memory.clock[3]
             memory.base[m] = memory.observed[0, m // 2, 2 + m % 2]
             memory.lowest[m], memory.full[m] = predictor.lowest[m], predictor.highest
             memory.clear[m] = thresholds.clear
+            memory.trust[m] = independence(memory.lasting[m, 1], memory.lasting[m, 2])
         weigh_hypotheses(thresholds, readings, memory, time, pressure)
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
@@ -222,6 +234,8 @@ def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pres
                 m = 2 * j + side
                 error = memory.clock[3] * (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
                 weigh_disagreement(thresholds, memory, j, 1 + side, error, time)
+                if memory.clock[4] == 0.0:
+                    note_residual(memory.lasting[m], error)
     look_at_potentiometers(thresholds, memory, time, angle, pressure)
     observe(memory, time, angle, pressure)
 
@@ -231,6 +245,16 @@ def usual(thresholds, memory, j):  # type: ignore[no-untyped-def]
     """Return how many standard deviations count as one; a simulation is worse where a joint moves fast."""
     fast = memory.observed[0, j, 1] / thresholds.fast
     return thresholds.inflation * math.sqrt(1.0 + fast * fast)
+
+
+@part
+def note_residual(lasting, error):  # type: ignore[no-untyped-def]
+    """Note in ``lasting`` of a muscle how much a standardised residual is like the one before."""
+    cut = min(max(error, -_LASTING), _LASTING)
+    lasting[0] = min(lasting[0] + 1.0, _REMEMBERED)
+    lasting[1] += (cut * cut - lasting[1]) / lasting[0]
+    lasting[2] += (cut * lasting[3] - lasting[2]) / lasting[0]
+    lasting[3] = cut
 
 
 @part
@@ -258,8 +282,11 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
                 least = max(least, memory.clear[m])
             fullness = (memory.base[m] - lowest) / (memory.full[m] - lowest)
             # A full muscle takes little, whatever is wrong; but it empties if its outlet is open.
-            full = fullness > thresholds.full and max(memory.command[0, m], memory.command[1, m]) > 0.0
+            fills = max(memory.command[0, m], memory.command[1, m]) > 0.0
+            full = fullness > thresholds.full and fills
             telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
+            # What has been found brings it so far by itself, and there it looks like other faults.
+            telling = telling and (fills or memory.base[m] <= thresholds.over or memory.clock[4] == 0.0)
             if readings.leak[h, m] > 0.0:
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
             if telling:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.control.monitor.hypotheses import carried_out
+from pneumarm.control.monitor.hypotheses import at_once, carried_out
 from pneumarm.kernels import part
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
@@ -20,6 +20,7 @@ from pneumarm.simulation.simulation import Simulation
 
 _LEAST_STD = 0.5  # counts; below this the converter's rounding is all there is
 _LOW = 0.5  # of the highest pressure; an empty muscle has less
+_LOST = 0.25  # of what comes in while both valves are open, standard deviation
 
 
 class Predictor(NamedTuple):
@@ -52,6 +53,8 @@ class Predictor(NamedTuple):
     """Of the others, shape (further,) [sensor units]."""
     further_scale: NDArray[np.float64]
     """Shape (further,) [sensor units]."""
+    following: NDArray[np.float64]
+    """Workspace: pressures that follow, shape (2 joints,) [counts]."""
 
 
 def predictor(simulation: Simulation) -> Predictor:
@@ -73,6 +76,7 @@ def predictor(simulation: Simulation) -> Predictor:
         velocities=joints if window.velocity == "measured" else 0,
         further_offset=scaling.observation_offset[window.joint_size :].copy(),
         further_scale=scaling.observation_scale[window.joint_size :].copy(),
+        following=np.zeros(2 * joints),
     )
 
 
@@ -97,37 +101,65 @@ def expect_further(predictor, lag):  # type: ignore[no-untyped-def]
 
 
 @part
-def expect_by_simulation(predictor, readings, memory, expected, angle):  # type: ignore[no-untyped-def]
-    """Set ``expected`` (n, m) pressures, and the ``angle`` (joints,) expected of a healthy arm [counts]."""
-    simulation, state = predictor.simulation, predictor.state
-    x, joints, history = state.x, simulation.joints, simulation.history
-    muscles = 2 * joints
-    for lag in range(history):
-        for j in range(joints):
+def expect_by_simulation(predictor, readings, memory):  # type: ignore[no-untyped-def]
+    """Set in ``memory`` the pressures that are expected under every hypothesis, and the angles of a healthy arm.
+
+    What comes in and what goes out while both valves of a muscle are open is added: no simulation has seen that, so
+    a part of what comes in is doubt.
+    """
+    simulation, x = predictor.simulation, predictor.state.x
+    for lag in range(simulation.history):
+        for j in range(simulation.joints):
             for q in range(4):
                 scaled = (memory.observed[lag, j, q] - predictor.offset[j, q]) / predictor.scale[j, q]
                 x[simulation.observed * lag + 4 * j + q] = np.float32(scaled)
         expect_further(predictor, lag)
-    for h in range(expected.shape[0]):
-        for m in range(muscles):
-            lowest = predictor.lowest[m]
-            level = (memory.observed[0, m // 2, 2 + m % 2] - lowest) / (predictor.highest - lowest)
-            source = readings.source[h, m]
-            now = carried_out(readings, h, m, memory.command[0, source], level) / predictor.command_scale[m]
-            x[predictor.first_command + m] = np.float32(now)
-            for lag in range(1, history):
-                told = memory.command[lag, source]
-                earlier = carried_out(readings, h, m, told, level) / predictor.command_scale[m]
-                x[simulation.observed * history + muscles * (lag - 1) + m] = np.float32(earlier)
-        predict_change(simulation, state)
-        for o in range(simulation.place.shape[0] - predictor.further_scale.shape[0]):
-            j, q = simulation.place[o] // 4, simulation.place[o] % 4
-            scaled = (memory.observed[0, j, q] - predictor.offset[j, q]) / predictor.scale[j, q] + state.change[o]
-            scaled = min(max(scaled, simulation.lowest[o]), simulation.highest[o])
-            following = predictor.offset[j, q] + predictor.scale[j, q] * scaled
-            if q >= 2:
-                m = 2 * j + q - 2
-                lost = predictor.period * readings.leak[h, m]
-                expected[h, m] = following - lost * max(0.0, memory.observed[0, j, q] - predictor.lowest[m])
-            elif q == 0 and h == 0:
-                angle[j] = following
+    for h in range(memory.expected.shape[0]):
+        expected, doubt = memory.expected[h], memory.doubt[h]
+        both_open = expect_under(predictor, readings, memory, h, -1.0)
+        for m in range(expected.shape[0]):
+            expected[m], doubt[m] = predictor.following[m], 0.0
+        if both_open:
+            expect_under(predictor, readings, memory, h, 0.0)
+            for m in range(expected.shape[0]):
+                expected[m] -= predictor.following[m]
+                doubt[m] = predictor.following[m]
+            expect_under(predictor, readings, memory, h, 1.0)
+            for m in range(expected.shape[0]):
+                expected[m] = max(expected[m] + predictor.following[m], predictor.lowest[m])
+                doubt[m] = _LOST * abs(predictor.following[m] - doubt[m])
+
+
+@part
+def expect_under(predictor, readings, memory, h, both):  # type: ignore[no-untyped-def]
+    """Set in ``predictor`` the pressures that follow under hypothesis ``h`` if two open valves do ``both``.
+
+    Returned is whether both valves of a muscle were open at once.
+    """
+    simulation, state = predictor.simulation, predictor.state
+    x, history, muscles, both_open = state.x, simulation.history, 2 * simulation.joints, False
+    for m in range(muscles):
+        lowest = predictor.lowest[m]
+        level = (memory.observed[0, m // 2, 2 + m % 2] - lowest) / (predictor.highest - lowest)
+        source = readings.source[h, m]
+        for lag in range(history):
+            told = memory.command[lag, source]
+            place = predictor.first_command + m
+            if lag > 0:
+                place = simulation.observed * history + muscles * (lag - 1) + m
+            done = carried_out(readings, h, m, told, level, both)
+            x[place] = np.float32(done / predictor.command_scale[m])
+            both_open = both_open or at_once(readings, h, m, told)
+    predict_change(simulation, state)
+    for o in range(simulation.place.shape[0] - predictor.further_scale.shape[0]):
+        j, q = simulation.place[o] // 4, simulation.place[o] % 4
+        scaled = (memory.observed[0, j, q] - predictor.offset[j, q]) / predictor.scale[j, q] + state.change[o]
+        scaled = min(max(scaled, simulation.lowest[o]), simulation.highest[o])
+        following = predictor.offset[j, q] + predictor.scale[j, q] * scaled
+        if q >= 2:
+            m = 2 * j + q - 2
+            lost = predictor.period * readings.leak[h, m]
+            predictor.following[m] = following - lost * max(0.0, memory.observed[0, j, q] - predictor.lowest[m])
+        elif q == 0 and h == 0:
+            memory.angle[j] = following
+    return both_open

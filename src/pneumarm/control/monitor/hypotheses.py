@@ -112,26 +112,36 @@ def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Reading
 
 
 @part
-def carried_out(readings, h, m, told, level):  # type: ignore[no-untyped-def]
+def carried_out(readings, h, m, told, level, both):  # type: ignore[no-untyped-def]
     """Return what muscle ``m`` at a ``level`` of the usual supply does under hypothesis ``h`` if ``told`` a command.
 
     During a pulse it does what it does when told to open, in the rest of the period what it does when told to close.
+    While both of its valves are open it does ``both``.
     """
     share = abs(told)
-    done = share * position(readings, h, m, 2 if told > 0.0 else 0) + (1.0 - share) * position(readings, h, m, 1)
+    opened = position(readings, h, m, 2 if told > 0.0 else 0, both)
+    done = share * opened + (1.0 - share) * position(readings, h, m, 1, both)
     if done > 0.0 and readings.supply[h] < math.inf:
         done *= supplied(readings.supply[h], level)
     return done
 
 
 @part
-def position(readings, h, m, told):  # type: ignore[no-untyped-def]
+def position(readings, h, m, told, both):  # type: ignore[no-untyped-def]
     """Return as a command what the valves of muscle ``m`` do when ``told`` to empty, to close, to fill (0, 1, 2).
 
-    No command says that both are open; the outlet, which is wider, then wins.
+    No command says that both are open: that is ``both``.
     """
-    valves = readings.open[h, m]
-    return -1.0 if valves[1, told] else 1.0 if valves[0, told] else 0.0
+    inlet, outlet = readings.open[h, m, 0, told], readings.open[h, m, 1, told]
+    return both if inlet and outlet else -1.0 if outlet else 1.0 if inlet else 0.0
+
+
+@part
+def at_once(readings, h, m, told):  # type: ignore[no-untyped-def]
+    """Return whether both valves of muscle ``m`` are open at once under hypothesis ``h`` if ``told`` a command."""
+    valves, state = readings.open[h, m], 2 if told > 0.0 else 0
+    opened = told != 0.0 and valves[0, state] and valves[1, state]
+    return opened or (abs(told) < 1.0 and valves[0, 1] and valves[1, 1])
 
 
 @part
@@ -174,3 +184,13 @@ def times_opened(readings, h, m, valve, fills, empties):  # type: ignore[no-unty
     """
     states = readings.open[h, m, valve]
     return 0.0 if states[1] else fills * states[2] + empties * states[0]
+
+
+@part
+def independence(square, product):  # type: ignore[no-untyped-def]
+    """Return how much an error says that the ones before it have not: 1 where errors do not last.
+
+    ``square`` is the mean square of errors, ``product`` the mean product of one with the one before.
+    """
+    correlation = min(max(product / square, 0.0), 0.9)
+    return (1.0 - correlation) / (1.0 + correlation)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.control.monitor.hypotheses import reduced, time_open, times_opened
+from pneumarm.control.monitor.hypotheses import independence, reduced, time_open, times_opened
 from pneumarm.kernels import part
 
 LOOK = 1 / 30
@@ -314,13 +314,6 @@ def level_of_supply(known, m):  # type: ignore[no-untyped-def]
 
 
 @part
-def independence(known, m):  # type: ignore[no-untyped-def]
-    """Return how much an error of muscle ``m`` says that the ones before it have not: 1 where errors do not last."""
-    correlation = min(max(known.lasting[m, 1] / known.lasting[m, 0], 0.0), 0.9)
-    return (1.0 - correlation) / (1.0 + correlation)
-
-
-@part
 def expect_by_identification(known, readings, memory, angle, pressure, empty):  # type: ignore[no-untyped-def]
     """Set in ``memory`` what pressures are expected under every hypothesis [counts], and how uncertain that is.
 
@@ -334,7 +327,7 @@ def expect_by_identification(known, readings, memory, angle, pressure, empty):  
         memory.lowest[m] = lowest_level(known, m) * highest
         memory.full[m] = highest_level(known, m) * highest
         memory.base[m] = known.last[m, 0] * highest
-        memory.trust[m] = independence(known, m)
+        memory.trust[m] = independence(known.lasting[m, 0], known.lasting[m, 1])
         features(known, readings, 0, m, angle, full, known.x[m])
         healthy = known.last[m, 0] + predicted(known, m, known.x[m])
         healthy = max(healthy, min(lowest_level(known, m), read))  # the line goes on below empty, no pressure does

@@ -38,6 +38,7 @@ from pneumarm.transitions.rows import Mark, Recorded
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
 _LONG = 1 / 3  # s; equal angles for less show nothing
 _RARE = math.log(1e6)  # of so many equal angles of a sound arm, about one is called frozen
+_OVER = 1.3  # highest pressures; a closed muscle that is compressed comes to 1.15
 _FEWEST = 10  # residuals of which a mean square is taken seriously
 
 
@@ -134,6 +135,7 @@ class Monitor:
             inflation=settings.inflation,
             full=weighing.full,
             empty=weighing.empty * spec.max_pressure_counts,
+            over=_OVER * spec.max_pressure_counts,
             clear=weighing.clear * spec.max_pressure_counts,
             unsure=weighing.unsure,
             calm=1e-3 * settings.calm * spec.counts_per_degree,
@@ -430,7 +432,7 @@ class Monitor:
             arrays = {name: np.array(values, np.float64) for name, values in saved["memory"].items()}
             findings = [Finding(**one) for one in saved["findings"]]
             earlier = int(saved.get("earlier", 0))
-            memory = Memory(**arrays)
+            memory = Memory(**{**self._memory._asdict(), **arrays})  # an earlier version remembered less
             same = [a.shape == b.shape for a, b in zip(memory, self._memory, strict=True)]
             further = np.array(saved.get("measured", []), np.float64).reshape(self._measured.shape)
             if not all(same) or saved["simulation"] is not (self._simulation is not None):

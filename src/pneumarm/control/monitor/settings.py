@@ -14,7 +14,7 @@ Mode = Literal["stop", "warn", "off"]
 class Weighing(Settings):
     """How much is needed to call something a fault of the valves or the air."""
 
-    alarm: float = 11.0
+    alarm: float = 14.0
     """Log-likelihood ratio from which on a fault counts as found."""
     supply: float = 4.0
     """Evidence that a low supply needs less: every inlet speaks for or against it, so by chance it has little."""

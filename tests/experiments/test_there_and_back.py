@@ -247,10 +247,10 @@ def test_the_period_helps_where_steps_differ(material: Prepared) -> None:
     assert told["velocity"] < 0.05 * blind["velocity"]
 
 
-def test_parts_of_a_collection_are_what_a_short_one_gives(laboratory: Path) -> None:
+def test_parts_of_a_collection_are_what_a_short_one_gives(tmp_path: Path) -> None:
     """Cut after 1.7 minutes it is the collection that ended there, though its store went on."""
-    both = EnoughData(minutes=(1.7, 2.5)).prepare(ARM, _arm_folder(laboratory), SMALL, _silent)
-    alone = EnoughData(minutes=(1.7,)).prepare(ARM, _arm_folder(laboratory), SMALL, _silent)
+    both = EnoughData(minutes=(1.7, 2.5)).prepare(ARM, tmp_path / "arm", SMALL, _silent)
+    alone = EnoughData(minutes=(1.7,)).prepare(ARM, tmp_path / "arm", SMALL, _silent)
     assert both[0].figures == alone[0].figures
     np.testing.assert_array_equal(both[0].begin.states, alone[0].begin.states)
     assert both[1].figures["minutes"] >= 2.5 > both[0].figures["minutes"] >= 1.7

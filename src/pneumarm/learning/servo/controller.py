@@ -57,8 +57,9 @@ _KNOWN = 4  # numbers that are learned of a joint
 _ARRIVED = 0.5  # s after a joint was first near its goal, from which on it is noted how near it stays
 _FARTHER = 4.0  # most that is added where the policy acts in every period
 _COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an error that count, most that is added
-_FOLLOWED, _LEARNED = 0.3, 0.7  # tolerances that plans are hoped to be off a moving reference by; see TwoWays
-_GAINED = 0.12  # tolerances nearer by a plan than by the policy, in the simulation, for plans to be tried first
+_FOLLOWED, _LEARNED = 0.5, 0.7  # tolerances that plans are hoped to be off a moving reference by; see TwoWays
+_GAINED = 0.12  # tolerances nearer by a plan than by the policy, in the simulation, for plans to be tried first ...
+_BELIEVED = 2.0  # ... and kept while they are not off by more
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
@@ -258,8 +259,7 @@ class ServoController:
             return False
         self._moved += 1
         if self._moved == (1 if self._reference is not None and self._reference.known_ahead else self._arrived):
-            gains = self._predictive.gains(state, wanted)
-            by_policy = max(2 * _FOLLOWED, gains) if gains > _GAINED else 0.0
+            by_policy = _BELIEVED if self._predictive.gains(state, wanted) > _GAINED else 0.0
             self._followed = TwoWays(self.spec.period, _FOLLOWED, (by_policy, _FOLLOWED), learned=_LEARNED)
         before = self._followed.second
         self._followed.see(float(np.abs(off[moves]).max() / self._unit))

@@ -59,6 +59,7 @@ _FARTHER = 4.0  # most that is added where the policy acts in every period
 _COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an error that count, most that is added
 _FOLLOWED, _LEARNED = 0.5, 0.7  # tolerances that plans are hoped to be off a moving reference by; see TwoWays
 _GAINED = 0.12  # tolerances nearer by a plan than by the policy, in the simulation, for plans to be tried first ...
+_ASKED = 0.0, 0.167, 0.333  # s after a reference began to move, at which the simulation is asked that
 _BELIEVED = 2.0  # ... and kept while they are not off by more
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
@@ -180,6 +181,8 @@ class ServoController:
         self._before: NDArray[np.float64] | None = None
         self._followed = TwoWays(self.spec.period, _FOLLOWED, learned=_LEARNED)
         self._moved = 0  # turns in which the reference has moved
+        begin = 0.0 if reference.known_ahead else _ARRIVED  # a forecast needs to have seen something
+        self._asked = [1 + round((begin + after) / self.spec.period) for after in _ASKED]
         self._correction = Correction(self.spec.joints, _TAUGHT_BY * self._tolerance)
         self._pulse = np.zeros((self.spec.joints, 2))  # the last of each joint
         for rest in self._rest:
@@ -258,10 +261,9 @@ class ServoController:
             self._followed.leave()
             return False
         self._moved += 1
-        if self._moved == (1 if self._reference is not None and self._reference.known_ahead else self._arrived):
-            by_policy = _BELIEVED if self._predictive.gains(state, wanted) > _GAINED else 0.0
-            self._followed = TwoWays(self.spec.period, _FOLLOWED, (by_policy, _FOLLOWED), learned=_LEARNED)
         before = self._followed.second
+        if self._moved in self._asked and not before and self._predictive.gains(state, wanted) > _GAINED:
+            self._followed = TwoWays(self.spec.period, _FOLLOWED, (_BELIEVED, _FOLLOWED), learned=_LEARNED)
         self._followed.see(float(np.abs(off[moves]).max() / self._unit))
         if self._followed.second != before:  # what one way falls short by says nothing of the other
             self._correction.forget()

@@ -92,7 +92,7 @@ class Moved:
     @property
     def time(self) -> NDArray[np.float64]:
         """Times of the readings of the last try, from its beginning, shape (n,) [s]."""
-        return self.recorded.time - self.recorded.time[0]
+        return self.recorded.time - self.time_start
 
     @property
     def degrees(self) -> NDArray[np.float64]:
@@ -146,6 +146,7 @@ class Tracked:
     """A reference that was followed. Times are on the arm's clock [s]."""
 
     time_start: float
+    """When the reference began."""
     seconds: float
     rms_error: NDArray[np.float64]
     """Root of the mean squared error over all readings, shape (joints,) [degrees]."""
@@ -251,15 +252,16 @@ def track(
     coming = replace(reference, at=lambda time: reference.at(max(time - lead_in, 0.0)))
     controller.reset(reference.at(0.0))
     controller.track(coming)
-    if lead_in > 0:
-        played(cycle, controller, lead_in, coming.at, watch, seen)
+    before = played(cycle, controller, lead_in, coming.at, watch, seen) if lead_in > 0 else None
     air = cycle.arm.air_used()
     recorded = played(cycle, controller, seconds, reference.at, watch, seen)
-    passed = recorded.time - recorded.time[0]
-    wanted = np.array([reference.at(float(time)) for time in passed])
+    # Turns come milliseconds early or late: the reference began when it was said to, not with a turn.
+    start = float(recorded.time[0] if before is None else before.time[0] + lead_in)
+    passed = recorded.time - start
+    wanted = np.array([reference.at(max(float(time), 0.0)) for time in passed])
     error = (recorded.angle - wanted) / cycle.arm.spec.counts_per_degree
     return Tracked(
-        time_start=float(recorded.time[0]),
+        time_start=start,
         seconds=float(passed[-1]),
         rms_error=np.sqrt((error**2).mean(axis=0)),
         switches=valve_changes(recorded.command[:-1], closed),

@@ -146,9 +146,10 @@ def _on_arm(
     """Yield the errors (steps, joints) [counts] of the agent on ``arm``."""
     cycle, controller = ControlCycle(guarded(arm)), agent.controller()
     for reference, seconds, before in _movements(goals, wave, settings):
-        _bring(cycle, controller, reference, before)
+        start = _bring(cycle, controller, reference, before)
         recorded = played(cycle, controller, seconds, reference.at)
-        yield {"arm": recorded.angle[1:] - _angles(reference, recorded.time[1:] - recorded.time[0])}
+        start = recorded.time[0] if start is None else start
+        yield {"arm": recorded.angle[1:] - _angles(reference, recorded.time[1:] - start)}
 
 
 def _better_on_arm(
@@ -207,13 +208,17 @@ def _better_in_simulation(
         }
 
 
-def _bring(cycle: ControlCycle, controller: Any, reference: Reference, seconds: float) -> None:
-    """Give ``controller`` the ``reference``, which begins after ``seconds`` in which the arm moves to its begin."""
+def _bring(cycle: ControlCycle, controller: Any, reference: Reference, seconds: float) -> float | None:
+    """Give ``controller`` the ``reference``, which begins after ``seconds`` in which the arm moves to its begin.
+
+    Returns when it begins on the arm's clock [s]; None: with the next reading.
+    """
     cycle.arm.make_ready()
     controller.reset(reference.at(0.0))
     if seconds > 0:
         controller.track(Reference(lambda time: reference.at(time - seconds)))
-        played(cycle, controller, seconds, lambda time: reference.at(time - seconds))
+        return float(played(cycle, controller, seconds, lambda time: reference.at(time - seconds)).time[0]) + seconds
+    return None
 
 
 def _angles(reference: Reference, times: Array) -> Array:

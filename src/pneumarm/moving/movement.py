@@ -92,7 +92,7 @@ class Moved:
     @property
     def time(self) -> NDArray[np.float64]:
         """Times of the readings of the last try, from its beginning, shape (n,) [s]."""
-        return self.recorded.time - self.time_start
+        return self.recorded.time - self.recorded.time[0]
 
     @property
     def degrees(self) -> NDArray[np.float64]:
@@ -162,7 +162,7 @@ class Tracked:
     @property
     def time(self) -> NDArray[np.float64]:
         """Times of the readings, from the beginning of the reference, shape (n,) [s]."""
-        return self.recorded.time - self.recorded.time[0]
+        return self.recorded.time - self.time_start
 
     @property
     def degrees(self) -> NDArray[np.float64]:

@@ -9,10 +9,8 @@ from collections.abc import Sequence
 
 _TRIED = 1.0  # s that one way is tried for
 _BEFORE = 0.5  # share of it that may be owed to what was before
-_LEARNED, _FORGOTTEN = (
-    0.3,
-    0.02,
-)  # share of what is known of a way that a try of it replaces, and one of the other
+_LEARNED = 0.3  # share of what is known of a way that a try of it replaces ...
+_FORGOTTEN = 0.02  # ... and one of the other
 
 
 class TwoWays:

@@ -6,10 +6,20 @@ import numpy as np
 import pytest
 
 from learning.synthetic_arm import synthetic_begin_states, synthetic_simulation
+from pneumarm.arm import Reading
 from pneumarm.arm.reference import Reference
 from pneumarm.learning.servo import ServoAgent, ServoSettings
 from pneumarm.learning.servo.gradient import ServoTask, Tape, tape
-from pneumarm.learning.servo.predictive import PLANS, Plans, improve, plans_of, play, price, slopes_by_commands
+from pneumarm.learning.servo.predictive import (
+    PLANS,
+    Plans,
+    PredictiveControl,
+    improve,
+    plans_of,
+    play,
+    price,
+    slopes_by_commands,
+)
 from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.planning import PlannedServo
@@ -135,6 +145,27 @@ def test_a_simulation_that_is_planned_in_settles_holds_and_tracks():
     assert [one.success for one in made] == [True] * 3
     sine = Reference(lambda time: np.array([520 + 8 * spec.counts_per_degree * np.sin(np.pi * time)]))
     assert track(arm, controller, sine, 5).rms_error[0] < 2
+
+
+def test_where_turns_come_late_plans_take_less_time(monkeypatch: pytest.MonkeyPatch):
+    """As on a computer that is too slow for them; on an arm whose clock stands while we compute none is late."""
+    servo = PlannedServo(SIMULATION)
+    controller, hurried = servo.controller(), []
+    monkeypatch.setattr(PredictiveControl, "hurry", lambda plan: hurried.append(plan))
+    controller.reset(np.array([600.0]))
+    time, period = 0.0, servo.spec.period
+    for late in (1.0, 1.2, 1.0, 2.0, 1.0):
+        controller.act(Reading(time, np.array([500.0]), np.full((1, 2), 90.0)))
+        time += late * period
+    assert len(hurried) == 1
+
+
+def test_to_take_less_time_is_to_make_plans_better_less_often():
+    plan, improved = PlannedServo(SIMULATION).predictive(), []
+    for _ in range(6):
+        plan.hurry()
+        improved.append(plan._times)
+    assert improved == [10, 5, 2, 1, 1, 1]
 
 
 def test_plans_are_followed_where_they_keep_nearer_than_the_policy():

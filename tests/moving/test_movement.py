@@ -116,6 +116,37 @@ def test_tracking_begins_where_the_reference_begins() -> None:
         track(arm, Towards(), constant([600.0]), 0.0)
 
 
+class Late(Steered):
+    """One whose waits are a tenth of a period longer once 1.5 s have passed."""
+
+    def wait(self, seconds: float) -> None:
+        super().wait(seconds * (1.1 if 1.5 < self.time < 2.05 else 1.0))
+
+
+def test_what_is_asked_for_counts_from_when_the_reference_began_and_not_from_a_late_turn() -> None:
+    asked: list[float] = []
+
+    def wave(time: float) -> NDArray[np.float64]:
+        asked.append(time)
+        return np.array([600.0 + 100 * time])
+
+    followed = track(Late(), Towards(), Reference(wave), 3.0)
+    assert followed.time_start == pytest.approx(2.0)
+    assert followed.time[0] == followed.recorded.time[0] - 2.0
+    assert followed.time[0] > 0.005  # the turn was late
+    np.testing.assert_allclose(followed.wanted[:, 0], 600.0 + 100 * followed.time)
+    np.testing.assert_allclose(
+        followed.rms_error[0], np.sqrt(np.mean((followed.recorded.angle - followed.wanted) ** 2)) / 10
+    )
+
+
+def test_times_of_a_movement_are_those_of_its_last_try() -> None:
+    (moved,) = move(Steered(), Towards(stuck=3), [[600.0]], MoveSettings(hold=1.0, tries=2))
+    assert moved.tries == 2
+    assert moved.time[0] == 0.0
+    assert moved.time[-1] == pytest.approx(1.0)
+
+
 def test_changes_of_valves_are_counted_by_muscle_and_a_pulse_is_two() -> None:
     closed = np.zeros((1, 2))
     commands = np.array([[[0, 0]], [[1, 0]], [[1, -1]], [[0, -1]], [[1, -1]]])

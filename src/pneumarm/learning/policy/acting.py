@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
 from pneumarm.learning.policy.inputs import InputParameters, write_inputs
 from pneumarm.learning.policy.proximal import FORBIDDEN, log_softmax, write_bias
 from pneumarm.networks.layers import Layers, forward, workspace
@@ -153,6 +153,20 @@ def move_all(mind, lanes, horizon):  # type: ignore[no-untyped-def]
             break
 
 
+@part
+def best_of(total, count):  # type: ignore[no-untyped-def]
+    """Return which of ``count`` choices has the highest mean ``total`` (n,), that of ``e`` being of ``e % count``."""
+    n, best, highest = total.shape[0], 0, -np.inf
+    for place in range(count):
+        added = 0.0
+        for e in range(place, n, count):
+            added += total[e]
+        mean = added / ((n - place + count - 1) // count)
+        if mean > highest:
+            best, highest = place, mean
+    return best
+
+
 @kernel
 def decide(mind, single, lanes, samples, horizon, clear):  # type: ignore[no-untyped-def]
     """Set ``single.actions`` (1, joints) to what to do in the arm of ``single``, looking ahead where it is not clear.
@@ -183,12 +197,4 @@ def decide(mind, single, lanes, samples, horizon, clear):  # type: ignore[no-unt
                 lanes.actions[e, other] = single.actions[0, other]
             lanes.actions[e, joint] = candidates[e % count]
         move_all(mind, lanes, horizon)
-        highest = -np.inf
-        for place in range(count):
-            total = 0.0
-            for e in range(place, n, count):
-                total += lanes.total[e]
-            mean = total / ((n - place + count - 1) // count)
-            if mean > highest:
-                highest = mean
-                single.actions[0, joint] = candidates[place]
+        single.actions[0, joint] = candidates[best_of(lanes.total, count)]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS, possible_actions, to_actions
 from pneumarm.kernels import kernel
-from pneumarm.learning.policy.acting import Lanes, Mind, copy_all, judge_all
+from pneumarm.learning.policy.acting import Lanes, Mind, best_of, copy_all, judge_all
 from pneumarm.learning.policy.proximal import FORBIDDEN
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.simulation.simulation import Simulation
@@ -112,15 +112,7 @@ def compare(mind, single, lanes, samples, courses, horizon):  # type: ignore[no-
         samples[e] = e // count  # equal noise for all courses
     copy_all(mind, lanes, single.fleet, samples)
     follow_all(mind, lanes, courses, horizon)
-    best, highest = 0, -np.inf
-    for place in range(count):
-        total = 0.0
-        for e in range(place, n, count):
-            total += lanes.total[e]
-        mean = total / ((n - place + count - 1) // count)
-        if mean > highest:
-            highest, best = mean, place
-    return best
+    return best_of(lanes.total, count)
 
 
 @kernel

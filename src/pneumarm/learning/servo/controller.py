@@ -61,6 +61,7 @@ _FOLLOWED, _LEARNED = 0.5, 0.7  # tolerances that plans are hoped to be off a mo
 _GAINED = 0.12  # tolerances nearer by a plan than by the policy, in the simulation, for plans to be tried first ...
 _ASKED = 0.0, 0.167, 0.333  # s after a reference began to move, at which the simulation is asked that
 _BELIEVED = 2.0  # ... and kept while they are not off by more
+_LATE = 1.5  # periods from a turn that was planned to the next one, which is then late: plans take too long here
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
@@ -181,6 +182,7 @@ class ServoController:
         self._before: NDArray[np.float64] | None = None
         self._followed = TwoWays(self.spec.period, _FOLLOWED, learned=_LEARNED)
         self._moved = 0  # turns in which the reference has moved
+        self._planned_at: float | None = None  # time of the last reading, if what followed it was planned
         begin = 0.0 if reference.known_ahead else _ARRIVED  # a forecast needs to have seen something
         self._asked = [1 + round((begin + after) / self.spec.period) for after in _ASKED]
         self._correction = Correction(self.spec.joints, _TAUGHT_BY * self._tolerance)
@@ -215,7 +217,9 @@ class ServoController:
         calm = np.array([rest.calm for rest in self._rest])
         active = np.array([rest.active.second for rest in self._rest])
         planned = self._is_planned(moves, path[1] - reading.angle, state, wanted)
-        if self._predictive is not None and (planned or self._actor is None):
+        if planned and self._predictive is not None:
+            if self._planned_at is not None and reading.time - self._planned_at > _LATE * self.spec.period:
+                self._predictive.hurry()
             command = self._predictive.pulses(state, wanted) if acts.any() else np.zeros((self.spec.joints, 2))
         else:
             assert self._actor is not None
@@ -228,6 +232,7 @@ class ServoController:
         if self._spread is not None:
             command = self._spread(command)
         self._tracker.commanded(command)
+        self._planned_at = reading.time if planned else None
         return command
 
     def _path(self, time: float) -> NDArray[np.float64]:
@@ -255,8 +260,8 @@ class ServoController:
         ``off`` (joints,) is how far the joints are from it [counts]; the rest as of
         :meth:`.PredictiveControl.pulses`. Before anything was seen the simulation is believed.
         """
-        if self._predictive is None:
-            return False
+        if self._actor is None or self._predictive is None:
+            return self._actor is None
         if not moves.any():
             self._followed.leave()
             return False

@@ -7,7 +7,7 @@ from pneumarm.arm.valves import CLOSED, VALVES
 from pneumarm.errors import PneumarmError
 from pneumarm.kernels import kernel
 from pneumarm.learning.policy.acting import Mind, decide, lanes
-from pneumarm.learning.policy.foresight import Foresight
+from pneumarm.learning.policy.courses import Courses
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.random import random_states
 from pneumarm.simulation.simulation import Simulation
@@ -24,7 +24,7 @@ class PolicyActor:
     It does not learn. A joint that passes its goal again and again is one that its policy keeps swinging: its valves
     stay closed until it has come to rest, and it goes on from there. A joint that is off its goal while its policy
     has long been venting empty muscles, of which the simulation knows least, is vented no longer: noise hides from
-    the policy that this changes nothing. Several joints may do what a plan says, see :mod:`.foresight`.
+    the policy that this changes nothing. Several joints may do what a plan says, see :mod:`.courses`.
     """
 
     def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings, simulation: Simulation) -> None:
@@ -39,7 +39,7 @@ class PolicyActor:
         self._lanes = lanes(mind, sizes, np.zeros((settings.lookahead, 4), np.uint64))
         self._samples = np.zeros(settings.lookahead, np.int64)
         several = window.joints > 1 and settings.lookahead > 0 and settings.nodes > 0
-        self._foresight = Foresight(simulation, settings) if several else None
+        self._courses = Courses(simulation, settings) if several else None
         self._decided = False
         self._state_size = mind.inputs.state_size
 
@@ -56,16 +56,16 @@ class PolicyActor:
         self._idle = np.zeros(goal.size, int)
         self._mind.limits.outlet[...] = -np.inf
         self._decided = False
-        if self._foresight is not None:
-            self._foresight.begin(goal)
+        if self._courses is not None:
+            self._courses.begin(goal)
 
     def act(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of the current state; they stay the same until the next state."""
         single = self._single
         if not self._decided:
             decide(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
-            if self._foresight is not None:
-                self._foresight.improve(self._mind, single, self._lanes, self._samples)
+            if self._courses is not None:
+                self._courses.improve(self._mind, single, self._lanes, self._samples)
             single.actions[0, self._resting > 0] = CLOSED
             arm = single.fleet
             for joint, action in enumerate(single.actions[0]):

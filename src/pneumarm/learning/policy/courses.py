@@ -28,7 +28,7 @@ _MOST = 3 + len(_HELD)  # courses: that of the policy, the plan, the last one, a
 _MOST_ACTIONS = 1_000  # of the whole arm, among which a plan can be sought in time
 
 
-class Foresight:
+class Courses:
     """Compares courses of several joints in a movement; for one joint looking ahead action by action is enough."""
 
     def __init__(self, simulation: Simulation, settings: PolicySettings) -> None:

@@ -9,7 +9,7 @@ from pneumarm.arm.valves import CLOSED
 from pneumarm.learning import PolicyAgent, PolicySettings
 from pneumarm.learning.policy.acting import lanes
 from pneumarm.learning.policy.agent import policy_sizes
-from pneumarm.learning.policy.foresight import compare
+from pneumarm.learning.policy.courses import compare
 from pneumarm.learning.policy.training import practised
 from pneumarm.networks.layers import weight_count
 from pneumarm.random import random_states

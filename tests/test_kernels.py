@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from children import python
-from pneumarm.kernels import kernel, part, sources_hash
+from pneumarm.kernels import inner, kernel, part, sources_hash
 
 LEFT = """
 from pneumarm.kernels import kernel
@@ -135,6 +135,27 @@ def test_a_kernel_may_make_arrays_also_where_a_part_is_the_first_to_call_it():
 
     outer = kernel(lambda x: inside(x))
     assert outer(np.ones(3)) == 7.0
+
+
+def test_a_kernel_for_kernels_refuses_python_before_and_after_it_was_compiled():
+    @inner
+    def twice(x):
+        return 2.0 * x
+
+    outer = kernel(lambda x: twice(x) + 1.0)
+    for _ in range(2):
+        with pytest.raises(TypeError, match="twice has no entry for Python"):
+            twice(1.0)
+        assert outer(1.0) == 3.0
+
+
+def test_a_part_with_an_entry_is_called_from_python_and_from_kernels():
+    @part(entry=True)
+    def twice(x):
+        return 2.0 * x
+
+    assert twice(1.0) == 2.0
+    assert kernel(lambda x: twice(x) + 1.0)(1.0) == 3.0
 
 
 def test_division_follows_numpy():

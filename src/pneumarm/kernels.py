@@ -121,27 +121,53 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
 
     Division follows NumPy's rules (no check for zero), because that check alone keeps a loop with a
     rational function in it from being vectorised. Options are passed on to ``numba.njit``.
+
+    Nothing here is called as a C function, so no kernel gets the entry for that: each entry is compiled and optimised
+    as the kernel itself is, which took a first run a fifth of its time.
     """
 
     def compile_(f: _Function) -> Any:
         # What is not said of counting references (_nrt) is as in the caller that happens to be compiled first.
-        settings = {"nogil": True, "error_model": "numpy", "_nrt": True, **options}
+        settings = {"nogil": True, "error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True, **options}
         dispatcher = numba.njit(**settings)(f)
-        if not getattr(numba_config, "DISABLE_JIT", 0) and settings.get("inline", "never") == "never":
+        if getattr(numba_config, "DISABLE_JIT", 0):
+            return dispatcher
+        if settings.get("no_cpython_wrapper"):
+            _refuse_python(dispatcher)
+        if settings.get("inline", "never") == "never":
             dispatcher._cache = _ForgivingCache(dispatcher.py_func)
         return dispatcher
 
     return compile_ if function is None else compile_(function)
 
 
-def part(function: _Function | None = None, **options: Any) -> Any:
-    """Compile ``function`` as a part of hot loops: as :func:`kernel`, but made to vanish in its caller.
+def inner(function: _Function | None = None, **options: Any) -> Any:
+    """Compile ``function`` as :func:`kernel` does, but for other kernels only: without an entry for Python."""
+    return kernel(function, **{"no_cpython_wrapper": True, **options})
+
+
+def part(function: _Function | None = None, *, entry: bool = False, **options: Any) -> Any:
+    """Compile ``function`` as a part of hot loops: as :func:`inner`, but made to vanish in its caller.
 
     Parts take their arguments as named tuples of arrays. Passed in the usual way each of these arrays is copied word
     by word and its references are counted, which takes longer than a small network; a part is always inlined
     and counts no references. So it must not make arrays, nor assign to slices; Numba says so if it does.
+
+    One that Python calls, too, needs an ``entry``.
     """
-    return kernel(function, **{"_nrt": False, "forceinline": True, **options})
+    compiled = kernel if entry else inner
+    return compiled(function, **{"_nrt": False, "forceinline": True, **options})
+
+
+def _refuse_python(dispatcher: Any) -> None:
+    """Let Python's calls of a kernel that has no entry for them end in an error, and not in a crash."""
+    name = dispatcher.py_func.__qualname__
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise TypeError(f"{name} has no entry for Python: call it from a kernel, or ask for one where it is defined")
+
+    dispatcher._compile_for_args = refuse
+    dispatcher._insert = lambda *_: None  # what is not found among those compiled is asked for by the line above
 
 
 def direct(compiled: Any) -> Any:

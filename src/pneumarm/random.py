@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 
 RandomState = NDArray[np.uint64]
 
@@ -32,7 +32,7 @@ def random_states(seed: int | Sequence[int], count: int) -> RandomState:
     return np.stack([child.generate_state(4, np.uint64) for child in children])
 
 
-@kernel
+@inner
 def next_word(state):  # type: ignore[no-untyped-def]
     """Return the next 64 random bits and advance ``state`` (4,) in place."""
     s0, s1, s2, s3 = state[0], state[1], state[2], state[3]
@@ -55,7 +55,7 @@ def uniform(state):  # type: ignore[no-untyped-def]
     return float(next_word(state) >> np.uint64(11)) * _TO_UNIT
 
 
-@kernel
+@inner
 def integer(state, bound):  # type: ignore[no-untyped-def]
     """Return an integer uniform in [0, bound); the bias of at most bound / 2**53 is of no consequence here."""
     return int(uniform(state) * bound)
@@ -96,7 +96,7 @@ def normal(state):  # type: ignore[no-untyped-def]
             return x
 
 
-@kernel
+@inner
 def _normal_tail(state, side):  # type: ignore[no-untyped-def]
     """Return a deviate beyond ``_TAIL`` on the ``side`` of its sign (Marsaglia, Technometrics 6, 1964)."""
     while True:

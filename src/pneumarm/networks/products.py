@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 
 _TILE = 4
 """Sums along one side of the piece of a result that is held in registers; tables are padded to a multiple of it."""
@@ -104,7 +104,7 @@ def add_block(x, h, r, w, sums):  # type: ignore[no-untyped-def]
         _add_tiles(x_now, sh, sums.x_sh)
 
 
-@kernel
+@inner
 def _copy_tile(a, begin, tile):  # type: ignore[no-untyped-def]
     """Copy the rows of ``a`` (..., rows) from ``begin`` on into ``tile``, zeros where they end."""
     rows = min(a.shape[1] - begin, tile.shape[1])
@@ -115,7 +115,7 @@ def _copy_tile(a, begin, tile):  # type: ignore[no-untyped-def]
             tile[j, i] = 0
 
 
-@kernel
+@inner
 def _slopes(h, r, w, slope, slope_error):  # type: ignore[no-untyped-def]
     """Write s_j and s_j e_j, e = W r, of every row."""
     for j in range(slope.shape[0]):
@@ -127,7 +127,7 @@ def _slopes(h, r, w, slope, slope_error):  # type: ignore[no-untyped-def]
                 slope_error[j, i] += w[j, o] * r[o, i] * slope[j, i]
 
 
-@kernel
+@inner
 def _pair_products(a, units, products):  # type: ignore[no-untyped-def]
     """Write a_j a_k of the first ``units`` into ``products``, j <= k."""
     c = 0
@@ -138,7 +138,7 @@ def _pair_products(a, units, products):  # type: ignore[no-untyped-def]
             c += 1
 
 
-@kernel
+@inner
 def _all_products(a, b, products):  # type: ignore[no-untyped-def]
     """Write a_j b_k of all units into ``products``."""
     for j in range(a.shape[0]):

@@ -10,7 +10,7 @@ FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 _CLIP = np.float32(6.29701)  # where the ratio in tansig reaches 1; tanh is 1 - 6.8e-6 there
 
 
-@part(fastmath=FASTMATH)
+@part(entry=True, fastmath=FASTMATH)
 def tansig(hidden):  # type: ignore[no-untyped-def]
     """Replace ``hidden`` (units,) by its hyperbolic tangent, within 7e-6.
 

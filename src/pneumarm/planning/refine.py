@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.learning.servo.price import PriceParameters
 from pneumarm.planning.search import advance, copy
 
@@ -37,7 +37,7 @@ class Wanted(NamedTuple):
     """Shortest pulse [periods]."""
 
 
-@kernel
+@inner
 def cost_of_reading(wanted, angle, step):  # type: ignore[no-untyped-def]
     """Return what the ``angle`` (joints,) after the command ``step`` costs, in the prices that a servo learns by."""
     total = 0.0

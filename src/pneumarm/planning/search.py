@@ -247,7 +247,7 @@ def misses(states, i, sought):  # type: ignore[no-untyped-def]
     return worst
 
 
-@part
+@part(entry=True)
 def within(value, tolerance, std):  # type: ignore[no-untyped-def]
     """Return the probability that a normal deviate around ``value`` is not farther from 0 than ``tolerance``."""
     if std == 0.0:

@@ -190,7 +190,7 @@ def predict_change(simulation, state):  # type: ignore[no-untyped-def]
         state.change[o] += total
 
 
-@part
+@part(entry=True)
 def shift(x, history, observed, command):  # type: ignore[no-untyped-def]
     """Move the observations in the window at the begin of ``x`` one step into the past, and remember ``command``.
 
@@ -240,7 +240,7 @@ def settle(simulation, noise, state, command):  # type: ignore[no-untyped-def]
     push(simulation, x, state.change, command)
 
 
-@part
+@part(entry=True)
 def step(simulation, noise, state, command):  # type: ignore[no-untyped-def]
     """Let ``state`` advance by one control period under the scaled ``command`` (2 joints,)."""
     put_command(simulation, state.x, command)
@@ -248,7 +248,7 @@ def step(simulation, noise, state, command):  # type: ignore[no-untyped-def]
     settle(simulation, noise, state, command)
 
 
-@part
+@part(entry=True)
 def begin(simulation, noise, state, sigma):  # type: ignore[no-untyped-def]
     """Put ``state`` into the scaled window ``sigma`` (state_size,), with noise that went on before it."""
     for i in range(sigma.shape[0]):

@@ -75,7 +75,7 @@ def simulated_states(world: SimulatedWorld, n: int) -> SimulatedStates:
     )
 
 
-@part
+@part(entry=True)
 def look_simulated(world, states, i):  # type: ignore[no-untyped-def]
     """Set the readings of state ``i`` to what its vector says."""
     x, unit = states.x, world.unit
@@ -86,7 +86,7 @@ def look_simulated(world, states, i):  # type: ignore[no-untyped-def]
             states.pressure[i, j, m] = unit[j, 2 + m, 0] + unit[j, 2 + m, 1] * x[i, 4 * j + 2 + m]
 
 
-@part
+@part(entry=True)
 def copy_simulated(states, to, source):  # type: ignore[no-untyped-def]
     """Copy state ``source`` to the place ``to``."""
     for k in range(states.x.shape[1]):
@@ -98,7 +98,7 @@ def copy_simulated(states, to, source):  # type: ignore[no-untyped-def]
             states.pressure[to, j, m] = states.pressure[source, j, m]
 
 
-@part
+@part(entry=True)
 def advance_simulated(world, states, i, valves):  # type: ignore[no-untyped-def]
     """Let one control period pass in state ``i`` with ``valves`` (joints, 2)."""
     for j in range(states.angle.shape[1]):

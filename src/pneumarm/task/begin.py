@@ -111,7 +111,7 @@ def begin_parameters(
     return BeginParameters(begin.states, begin.angle, order, sorted_, np.array(domain, np.float64), cumulative)
 
 
-@part
+@part(entry=True)
 def side_probability(goal, domain):  # type: ignore[no-untyped-def]
     """Return the probability of a begin state below ``goal`` in the ``domain`` of angles (thesis eq. 4.15, 4.16).
 
@@ -120,7 +120,7 @@ def side_probability(goal, domain):  # type: ignore[no-untyped-def]
     return (goal - domain[0]) / (domain[1] - domain[0])
 
 
-@part
+@part(entry=True)
 def draw_interval(domain, weights, goal, deviation, random):  # type: ignore[no-untyped-def]
     """Return a sub-interval of begin angles of a joint around its ``goal``, as its ends [counts] (section 4.3.2).
 
@@ -140,7 +140,7 @@ def draw_interval(domain, weights, goal, deviation, random):  # type: ignore[no-
     return goal + near * side, goal + far * side
 
 
-@part
+@part(entry=True)
 def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
     """Return the index of a begin state for ``goal`` (joints,) within ``deviation`` [counts].
 

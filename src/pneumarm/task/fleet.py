@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import CLOSED, VALVES
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import inner, kernel, part
 from pneumarm.networks.layers import weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.random import RandomState
@@ -146,7 +146,7 @@ def one(fleet, e):  # type: ignore[no-untyped-def]
     return Episode(state, fleet.goal[e], fleet.actions[e], fleet.switched[e], fleet.command[e])
 
 
-@kernel
+@inner
 def begin_one(environment, fleet, e):  # type: ignore[no-untyped-def]
     """Let arm ``e`` begin an episode anywhere."""
     begin_episode(environment, one(fleet, e), np.inf, fleet.random[e])

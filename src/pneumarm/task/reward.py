@@ -76,25 +76,25 @@ class Reward(Settings):
         return each
 
 
-@part
+@part(entry=True)
 def is_near(reward, angle, goal):  # type: ignore[no-untyped-def]
     """Return whether a joint is at its ``goal`` (thesis eq. 5.1)."""
     return abs(angle - goal) <= reward.angle_tolerance
 
 
-@part
+@part(entry=True)
 def is_slow(reward, velocity):  # type: ignore[no-untyped-def]
     """Return whether a joint is slow enough to have reached a goal that it is at (thesis eq. 5.2)."""
     return abs(velocity) <= reward.velocity_tolerance
 
 
-@part
+@part(entry=True)
 def is_switch(before, action):  # type: ignore[no-untyped-def]
     """Return whether a joint's ``action`` is a switch after the one ``before`` it, -1 where it is the first."""
     return before >= 0 and before != action
 
 
-@part
+@part(entry=True)
 def paid(reward, reached, switched):  # type: ignore[no-untyped-def]
     """Return what is paid for an action; ``switched`` is whether a joint, or how many joints, switched."""
     return (reward.goal if reached else reward.action) + reward.switch * switched

@@ -16,7 +16,7 @@ from pneumarm.arm.virtual.constants import constants
 from pneumarm.arm.virtual.faults import Fault, Plan, check_plan
 from pneumarm.arm.virtual.further import begin_sampling, changing, further_sensors, pass_sampling, sense_further
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, PERIOD, ArmParameters
-from pneumarm.arm.virtual.passing import drawn_lateness, pass_for, pass_time, pass_until
+from pneumarm.arm.virtual.passing import drawn_lateness, pass_time
 from pneumarm.arm.virtual.playing import FaultPlayer
 from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.sensors import sense
@@ -31,7 +31,7 @@ LATENCY = 0.007
 """Time between reading and acting [s] (thesis section 5.1: about 7 ms)."""
 LONGEST_WAIT = 1e8
 """Longest wait [s], three years."""
-_sense, _pass_for, _pass_until = direct(sense), direct(pass_for), direct(pass_until)
+_sense, _pass_time, _drawn_lateness = direct(sense), direct(pass_time), direct(drawn_lateness)
 _open_valves, _open_pulses = direct(command), direct(command)
 _HEADER = struct.Struct("<8sI16s")
 _MAGIC, _VERSION = b"pneumarm", 3
@@ -274,12 +274,11 @@ class VirtualArm(Arm):
         """
         if not 0.0 <= seconds <= LONGEST_WAIT:
             raise PneumarmError(f"an arm can wait for 0 to {LONGEST_WAIT:g} s, got {seconds!r}")
+        until = self.time + float(seconds)
         if self._player is not None:
-            self._play(self._player, self.time + seconds)
-        elif self._further is not None:
-            self._pass(self.time + seconds)
+            self._play(self._player, until)
         else:
-            _pass_for(self.body, float(seconds))
+            self._pass(until)
 
     def wait_until(self, time: float) -> None:
         """Let time pass until the clock shows ``time`` [s], or a little more; return at once if it is past.
@@ -291,11 +290,9 @@ class VirtualArm(Arm):
         if not time <= LONGEST_WAIT and not time - self.time <= LONGEST_WAIT:
             raise PneumarmError(f"an arm can wait for up to {LONGEST_WAIT:g} s, got the time {time!r}")
         if self._player is not None:
-            self._play(self._player, time, late=True)
-        elif self._further is not None:
-            self._pass_late(time)
+            self._play(self._player, float(time), late=True)
         else:
-            _pass_until(self.body, float(time))
+            self._pass_late(float(time))
 
     def _play(self, player: FaultPlayer, until: float, *, late: bool = False) -> None:
         """Let time pass until ``until`` [s], or until a little ``late``, cut where faults change."""
@@ -311,16 +308,14 @@ class VirtualArm(Arm):
     def _pass(self, until: float) -> None:
         """Let time pass until ``until`` [s], with samples of the angle where there is a sensor that needs them."""
         if self._further is None:
-            pass_time(self.body, until)
+            _pass_time(self.body, until)
         else:
             pass_sampling(self.body, self._further, until)
 
     def _pass_late(self, until: float) -> None:
         """Let time pass until ``until`` [s], or a little more; not at all if it is past."""
-        if self._further is None:
-            pass_until(self.body, until)
-        elif until > self.time:
-            self._pass(until + drawn_lateness(self.body))
+        if until > self.time:
+            self._pass(until + _drawn_lateness(self.body))
 
     def _update(self, player: FaultPlayer) -> None:
         if player.update(self.time):

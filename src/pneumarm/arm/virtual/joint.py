@@ -1,10 +1,10 @@
 """The hinge: end stops, bearings, the cables of the muscles, and what all of it does to the angles."""
 
 from pneumarm.arm.virtual.chain import hanging_torque, solve, swing
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import inner, part
 
 
-@kernel
+@inner
 def muscle_direction(which):  # type: ignore[no-untyped-def]
     """Return -1 for muscle 0, which shortens as the angle grows, and +1 for muscle 1."""
     return 2.0 * which - 1.0
@@ -23,13 +23,13 @@ def cable_run(constants, joints, j):  # type: ignore[no-untyped-def]
     return run, speed
 
 
-@kernel
+@inner
 def muscle_length(c, which, run):  # type: ignore[no-untyped-def]
     """Return the length l = lc -+ run [m] of muscle ``which`` (0 or 1) whose cable has run so far, ``run`` [m]."""
     return c.length_at_zero + muscle_direction(which) * run
 
 
-@kernel
+@inner
 def stop_torque(c, angle, speed):  # type: ignore[no-untyped-def]
     """Return the torque of the end stops [N m]; they push and never hold back."""
     if angle > c.stop_angle:

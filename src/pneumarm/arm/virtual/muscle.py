@@ -16,7 +16,7 @@ from pneumarm.arm.virtual.flow import free_air
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS, FREE_AIR
 from pneumarm.arm.virtual.state import INLET, OUTLET
 from pneumarm.arm.virtual.threshold import engage, threshold
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 
 
 @kernel
@@ -30,13 +30,13 @@ def braid(c, length):  # type: ignore[no-untyped-def]
     return pull, volume
 
 
-@kernel
+@inner
 def passive_pull(stiffness, bladder_length, c, length):  # type: ignore[no-untyped-def]
     """Return the pull of bladder and jammed braid [N] at ``length`` [m]."""
     return stiffness * max(0.0, length - bladder_length) + c.stop_stiffness * max(0.0, length - c.stop_length)
 
 
-@kernel
+@inner
 def air_in(muscle, c, supply):  # type: ignore[no-untyped-def]
     """Return what flows into the muscle through valves and leaks, and through the inlet alone [m3/s of free air]."""
     pressure, taken = muscle.pressure, 0.0

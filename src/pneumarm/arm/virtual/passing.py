@@ -4,7 +4,7 @@ import math
 
 from pneumarm.arm.virtual.rest import CALM_SAMPLES, CALM_SPEED, LAST, LONG, SAMPLE, fast_forward, fastest, steady
 from pneumarm.arm.virtual.step import SUBSTEP, integrate
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.random import uniform
 
 MOST_LATENESS = 8.0
@@ -24,7 +24,7 @@ def pass_time(body, until):  # type: ignore[no-untyped-def]
     integrate(body, until, SUBSTEP)
 
 
-@kernel
+@inner
 def pass_for(body, seconds):  # type: ignore[no-untyped-def]
     """Let ``seconds`` [s] pass."""
     pass_time(body, body.surroundings[0].time + seconds)
@@ -36,7 +36,7 @@ def drawn_lateness(body):  # type: ignore[no-untyped-def]
     return min(-body.lateness * math.log(1.0 - uniform(body.jitter_random)), MOST_LATENESS * body.lateness)
 
 
-@kernel
+@inner
 def pass_until(body, time):  # type: ignore[no-untyped-def]
     """Let time pass until ``time`` [s] and then as long as the operating system takes to wake up."""
     if time > body.surroundings[0].time:

@@ -15,7 +15,7 @@ from pneumarm.arm.virtual.muscle import move, static_tension
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, FREE_AIR
 from pneumarm.arm.virtual.slow import relax_muscle, surround
 from pneumarm.arm.virtual.state import INLET, OUTLET
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 
 LONG = 10.0
 """A wait longer than this may be fast-forwarded [s]."""
@@ -40,7 +40,7 @@ _MOST_SWEEPS = 100  # over the joints of a chain, until each stands where the ot
 _LARGEST = 0.05  # an equilibrium farther away than this was no rest [rad]
 
 
-@kernel
+@inner
 def fastest(body):  # type: ignore[no-untyped-def]
     """Return the speed of the fastest joint [rad/s]."""
     speed = 0.0
@@ -49,7 +49,7 @@ def fastest(body):  # type: ignore[no-untyped-def]
     return speed
 
 
-@kernel
+@inner
 def steady(body):  # type: ignore[no-untyped-def]
     """Return whether every muscle is closed or vented, with no valve about to switch."""
     for j in range(len(body.joints)):
@@ -62,7 +62,7 @@ def steady(body):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inner
 def fast_forward(body, until):  # type: ignore[no-untyped-def]
     """Bring a resting arm to ``until`` [s]; return False, before that, where it would not stay at rest."""
     surroundings = body.surroundings[0]
@@ -87,7 +87,7 @@ def fast_forward(body, until):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inner
 def leak(muscle, c, surroundings_c, elapsed):  # type: ignore[no-untyped-def]
     """Let air leak for ``elapsed`` [s] at a constant volume; a vented muscle keeps its pressure.
 
@@ -101,7 +101,7 @@ def leak(muscle, c, surroundings_c, elapsed):  # type: ignore[no-untyped-def]
     muscle.pressure += (muscle.pressure - balance) * math.expm1(-rate * elapsed)
 
 
-@kernel
+@inner
 def resting_torque(body, trial, j):  # type: ignore[no-untyped-def]
     """Return the torque [N m] of joint ``j`` after an infinitely slow move from the muscles' lengths to the angles.
 
@@ -124,14 +124,14 @@ def resting_torque(body, trial, j):  # type: ignore[no-untyped-def]
     return torque
 
 
-@kernel
+@inner
 def torque_at(body, trial, j, angle):  # type: ignore[no-untyped-def]
     """Return :func:`resting_torque` with joint ``j`` at ``angle`` [rad]."""
     body.joints[j].angle = angle
     return resting_torque(body, trial, j)
 
 
-@kernel
+@inner
 def settle(body, trial):  # type: ignore[no-untyped-def]
     """Move the joints to their equilibrium near by; False where there is none. ``trial`` (joints, 2) is workspace.
 
@@ -159,7 +159,7 @@ def settle(body, trial):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inner
 def settle_joint(body, trial, j):  # type: ignore[no-untyped-def]
     """Move joint ``j`` to its equilibrium near by; return False if there is none.
 

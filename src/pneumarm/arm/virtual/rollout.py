@@ -20,7 +20,7 @@ from pneumarm.arm.virtual.sensors import convert, worn
 from pneumarm.arm.virtual.state import JOINT, MUSCLE, SURROUNDINGS
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import inner, kernel, part
 
 _velocity = part(derived_velocity)
 
@@ -97,7 +97,7 @@ def capture(arm: VirtualArm, physics: Physics, states: PhysicsStates, i: int) ->
     states.velocity[i] = 0.0
 
 
-@kernel
+@inner
 def body_at(physics, states, i):  # type: ignore[no-untyped-def]
     """Return the body of state ``i``."""
     own = physics.body

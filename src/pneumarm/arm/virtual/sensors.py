@@ -4,7 +4,7 @@ import math
 
 from pneumarm.arm.virtual.constants import BUMPS
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.random import normal, uniform
 
 MOST_CONVERSIONS = 9
@@ -21,7 +21,7 @@ def convert(value, noise, c, random):  # type: ignore[no-untyped-def]
     return min(max(math.floor(value + disturbance + 0.5), 0.0), c.highest)
 
 
-@kernel
+@inner
 def median_conversion(value, noise, c, random, sorted_):  # type: ignore[no-untyped-def]
     """Return the median of several conversions of ``value``, sorted by insertion into the scratch ``sorted_``."""
     for i in range(c.conversions):
@@ -34,7 +34,7 @@ def median_conversion(value, noise, c, random, sorted_):  # type: ignore[no-unty
     return sorted_[c.conversions // 2]
 
 
-@kernel
+@inner
 def worn(value, c):  # type: ignore[no-untyped-def]
     """Return the angle [counts] as a worn track shows it."""
     bump = 0.0

@@ -3,7 +3,7 @@
 import math
 
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS, REFERENCE_TEMPERATURE
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.random import normal
 
 BLADDER_PER_DEGREE = 0.003
@@ -38,7 +38,7 @@ def adapt(muscle, c):  # type: ignore[no-untyped-def]
         muscle.creep_pull += c.creep_stiffness[i] * muscle.creep[i]
 
 
-@kernel
+@inner
 def tick_muscle(muscle, c, room):  # type: ignore[no-untyped-def]
     """Let one slow tick pass in a muscle, in a room of the temperature ``room`` [Celsius]."""
     stretch = muscle.length - c.length_at_zero
@@ -49,7 +49,7 @@ def tick_muscle(muscle, c, room):  # type: ignore[no-untyped-def]
     adapt(muscle, c)
 
 
-@kernel
+@inner
 def relax_muscle(muscle, c, room, elapsed):  # type: ignore[no-untyped-def]
     """Let ``elapsed`` [s] pass in a muscle that rests: as :func:`tick_muscle`, for any time."""
     stretch = muscle.length - c.length_at_zero
@@ -61,7 +61,7 @@ def relax_muscle(muscle, c, room, elapsed):  # type: ignore[no-untyped-def]
     adapt(muscle, c)
 
 
-@kernel
+@inner
 def sag(body, elapsed):  # type: ignore[no-untyped-def]
     """Let the supply give way for ``elapsed`` [s] to the air that all muscles took meanwhile."""
     surroundings, c, taken = body.surroundings[0], body.constants.surroundings[0], 0.0
@@ -73,7 +73,7 @@ def sag(body, elapsed):  # type: ignore[no-untyped-def]
     surroundings.drawn = taken
 
 
-@kernel
+@inner
 def surround(body, elapsed):  # type: ignore[no-untyped-def]
     """Let ``elapsed`` [s] before the clock's time pass in the supply and in the room."""
     surroundings, c = body.surroundings[0], body.constants.surroundings[0]

@@ -13,7 +13,7 @@ from pneumarm.arm.virtual.parameters import ATMOSPHERE
 from pneumarm.arm.virtual.slow import surround, tick_muscle
 from pneumarm.arm.virtual.state import INLET, OUTLET, SLOW_TICK
 from pneumarm.arm.virtual.valve import toggle_due
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import inner, kernel, part
 
 SUBSTEP = 0.5e-3
 """Longest substep [s]."""
@@ -46,7 +46,7 @@ def follow_sensors(body, supply, elapsed):  # type: ignore[no-untyped-def]
                 muscle.leap += (muscle.leap - c.sensor_share * drop) * followed
 
 
-@kernel
+@inner
 def slow_tick(body):  # type: ignore[no-untyped-def]
     """Let one slow tick pass in everything that changes slowly."""
     surroundings = body.surroundings[0]

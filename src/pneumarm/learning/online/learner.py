@@ -162,7 +162,7 @@ class OnlineLearner:
         return checked
 
 
-@part
+@part(entry=True)
 def begin_acting(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
     """Begin an episode in the state and goal ``x``: choose its first actions."""
     for agent in range(workspace.chosen.shape[0]):
@@ -170,7 +170,7 @@ def begin_acting(learner, schedule, x, workspace, random):  # type: ignore[no-un
     look_ahead(learner, schedule, x, workspace, random)
 
 
-@part
+@part(entry=True)
 def learn_and_act(learner, schedule, x, workspace, random, seen, terminal):  # type: ignore[no-untyped-def]
     """Do what the training loop does after an action.
 

@@ -84,7 +84,7 @@ def look_ahead(learner, schedule, x, workspace, random):  # type: ignore[no-unty
     spread(workspace.next_chosen, workspace.next_actions)
 
 
-@part
+@part(entry=True)
 def decide(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
     """Let agents choose what to do next in ``x``."""
     for agent in range(workspace.next_chosen.shape[0]):
@@ -99,7 +99,7 @@ def decide(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-
             workspace.cut[agent] = 1 if chosen != best else 0
 
 
-@part
+@part(entry=True)
 def spread(chosen, actions):  # type: ignore[no-untyped-def]
     """Set ``actions`` (joints,) to what their agents have ``chosen`` (agents,), see :mod:`.values`."""
     each = actions.shape[0] // chosen.shape[0]
@@ -110,7 +110,7 @@ def spread(chosen, actions):  # type: ignore[no-untyped-def]
             left //= ACTIONS
 
 
-@part
+@part(entry=True)
 def learn(learner, workspace, is_reached):  # type: ignore[no-untyped-def]
     """Move the values of what was chosen towards their targets; the goal of all joints ``is_reached`` or not."""
     each = workspace.paid.shape[0] // workspace.chosen.shape[0]
@@ -127,7 +127,7 @@ def learn(learner, workspace, is_reached):  # type: ignore[no-untyped-def]
             forget_traces(learner, agent)
 
 
-@part
+@part(entry=True)
 def remember(workspace, x):  # type: ignore[no-untyped-def]
     """Remember the state ``x`` (inputs,) and what was chosen there."""
     for i in range(x.shape[0]):
@@ -136,7 +136,7 @@ def remember(workspace, x):  # type: ignore[no-untyped-def]
         workspace.chosen[agent] = workspace.next_chosen[agent]
 
 
-@part
+@part(entry=True)
 def train_episode(environment, learner, schedule, episode, workspace):  # type: ignore[no-untyped-def]
     """Run one episode, learning; return actions taken, sum of rewards, and whether the goal was reached."""
     x, random, total = episode.state.x, episode.state.random, 0.0
@@ -159,7 +159,7 @@ def train_episode(environment, learner, schedule, episode, workspace):  # type: 
     return environment.task.cutoff, total, False
 
 
-@part
+@part(entry=True)
 def train_episodes(environment, learner, schedule, episode, workspace, count, performance):  # type: ignore[no-untyped-def]
     """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes."""
     steps = 0
@@ -172,7 +172,7 @@ def train_episodes(environment, learner, schedule, episode, workspace, count, pe
     return performance, steps, count
 
 
-@part
+@part(entry=True)
 def test_episodes(environment, learner, schedule, episode, workspace, random, record):  # type: ignore[no-untyped-def]
     """Fill ``record`` with episodes over all begin states and goals, drawn from ``random``.
 

@@ -178,7 +178,7 @@ def _by_action(weights: NDArray[np.float32], width: int, choices: int) -> NDArra
     return used.reshape(*used.shape[:2], choices, width).transpose(0, 2, 1, 3)
 
 
-@part
+@part(entry=True)
 def action_values(learner, agent, x, values):  # type: ignore[no-untyped-def]
     """Set ``values`` (choices,) to the action values of ``agent`` in the state and goal ``x``, in units of reward."""
     weights, hidden = learner.weights[agent], learner.hidden
@@ -193,13 +193,13 @@ def action_values(learner, agent, x, values):  # type: ignore[no-untyped-def]
         values[action] = value * np.float32(learner.scale)
 
 
-@part
+@part(entry=True)
 def td_target(reward, discount, next_value, terminal):  # type: ignore[no-untyped-def]
     """Return what Q(s_k, a_k) should have been: r_{k+1} + gamma Q(s_{k+1}, .), where a terminal state has 0."""
     return reward if terminal else reward + discount * next_value
 
 
-@part(fastmath=_IN_ORDER)
+@part(entry=True, fastmath=_IN_ORDER)
 def backpropagate(learner, agent, x, action):  # type: ignore[no-untyped-def]
     """Return the value of ``action`` in ``x`` and leave its network's activations and slopes in the learner.
 
@@ -232,7 +232,7 @@ def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-
     add_products(table, first, x, slope)
 
 
-@part
+@part(entry=True)
 def update(learner, agent, x, action, target):  # type: ignore[no-untyped-def]
     """Move the value of ``action`` in ``x`` towards ``target``; return the error delta, in units of reward."""
     delta = target - backpropagate(learner, agent, x, action)
@@ -256,7 +256,7 @@ def follow_traces(learner, agent, factor):  # type: ignore[no-untyped-def]
             follow(weights, traces, action * width, width, factor, decay)
 
 
-@part
+@part(entry=True)
 def forget_traces(learner, agent):  # type: ignore[no-untyped-def]
     """Set the traces of ``agent`` to 0, as at the start of every episode."""
     traces, width = learner.traces[agent], learner.activation.shape[0]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import inner, kernel, part
 from pneumarm.learning.policy.inputs import InputParameters, write_inputs
 from pneumarm.learning.policy.proximal import FORBIDDEN, log_softmax, write_bias
 from pneumarm.networks.layers import Layers, forward, workspace
@@ -117,7 +117,7 @@ def run_lanes(mind, lanes, record, first, count):  # type: ignore[no-untyped-def
                 note_end(task, one(arms, e), lanes.is_reached[e], record, first + e)
 
 
-@kernel
+@inner
 def copy_all(mind, lanes, arm, samples):  # type: ignore[no-untyped-def]
     """Make every lane the first of the fleet ``arm``; equal ``samples`` (n,) get equal noise."""
     arms, goal_place = lanes.fleet, mind.limits.goal_place
@@ -136,7 +136,7 @@ def copy_all(mind, lanes, arm, samples):  # type: ignore[no-untyped-def]
         lanes.alive[e] = True
 
 
-@kernel
+@inner
 def move_all(mind, lanes, horizon):  # type: ignore[no-untyped-def]
     """Take ``lanes.actions``, then go on greedily for ``horizon`` steps at most; sum up ``lanes.total``."""
     for k in range(horizon):

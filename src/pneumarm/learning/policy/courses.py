@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS, possible_actions, to_actions
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.learning.policy.acting import Lanes, Mind, best_of, copy_all, judge_all
 from pneumarm.learning.policy.proximal import FORBIDDEN
 from pneumarm.learning.policy.settings import PolicySettings
@@ -115,7 +115,7 @@ def compare(mind, single, lanes, samples, courses, horizon):  # type: ignore[no-
     return best_of(lanes.total, count)
 
 
-@kernel
+@inner
 def follow_all(mind, lanes, courses, horizon):  # type: ignore[no-untyped-def]
     """Let lane ``e`` follow course ``e % m`` of (m, steps, joints), then the policy; sum up ``lanes.total``."""
     steps, left = courses.shape[1], lanes.total.shape[0]

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import inner, kernel, part
 from pneumarm.learning.policy.inputs import write_inputs
 from pneumarm.networks.layers import adam, backward, forward
 from pneumarm.networks.tansig import FASTMATH
@@ -163,7 +163,7 @@ def write_bias(limits, hold, x, actions, still, bias, e):  # type: ignore[no-unt
             bias[ACTIONS * joint + action, e] = added
 
 
-@kernel
+@inner
 def act_all(limits, inputs, rule, policy, fleet, batch, k):  # type: ignore[no-untyped-def]
     """Choose the actions of step ``k`` in all arms."""
     x = batch.inputs[k]
@@ -211,7 +211,7 @@ def collect(environment, limits, inputs, rule, policy, fleet, batch):  # type: i
     return episodes, successes, total
 
 
-@kernel
+@inner
 def estimate(rule, value, batch):  # type: ignore[no-untyped-def]
     """Set the advantages, normalised, and the targets of the values, by the network ``value``."""
     steps, n = batch.reward.shape

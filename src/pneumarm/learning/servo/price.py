@@ -66,7 +66,7 @@ def price_of_one_error(prices, error):  # type: ignore[no-untyped-def]
     return np.float32(0.5) * np.log(square) + far * size, sign * (sharp * beyond / square + far)
 
 
-@part
+@part(entry=True)
 def price_of_slack(prices, error, share):  # type: ignore[no-untyped-def]
     """Return the price of a muscle's pressure, as a ``share`` of the range, and its slope by that.
 
@@ -80,7 +80,7 @@ def price_of_slack(prices, error, share):  # type: ignore[no-untyped-def]
     return price * short, -price
 
 
-@part
+@part(entry=True)
 def price_of_cocontraction(prices, mean):  # type: ignore[no-untyped-def]
     """Return the price of the ``mean`` pressure of two muscles, as a share of the range, and its slope by that."""
     price, stiffness = np.float32(prices.cocontraction), np.float32(prices.stiffness)

@@ -5,14 +5,15 @@ import pytest
 
 from pneumarm.task.forecast import Forecast
 
+PERIOD = 1 / 30
 STEPS = np.array([1, 3, 6, 10])
 
 
-def worst(reference, first: int, last: int) -> float:
-    """Return the largest error of forecasts made from step ``first`` to ``last``."""
-    forecast, errors = Forecast(1 / 30), []
-    for k in range(last):
-        forecast.see(reference(k))
+def worst(reference, first: int, last: int, lateness: float = 0.0) -> float:
+    """Return the largest error of forecasts made from step ``first`` to ``last``, seen up to ``lateness`` steps late."""
+    forecast, errors = Forecast(PERIOD), []
+    for k in np.arange(last) + np.random.default_rng(0).uniform(0.0, lateness, last):
+        forecast.see(reference(k), PERIOD * k)
         if k >= first:
             wanted = np.array([reference(k + step) for step in STEPS])
             errors.append(np.abs(forecast.ahead(STEPS) - wanted).max())
@@ -33,8 +34,35 @@ def test_a_sinusoid_goes_on(frequency: float):
     assert worst(wave, 20, 150) < 0.02 * amplitude
 
 
+@pytest.mark.parametrize("frequency", [0.1, 0.5, 1.0, 2.0])
+def test_it_goes_on_where_readings_come_late(frequency: float):
+    """By up to a tenth of a period, as under an operating system."""
+
+    def wave(k: float) -> np.ndarray:
+        return np.array([512 + 200 * np.sin(2 * np.pi * frequency * PERIOD * k)])
+
+    assert worst(wave, 20, 150, lateness=0.1) < 0.02 * 200
+
+
 def test_a_ramp_goes_on():
     assert worst(lambda k: np.array([3.0 * k]), 10, 60) < 1e-6
+    assert worst(lambda k: np.array([3.0 * k]), 10, 60, lateness=0.3) < 1e-6
+
+
+def test_a_reading_at_the_same_time_adds_nothing():
+    forecast = Forecast(PERIOD)
+    for k in range(5):
+        for _ in range(2):
+            forecast.see([3.0 * k], PERIOD * k)
+    assert forecast.ahead(STEPS)[:, 0] == pytest.approx(3.0 * (4 + STEPS))
+
+
+def test_it_forecasts_over_a_turn_that_was_left_out():
+    forecast = Forecast(PERIOD)
+    for k in [*range(10), *range(13, 20)]:
+        forecast.see([200 * np.sin(2 * np.pi * PERIOD * k)], PERIOD * k)
+    coming = 200 * np.sin(2 * np.pi * PERIOD * (19 + STEPS))
+    assert forecast.ahead(STEPS)[:, 0] == pytest.approx(coming, abs=10)
 
 
 @pytest.mark.parametrize("frequency", [0.25, 0.5, 1.0, 2.0])
@@ -50,7 +78,7 @@ def test_after_a_jump_it_is_right_again_soon():
 
 
 def test_it_stays_finite_whatever_is_asked_for():
-    random, forecast = np.random.default_rng(0), Forecast(1 / 30)
-    for _ in range(300):
-        forecast.see(random.choice([0.0, 1000.0, 512.0], size=2) + random.normal(0, 5, 2))
+    random, forecast = np.random.default_rng(0), Forecast(PERIOD)
+    for k in range(300):
+        forecast.see(random.choice([0.0, 1000.0, 512.0], size=2) + random.normal(0, 5, 2), PERIOD * k)
         assert np.abs(forecast.ahead(STEPS)).max() < 2e4

@@ -38,7 +38,7 @@ _ADVANCE = {PhysicsStates: advance_physics, SimulatedStates: advance_simulated}
 _COPY = {PhysicsStates: copy_physics, SimulatedStates: copy_simulated}
 _UNLIKELY = 0.05
 """A plan that is less likely to succeed is none."""
-_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": True}  # as a kernel's part
+_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": True}  # as a part
 
 
 def advance(world: Any, states: Any, i: int, valves: NDArray[np.int8]) -> None:

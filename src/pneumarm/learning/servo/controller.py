@@ -243,7 +243,7 @@ class ServoController:
         if self._reference.known_ahead:
             coming = np.array([self._reference.at(time + k * self.spec.period) for k in ahead])
         else:
-            self._forecast.see(now)
+            self._forecast.see(now, time)
             coming = self._forecast.ahead(ahead)
         before, self._before = now if self._before is None else self._before, now
         return np.concatenate([[before, now], coming])

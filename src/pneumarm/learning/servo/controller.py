@@ -183,8 +183,7 @@ class ServoController:
         self._followed = TwoWays(self.spec.period, _FOLLOWED, learned=_LEARNED)
         self._moved = 0  # turns in which the reference has moved
         self._planned_at: float | None = None  # time of the last reading, if what followed it was planned
-        begin = 0.0 if reference.known_ahead else _ARRIVED  # a forecast needs to have seen something
-        self._asked = [1 + round((begin + after) / self.spec.period) for after in _ASKED]
+        self._asked = [1 + round(after / self.spec.period) for after in _ASKED]
         self._correction = Correction(self.spec.joints, _TAUGHT_BY * self._tolerance)
         self._pulse = np.zeros((self.spec.joints, 2))  # the last of each joint
         for rest in self._rest:

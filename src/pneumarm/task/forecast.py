@@ -92,29 +92,19 @@ class Forecast:
         """Return what was asked for at even times, the last of them now, shape (times, joints)."""
         now = self._times[-1]
         count = 1 + round((now - self._times[0]) / self._period)
-        return self._at(now - self._period * np.arange(min(count, len(self._times)))[::-1])
+        return self._at(now - self._period * np.arange(min(count, len(self._times)), dtype=np.float64)[::-1])
 
     def _all(self, steps: NDArray[np.int64]) -> Array:
         """Return all forecasts, shape (forecasters, previews, joints)."""
         seen = self._even()
-        now = seen[-1]
-        hold = np.broadcast_to(now, (len(steps), now.size))
-        swung = np.stack([self._swung(seen[:, j], steps) for j in range(now.size)], axis=1)
-        continued = np.stack([_continued(seen[:, j], steps) for j in range(now.size)], axis=1)
-        return np.stack([hold, swung, continued])
-
-    def _swung(self, seen: Array, steps: NDArray[np.int64]) -> Array:
-        """Return the forecast (previews,) of a swing from the numbers ``seen`` (n,)."""
-        change = np.diff(seen)
-        largest = np.abs(change).max(initial=0.0)
-        if largest == 0.0:
-            return np.full(len(steps), seen[-1])
-        change = change / largest
-        middle = change[1:-1]
-        weight = _DOUBT * self._swing + (middle * (change[2:] + change[:-2])).sum()
-        weight = float(np.clip(weight / (_DOUBT + (middle**2).sum()), -2.0, 2.0))
-        latest = change[[-1, max(-2, -len(change))]]
-        return _stepped(seen[-1], latest, np.array([weight, -1.0]), largest, steps)
+        hold = np.broadcast_to(seen[-1], (len(steps), seen.shape[1]))
+        if len(seen) == 1:
+            return np.stack([hold] * len(self._errors))
+        change = np.diff(seen, axis=0)
+        largest = np.abs(change).max(axis=0)
+        unit = np.where(largest > 0.0, largest, 1.0)
+        ways = _as_swing(change / unit, self._swing), _as_autoregression(change / unit)
+        return np.stack([hold, *(_stepped(seen[-1], *way, unit, steps) for way in ways)])
 
 
 def _lagrange(nodes: Array, at: Array) -> Array:
@@ -128,27 +118,39 @@ def _lagrange(nodes: Array, at: Array) -> Array:
     return weights
 
 
-def _continued(seen: Array, steps: NDArray[np.int64]) -> Array:
-    """Return the autoregression's forecast (previews,) of the numbers ``seen`` (n,)."""
-    change = np.diff(seen)
-    largest = np.abs(change).max() if change.size else 0.0
+def _as_swing(change: Array, expected: float) -> tuple[Array, Array]:
+    """Return the latest of the changes (n, joints) and their weights, both (2, joints), in a swing.
+
+    ``expected`` is the weight of the latest change where little was seen.
+    """
+    middle = change[1:-1]
+    weight = _DOUBT * expected + (middle * (change[2:] + change[:-2])).sum(axis=0)
+    weight = np.clip(weight / (_DOUBT + (middle**2).sum(axis=0)), -2.0, 2.0)
+    return change[[-1, max(-2, -len(change))]], np.stack([weight, np.full(weight.shape, -1.0)])
+
+
+def _as_autoregression(change: Array) -> tuple[Array, Array]:
+    """Return the latest of the changes (n, joints) and their weights, both (order, joints), in an autoregression."""
     rows = len(change) - _ORDER
-    if rows < 2 or largest == 0.0:
-        return seen[-1] + steps * (change[-1] if change.size else 0.0)
-    change = change / largest
+    if rows < 2:
+        return change[-1:], np.ones((1, change.shape[1]))
     before = np.stack([change[_ORDER - 1 - i : len(change) - 1 - i] for i in range(_ORDER)], axis=1)
-    prior = np.eye(_ORDER)[0]
-    normal = before.T @ before + _RIDGE * np.eye(_ORDER)
-    weights = prior + np.linalg.solve(normal, before.T @ (change[_ORDER:] - before @ prior))
-    return _stepped(seen[-1], change[::-1][:_ORDER], weights, largest, steps)
+    normal = np.einsum("roj,rpj->jop", before, before) + _RIDGE * np.eye(_ORDER)
+    missed = np.einsum("roj,rj->jo", before, change[_ORDER:] - before[:, 0])
+    weights = np.linalg.solve(normal, missed[..., None])[..., 0].T
+    weights[0] += 1.0
+    return change[::-1][:_ORDER], weights
 
 
-def _stepped(now: float, latest: Array, weights: Array, unit: float, steps: NDArray[np.int64]) -> Array:
-    """Return what comes (previews,) after ``now`` where differences, the ``latest`` first, go on by ``weights``."""
-    state, value, values = latest.copy(), now, []
-    for _ in range(int(steps.max())):
-        following = float(np.clip(weights @ state, -_FASTEST, _FASTEST))
-        state = np.concatenate([[following], state[:-1]])
-        value += following * unit
-        values.append(value)
-    return np.array(values)[steps - 1]
+def _stepped(now: Array, latest: Array, weights: Array, unit: Array, steps: NDArray[np.int64]) -> Array:
+    """Return what comes (previews, joints) after ``now`` where changes, the ``latest`` first, go on by ``weights``.
+
+    Changes are in parts of ``unit`` (joints,).
+    """
+    state, sums = latest.copy(), np.zeros((int(steps.max()) + 1, now.size))
+    for k in range(len(sums) - 1):
+        following = np.minimum(np.maximum((weights * state).sum(axis=0), -_FASTEST), _FASTEST)
+        state[1:] = state[:-1]
+        state[0] = following
+        sums[k + 1] = sums[k] + following
+    return now + sums[steps] * unit

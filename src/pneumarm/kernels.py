@@ -29,6 +29,12 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.registry import cpu_target
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+KERNEL: Any = {"nogil": True, "error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True}
+"""Options of Numba's for a :func:`kernel`."""
+INNER: Any = {**KERNEL, "no_cpython_wrapper": True}
+"""... for an :func:`inner` one."""
+PART: Any = {**INNER, "_nrt": False, "forceinline": True}
+"""... for a :func:`part`, and for what is one by the types of its arguments (``numba.extending.overload``)."""
 _KEEP = 3  # folders of earlier sources kept, so that switching back and forth does not recompile
 
 
@@ -128,7 +134,7 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
 
     def compile_(f: _Function) -> Any:
         # What is not said of counting references (_nrt) is as in the caller that happens to be compiled first.
-        settings = {"nogil": True, "error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True, **options}
+        settings = {**KERNEL, **options}
         dispatcher = numba.njit(**settings)(f)
         if getattr(numba_config, "DISABLE_JIT", 0):
             return dispatcher
@@ -143,7 +149,7 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
 
 def inner(function: _Function | None = None, **options: Any) -> Any:
     """Compile ``function`` as :func:`kernel` does, but for other kernels only: without an entry for Python."""
-    return kernel(function, **{"no_cpython_wrapper": True, **options})
+    return kernel(function, **{**INNER, **options})
 
 
 def part(function: _Function | None = None, *, entry: bool = False, **options: Any) -> Any:
@@ -155,8 +161,7 @@ def part(function: _Function | None = None, *, entry: bool = False, **options: A
 
     One that Python calls, too, needs an ``entry``.
     """
-    compiled = kernel if entry else inner
-    return compiled(function, **{"_nrt": False, "forceinline": True, **options})
+    return kernel(function, **{**PART, "no_cpython_wrapper": not entry, **options})
 
 
 def _refuse_python(dispatcher: Any) -> None:

@@ -21,13 +21,14 @@ from numba.np.arrayobj import make_array
 from numpy import float32
 from numpy.typing import NDArray
 
+from pneumarm.kernels import PART
+
 LANES = 8
 """Units are padded to a multiple of this."""
 ROWS = 4
 """Inputs are padded to a multiple of this."""
 
 _Floats = NDArray[float32]
-_INLINE: Any = {"forceinline": True, "_nrt": False, "nogil": True, "error_model": "numpy"}
 _ALIGNED = 4  # bytes
 _CONTRACT = ("contract",)  # a product and a sum may become one instruction, which rounds once
 
@@ -219,9 +220,9 @@ def _follow(typing: Any, table: Any, traces: Any, first: Any, units: Any, factor
 
 
 # Translations for kernels.
-overload(weighted_sums, jit_options=_INLINE)(lambda x, weights, first, sums: _call_weighted_sums)
-overload(add_products, jit_options=_INLINE)(lambda table, first, x, factors: _call_add_products)
-overload(follow, jit_options=_INLINE)(lambda table, traces, first, units, factor, decay: _call_follow)
+overload(weighted_sums, jit_options=PART)(lambda x, weights, first, sums: _call_weighted_sums)
+overload(add_products, jit_options=PART)(lambda table, first, x, factors: _call_add_products)
+overload(follow, jit_options=PART)(lambda table, traces, first, units, factor, decay: _call_follow)
 
 
 def _call_weighted_sums(x, weights, first, sums):  # type: ignore[no-untyped-def]

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import ACTIONS, VALVES, possible_actions
 from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import PART, kernel, part
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
 from pneumarm.task.reward import Reward
@@ -38,7 +38,6 @@ _ADVANCE = {PhysicsStates: advance_physics, SimulatedStates: advance_simulated}
 _COPY = {PhysicsStates: copy_physics, SimulatedStates: copy_simulated}
 _UNLIKELY = 0.05
 """A plan that is less likely to succeed is none."""
-_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": True}  # as a part
 
 
 def advance(world: Any, states: Any, i: int, valves: NDArray[np.int8]) -> None:
@@ -52,7 +51,7 @@ def copy(states: Any, to: int, source: int) -> None:
 
 
 # Compiled code picks by type as well: kernels handed over as arguments could not be cached.
-@overload(advance, jit_options=_OPTIONS)
+@overload(advance, jit_options=PART)
 def _advance(world, states, i, valves):  # type: ignore[no-untyped-def]
     if states.instance_class is PhysicsStates:
         return lambda world, states, i, valves: advance_physics(world, states, i, valves)
@@ -61,7 +60,7 @@ def _advance(world, states, i, valves):  # type: ignore[no-untyped-def]
     return None
 
 
-@overload(copy, jit_options=_OPTIONS)
+@overload(copy, jit_options=PART)
 def _copy(states, to, source):  # type: ignore[no-untyped-def]
     if states.instance_class is PhysicsStates:
         return lambda states, to, source: copy_physics(states, to, source)

@@ -5,9 +5,9 @@ import pytest
 from gymnasium.vector import AutoresetMode
 from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
+from pneumarm import learning
 from pneumarm.errors import UnusableInput
 from pneumarm.gym import PointToPointVector, point_to_point
-from pneumarm.task.movements import TEST
 
 WANTED = "stable-baselines3, which brings torch, is not installed: pip install --editable '.[stable-baselines]'"
 stable_baselines3 = pytest.importorskip("stable_baselines3", reason=WANTED)
@@ -32,7 +32,7 @@ def test_an_imported_agent_decides_as_its_model(kind: str) -> None:
     observations = np.random.default_rng(0).uniform(-1, 1, (300, 17)).astype(np.float32)
     expected, _ = model.predict(observations, deterministic=True)
     np.testing.assert_array_equal(policy.values(observations)[:, 0].argmax(axis=-1), expected)
-    assert policy.test(SIMULATION, BEGIN, 5, (0, TEST)).actions.sum() > 0
+    assert learning.test(policy, SIMULATION, BEGIN, 5).actions.sum() > 0
 
 
 def test_a_single_environment_passes_their_checker() -> None:

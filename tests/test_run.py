@@ -51,6 +51,16 @@ def test_results_have_the_keys_that_are_promised(small_run: Path) -> None:
     assert results["transfer"]["learning_rate"] == SMALL.transfer.learning_rate
 
 
+def test_the_arm_is_to_be_seen_moving_once_it_was_recorded(tmp_path: Path) -> None:
+    """Long before the report: a person waits for the later stages."""
+    told: list[str] = []
+    run = Run(tmp_path / "run", SMALL, tell=told.append)
+    run._collect()
+    picture = tmp_path / "run" / "recorded.svg"
+    assert "<animate" in picture.read_text()
+    assert str(picture) in told[0]
+
+
 def test_the_bound_is_told_for_the_movements_of_the_tests(small_run: Path) -> None:
     results = results_of(small_run)
     bound = results["bound"]

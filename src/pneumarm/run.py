@@ -47,6 +47,8 @@ from pneumarm.records import demonstrate, marked_record, moving_record, training
 from pneumarm.rehearsal import Piece, Rehearsal
 from pneumarm.report import save_demonstration, save_spec, write_report
 from pneumarm.report.run_report import TEST
+from pneumarm.report.shown import read_shown
+from pneumarm.report.viewing import write_view
 from pneumarm.settings import Valid
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.simulation.enough import EnoughSettings, collect_enough
@@ -55,6 +57,8 @@ from pneumarm.task import BeginStates, begin_states, read_episodes, write_episod
 from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, Store, collect, enough
 
 SETTINGS = "settings.json"
+RECORDED = "recorded.svg"
+"""A picture that plays: how the arm moved at the end of its recording."""
 Progress = Callable[[str], AbstractContextManager[Report]]
 
 
@@ -138,15 +142,18 @@ class Run:
         progress: Progress = silent,
         seen_by: Callable[[Arm], Arm] = lambda arm: arm,
         monitor: Mode = "stop",
+        tell: Callable[[str], None] = lambda line: None,
     ) -> None:
         """Take up the run in ``folder``, or begin it; ``seen_by`` may put something around the arm that shows it.
+
+        What there is to be seen before the end is told by ``tell``, in a line.
 
         Raises:
             UnusableInput: the folder's parent is missing, it holds something else, or a run with other settings.
 
         """
         self.folder, self.settings, self.progress, self._seen_by = folder, settings, progress, seen_by
-        self._monitor = monitor
+        self._monitor, self._tell = monitor, tell
         self.results: dict[str, Any] = {}
         self._stage = ""
         self.store = folder / "transitions.db"
@@ -265,6 +272,8 @@ class Run:
             collected = record(wanted.transitions or FEWEST_TRANSITIONS)
             save_spec(self.folder, arm.spec)
             marked_record(store).save(self.folder)
+        write_view(read_shown(self.store), self.folder / RECORDED)
+        self._tell(f"the arm as it moved: {self.folder / RECORDED}, which plays in a browser; the report follows")
         return {"collect": collected_results(collected, watch) | decided}
 
     def _rehearse(self, arm: Arm) -> None:

@@ -10,7 +10,7 @@ STEPS = np.array([1, 3, 6, 10])
 
 
 def worst(reference, first: int, last: int, lateness: float = 0.0) -> float:
-    """Return the largest error of forecasts made from step ``first`` to ``last``, seen up to ``lateness`` steps late."""
+    """Return the largest error of forecasts from step ``first`` to ``last``, seen up to ``lateness`` steps late."""
     forecast, errors = Forecast(PERIOD), []
     for k in np.arange(last) + np.random.default_rng(0).uniform(0.0, lateness, last):
         forecast.see(reference(k), PERIOD * k)

@@ -50,7 +50,7 @@ def run_(
     if write_config is not None:
         _write_config(write_config, {"out": str(out), **msgspec.to_builtins(settings)})
         return
-    run = Run(out, settings, lambda title: progress(run.numbered(title)), monitor=monitor)
+    run = Run(out, settings, lambda title: progress(run.numbered(title)), monitor=monitor, tell=say)
     results = run.do()
     if "enough" in results["collect"]:
         say(results["collect"]["enough"]["verdict"])

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks._trials import Rows, in_processes
-from benchmarks.moving import Plan, arm_for, asked_for, prepared
+from benchmarks.moving import TOLERANCE, Plan, arm_for, asked_for, prepared
 from pneumarm.arm import ControlCycle, guarded, open_arm
 from pneumarm.arm.virtual import Fault, Leak, Payload, Push, VirtualArm
 from pneumarm.control import TransferSettings, transfer
@@ -46,7 +46,6 @@ GOALS = (-20.0, 0.0, 20.0)
 """[degrees]"""
 CALM = 2.0
 """Errors count after so many seconds, in which the goal is reached."""
-TOLERANCE = 1.0
 LONG = 600.0
 LEAK = 30.0
 PUSH, PUSHED, EVERY, PUSHES = 0.3, 0.2, 4.0, 10

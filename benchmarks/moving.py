@@ -10,6 +10,7 @@ PNEUMARM_MOVING_CONTROLLERS  "agent,pid,pid@200,scheduled,pwm,sliding,sliding@20
                              with pulses, or by whole periods where ``-whole`` is added, such as pid-whole@200
 PNEUMARM_MOVING_ARMS         seeds of virtual arms, the ten held-out arms by default; or names divided by blanks
 PNEUMARM_MOVING_RANGE        30: goals are within so many degrees of the middle
+PNEUMARM_MOVING_TOLERANCE    1: who is within so many degrees of a goal, and stays, has settled
 PNEUMARM_MOVING_SEEDS        "0,1,2": of collecting, training and tuning, and of goals and noise
 PNEUMARM_MOVING_GOALS        500 for each of them
 PNEUMARM_MOVING_MINUTES      20, of arm time to collect or to tune
@@ -60,6 +61,18 @@ class Plan:
     seconds: float
     range: float
     """Goals are drawn uniformly within so many degrees of the middle."""
+    tolerance: float
+    """[degrees]"""
+
+    def rows(self) -> Rows:
+        """Return the rows that were measured already, by this plan and others."""
+        return Rows(self.folder / "rows.jsonl", "controller", "arm", "seed", *self.numbers)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """What rows of this plan have in common."""
+        names = "goals", "minutes", "seconds", "range", "tolerance"
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -82,6 +95,7 @@ def asked_for(controllers: str = CONTROLLERS, seeds: str = "0,1,2") -> Asked:
             environment.number("PNEUMARM_MOVING_MINUTES", 20.0),
             environment.number("PNEUMARM_MOVING_SECONDS", 30.0),
             environment.number("PNEUMARM_MOVING_RANGE", 30.0),
+            environment.number("PNEUMARM_MOVING_TOLERANCE", TOLERANCE),
         ),
         environment.words("PNEUMARM_MOVING_CONTROLLERS", controllers),
         names_of(environment.text("PNEUMARM_MOVING_ARMS", HELD_OUT), "virtual:seed="),
@@ -93,14 +107,14 @@ def asked_for(controllers: str = CONTROLLERS, seeds: str = "0,1,2") -> Asked:
 def measure() -> Iterator[str]:
     wished = asked_for()
     plan, controllers, arms, seeds = wished.plan, wished.controllers, wished.arms, wished.seeds
-    rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds", "range")
+    rows, numbers = plan.rows(), plan.numbers.values()
     asked = [(name, arm, seed) for name in controllers for arm in arms for seed in seeds]
-    wanted = [one for one in asked if rows.get(*one, plan.goals, plan.minutes, plan.seconds, plan.range) is None]
+    wanted = [one for one in asked if rows.get(*one, *numbers) is None]
     for row in in_processes(measured, [(plan, *one) for one in wanted], wished.processes):
         rows.add(row)
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in controllers}
     for one in asked:
-        row = rows.get(*one, plan.goals, plan.minutes, plan.seconds, plan.range)
+        row = rows.get(*one, *numbers)
         assert row is not None
         found[one[0]].append(row)
     yield from settling_table(found)
@@ -141,12 +155,11 @@ def measured(plan: Plan, name: str, arm: str, seed: int) -> dict[str, Any]:
     """Return the row of one controller on one arm."""
     controller = prepared(plan, name, arm, seed)
     random = np.random.default_rng((zlib.crc32(arm.encode()), seed))
-    row: dict[str, Any] = {"controller": name, "arm": arm, "seed": seed}
-    row |= {"goals": plan.goals, "minutes": plan.minutes, "seconds": plan.seconds, "range": plan.range}
+    row: dict[str, Any] = {"controller": name, "arm": arm, "seed": seed, **plan.numbers}
     with open_arm(arm_for(name, arm), 1000 + seed) as opened:
-        mover, spec, _ = open_tracking(controller, opened, TOLERANCE)
+        mover, spec, _ = open_tracking(controller, opened, plan.tolerance)
         goals = counts_of(random.uniform(-plan.range, plan.range, (1 + plan.goals, spec.joints)), spec)
-        made = move(opened, mover, goals, MoveSettings(hold=HOLD, tries=1, tolerance=TOLERANCE))
+        made = move(opened, mover, goals, MoveSettings(hold=HOLD, tries=1, tolerance=plan.tolerance))
         next(made)  # from a vented arm
         row |= settling([*made])
         tracking: dict[str, float] = {}

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks._trials import Rows
-from benchmarks.moving import AMPLITUDES, FREQUENCIES, TOLERANCE, Plan, arm_for, asked_for, key, prepared
+from benchmarks.moving import AMPLITUDES, FREQUENCIES, Plan, arm_for, asked_for, key, prepared
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control.named import open_tracking
@@ -48,7 +47,7 @@ def measure() -> Iterator[str]:
     plan, arms, seeds = wished.plan, wished.arms, wished.seeds
     names = [name for name in wished.controllers if name != "plan"][: len(INKS)]
     yield str(save(movements({name: made(plan, name, arms[0]) for name in names}), "moving.svg"))
-    rows = Rows(plan.folder / "rows.jsonl", "controller", "arm", "seed", "goals", "minutes", "seconds", "range")
+    rows = plan.rows()
     errors = {
         name: [np.mean([row["tracking"][key(AMPLITUDES[0], f, True)] for row in found]) for f in FREQUENCIES]
         for name in names
@@ -73,7 +72,7 @@ def words_of(name: str) -> str:
 def made(plan: Plan, name: str, arm: str) -> tuple[Course, Course]:
     """Return the movements to the goals one after the other, and along the sinusoid."""
     with open_arm(arm_for(name, arm), 1) as opened:
-        mover, spec, _ = open_tracking(prepared(plan, name, arm, 0), opened, TOLERANCE)
+        mover, spec, _ = open_tracking(prepared(plan, name, arm, 0), opened, plan.tolerance)
         goals = counts_of(np.array(GOALS)[:, None], spec)
         moved = [*move(opened, mover, goals, MoveSettings(hold=HOLD, tries=1))][1:]
         begin = moved[0].recorded.time[0]

@@ -57,6 +57,27 @@ def test_a_reading_at_the_same_time_adds_nothing():
     assert forecast.ahead(STEPS)[:, 0] == pytest.approx(3.0 * (4 + STEPS))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_turn_that_comes_soon_after_a_late_one_makes_no_noise_a_wild_slope(seed: int):
+    random, forecast = np.random.default_rng(seed), Forecast(PERIOD)
+
+    def wave(k: float) -> float:
+        return 500.0 + 200.0 * np.sin(np.pi * PERIOD * k)
+
+    for turn in range(100):
+        k = turn + (0.98 if turn % 10 == 5 else 0.0)
+        forecast.see([wave(k) + random.normal(0, 1)], PERIOD * k)
+        if turn > 30:
+            assert abs(forecast.ahead(STEPS)[0, 0] - wave(k + 1)) < 20
+
+
+def test_it_begins_anew_where_the_second_reading_comes_soon():
+    forecast = Forecast(PERIOD)
+    forecast.see([1.0], 0.0)
+    forecast.see([2.0], 0.1 * PERIOD)
+    assert forecast.ahead(STEPS)[:, 0] == pytest.approx(2.0)
+
+
 def test_it_forecasts_over_a_turn_that_was_left_out():
     forecast = Forecast(PERIOD)
     for k in [*range(10), *range(13, 20)]:

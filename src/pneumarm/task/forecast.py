@@ -13,7 +13,7 @@ What was before a jump or a bend says nothing of what comes after it, and is for
 Readings come milliseconds early or late, and the reference was asked for at those times. Taken for even ones they
 spoil every difference: a swing of 1 Hz, seen with 1.5 ms of lateness, would be forecast 8 degrees of 20 off after a
 quarter of a second. So r_k is interpolated at even times, a period apart and the last of them now, by a cubic through
-the four readings around each.
+the four readings around each. One that comes soon after another takes its place.
 """
 
 from collections import deque
@@ -32,6 +32,7 @@ _SWING = 0.7  # Hz, of which a reference is expected that has just begun to move
 _DOUBT = 0.02  # in the swing that is expected, in parts of the largest difference squared
 _RIDGE = 1e-6  # in parts of the largest difference squared
 _FASTEST = 1.5  # largest forecast difference, in parts of the largest one seen
+_SOON = 0.5  # periods; after a late turn the next one comes so soon that any noise between both would be a wild slope
 _CUBIC = 4  # readings that a value between two of them is interpolated from
 
 
@@ -50,6 +51,9 @@ class Forecast:
         """Take in what is asked for now, shape (joints,), at ``time`` [s]; nothing, where no time has passed."""
         if self._times and time <= self._times[-1]:
             return
+        if self._times and time - self._times[-1] < _SOON * self._period:
+            for seen in (self._times, self._values, self._said):
+                seen.pop()
         value = np.atleast_1d(np.asarray(value, np.float64))
         if self._said and self._is_surprise(value, time):
             self._times = deque([self._times[-1]], self._times.maxlen)

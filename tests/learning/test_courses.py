@@ -1,17 +1,23 @@
 """Several joints: what the policy would do is compared with plans, in the simulation; one joint is left as it is."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import count
+from typing import Any
 
 import numpy as np
 import pytest
 
+from pneumarm.arm import Reading
 from pneumarm.arm.valves import CLOSED
+from pneumarm.control import AgentController
 from pneumarm.learning import PolicyAgent, PolicySettings
 from pneumarm.learning.policy.acting import lanes
 from pneumarm.learning.policy.agent import policy_sizes
 from pneumarm.learning.policy.courses import compare
 from pneumarm.learning.policy.training import practised
 from pneumarm.networks.layers import weight_count
+from pneumarm.planning import search
 from pneumarm.random import random_states
 from pneumarm.task import BeginStates
 from pneumarm.task.movements import Movements
@@ -83,6 +89,44 @@ def test_the_course_of_the_highest_return_is_found_wherever_it_stands(place: int
     assert compare(mind, single, many, np.zeros(12, np.int64), courses, 20) == place
     totals = [many.total[k::3].mean() for k in range(3)]
     assert totals[place] == max(totals) > 20
+
+
+@pytest.fixture
+def sought(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return for how many states each search has room, from now on."""
+    seen: list[int] = []
+
+    def noted(world: Any, states: Any, problem: Any, workspace: search.Tree, *last: Any) -> search.Plan:
+        seen.append(len(workspace.free))
+        return find(world, states, problem, workspace, *last)
+
+    find = search.find
+    monkeypatch.setattr(search, "find", noted)
+    return seen
+
+
+def readings(late_by: float) -> Iterator[Reading]:
+    """Yield readings of an arm at rest, the fourth ``late_by`` periods after it was due."""
+    period = simulation(2).spec.period
+    for turn in count():
+        time = turn + late_by * (turn > 2)
+        yield Reading(time * period, np.full(2, 500.0), np.full((2, 2), 500.0))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "late_by", "halved"), [(0.02, 1.0, True), (0.02, 0.0, False), (0.001, 1.0, False)]
+)
+def test_plans_that_make_a_turn_late_are_sought_for_half_as_long(
+    sought: list[int], monkeypatch: pytest.MonkeyPatch, seconds: float, late_by: float, halved: bool
+) -> None:
+    clock = count()
+    monkeypatch.setattr("pneumarm.learning.policy.courses.perf_counter", lambda: seconds * next(clock))
+    controller = AgentController(untrained(2))
+    controller.reset(np.array([560.0, 440.0]))
+    for reading, _ in zip(readings(late_by), range(5), strict=False):
+        controller.act(reading)
+    assert sought[:3] == [sought[0]] * 3
+    assert sought[3:] == [sought[0] // 2 if halved else sought[0]] * 2
 
 
 def test_several_joints_practise_more() -> None:

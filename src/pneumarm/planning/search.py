@@ -209,6 +209,11 @@ def tree(settings: PlanSettings, joints: int) -> Tree:
     )
 
 
+def halved(workspace: Tree, actions: int) -> Tree:
+    """Return ``workspace`` with half of its states, enough to try each of the ``actions`` of the arm once."""
+    return workspace._replace(free=workspace.free[: max(len(workspace.free) // 2, actions + 1)])
+
+
 def workspace_of(settings: PlanSettings, joints: int) -> int:
     """Return how many states a search needs workspace for."""
     return settings.nodes + int(ACTIONS**joints) + 1

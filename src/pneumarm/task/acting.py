@@ -1,6 +1,6 @@
 """The testing phase of section 5.2 for whatever acts step by step, compiled or not."""
 
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,9 @@ from pneumarm.random import random_state
 from pneumarm.task.environment import Environment, Episode, begin_episode, episode, take, take_pulses
 from pneumarm.task.movements import NOISE, Movements, movements
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
+
+LATE = 1.5
+"""Periods from one turn to the next from which on that is late: what was decided took too long, or came too late."""
 
 
 class Acting(Protocol):
@@ -24,6 +27,14 @@ class Acting(Protocol):
 
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state`` without learning."""
+
+
+@runtime_checkable
+class Hurries(Protocol):
+    """What can decide faster, and less well."""
+
+    def hurry(self) -> None:
+        """Take about half as long from now on, where its last decision made the next turn late."""
 
 
 @kernel

@@ -8,6 +8,7 @@ from pneumarm.learning.servo.correction import Correction, features_of
 from pneumarm.learning.servo.predictive import PredictiveControl
 from pneumarm.learning.servo.servo import Servo
 from pneumarm.learning.servo.two_ways import TwoWays
+from pneumarm.task.acting import LATE
 from pneumarm.task.forecast import Forecast
 
 _TAUGHT_BY = 2.0  # most tolerances of an error that corrections are learned from
@@ -15,7 +16,6 @@ _HOPED, _LEARNED = 0.5, 0.7  # tolerances that plans are hoped to be off by; see
 _GAINED = 0.12  # tolerances nearer by a plan than by the policy, in the simulation, for plans to be tried first ...
 _ASKED = 0.0, 0.167, 0.333  # s after a reference began to move, at which the simulation is asked that
 _BELIEVED = 2.0  # ... and kept while they are not off by more
-_LATE = 1.5  # periods from a turn that was planned to the next one, which is then late: plans take too long here
 
 
 class Following:
@@ -86,6 +86,6 @@ class Following:
 
     def note_plan(self, time: float, plans: PredictiveControl | None) -> None:
         """Note that what follows the reading at ``time`` [s] is planned, or is not; late ``plans`` are hurried."""
-        if plans is not None and self._planned_at is not None and time - self._planned_at > _LATE * self._spec.period:
+        if plans is not None and self._planned_at is not None and time - self._planned_at > LATE * self._spec.period:
             plans.hurry()
         self._planned_at = None if plans is None else time

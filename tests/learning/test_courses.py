@@ -105,28 +105,24 @@ def sought(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return seen
 
 
-def readings(late_by: float) -> Iterator[Reading]:
-    """Yield readings of an arm at rest, the fourth ``late_by`` periods after it was due."""
-    period = simulation(2).spec.period
+def readings(late: int) -> Iterator[Reading]:
+    """Yield readings of an arm at rest; from the fourth on ``late`` come a period after they were due."""
+    period, time = simulation(2).spec.period, 0.0
     for turn in count():
-        time = turn + late_by * (turn > 2)
-        yield Reading(time * period, np.full(2, 500.0), np.full((2, 2), 500.0))
+        yield Reading(time, np.full(2, 500.0), np.full((2, 2), 500.0))
+        time += period * (2 if 2 <= turn < 2 + late else 1)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "late_by", "halved"), [(0.02, 1.0, True), (0.02, 0.0, False), (0.001, 1.0, False)]
-)
-def test_plans_that_make_a_turn_late_are_sought_for_half_as_long(
-    sought: list[int], monkeypatch: pytest.MonkeyPatch, seconds: float, late_by: float, halved: bool
+@pytest.mark.parametrize(("late", "parts"), [(0, [1, 1, 1, 1]), (1, [2, 2, 2, 2]), (3, [2, 4, 4, 4])])
+def test_plans_are_sought_for_half_as_long_where_turns_come_late_but_never_hardly_at_all(
+    sought: list[int], late: int, parts: list[int]
 ) -> None:
-    clock = count()
-    monkeypatch.setattr("pneumarm.learning.policy.courses.perf_counter", lambda: seconds * next(clock))
     controller = AgentController(untrained(2))
     controller.reset(np.array([560.0, 440.0]))
-    for reading, _ in zip(readings(late_by), range(5), strict=False):
+    for reading, _ in zip(readings(late), range(7), strict=False):
         controller.act(reading)
     assert sought[:3] == [sought[0]] * 3
-    assert sought[3:] == [sought[0] // 2 if halved else sought[0]] * 2
+    assert sought[3:] == [sought[0] // part for part in parts]
 
 
 def test_several_joints_practise_more() -> None:

@@ -34,7 +34,7 @@ class Hurries(Protocol):
     """What can decide faster, and less well."""
 
     def hurry(self) -> None:
-        """Take about half as long from now on, where its last decision made the next turn late."""
+        """Take about half as long from now on: turns come late, and a command that comes late is not given."""
 
 
 @kernel

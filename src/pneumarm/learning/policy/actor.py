@@ -84,7 +84,7 @@ class PolicyActor:
         self._decided = False
 
     def hurry(self) -> None:
-        """Take about half as long from now on, where its last decision made the next turn late."""
+        """Seek plans for about half as long from now on."""
         if self._courses is not None:
             self._courses.hurry()
 

@@ -11,8 +11,6 @@ A plan alone trusts the simulation to be right for ten periods, and a policy to 
 noise, each stands in for the other.
 """
 
-from time import perf_counter
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,7 +26,7 @@ _POLICY = -1  # in a course: what the policy says
 _HELD = (1, 3, 6, 12)  # periods for which the last actions may go on
 _MOST = 3 + len(_HELD)  # courses: that of the policy, the plan, the last one, and these
 _MOST_ACTIONS = 1_000  # of the whole arm, among which a plan can be sought in time
-_LONG = 0.3  # of a period: a search that took no longer is not what made a turn late
+_HALVED = 2  # times at most: turns may be late for other reasons
 
 
 class Courses:
@@ -49,7 +47,7 @@ class Courses:
         self._last = self._last[:0]
 
     def hurry(self) -> None:
-        """Seek plans half as long from now on, where the last search made a turn late."""
+        """Seek plans for about half as long from now on, down to a quarter of what the settings say."""
         if self._search is not None:
             self._search.hurry()
 
@@ -96,7 +94,7 @@ class _Search:
         self.goal = self._problem.goal
         """Shape (joints,) [counts]."""
         self._tree, self._find, self._halved = tree(plan, joints), find, halved
-        self._long, self._took = _LONG * simulation.spec.period, 0.0
+        self._times_left = _HALVED
         self._actions = to_actions(self._problem.commands)
         """Actions of each joint by those of the whole arm, shape (9**joints, joints)."""
 
@@ -105,18 +103,17 @@ class _Search:
 
         Unless it ``may_hold``, the plan begins with others than these.
         """
-        began = perf_counter()
         self._model.put(state)
         same = np.flatnonzero((self._actions == before).all(axis=1))
         last = int(same[0]) if same.size else -1  # none before the first
         found = self._find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
         actions: NDArray[np.int64] = self._actions[found.actions]
-        self._took = perf_counter() - began
         return actions
 
     def hurry(self) -> None:
-        """Keep half as many states from now on, where the last search took long."""
-        if self._took > self._long:
+        """Keep half as many states from now on."""
+        if self._times_left:
+            self._times_left -= 1
             self._tree = self._halved(self._tree, len(self._problem.commands))
 
 

@@ -12,6 +12,7 @@ from pneumarm.arm import Reading
 from pneumarm.arm.valves import CLOSED
 from pneumarm.control import AgentController
 from pneumarm.learning import PolicyAgent, PolicySettings
+from pneumarm.learning.policy import courses
 from pneumarm.learning.policy.acting import lanes
 from pneumarm.learning.policy.agent import policy_sizes
 from pneumarm.learning.policy.courses import compare
@@ -105,6 +106,20 @@ def sought(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return seen
 
 
+@pytest.fixture
+def compared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return in how many simulated arms courses are compared each time, from now on."""
+    seen: list[int] = []
+
+    def noted(mind: Any, single: Any, many: Any, *how: Any) -> int:
+        seen.append(len(many.total))
+        best: int = compare(mind, single, many, *how)
+        return best
+
+    monkeypatch.setattr(courses, "compare", noted)
+    return seen
+
+
 def readings(late: int) -> Iterator[Reading]:
     """Yield readings of an arm at rest; from the fourth on ``late`` come a period after they were due."""
     period, time = simulation(2).spec.period, 0.0
@@ -114,15 +129,26 @@ def readings(late: int) -> Iterator[Reading]:
 
 
 @pytest.mark.parametrize(("late", "parts"), [(0, [1, 1, 1, 1]), (1, [2, 2, 2, 2]), (3, [2, 4, 4, 4])])
-def test_plans_are_sought_for_half_as_long_where_turns_come_late_but_never_hardly_at_all(
-    sought: list[int], late: int, parts: list[int]
+def test_decisions_take_half_as_long_where_turns_come_late_but_never_hardly_any_time(
+    sought: list[int], compared: list[int], late: int, parts: list[int]
 ) -> None:
-    controller = AgentController(untrained(2))
+    agent = untrained(2)
+    controller = AgentController(replace(agent, settings=replace(agent.settings, lookahead=96)))
     controller.reset(np.array([560.0, 440.0]))
     for reading, _ in zip(readings(late), range(7), strict=False):
         controller.act(reading)
     assert sought[:3] == [sought[0]] * 3
     assert sought[3:] == [sought[0] // part for part in parts]
+    assert compared == [96, 96, 96, *(96 // part for part in parts)]
+
+
+def test_what_little_is_looked_ahead_is_not_halved(compared: list[int]) -> None:
+    agent = untrained(2)
+    controller = AgentController(replace(agent, settings=replace(agent.settings, lookahead=20)))
+    controller.reset(np.array([560.0, 440.0]))
+    for reading, _ in zip(readings(3), range(7), strict=False):
+        controller.act(reading)
+    assert compared == [20, 20, 20, 18, 18, 18, 18]
 
 
 def test_several_joints_practise_more() -> None:

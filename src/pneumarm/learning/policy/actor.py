@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.arm.valves import CLOSED, VALVES
+from pneumarm.arm.valves import ACTIONS, CLOSED, VALVES
 from pneumarm.errors import PneumarmError
 from pneumarm.kernels import kernel
 from pneumarm.learning.policy.acting import Mind, decide, lanes
@@ -16,6 +16,8 @@ from pneumarm.task.reward import is_switch
 
 _EMPTY = 0.03  # of the range of pressures: a muscle with less has nothing to let out
 _IDLE = 0.35  # s in which valves do nothing, after which that does not go on
+_FEWEST = 2 * ACTIONS  # simulated arms: some for each of what may be done
+_HURRIES = 2  # times that looking ahead is made faster, at most: turns may be late for other reasons
 
 
 class PolicyActor:
@@ -28,7 +30,7 @@ class PolicyActor:
     """
 
     def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings, simulation: Simulation) -> None:
-        self._mind, self._horizon, self._clear = mind, settings.horizon, settings.clear
+        self._mind, self._sizes, self._horizon, self._clear = mind, sizes, settings.horizon, settings.clear
         self._most_passes, self._rest = settings.passes, round(settings.rest / simulation.spec.period)
         window, scaling = simulation.window, simulation.scaling
         offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
@@ -36,10 +38,10 @@ class PolicyActor:
         self._empty = (lowest + _EMPTY * (highest - lowest) - offset[:, 2:]) / scale[:, 2:]
         self._longest_idle = round(_IDLE / simulation.spec.period)
         self._single = lanes(mind, sizes, random_states(0, 1))
-        self._lanes = lanes(mind, sizes, np.zeros((settings.lookahead, 4), np.uint64))
-        self._samples = np.zeros(settings.lookahead, np.int64)
+        self._look_ahead_in(settings.lookahead)
         several = window.joints > 1 and settings.lookahead > 0 and settings.nodes > 0
         self._courses = Courses(simulation, settings) if several else None
+        self._hurries_left = _HURRIES if several else 0  # a decision for one joint takes a millisecond or two
         self._decided = False
         self._state_size = mind.inputs.state_size
 
@@ -84,9 +86,16 @@ class PolicyActor:
         self._decided = False
 
     def hurry(self) -> None:
-        """Seek plans for about half as long from now on."""
-        if self._courses is not None:
+        """Decide for several joints in about half the time from now on, down to a quarter of it."""
+        if self._courses is not None and self._hurries_left:
+            self._hurries_left -= 1
             self._courses.hurry()
+            self._look_ahead_in(max(len(self._samples) // 2, min(len(self._samples), _FEWEST)))
+
+    def _look_ahead_in(self, arms: int) -> None:
+        """Make room for so many simulated ``arms``, in which it looks ahead."""
+        self._lanes = lanes(self._mind, self._sizes, np.zeros((arms, 4), np.uint64))
+        self._samples = np.zeros(arms, np.int64)
 
     def _note_passes(self) -> None:
         """Count the passes of each joint, and let one that swings rest."""

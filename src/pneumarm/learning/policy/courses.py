@@ -26,7 +26,6 @@ _POLICY = -1  # in a course: what the policy says
 _HELD = (1, 3, 6, 12)  # periods for which the last actions may go on
 _MOST = 3 + len(_HELD)  # courses: that of the policy, the plan, the last one, and these
 _MOST_ACTIONS = 1_000  # of the whole arm, among which a plan can be sought in time
-_HALVED = 2  # times at most: turns may be late for other reasons
 
 
 class Courses:
@@ -47,7 +46,7 @@ class Courses:
         self._last = self._last[:0]
 
     def hurry(self) -> None:
-        """Seek plans for about half as long from now on, down to a quarter of what the settings say."""
+        """Seek plans for about half as long from now on."""
         if self._search is not None:
             self._search.hurry()
 
@@ -94,7 +93,6 @@ class _Search:
         self.goal = self._problem.goal
         """Shape (joints,) [counts]."""
         self._tree, self._find, self._halved = tree(plan, joints), find, halved
-        self._times_left = _HALVED
         self._actions = to_actions(self._problem.commands)
         """Actions of each joint by those of the whole arm, shape (9**joints, joints)."""
 
@@ -112,9 +110,7 @@ class _Search:
 
     def hurry(self) -> None:
         """Keep half as many states from now on."""
-        if self._times_left:
-            self._times_left -= 1
-            self._tree = self._halved(self._tree, len(self._problem.commands))
+        self._tree = self._halved(self._tree, len(self._problem.commands))
 
 
 @kernel

@@ -166,18 +166,53 @@ def test_a_fault_that_ends_is_over():
     assert monitor.now == []
 
 
-def test_goes_on_from_its_state_as_if_nothing_had_happened(simulation):
-    faults = [StuckValve(begin=18.0)]
+def watched_until(monitor, arm, end, seed):
+    for _ in watched_steps(arm, monitor, seed):
+        if arm.time > end:
+            break
+
+
+def test_what_it_has_seen_of_an_arm_for_long_counts_more_than_a_simulation(simulation):
+    arm = VirtualArm(draw_parameters(3), seed=6)
+    monitor = Monitor(arm.spec, simulation)
+    watched_until(monitor, arm, 400.0, 6)
+    assert monitor.findings == []
+    arm.faults = (StuckValve(muscle=2, begin=arm.time),)
+    for _ in watched_steps(arm, monitor, 7):
+        if monitor.findings or arm.time > 430:
+            break
+    assert [(one.kind, one.muscle) for one in monitor.findings] == [("stuck-valve", 2)]
+    assert "what this arm itself did" in monitor.reasons()
+
+
+def test_a_simulation_judges_valves_while_little_was_seen_of_them(simulation):
+    arm = VirtualArm(draw_parameters(3), seed=6)
+    monitor = Monitor(arm.spec, simulation)
+    monitor.begin(at_rest=True)
+    for _ in range(9_000):  # five minutes of closed valves
+        monitor.see(arm.read(), np.zeros((1, 2)))
+        arm.wait(arm.spec.period)
+    arm.faults = (SupplyLoss(begin=arm.time),)
+    for _ in watched_steps(arm, monitor, 7):
+        if monitor.findings:
+            break
+    assert monitor.findings[0].kind == "low-supply"
+    assert "what the simulation of this arm expects" in monitor.reasons()
+
+
+@pytest.mark.parametrize("begin", [18.0, 400.0])
+def test_goes_on_from_its_state_as_if_nothing_had_happened(simulation, begin):
+    faults = [StuckValve(begin=begin)]
     runs = []
     for interrupted in (False, True):
         arm = VirtualArm(draw_parameters(3), seed=2, faults=faults)
         monitor = Monitor(arm.spec, simulation)
         for step in watched_steps(arm, monitor, 2):
-            if interrupted and 15.0 < arm.time < 25.0 and step.valves is None:
+            if interrupted and begin - 3 < arm.time < begin + 7 and step.valves is None:
                 state = monitor.get_state()
                 monitor.findings = []
                 monitor.set_state(state)
-            if arm.time > 40:
+            if arm.time > begin + 22:
                 break
         runs.append((monitor.findings, monitor.get_state()))
     assert runs[0] == runs[1]

@@ -155,8 +155,8 @@ class Memory(NamedTuple):
     angle: NDArray[np.float64]
     """Angles expected of a healthy arm, shape (joints,) [counts]."""
     lasting: NDArray[np.float64]
-    """Residuals of pressures: how many, mean square, mean product of one with the one before, the last one; shape
-    (muscles, 4)."""
+    """Residuals of angle and pressures: how many, mean square, mean product of one with the one before, the last one;
+    shape (joints, 3, 4)."""
 
 
 def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
@@ -185,13 +185,59 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
         surprise=np.zeros((2 * joints, 4)),
         trust=np.ones(2 * joints),
         angle=np.zeros(joints),
-        lasting=np.tile([_AT_FIRST, 1.0, 0.0, 0.0], (2 * joints, 1)),
+        lasting=np.tile([_AT_FIRST, 1.0, 0.0, 0.0], (joints, 3, 1)),
     )
 
 
 @kernel
-def see_by_identification(known, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
-    """Weigh a reading by what is known of the arm; the valves chosen after it go into ``memory.command[0]``."""
+def see_by_identification(  # type: ignore[no-untyped-def]
+    known, readings, thresholds, judged, memory, time, angle, pressure
+):
+    """Weigh a reading by what is known of the arm; the valves chosen after it go into ``memory.command[0]``.
+
+    ``judged`` says which hypotheses are, shape (n,).
+    """
+    is_experienced = known.clock[2] * known.look[1] >= EXPERIENCE
+    identify(known, readings, thresholds, judged, memory, time, angle, pressure, is_experienced)
+    look_at_potentiometers(thresholds, memory, time, angle, pressure)
+    observe(memory, time, angle, pressure)
+
+
+@kernel
+def see_by_simulation(  # type: ignore[no-untyped-def]
+    predictor, known, readings, thresholds, judged, memory, time, angle, pressure
+):
+    """Weigh a reading by a simulation; the valves chosen after it go into ``memory.command[0]``.
+
+    The arm is identified besides. ``judged`` says which hypotheses are judged by the simulation and which by what is
+    known of the arm, shape (2, n); ``thresholds`` are those of each.
+    """
+    by_simulation, by_identification = thresholds
+    if memory.clock[1] >= memory.clock[2]:
+        expect_by_simulation(predictor, readings, memory)
+        for m in range(memory.std.shape[0]):
+            memory.std[m] = usual(by_simulation, memory, m // 2) * predictor.std[m // 2, 2 + m % 2] * memory.clock[3]
+            memory.base[m] = memory.observed[0, m // 2, 2 + m % 2]
+            memory.lowest[m], memory.full[m] = predictor.lowest[m], predictor.highest
+            memory.clear[m] = by_simulation.clear
+            memory.trust[m] = what_is_new(memory, m // 2, 1 + m % 2)
+        weigh_hypotheses(by_simulation, readings, judged[0], memory, time, pressure)
+        for j in range(angle.shape[0]):
+            error = (angle[j] - memory.angle[j]) / (usual(by_simulation, memory, j) * predictor.std[j, 0])
+            weigh_disagreement(by_simulation, memory, j, 0, error, time)
+            place_residual(by_simulation, memory, j, angle[j], error)
+            for side in range(2):
+                m = 2 * j + side
+                error = memory.clock[3] * (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
+                weigh_disagreement(by_simulation, memory, j, 1 + side, error, time)
+    identify(known, readings, by_identification, judged[1], memory, time, angle, pressure, judged[1].any())
+    look_at_potentiometers(by_simulation, memory, time, angle, pressure)
+    observe(memory, time, angle, pressure)
+
+
+@part
+def identify(known, readings, thresholds, judged, memory, time, angle, pressure, judges):  # type: ignore[no-untyped-def]
+    """Learn of the arm from a reading that is a look; if it ``judges``, weigh the hypotheses that are ``judged``."""
     if memory.clock[1] < 1.0:
         remember_look(known, angle, pressure, True)
     else:
@@ -201,43 +247,16 @@ def see_by_identification(known, readings, thresholds, memory, time, angle, pres
         if known.clock[1] >= 0.0:
             expect_by_identification(known, readings, memory, angle, pressure, thresholds.empty)
             for m in range(memory.std.shape[0]):
+                memory.std[m] *= memory.clock[3]
                 memory.clear[m] = min(thresholds.clear, half_a_filling(known, m))
-            if known.clock[2] * known.look[1] >= EXPERIENCE:
-                weigh_hypotheses(thresholds, readings, memory, time, pressure)
+            if judges:
+                weigh_hypotheses(thresholds, readings, judged, memory, time, pressure)
             if memory.clock[4] == 0.0:
                 for m in range(memory.std.shape[0]):
                     learn(known, m, angle, pressure[m // 2, m % 2])
             note_answers(known, pressure)
         remember_look(known, angle, pressure, False)
         shift_slots(known)
-    look_at_potentiometers(thresholds, memory, time, angle, pressure)
-    observe(memory, time, angle, pressure)
-
-
-@kernel
-def see_by_simulation(predictor, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
-    """Weigh a reading by a simulation; the valves chosen after it go into ``memory.command[0]``."""
-    if memory.clock[1] >= memory.clock[2]:
-        expect_by_simulation(predictor, readings, memory)
-        for m in range(memory.std.shape[0]):
-            memory.std[m] = usual(thresholds, memory, m // 2) * predictor.std[m // 2, 2 + m % 2] * memory.clock[3]
-            memory.base[m] = memory.observed[0, m // 2, 2 + m % 2]
-            memory.lowest[m], memory.full[m] = predictor.lowest[m], predictor.highest
-            memory.clear[m] = thresholds.clear
-            memory.trust[m] = independence(memory.lasting[m, 1], memory.lasting[m, 2])
-        weigh_hypotheses(thresholds, readings, memory, time, pressure)
-        for j in range(angle.shape[0]):
-            error = (angle[j] - memory.angle[j]) / (usual(thresholds, memory, j) * predictor.std[j, 0])
-            weigh_disagreement(thresholds, memory, j, 0, error, time)
-            place_residual(thresholds, memory, j, angle[j], error)
-            for side in range(2):
-                m = 2 * j + side
-                error = memory.clock[3] * (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
-                weigh_disagreement(thresholds, memory, j, 1 + side, error, time)
-                if memory.clock[4] == 0.0:
-                    note_residual(memory.lasting[m], error)
-    look_at_potentiometers(thresholds, memory, time, angle, pressure)
-    observe(memory, time, angle, pressure)
 
 
 @part
@@ -248,8 +267,14 @@ def usual(thresholds, memory, j):  # type: ignore[no-untyped-def]
 
 
 @part
+def what_is_new(memory, j, q):  # type: ignore[no-untyped-def]
+    """Return which part of the evidence of a residual is new."""
+    return independence(memory.lasting[j, q, 1], memory.lasting[j, q, 2])
+
+
+@part
 def note_residual(lasting, error):  # type: ignore[no-untyped-def]
-    """Note in ``lasting`` of a muscle how much a standardised residual is like the one before."""
+    """Note in ``lasting`` of a quantity how much a standardised residual is like the one before."""
     cut = min(max(error, -_LASTING), _LASTING)
     lasting[0] = min(lasting[0] + 1.0, _REMEMBERED)
     lasting[1] += (cut * cut - lasting[1]) / lasting[0]
@@ -264,8 +289,8 @@ def surprise(error):  # type: ignore[no-untyped-def]
 
 
 @part
-def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ignore[no-untyped-def]
-    """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis."""
+def weigh_hypotheses(thresholds, readings, judged, memory, time, pressure):  # type: ignore[no-untyped-def]
+    """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis that is ``judged`` (n,)."""
     most = 0.0
     for m in range(memory.std.shape[0]):
         read = pressure[m // 2, m % 2]
@@ -273,6 +298,8 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             last = memory.surprise[m]
             last[0], last[1], last[2], last[3] = time, read, memory.expected[0, m], memory.std[m]
     for h in range(1, memory.score.shape[0]):
+        if not judged[h]:
+            continue
         evidence = 0.0
         for m in range(memory.std.shape[0]):
             difference = memory.expected[h, m] - memory.expected[0, m]
@@ -287,8 +314,9 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
             # What has been found brings it so far by itself, and there it looks like other faults.
             telling = telling and (fills or memory.base[m] <= thresholds.over or memory.clock[4] == 0.0)
-            if readings.leak[h, m] > 0.0:
+            if readings.leak[h, m] > 0.0:  # small differences tell, but an empty muscle has nothing to lose
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
+                telling = telling and memory.base[m] - lowest >= thresholds.empty
             if telling:
                 unsure = thresholds.unsure * difference
                 std = math.sqrt(memory.std[m] ** 2 + unsure * unsure + memory.doubt[h, m] ** 2)
@@ -318,6 +346,9 @@ def is_calm(thresholds, memory, m):  # type: ignore[no-untyped-def]
 def weigh_disagreement(thresholds, memory, j, q, error, time):  # type: ignore[no-untyped-def]
     """Add the evidence of a standardised residual that residuals are ``apart`` times as large as usual."""
     evidence = surprise(error) - surprise(error / thresholds.apart) - math.log(thresholds.apart)
+    evidence *= what_is_new(memory, j, q)
+    if memory.clock[4] == 0.0:
+        note_residual(memory.lasting[j, q], error)
     cut, scatter = min(max(error, -_LARGEST), _LARGEST), memory.scatter[j, q]
     if memory.disagreement[j, q] <= 0.0:
         memory.disagreement_since[j, q] = time

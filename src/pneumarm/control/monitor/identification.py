@@ -32,6 +32,9 @@ LOOKS = 3
 """Looks whose slots are features: what is open now, and what may still be under way in pipes and hoses."""
 EXPERIENCE = 20.0
 """An arm is not judged before it has been watched for so long [s]."""
+ALL = 40.0
+"""Time for which each muscle was seen filling, and emptying, after which an arm is known better than a simulation of
+minutes knows it [s]."""
 _SLOTS = SLOTS * LOOKS
 _CURVES = 4 * _SLOTS  # the first feature after those of the slots
 FEATURES = _CURVES + 23
@@ -435,6 +438,12 @@ def remember_look(known, angle, pressure, fresh):  # type: ignore[no-untyped-def
     if not fresh:
         known.clock[1] += 1.0
         known.clock[2] += 1.0
+
+
+def count_of_looks(known: Identified) -> NDArray[np.float64]:
+    """Return in how many looks each muscle was seen filling, and emptying, shape (m, 2)."""
+    counts: NDArray[np.float64] = (known.error[:, 1:, ..., 0] - _KNOWN).sum(axis=(2, 3))
+    return counts
 
 
 OBEYS, DISOBEYS, CROSSWISE = 0.25, -0.2, 0.4

@@ -19,18 +19,20 @@ from pneumarm.control.monitor.evidence import (
     see_by_identification,
     see_by_simulation,
 )
-from pneumarm.control.monitor.expectation import Predictor, predictor
+from pneumarm.control.monitor.expectation import predictor
 from pneumarm.control.monitor.findings import CHANGES, DISAGREEMENTS, Finding, Key, marks_of
 from pneumarm.control.monitor.hypotheses import hypotheses
 from pneumarm.control.monitor.identification import (
+    ALL,
     EXPERIENCE,
     LOOKS,
     Identified,
+    count_of_looks,
     forget_answers,
     identified,
     wrong_from_the_start,
 )
-from pneumarm.control.monitor.settings import Mode, MonitorSettings
+from pneumarm.control.monitor.settings import Mode, MonitorSettings, Weighing
 from pneumarm.errors import UnusableInput
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Mark, Recorded
@@ -45,10 +47,11 @@ _FEWEST = 10  # residuals of which a mean square is taken seriously
 class Monitor:
     """Watches an arm; a :class:`~pneumarm.transitions.watch.Watch`.
 
-    With a ``simulation`` of the arm valves, supply and large leaks are judged by what it expects, and an arm that
-    has changed is noticed. Without one the first three are judged by what the monitor itself learns of the arm while
-    it watches (:mod:`pneumarm.control.monitor.identification`), from twenty seconds on and the better the longer; and
-    it is noticed if pressures do what no sound arm's do. Potentiometers on a rail or frozen are found in both cases.
+    Valves, supply and large leaks are judged by what the monitor itself learns of the arm while it watches
+    (:mod:`pneumarm.control.monitor.identification`), from twenty seconds on and the better the longer; and it is
+    noticed if pressures do what no sound arm's do. With a ``simulation`` of the arm they are judged by what that
+    expects until the monitor has seen each muscle fill and empty for long enough itself, leaks for ever; and an arm
+    that has changed is noticed. Potentiometers on a rail or frozen are found in both cases.
     Of an arm without pressure sensors only the angles are judged: potentiometers, and by a simulation whether the arm
     has changed, whatever the reason.
 
@@ -85,14 +88,15 @@ class Monitor:
         self._hypotheses, self._readings = hypotheses(spec.joints, spec.muscles)
         if not spec.pressure_sensors:  # estimates follow the commands, whatever valves and air do
             self._hypotheses, self._readings = self._hypotheses[:1], self._readings.first(1)
-        self._weighing = self.settings.by_identification if simulation is None else self.settings.by_simulation
-        self._prior = np.array([self._weighing.supply * (one.kind == "low-supply") for one in self._hypotheses])
+        self._is_leak = np.array([one.kind == "leak" for one in self._hypotheses])
         history = 2 if simulation is None else max(2, simulation.window.history)
         self._memory = new_memory(spec.joints, history, len(self._hypotheses))
         self._simulation = simulation
-        self._thresholds = self._packed()
-        self._expects: Identified | Predictor = identified(spec) if simulation is None else predictor(simulation)
-        self._see = see_by_identification if simulation is None else see_by_simulation
+        self._known = identified(spec)
+        self._predictor = None if simulation is None else predictor(simulation)
+        self._by_simulation = self._packed(self.settings.by_simulation)
+        self._by_identification = self._packed(self.settings.by_identification)
+        self._judge_by_simulation(simulation is not None)
         self._from_the_start: dict[Key, float] = {}  # what no sound arm does
         self.begin(at_rest=True)
 
@@ -111,7 +115,7 @@ class Monitor:
         if self._simulation is None or simulation.window != self._simulation.window:
             raise UnusableInput("a monitor can go on only with a simulation that was adapted from the one it has")
         measured_before = self._measured
-        self._simulation, self._expects = simulation, predictor(simulation)
+        self._simulation, self._predictor = simulation, predictor(simulation)
         self._measured[...] = measured_before
         memory = self._memory
         memory.disagreement[...] = memory.zone[...] = 0.0
@@ -123,11 +127,20 @@ class Monitor:
     @property
     def familiar(self) -> bool:
         """Whether it has seen enough of the arm to tell what is unusual; with a simulation it has from the start."""
-        known = self._expects
-        return not isinstance(known, Identified) or bool(known.clock[2] * known.look[1] >= EXPERIENCE)
+        return self._predictor is not None or bool(self._known.clock[2] * self._known.look[1] >= EXPERIENCE)
 
-    def _packed(self) -> Thresholds:
-        settings, spec, weighing = self.settings, self.spec, self._weighing
+    def _judge_by_simulation(self, trusted: bool) -> None:
+        """Judge valves and supply by the simulation while it is ``trusted``, then by what is known of the arm."""
+        self._trusts_simulation = trusted
+        weighing = self.settings.by_simulation if trusted else self.settings.by_identification
+        self._thresholds = self._by_simulation if trusted else self._by_identification
+        self._prior = np.array([weighing.supply * (one.kind == "low-supply") for one in self._hypotheses])
+        self._judged = np.stack([trusted | self._is_leak, ~(trusted | self._is_leak)])
+        if self._predictor is None:
+            self._judged[:] = True
+
+    def _packed(self, weighing: Weighing) -> Thresholds:
+        settings, spec = self.settings, self.spec
         return Thresholds(
             most=settings.most,
             alarm=weighing.alarm,
@@ -160,8 +173,7 @@ class Monitor:
         memory.clock[2] = 1.0 if at_rest else memory.observed.shape[0] + 1.0
         memory.command[...] = 0.0
         memory.scatter[..., 2] = 0.0
-        if isinstance(self._expects, Identified):
-            self._begin_identifying(self._expects, at_rest)
+        self._begin_identifying(at_rest)
         broken = {(key[0], key[2]) for key in self._open}
         for j in range(self.spec.joints):  # what is broken stays so
             if ("frozen-potentiometer", j + 1) not in broken:
@@ -169,10 +181,16 @@ class Monitor:
             if ("dead-potentiometer", j + 1) not in broken:
                 memory.rail[j] = 0.0
 
-    def _begin_identifying(self, known: Identified, at_rest: bool) -> None:
-        """Begin a sequence with what has been learned of the arm so far, and look for what no sound arm does."""
+    def _begin_identifying(self, at_rest: bool) -> None:
+        """Begin a sequence with what has been learned of the arm so far, and look for what no sound arm does.
+
+        With a simulation that is not looked for: a controller may well hold a pressure of a leaky muscle for long.
+        """
+        known = self._known
         known.open[...] = known.opened[...] = known.held[...] = 0.0
         known.clock[:2] = 0.0, 0.0 if at_rest else -LOOKS
+        if self._predictor is not None:
+            return
         since = float(self._memory.clock[0])
         found = wrong_from_the_start(known)
         self._from_the_start = {key: self._from_the_start.get(key, since) for key in found}
@@ -187,9 +205,32 @@ class Monitor:
             self._go_on_from(reading.time)
         if memory.clock[1] and not 0.5 < (reading.time - memory.clock[0]) / self.spec.period < 1.5:
             self.begin(at_rest=False)  # a lost period: nothing is known of what was in it
-        self._see(
-            self._expects, self._readings, self._thresholds, memory, reading.time, reading.angle, reading.pressure
-        )
+        if self._predictor is None:
+            see_by_identification(
+                self._known,
+                self._readings,
+                self._by_identification,
+                self._judged[0],
+                memory,
+                reading.time,
+                reading.angle,
+                reading.pressure,
+            )
+        else:
+            see_by_simulation(
+                self._predictor,
+                self._known,
+                self._readings,
+                (self._by_simulation, self._by_identification),
+                self._judged,
+                memory,
+                reading.time,
+                reading.angle,
+                reading.pressure,
+            )
+            if self._trusts_simulation and not memory.clock[4] and self._has_seen_all():
+                memory.score[~self._is_leak] = 0.0
+                self._judge_by_simulation(False)
         self._note_further(reading)
         # Not by a kernel: handing the memory over to one takes longer than the kernel.
         memory.command[0] = 0.0 if valves is None else valves.ravel()
@@ -199,7 +240,12 @@ class Monitor:
     @property
     def _measured(self) -> NDArray[np.float64]:
         """What further sensors said, shape (history, needs); (0, 0) where none is needed."""
-        return np.zeros((0, 0)) if isinstance(self._expects, Identified) else self._expects.measured
+        return np.zeros((0, 0)) if self._predictor is None else self._predictor.measured
+
+    def _has_seen_all(self) -> bool:
+        """Whether each muscle was seen to fill and to empty for long enough, so that the simulation is not needed."""
+        looks = count_of_looks(self._known)[:: 3 - self.spec.muscles]
+        return bool(self.spec.pressure_sensors and looks.min() * self._known.look[1] >= ALL)
 
     def _note_further(self, reading: Reading) -> None:
         """Remember what the further sensors say that the simulation needs."""
@@ -395,11 +441,11 @@ class Monitor:
                     f"at {when:.1f} s pressure {m % 2 + 1} of joint {m // 2 + 1} read {read:.2f} bar where "
                     f"{expected:.2f} ± {std:.2f} was expected"
                 )
-        if isinstance(self._expects, Identified):
-            known = float(self._expects.clock[2] * self._expects.look[1])
-            against = f"what this arm itself did in the {known:.0f} s that it was watched"
-        else:
+        if self._trusts_simulation:
             against = "what the simulation of this arm expects"
+        else:
+            known = float(self._known.clock[2] * self._known.look[1])
+            against = f"what this arm itself did in the {known:.0f} s that it was watched"
         shown = "; ".join(seen) or "no single reading is far off, together they are"
         return f"{shown}. It is judged against {against}"
 
@@ -412,12 +458,13 @@ class Monitor:
             "findings": [asdict(one) for one in self.findings],
             "earlier": self._earlier,
             "simulation": self._simulation is not None,
+            "trusted": self._trusts_simulation,
+            "identified": {
+                name: b64encode(values.tobytes()).decode() for name, values in self._known._asdict().items()
+            },
         }
         if self._measured.size:
             state["measured"] = self._measured.tolist()
-        if isinstance(self._expects, Identified):
-            known = self._expects._asdict().items()
-            state["identified"] = {name: b64encode(values.tobytes()).decode() for name, values in known}
         return json.dumps(state).encode()
 
     def set_state(self, state: bytes) -> None:
@@ -437,16 +484,16 @@ class Monitor:
             further = np.array(saved.get("measured", []), np.float64).reshape(self._measured.shape)
             if not all(same) or saved["simulation"] is not (self._simulation is not None):
                 raise ValueError("it has other sizes")
-            known = _identified_of(saved["identified"], self._expects) if "identified" in saved else None
+            known, trusted = _identified_of(saved["identified"], self._known), bool(saved["trusted"])
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise UnusableInput(
                 f"the state of the monitor is damaged, of another arm or of an earlier version ({error})"
             ) from error
         for mine, values in zip(self._memory, memory, strict=True):
             mine[...] = values
-        if known is not None:
-            for name, values in known._asdict().items():
-                getattr(self._expects, name)[...] = values
+        for name, values in known._asdict().items():
+            getattr(self._known, name)[...] = values
+        self._judge_by_simulation(trusted)
         self._measured[...] = further
         self.findings, self._earlier = findings, earlier
         self._open = {
@@ -456,7 +503,7 @@ class Monitor:
         }
 
 
-def _identified_of(saved: Mapping[str, str], mine: Identified | Predictor) -> Identified:
+def _identified_of(saved: Mapping[str, str], mine: Identified) -> Identified:
     """Return what was saved of what is known of an arm; ValueError where it is not of one like ``mine``."""
     return Identified(
         **{name: np.frombuffer(b64decode(text)).reshape(getattr(mine, name).shape) for name, text in saved.items()}

@@ -19,12 +19,13 @@ PNEUMARM_SUCCESS_FOLDER     where agents and rows are kept; a call with the same
 A failed movement is kept as a row of ``failed.jsonl`` there: its first try with all that was read and set.
 """
 
+import math
 import re
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +49,11 @@ SEED = 0
 """Of everything but the arm, as ``pneumarm run`` has it."""
 BLOCK = 500
 TASKS = "settle", "reach"
+WORTH = {"settle": "median of the seconds to settle", "reach": "reward"}
+"""What a row tells of a block besides its failures, by task."""
 PAUSE = MoveSettings().pause
 """Before a second try [s]."""
+QUANTILES = 0.0, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0
 SHOWN = 20
 """Failures that are told of one by one."""
 HEADER = f"{'':34}{'movements':>10}" + "".join(f"{name:>14}{'of 100,000':>26}" for name in ("failed", "failed twice"))
@@ -87,6 +91,7 @@ def measure() -> Iterator[str]:
             if any(row["failed"] for row in chosen if row["arm"] == arm):
                 yield line(f"{task} {arm}", [row for row in chosen if row["arm"] == arm])
         yield line(f"{task}, {len(arms)} arms", chosen)
+        yield from quantiles(task, chosen)
         yield from table(
             [one for one in failures if one["task"] == task and one["arm"] in arms and one["number"] < wanted[task]]
         )
@@ -119,10 +124,8 @@ def make_block(folder: Path, arm: str, task: str, block: int, movements: int) ->
     agent = load_agent(place(folder, arm, task))
     first = block * BLOCK
     make = settle if task == "settle" else reach
-    failures = [
-        {"arm": arm, "task": task, "number": number, **failed}
-        for number, failed in make(agent, arm, range(first, first + movements), block)
-    ]
+    made = list(make(agent, arm, range(first, first + movements), block))
+    failures = [{"arm": arm, "task": task, "number": one.number, **one.failed} for one in made if one.failed]
     return {
         "arm": arm,
         "task": task,
@@ -130,12 +133,25 @@ def make_block(folder: Path, arm: str, task: str, block: int, movements: int) ->
         "movements": movements,
         "failed": len(failures),
         "failed_twice": sum(one["twice"] for one in failures),
+        "worth": float(
+            np.median([one.worth for one in made]) if task == "settle" else np.mean([one.worth for one in made])
+        ),
         "failures": failures,
     }
 
 
-def settle(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the number of each movement that did not settle at once, and what there is to know of it."""
+class Made(NamedTuple):
+    """A movement that was made."""
+
+    number: int
+    worth: float
+    """Reward of one that was to reach its goal, seconds until one settled, infinite where it did not."""
+    failed: dict[str, Any] | None
+    """What there is to know of its first try if that failed."""
+
+
+def settle(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[Made]:
+    """Yield movements that are to settle at their goals."""
     assert isinstance(agent, Tracks)
     goals = goals_of(agent).draw(np.random.default_rng([SEED, seed]), BLOCK)[: len(numbers)]
     once, controller = MoveSettings(tries=1), agent.controller()
@@ -143,14 +159,17 @@ def settle(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tup
         guard = guarded(opened)
         for number, goal in zip(numbers, goals, strict=True):
             (moved,) = move_and_hold(guard, controller, [goal], once)
+            failed = None
             if not moved.success:
                 guard.wait(PAUSE)
                 (again,) = move_and_hold(guard, controller, [goal], once)
-                yield number, failure(moved.recorded, moved.spec, goal, not again.success)
+                failed = failure(moved.recorded, moved.spec, goal, not again.success)
+            seconds = math.inf if moved.time_settled is None else moved.time_settled - moved.time_start
+            yield Made(number, seconds, failed)
 
 
-def reach(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the number of each movement that did not reach its goal at once, and what there is to know of it."""
+def reach(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[Made]:
+    """Yield movements that are to reach their goals."""
     controller, settings = AgentController(agent), agent.settings
     warm_up(agent)
     with open_arm(arm, seed) as opened:
@@ -158,10 +177,12 @@ def reach(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[tupl
         for number, draw in zip(numbers, drawn(goals_of(agent), SEED, numbers), strict=True):
             BEGIN.reach(cycle.arm, draw.random)
             made = move(cycle, controller, draw.goal, settings, velocity=agent.window.velocity)
+            failed = None
             if not made.success:
                 cycle.arm.wait(PAUSE)
                 again = move(cycle, controller, draw.goal, settings, velocity=agent.window.velocity)
-                yield number, failure(made.recorded, opened.spec, made.goal, not again.success)
+                failed = failure(made.recorded, opened.spec, made.goal, not again.success)
+            yield Made(number, made.reward, failed)
 
 
 def failure(recorded: Recorded, spec: ArmSpec, goal: NDArray[np.float64], twice: bool) -> dict[str, Any]:
@@ -182,6 +203,25 @@ def line(name: str, rows: list[dict[str, Any]]) -> str:
     """Return the figures of ``rows`` as a line of the table."""
     movements, failed, twice = (sum(row[key] for row in rows) for key in ("movements", "failed", "failed_twice"))
     return f"{name:34}{movements:>10,}" + "".join(f"{n:>14,}{rate(n, movements):>26}" for n in (failed, twice))
+
+
+def quantiles(task: str, rows: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield how well the arms of ``rows`` do, from the worst to the best."""
+    found = []
+    for arm in {row["arm"] for row in rows}:
+        own = [row for row in rows if row["arm"] == arm]
+        movements = [row["movements"] for row in own]
+        succeeded = 1 - sum(row["failed"] for row in own) / sum(movements)
+        found.append((succeeded, np.average([row["worth"] for row in own], weights=movements)))
+    if not found:
+        return
+    levels = 1 - np.array(QUANTILES) if task == "settle" else QUANTILES  # the fewer seconds the better
+    succeeded, worth = zip(*found, strict=True)
+    for name, values in (
+        ("success at once", np.quantile(succeeded, QUANTILES)),
+        (WORTH[task], np.quantile(worth, levels)),
+    ):
+        yield f"  {name + ', by arm':40}" + " ".join(f"{value:10.4f}" for value in values)
 
 
 def rate(failed: int, movements: int) -> str:

@@ -9,6 +9,8 @@ from pneumarm.arm import guarded, open_arm
 from pneumarm.arm.virtual import FrozenPotentiometer
 from pneumarm.checkup import measure
 from pneumarm.classical import TuneSettings, tune
+from pneumarm.commands.run_ import how_it_moves
+from pneumarm.console import show
 from pneumarm.control import Monitor
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.gym import point_to_point
@@ -45,6 +47,17 @@ def test_the_whole_job_settles_and_its_report_says_what_was_estimated(run):
     page = (folder / "report.html").read_text()
     assert "Its pressures are not measured" in page
     assert "estimated pressure" in page
+
+
+def test_the_terminal_says_how_the_arm_moves(run, capsys):
+    _, results = run
+    show(results, False, lambda: list(how_it_moves(results)))
+    said, settled = capsys.readouterr().out, results["settle"]
+    assert f"{round(settled['settled'] * settled['movements'])} of {settled['movements']} goals" in said
+    assert f"{settled['median_seconds']:.2f} s" in said
+    for one in results["track"]:
+        assert f"{one['rms_error_deg'][0]:.2f}°" in said
+    assert list(how_it_moves({"settle": None, "track": []})) == []
 
 
 def test_its_agent_is_refused_by_an_arm_with_pressures_and_moves_its_own(run, capsys):

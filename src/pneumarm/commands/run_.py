@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
+from rich.table import Table
 
 from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, Settings, move_command
 from pneumarm.commands.config_file import as_config
@@ -60,7 +61,9 @@ def run_(
         "after adaptation": results["transfer"]["after"],
     }
     rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
-    show(results, json, lambda: [table(("", *HEADINGS), rows, title="Ledger")])
+    settles = run.settings.settles
+    title = "To reach goals, as the thesis pays for it, which this agent was not trained for" if settles else "Ledger"
+    show(results, json, lambda: [*how_it_moves(results), table(("", *HEADINGS), rows, title=title)])
     say_history(out)
     for stage, doing in (("collect", "collecting"), ("transfer", "moving")):
         for line in complaints(results[stage], doing):
@@ -74,6 +77,27 @@ def run_(
     )
     with Store.open(run.store) as store:
         say(f"move the arm with {move_command(out, settings.arm, store.spec, store.percentiles())}")
+
+
+def how_it_moves(results: dict[str, Any]) -> Iterator[Table]:
+    """Yield a table of how the arm settled at goals and followed references, where it was tried."""
+    found = results["settle"]
+    if not found:
+        return
+    seconds = found["median_seconds"]
+    rows = [
+        (
+            f"settles within {found['tolerance_deg']:g}° of",
+            f"{round(found['settled'] * found['movements'])} of {found['movements']} goals",
+        ),
+        ("half of them within", None if seconds is None else f"{seconds:.2f} s"),
+        ("rests off by", f"{found['rest_error_deg']:.2f}°"),
+        ("valve changes a second", f"{found['valve_changes_per_second']:.0f}"),
+    ]
+    for one in results["track"]:
+        errors = ", ".join(f"{error:.2f}°" for error in one["rms_error_deg"])
+        rows.append((f"follows {one['amplitude_deg']:.0f}°, {one['frequency_hz']:g} Hz, off by", errors))
+    yield table(("adapted, on the arm", ""), rows, title="How it moves")
 
 
 def _spent(results: dict[str, Any]) -> Iterator[str]:

@@ -7,15 +7,16 @@ arm without the fault is given the same commands beside it: the *contradiction* 
 more than noise does from what that one reads (CONTRADICTS). Times are watched time (the arm is not watched while it
 is brought to a begin state), medians and 95 %, from the begin of the fault and from the contradiction. *Unmarked* are
 readings from the contradiction on that are not marked, and so may be learned from.
-Healthy hours are collecting from a cold morning on, and movements by a policy before, while and after it adapts.
+Healthy hours are collecting from a cold morning on, movements by a policy before, while and after it adapts, and
+goals that it holds for five minutes each.
 Settings come from the environment:
 
 PNEUMARM_FAULTS_DRAW     standard, arms like the thesis' (virtual:seed=N), by default, or wide (virtual:wide,seed=N)
 PNEUMARM_FAULTS_ARMS     seeds of them, 1 to 20 by default; held out are 1001 to 1010, and 5000 to 5299 of the wide
 PNEUMARM_FAULTS_COLLECT  usual, as a default run collects, by default, or thesis, for whole periods alone
-PNEUMARM_FAULTS_WHILE    early,watched,later,moving by default: when
+PNEUMARM_FAULTS_WHILE    early,watched,later,moving,holding by default: when; no fault begins while a goal is held
 PNEUMARM_FAULTS_CASES    cases of each fault, 40
-PNEUMARM_FAULTS_HOURS    healthy hours of each recording, 10, and a fifth of that of movements; 0 for none
+PNEUMARM_FAULTS_HOURS    healthy hours of each recording, 10, and a fifth of that of moving and of holding; 0 for none
 PNEUMARM_FAULTS_LEAKS    1 to try leak tests, too; 0 by default
 PNEUMARM_FAULTS_FOLDER   where all that was made is kept, so that an interrupted benchmark goes on; by default a
                          temporary folder
@@ -55,7 +56,9 @@ from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control import AgentController, TransferSettings, transfer
 from pneumarm.control.monitor import Finding, Monitor, marks_of
 from pneumarm.control.movement import BEGIN, draw_movement, move
-from pneumarm.learning import AnyAgent, load_agent, train
+from pneumarm.learning import AnyAgent, Tracks, goals_of, load_agent, train
+from pneumarm.moving.movement import MoveSettings
+from pneumarm.moving.movement import move as move_and_hold
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.fit import FitSettings, fit_store
 from pneumarm.statistics import wilson
@@ -71,6 +74,8 @@ DRAWS = {"standard": "virtual:seed={}", "wide": "virtual:wide,seed={}"}
 COLLECT = {"usual": CollectSettings(), "thesis": WHOLE_PERIODS}
 WARM_UP = {"early": 20.0, "watched": 150.0, "later": 20.0, "moving": 20.0}
 """Healthy watched time before a fault [s], then up to MOMENT longer."""
+HELD = 300.0
+"""For how long a sound arm is held at a goal [s]."""
 MOMENT = 20.0
 FIRST = "early", "watched"
 """Of a first recording: slow changes and noise are judged by a simulation alone."""
@@ -355,7 +360,7 @@ def measure() -> Iterator[str]:
     draw = environment.choice("PNEUMARM_FAULTS_DRAW", DRAWS)
     how = environment.choice("PNEUMARM_FAULTS_COLLECT", COLLECT)
     arms = environment.seeds("PNEUMARM_FAULTS_ARMS", "1-20")
-    ways = environment.words("PNEUMARM_FAULTS_WHILE", ",".join(WARM_UP))
+    ways = environment.words("PNEUMARM_FAULTS_WHILE", ",".join((*WARM_UP, "holding")))
     cases = environment.whole("PNEUMARM_FAULTS_CASES", 40, least=0)
     hours = environment.whole("PNEUMARM_FAULTS_HOURS", 10, least=0)
     with environment.kept_folder("PNEUMARM_FAULTS_FOLDER") as folder:
@@ -363,10 +368,10 @@ def measure() -> Iterator[str]:
         if cases:
             yield HEADER
         for kind in KINDS if cases else ():
-            for way in ways if kind.within <= SOON else [way for way in ways if way not in FIRST]:
+            for way in [way for way in ways if way in WARM_UP and (kind.within <= SOON or way not in FIRST)]:
                 yield line(kind, way, [bench.case(kind, arms[i % len(arms)], i, way) for i in range(cases)])
         for way in [way for way in ways if way != "watched"] if hours else ():  # early is the beginning of that
-            each = (hours / 5 if way == "moving" else hours) / len(arms)
+            each = (hours / 5 if way in ("moving", "holding") else hours) / len(arms)
             yield false_alarms(way, [bench.healthy(arm, each, way) for arm in arms])
         if environment.whole("PNEUMARM_FAULTS_LEAKS", 0, least=0):
             for name, factor, watch in (
@@ -437,6 +442,8 @@ class Bench:
             known = self.known(arm, way)
             if known is not None and way == "moving":
                 found, watched = healthy_movements(self.draw, arm, known, self.agent(arm), hours)
+            elif known is not None and way == "holding":
+                found, watched = healthy_holding(self.draw, arm, known, self.agent(arm), hours)
             else:
                 found, watched = healthy_collecting(arm, known, hours, self.draw, COLLECT[self.how])
             told = {"faults": [str(one) for one in found if one.spoils], "watched": watched}
@@ -497,6 +504,19 @@ def healthy_movements(
     settings = TransferSettings(episodes=episodes // 2, test_episodes=max(1, episodes // 4))
     with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", healthy.spec) as store:
         transfer(agent, healthy, store, settings, seed=arm, watch=monitor)
+    return monitor.findings, healthy.time / 3600
+
+
+def healthy_holding(
+    draw: str, arm: int, simulation: Simulation, agent: AnyAgent, hours: float
+) -> tuple[list[Finding], float]:
+    """Return what was found wrong with a healthy arm that is held at goals, and the hours that took."""
+    assert isinstance(agent, Tracks)
+    healthy = opened(draw, arm, 3000 + arm)
+    monitor, count = Monitor(healthy.spec, simulation), max(1, round(hours * 3600 / HELD))
+    goals = goals_of(agent).draw(np.random.default_rng([arm, 8]), count)
+    for _ in move_and_hold(healthy, agent.controller(), list(goals), MoveSettings(HELD, tries=1), watch=monitor):
+        pass
     return monitor.findings, healthy.time / 3600
 
 

@@ -43,6 +43,8 @@ FREEDOM = 4.0
 """Degrees of freedom of the Student distribution of residuals."""
 ZONES = 32
 """Parts of the range of an angle by which residuals are kept."""
+_NOTHING = 0.1  # evidence that is none
+_LEAKING = 0.5  # standard deviations of a difference that tells of a leak: of less errors tell as much
 _FAR = 2.5  # standard deviations of a pressure that is worth telling of
 _REMEMBERED = 3000.0  # residuals after which earlier ones count less in how long they last ...
 _AT_FIRST = 1000.0  # ... and for how many not lasting at all counts at the beginning
@@ -56,6 +58,8 @@ class Thresholds(NamedTuple):
 
     most: float
     """Evidence of a single reading at most."""
+    kept: float
+    """Part of the evidence that is left after a period, while nothing was found."""
     alarm: float
     """Evidence of a fault from which on it counts as found; that of none grows beyond twice this."""
     telling: float
@@ -107,7 +111,7 @@ class Memory(NamedTuple):
     clock: NDArray[np.float64]
     """Time of the newest reading [s]; readings in a row; rows that a window needs; by how much larger residuals are
     than usual: 1, or ``apart`` of an arm that has changed, of which a simulation proves less; 1 while something is
-    wrong from which nothing may be learned; shape (5,)."""
+    wrong from which nothing may be learned; 1 while anything is found; shape (6,)."""
     score: NDArray[np.float64]
     """S_h, shape (hypotheses,)."""
     since: NDArray[np.float64]
@@ -164,7 +168,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
     return Memory(
         observed=np.zeros((history, joints, 4)),
         command=np.zeros((history, 2 * joints)),
-        clock=np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
+        clock=np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
         score=np.zeros(hypotheses),
         since=np.zeros(hypotheses),
         disagreement=np.zeros((joints, 3)),
@@ -197,6 +201,7 @@ def see_by_identification(  # type: ignore[no-untyped-def]
 
     ``judged`` says which hypotheses are, shape (n,).
     """
+    forget(thresholds, memory)
     is_experienced = known.clock[2] * known.look[1] >= EXPERIENCE
     identify(known, readings, thresholds, judged, memory, time, angle, pressure, is_experienced)
     look_at_potentiometers(thresholds, memory, time, angle, pressure)
@@ -213,6 +218,7 @@ def see_by_simulation(  # type: ignore[no-untyped-def]
     known of the arm, shape (2, n); ``thresholds`` are those of each.
     """
     by_simulation, by_identification = thresholds
+    forget(by_simulation, memory)
     if memory.clock[1] >= memory.clock[2]:
         expect_by_simulation(predictor, readings, memory)
         for m in range(memory.std.shape[0]):
@@ -257,6 +263,24 @@ def identify(known, readings, thresholds, judged, memory, time, angle, pressure,
             note_answers(known, pressure)
         remember_look(known, angle, pressure, False)
         shift_slots(known)
+
+
+@part
+def forget(thresholds, memory):  # type: ignore[no-untyped-def]
+    """Let evidence fade while nothing was found: what adds up for minutes is an error of what is expected."""
+    if memory.clock[5] == 0.0:
+        for h in range(memory.score.shape[0]):
+            memory.score[h] = faded(thresholds, memory.score[h])
+        for j in range(memory.disagreement.shape[0]):
+            for q in range(memory.disagreement.shape[1]):
+                memory.disagreement[j, q] = faded(thresholds, memory.disagreement[j, q])
+
+
+@part
+def faded(thresholds, evidence):  # type: ignore[no-untyped-def]
+    """Return what is left of ``evidence`` after a period."""
+    left = thresholds.kept * evidence
+    return left if left > _NOTHING else 0.0
 
 
 @part
@@ -314,8 +338,9 @@ def weigh_hypotheses(thresholds, readings, judged, memory, time, pressure):  # t
             telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
             # What has been found brings it so far by itself, and there it looks like other faults.
             telling = telling and (fills or memory.base[m] <= thresholds.over or memory.clock[4] == 0.0)
-            if readings.leak[h, m] > 0.0:  # small differences tell, but an empty muscle has nothing to lose
+            if readings.leak[h, m] > 0.0:  # smaller differences tell, but an empty muscle has nothing to lose
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
+                telling = telling and abs(difference) > _LEAKING * memory.std[m]
                 telling = telling and memory.base[m] - lowest >= thresholds.empty
             if telling:
                 unsure = thresholds.unsure * difference

@@ -122,7 +122,7 @@ class Monitor:
         memory.score[[one.kind in CHANGES for one in self._hypotheses]] = 0.0
         for key in [key for key in self._open if key[0] in CHANGES]:
             self._close(key, float(memory.clock[0]))
-        memory.clock[3] = self._width()
+        self._note_what_is_open()
 
     @property
     def familiar(self) -> bool:
@@ -143,6 +143,7 @@ class Monitor:
         settings, spec = self.settings, self.spec
         return Thresholds(
             most=settings.most,
+            kept=math.exp(-spec.period / settings.fading),
             alarm=weighing.alarm,
             telling=weighing.telling,
             inflation=settings.inflation,
@@ -303,12 +304,13 @@ class Monitor:
                 self.findings.append(Finding(kind, detail, joint, muscle, since, now))
         for key in [key for key in self._open if key not in holding]:
             self._close(key, now)
-        self._memory.clock[3] = self._width()
-        self._memory.clock[4] = float(any(key[0] not in CHANGES for key in self._open))
+        self._note_what_is_open()
 
-    def _width(self) -> float:
-        """Return how large residuals are, in usual ones: a simulation of another arm is no proof of a stuck valve."""
-        return self.settings.apart if any(key[0] in DISAGREEMENTS for key in self._open) else 1.0
+    def _note_what_is_open(self) -> None:
+        """Tell the kernels. Residuals of an arm that has changed are larger, and no proof of a stuck valve."""
+        has_changed = any(key[0] in DISAGREEMENTS for key in self._open)
+        is_wrong = any(key[0] not in CHANGES for key in self._open)
+        self._memory.clock[3:] = self.settings.apart if has_changed else 1.0, is_wrong, bool(self._open)
 
     def _close(self, key: Key, now: float) -> None:
         place = self._open.pop(key)

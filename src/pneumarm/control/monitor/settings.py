@@ -49,6 +49,9 @@ class MonitorSettings(Settings):
     """By how much the evidence of another fault must exceed it for what was found to be called by its name."""
     most: float = 5.0
     """Evidence that a single reading gives at most."""
+    fading: float = 20.0
+    """Time in which evidence of what has not been found fades to 37 % [s]: faults show in seconds, and what takes
+    minutes to add up, while an arm is held at a goal, is an error of what is expected."""
     inflation: float = 1.5
     """Standard deviations of the simulation's error on held-out sequences that count as one."""
     calm: float = 20.0
@@ -82,6 +85,7 @@ class MonitorSettings(Settings):
         return {
             "lead": 0 <= self.lead < math.inf,
             "most": 0 < self.most < math.inf,
+            "fading": 0 < self.fading < math.inf,
             "inflation": 0 < self.inflation < math.inf,
             "calm": 0 < self.calm < math.inf,
             "fast": 0 < self.fast < math.inf,

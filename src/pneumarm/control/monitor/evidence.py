@@ -44,7 +44,7 @@ FREEDOM = 4.0
 ZONES = 32
 """Parts of the range of an angle by which residuals are kept."""
 _NOTHING = 0.1  # evidence that is none
-_LEAKING = 0.5  # standard deviations of a difference that tells of a leak: of less errors tell as much
+_LEAKING = 1.0  # standard deviations of a difference that tells of a leak: of less, errors tell as much
 _FAR = 2.5  # standard deviations of a pressure that is worth telling of
 _REMEMBERED = 3000.0  # residuals after which earlier ones count less in how long they last ...
 _AT_FIRST = 1000.0  # ... and for how many not lasting at all counts at the beginning
@@ -194,28 +194,23 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
 
 
 @kernel
-def see_by_identification(  # type: ignore[no-untyped-def]
-    known, readings, thresholds, judged, memory, time, angle, pressure
-):
-    """Weigh a reading by what is known of the arm; the valves chosen after it go into ``memory.command[0]``.
-
-    ``judged`` says which hypotheses are, shape (n,).
-    """
+def see_by_identification(known, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
+    """Weigh a reading by what is known of the arm; the valves chosen after it go into ``memory.command[0]``."""
     forget(thresholds, memory)
     is_experienced = known.clock[2] * known.look[1] >= EXPERIENCE
-    identify(known, readings, thresholds, judged, memory, time, angle, pressure, is_experienced)
+    identify(known, readings, thresholds, memory, time, angle, pressure, is_experienced)
     look_at_potentiometers(thresholds, memory, time, angle, pressure)
     observe(memory, time, angle, pressure)
 
 
 @kernel
 def see_by_simulation(  # type: ignore[no-untyped-def]
-    predictor, known, readings, thresholds, judged, memory, time, angle, pressure
+    predictor, known, readings, thresholds, trusts_simulation, memory, time, angle, pressure
 ):
     """Weigh a reading by a simulation; the valves chosen after it go into ``memory.command[0]``.
 
-    The arm is identified besides. ``judged`` says which hypotheses are judged by the simulation and which by what is
-    known of the arm, shape (2, n); ``thresholds`` are those of each.
+    The arm is identified besides. Unless it ``trusts_simulation``, what is known of the arm judges its valves and the
+    simulation only whether it has changed; ``thresholds`` are those of each.
     """
     by_simulation, by_identification = thresholds
     forget(by_simulation, memory)
@@ -227,7 +222,8 @@ def see_by_simulation(  # type: ignore[no-untyped-def]
             memory.lowest[m], memory.full[m] = predictor.lowest[m], predictor.highest
             memory.clear[m] = by_simulation.clear
             memory.trust[m] = what_is_new(memory, m // 2, 1 + m % 2)
-        weigh_hypotheses(by_simulation, readings, judged[0], memory, time, pressure)
+        if trusts_simulation:
+            weigh_hypotheses(by_simulation, readings, memory, time, pressure)
         for j in range(angle.shape[0]):
             error = (angle[j] - memory.angle[j]) / (usual(by_simulation, memory, j) * predictor.std[j, 0])
             weigh_disagreement(by_simulation, memory, j, 0, error, time)
@@ -236,14 +232,14 @@ def see_by_simulation(  # type: ignore[no-untyped-def]
                 m = 2 * j + side
                 error = memory.clock[3] * (pressure[j, side] - memory.expected[0, m]) / memory.std[m]
                 weigh_disagreement(by_simulation, memory, j, 1 + side, error, time)
-    identify(known, readings, by_identification, judged[1], memory, time, angle, pressure, judged[1].any())
+    identify(known, readings, by_identification, memory, time, angle, pressure, not trusts_simulation)
     look_at_potentiometers(by_simulation, memory, time, angle, pressure)
     observe(memory, time, angle, pressure)
 
 
 @part
-def identify(known, readings, thresholds, judged, memory, time, angle, pressure, judges):  # type: ignore[no-untyped-def]
-    """Learn of the arm from a reading that is a look; if it ``judges``, weigh the hypotheses that are ``judged``."""
+def identify(known, readings, thresholds, memory, time, angle, pressure, judges):  # type: ignore[no-untyped-def]
+    """Learn of the arm from a reading that is a look; if it ``judges``, weigh the hypotheses, too."""
     if memory.clock[1] < 1.0:
         remember_look(known, angle, pressure, True)
     else:
@@ -256,7 +252,7 @@ def identify(known, readings, thresholds, judged, memory, time, angle, pressure,
                 memory.std[m] *= memory.clock[3]
                 memory.clear[m] = min(thresholds.clear, half_a_filling(known, m))
             if judges:
-                weigh_hypotheses(thresholds, readings, judged, memory, time, pressure)
+                weigh_hypotheses(thresholds, readings, memory, time, pressure)
             if memory.clock[4] == 0.0:
                 for m in range(memory.std.shape[0]):
                     learn(known, m, angle, pressure[m // 2, m % 2])
@@ -313,8 +309,8 @@ def surprise(error):  # type: ignore[no-untyped-def]
 
 
 @part
-def weigh_hypotheses(thresholds, readings, judged, memory, time, pressure):  # type: ignore[no-untyped-def]
-    """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis that is ``judged`` (n,)."""
+def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ignore[no-untyped-def]
+    """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis."""
     most = 0.0
     for m in range(memory.std.shape[0]):
         read = pressure[m // 2, m % 2]
@@ -322,8 +318,6 @@ def weigh_hypotheses(thresholds, readings, judged, memory, time, pressure):  # t
             last = memory.surprise[m]
             last[0], last[1], last[2], last[3] = time, read, memory.expected[0, m], memory.std[m]
     for h in range(1, memory.score.shape[0]):
-        if not judged[h]:
-            continue
         evidence = 0.0
         for m in range(memory.std.shape[0]):
             difference = memory.expected[h, m] - memory.expected[0, m]

@@ -50,8 +50,8 @@ class Monitor:
     Valves, supply and large leaks are judged by what the monitor itself learns of the arm while it watches
     (:mod:`pneumarm.control.monitor.identification`), from twenty seconds on and the better the longer; and it is
     noticed if pressures do what no sound arm's do. With a ``simulation`` of the arm they are judged by what that
-    expects until the monitor has seen each muscle fill and empty for long enough itself, leaks for ever; and an arm
-    that has changed is noticed. Potentiometers on a rail or frozen are found in both cases.
+    expects until the monitor has seen each muscle fill and empty for long enough itself; and an arm that has changed
+    is noticed. Potentiometers on a rail or frozen are found in both cases.
     Of an arm without pressure sensors only the angles are judged: potentiometers, and by a simulation whether the arm
     has changed, whatever the reason.
 
@@ -88,7 +88,6 @@ class Monitor:
         self._hypotheses, self._readings = hypotheses(spec.joints, spec.muscles)
         if not spec.pressure_sensors:  # estimates follow the commands, whatever valves and air do
             self._hypotheses, self._readings = self._hypotheses[:1], self._readings.first(1)
-        self._is_leak = np.array([one.kind == "leak" for one in self._hypotheses])
         history = 2 if simulation is None else max(2, simulation.window.history)
         self._memory = new_memory(spec.joints, history, len(self._hypotheses))
         self._simulation = simulation
@@ -130,14 +129,11 @@ class Monitor:
         return self._predictor is not None or bool(self._known.clock[2] * self._known.look[1] >= EXPERIENCE)
 
     def _judge_by_simulation(self, trusted: bool) -> None:
-        """Judge valves and supply by the simulation while it is ``trusted``, then by what is known of the arm."""
+        """Judge valves and air by the simulation while it is ``trusted``, then by what is known of the arm."""
         self._trusts_simulation = trusted
         weighing = self.settings.by_simulation if trusted else self.settings.by_identification
         self._thresholds = self._by_simulation if trusted else self._by_identification
         self._prior = np.array([weighing.supply * (one.kind == "low-supply") for one in self._hypotheses])
-        self._judged = np.stack([trusted | self._is_leak, ~(trusted | self._is_leak)])
-        if self._predictor is None:
-            self._judged[:] = True
 
     def _packed(self, weighing: Weighing) -> Thresholds:
         settings, spec = self.settings, self.spec
@@ -211,7 +207,6 @@ class Monitor:
                 self._known,
                 self._readings,
                 self._by_identification,
-                self._judged[0],
                 memory,
                 reading.time,
                 reading.angle,
@@ -223,14 +218,14 @@ class Monitor:
                 self._known,
                 self._readings,
                 (self._by_simulation, self._by_identification),
-                self._judged,
+                self._trusts_simulation,
                 memory,
                 reading.time,
                 reading.angle,
                 reading.pressure,
             )
             if self._trusts_simulation and not memory.clock[4] and self._has_seen_all():
-                memory.score[~self._is_leak] = 0.0
+                memory.score[...] = 0.0
                 self._judge_by_simulation(False)
         self._note_further(reading)
         # Not by a kernel: handing the memory over to one takes longer than the kernel.

@@ -23,6 +23,7 @@ PNEUMARM_FAULTS_FOLDER   where all that was made is kept, so that an interrupted
 """
 
 import math
+import shutil
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -441,7 +442,8 @@ class Bench:
         if row is None:
             known = self.known(arm, way)
             if known is not None and way == "moving":
-                found, watched = healthy_movements(self.draw, arm, known, self.agent(arm), hours)
+                recording = self.folder / f"{self.draw}-{arm}.db"
+                found, watched = healthy_movements(self.draw, arm, known, self.agent(arm), hours, recording)
             elif known is not None and way == "holding":
                 found, watched = healthy_holding(self.draw, arm, known, self.agent(arm), hours)
             else:
@@ -495,16 +497,24 @@ def healthy_collecting(
 
 
 def healthy_movements(
-    draw: str, arm: int, simulation: Simulation, agent: AnyAgent, hours: float
+    draw: str, arm: int, simulation: Simulation, agent: AnyAgent, hours: float, recording: Path
 ) -> tuple[list[Finding], float]:
-    """Return what was found wrong with a healthy arm that a policy moves and adapts to, and the hours that took."""
+    """Return what was found wrong with a healthy arm that a policy moves and adapts to, and the hours that took.
+
+    As in a run the movements are stored behind the ``recording``, so that what was seen there is known.
+    """
     healthy = opened(draw, arm, 2000 + arm)
     monitor = Monitor(healthy.spec, simulation)
     episodes = max(1, round(hours * 3600 / 5.5))
     settings = TransferSettings(episodes=episodes // 2, test_episodes=max(1, episodes // 4))
-    with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", healthy.spec) as store:
-        transfer(agent, healthy, store, settings, seed=arm, watch=monitor)
-    return monitor.findings, healthy.time / 3600
+    with tempfile.TemporaryDirectory() as place:
+        db = Path(shutil.copy(recording, place))
+        with Store.for_arm(db, healthy.spec) as store:
+            if (state := store.state("arm")) is not None:
+                healthy.set_state(state)
+            began = healthy.time
+            transfer(agent, healthy, store, settings, seed=arm, watch=monitor)
+    return monitor.findings, (healthy.time - began) / 3600
 
 
 def healthy_holding(

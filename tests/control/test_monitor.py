@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from benchmarks.faults import KINDS, fitted, healthy_collecting, judged, play, watched_steps
 
-from pneumarm.arm import Reading
+from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.virtual import (
     DeadPotentiometer,
     Leak,
@@ -183,6 +183,23 @@ def test_what_it_has_seen_of_an_arm_for_long_counts_more_than_a_simulation(simul
             break
     assert [(one.kind, one.muscle) for one in monitor.findings] == [("stuck-valve", 2)]
     assert "what this arm itself did" in monitor.reasons()
+
+
+def test_what_was_seen_while_an_arm_was_recorded_is_known_later(simulation):
+    arm = VirtualArm(draw_parameters(3), seed=6)
+    recorded = Monitor(arm.spec)
+    watched_until(recorded, arm, 400.0, 6)
+    monitor = Monitor(arm.spec, simulation)
+    monitor.know(recorded.get_state())
+    begun = arm.time
+    watched_until(monitor, arm, begun + 30.0, 7)
+    assert monitor.findings == []
+    assert "what this arm itself did" in monitor.reasons()
+    for damaged in (b"", b"{}", b'{"identified": {"weight": ""}}'):
+        with pytest.raises(UnusableInput, match="known of the arm"):
+            monitor.know(damaged)
+    with pytest.raises(UnusableInput, match="another arm"):
+        Monitor(open_arm("virtual:joints=2").spec).know(recorded.get_state())
 
 
 def test_a_simulation_judges_valves_while_little_was_seen_of_them(simulation):

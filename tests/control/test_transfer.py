@@ -15,7 +15,7 @@ import pneumarm
 from pneumarm.adaptation import Adaptation, AdaptationSettings, RefitSettings
 from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.virtual import StuckValve, VirtualArm
-from pneumarm.control import TransferSettings, put_back, read_history, transfer, transfer_into
+from pneumarm.control import Monitor, TransferSettings, put_back, read_history, transfer, transfer_into
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.learning import Agent, AnyAgent, PolicyAgent, PolicySettings, train
 from pneumarm.learning.servo import ServoAgent, ServoSettings
@@ -143,6 +143,15 @@ def test_a_policy_that_was_interrupted_while_adapting_goes_on_as_if_nothing_had_
     assert (folder / "adapted.safetensors").read_bytes() != _saved(policy, tmp_path)
     assert (folder / "agents/000.safetensors").read_bytes() == _saved(policy, tmp_path)
     assert transfer_into(folder, policy, VirtualArm(seed=4), POLICY, seed=1) == whole  # there is nothing left to do
+
+
+def test_the_monitor_knows_what_was_seen_while_the_arm_was_recorded(policy: AnyAgent, tmp_path: Path) -> None:
+    arm, settings = VirtualArm(seed=4), TransferSettings(episodes=2, test_episodes=2)
+    with Store.for_arm(tmp_path / "transitions.db", arm.spec) as store:
+        collect(arm, store, 9_000, 1, watch=Monitor(arm.spec))
+        watch = Monitor(arm.spec, policy.simulation)
+        transfer(policy, arm, store, settings, seed=1, watch=watch)
+    assert "what this arm itself did" in watch.reasons()
 
 
 @pytest.fixture(scope="module")

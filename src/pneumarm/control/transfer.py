@@ -218,8 +218,12 @@ class Transfer:
         warm_up(self._arrived)
         if self._learning is not None:
             warm_up(self._arrived, self._learning.another())
-        if (seen := self._state("watch")) is not None:
+        seen = self._store.state("watch")
+        if seen is not None and self._done:
             self._watch.set_state(seen)
+        elif seen is not None:  # of the recording
+            with suppress(UnusableInput):  # of an earlier version
+                self._watch.know(seen)
 
     def _judge(self) -> None:
         """Let the monitor judge by the simulation of the agent as it is."""

@@ -464,6 +464,20 @@ class Monitor:
             state["measured"] = self._measured.tolist()
         return json.dumps(state).encode()
 
+    def know(self, state: bytes) -> None:
+        """Take up what a monitor with this ``state`` had learned of the arm, as the one that watched it recorded.
+
+        Raises:
+            UnusableInput: it is none, or one of a monitor of another arm.
+
+        """
+        try:
+            known = _identified_of(json.loads(state)["identified"], self._known)
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise UnusableInput(f"what was known of the arm is damaged, or of another arm ({error})") from error
+        for name, values in known._asdict().items():
+            getattr(self._known, name)[...] = values
+
     def set_state(self, state: bytes) -> None:
         """Take up a state of :meth:`get_state`, bit for bit.
 

@@ -196,7 +196,6 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
 @kernel
 def see_by_identification(known, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
     """Weigh a reading by what is known of the arm; the valves chosen after it go into ``memory.command[0]``."""
-    forget(thresholds, memory)
     is_experienced = known.clock[2] * known.look[1] >= EXPERIENCE
     identify(known, readings, thresholds, memory, time, angle, pressure, is_experienced)
     look_at_potentiometers(thresholds, memory, time, angle, pressure)
@@ -263,7 +262,7 @@ def identify(known, readings, thresholds, memory, time, angle, pressure, judges)
 
 @part
 def forget(thresholds, memory):  # type: ignore[no-untyped-def]
-    """Let evidence fade while nothing was found: what adds up for minutes is an error of what is expected."""
+    """Let evidence fade while nothing was found: what adds up for minutes is an error of the simulation."""
     if memory.clock[5] == 0.0:
         for h in range(memory.score.shape[0]):
             memory.score[h] = faded(thresholds, memory.score[h])

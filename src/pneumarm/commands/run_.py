@@ -62,7 +62,7 @@ def run_(
     }
     rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
     settles = run.settings.settles
-    title = "To reach goals, as the thesis pays for it, which this agent was not trained for" if settles else "Ledger"
+    title = "Reaching goals, for which it was not trained" if settles else "Ledger"
     show(results, json, lambda: [*how_it_moves(results), table(("", *HEADINGS), rows, title=title)])
     say_history(out)
     for stage, doing in (("collect", "collecting"), ("transfer", "moving")):

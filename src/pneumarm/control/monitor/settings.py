@@ -50,8 +50,8 @@ class MonitorSettings(Settings):
     most: float = 5.0
     """Evidence that a single reading gives at most."""
     fading: float = 20.0
-    """Time in which, with a simulation, evidence of what has not been found fades to 37 % [s]: faults show in seconds,
-    and what takes minutes to add up, while an arm is held at a goal, is an error of the simulation."""
+    """Time in which, with a simulation, evidence of what has not been found fades to 37 % [s]: faults show in
+    seconds, and what takes minutes to add up, while an arm is held at a goal, is an error of the simulation."""
     inflation: float = 1.5
     """Standard deviations of the simulation's error on held-out sequences that count as one."""
     calm: float = 20.0

@@ -57,6 +57,7 @@ from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control import AgentController, TransferSettings, transfer
 from pneumarm.control.monitor import Finding, Monitor, marks_of
 from pneumarm.control.movement import BEGIN, draw_movement, move
+from pneumarm.errors import UnusableInput
 from pneumarm.learning import AnyAgent, Tracks, goals_of, load_agent, train
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.movement import move as move_and_hold
@@ -362,6 +363,8 @@ def measure() -> Iterator[str]:
     how = environment.choice("PNEUMARM_FAULTS_COLLECT", COLLECT)
     arms = environment.seeds("PNEUMARM_FAULTS_ARMS", "1-20")
     ways = environment.words("PNEUMARM_FAULTS_WHILE", ",".join((*WARM_UP, "holding")))
+    if unknown := [way for way in ways if way not in (*WARM_UP, "holding")]:
+        raise UnusableInput(f"PNEUMARM_FAULTS_WHILE: expected {', '.join((*WARM_UP, 'holding'))}, got {unknown[0]}")
     cases = environment.whole("PNEUMARM_FAULTS_CASES", 40, least=0)
     hours = environment.whole("PNEUMARM_FAULTS_HOURS", 10, least=0)
     with environment.kept_folder("PNEUMARM_FAULTS_FOLDER") as folder:

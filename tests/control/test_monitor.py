@@ -200,6 +200,8 @@ def test_what_was_seen_while_an_arm_was_recorded_is_known_later(simulation):
             monitor.know(damaged)
     with pytest.raises(UnusableInput, match="another arm"):
         Monitor(open_arm("virtual:joints=2").spec).know(recorded.get_state())
+    with pytest.raises(UnusableInput, match="control period"):
+        Monitor(replace(arm.spec, period=1 / 50)).know(recorded.get_state())
 
 
 def test_a_simulation_judges_valves_while_little_was_seen_of_them(simulation):

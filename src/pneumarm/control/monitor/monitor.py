@@ -473,10 +473,13 @@ class Monitor:
         """
         try:
             known = _identified_of(json.loads(state)["identified"], self._known)
+            if (known.look != self._known.look).any():
+                raise ValueError("it has another control period, or other ranges")
         except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise UnusableInput(f"what was known of the arm is damaged, or of another arm ({error})") from error
         for name, values in known._asdict().items():
             getattr(self._known, name)[...] = values
+        self.begin(at_rest=True)
 
     def set_state(self, state: bytes) -> None:
         """Take up a state of :meth:`get_state`, bit for bit.

@@ -41,7 +41,7 @@ class PolicyActor:
         self._look_ahead_in(settings.lookahead)
         several = window.joints > 1 and settings.lookahead > 0 and settings.nodes > 0
         self._courses = Courses(simulation, settings) if several else None
-        self._hurries_left = _HURRIES if several else 0  # a decision for one joint takes a millisecond or two
+        self._hurries_left = _HURRIES
         self._decided = False
         self._state_size = mind.inputs.state_size
 
@@ -86,7 +86,7 @@ class PolicyActor:
         self._decided = False
 
     def hurry(self) -> None:
-        """Decide for several joints in about half the time from now on, down to a quarter of it."""
+        """Decide in about half the time from now on, down to a quarter; for one joint it takes a millisecond."""
         if self._courses is not None and self._hurries_left:
             self._hurries_left -= 1
             self._courses.hurry()

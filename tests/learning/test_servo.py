@@ -10,6 +10,8 @@ from learning.synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.arm import Reading, guarded
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.errors import UnusableInput
+from pneumarm.learning import test as simulated_test
+from pneumarm.learning.methods import TEST
 from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import learn_once
@@ -25,7 +27,10 @@ from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.simulation.arm import SimulationArm
+from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.acting import test_acting
+from pneumarm.task.environment import environment
 
 SMALL = ServoSettings(arms=8, updates=4, agents=1, duration=0.3, hidden=(8, 8), validation_movements=8)
 
@@ -198,6 +203,22 @@ def trained() -> ServoAgent:
     simulation = replace(simulation, error_std=simulation.error_std / 4)
     settings = ServoSettings(arms=48, updates=400, agents=1, hidden=(24, 24), validation_movements=48)
     return train_servo(simulation, synthetic_begin_states(simulation), settings).agent
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_many_movements_at_once_are_those_that_are_made_one_after_another(joints: int):
+    simulation = synthetic_simulation(joints)
+    begin = synthetic_begin_states(simulation)
+    settings = replace(SMALL, updates=40, cutoff=12, noise=NoiseSettings(kind="none"))  # some are cut off
+    agent = train_servo(simulation, begin, settings).agent
+    made = simulated_test(agent, simulation, begin, 150, 3)
+    again = test_acting(agent.actor(), environment(simulation, begin, settings), 150, (3, TEST))
+    for name in ("goal", "angle_begin"):
+        np.testing.assert_array_equal(getattr(made, name), getattr(again, name))
+    for name in ("reward", "actions", "all_switches"):  # sums are in another order, so a pulse may be another once
+        assert (getattr(made, name) == getattr(again, name)).mean() > 0.9
+    assert 0 < made.success.mean() < 1
+    assert made.all_switches.max() > 0
 
 
 def test_it_settles_and_holds_without_pulses(trained: ServoAgent):

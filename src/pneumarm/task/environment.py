@@ -172,17 +172,23 @@ def take(environment, episode, actions):  # type: ignore[no-untyped-def]
 
 
 @part
-def take_pulses(environment, episode, pulses):  # type: ignore[no-untyped-def]
-    """Do what :func:`take` does with ``pulses`` (joints, 2); a switch is a joint's other pulses than before."""
+def order_pulses(task, episode, pulses):  # type: ignore[no-untyped-def]
+    """Do what :func:`order` does with ``pulses`` (joints, 2); a switch is a joint's other pulses than before."""
     for joint in range(pulses.shape[0]):
         differs = False
         for muscle in range(2):
-            whole = environment.task.commands[joint, ACTIONS - 1, muscle]  # both inlets open for the whole period
+            whole = task.commands[joint, ACTIONS - 1, muscle]  # both inlets open for the whole period
             command = np.float32(pulses[joint, muscle]) * whole
             differs = differs or command != episode.command[2 * joint + muscle]
             episode.command[2 * joint + muscle] = command
         episode.switched[joint] = 1 if episode.actions[joint] >= 0 and differs else 0
         episode.actions[joint] = 0  # no longer the first
+
+
+@part
+def take_pulses(environment, episode, pulses):  # type: ignore[no-untyped-def]
+    """Do what :func:`take` does with ``pulses`` (joints, 2)."""
+    order_pulses(environment.task, episode, pulses)
     step(environment.simulation, environment.noise, episode.state, episode.command)
     return reached(environment.task, episode)
 

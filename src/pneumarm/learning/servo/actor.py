@@ -16,18 +16,39 @@ if TYPE_CHECKING:
     from pneumarm.learning.servo.agent import ServoAgent
 
 
+class ServoNetwork:
+    """The policy's network and its workspace, for the commands of ``n`` arms at once."""
+
+    def __init__(self, agent: ServoAgent, n: int) -> None:
+        window, self.task = agent.window, agent.task
+        self._layers, self._units = split(agent.policy, agent.sizes), layers_workspace(agent.sizes, n)
+        self._inputs = np.zeros((input_size(self.task.inputs), n), np.float32)
+        self._command, self._slope = (np.zeros((2 * window.joints, n), np.float32) for _ in range(2))
+        self._no_noise = np.zeros((window.history, 3 * window.joints, n), np.float32)
+
+    def command(
+        self, x: NDArray[np.float32], previews: NDArray[np.float32], underway: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """Return the commands (2 joints, n) in the states ``x`` (size, n); they are overwritten next time.
+
+        The reference will be at ``previews`` (previews, joints, n) [scaled], and ``underway`` (joints, n) tells which
+        joints are on their way to a goal that stays.
+        """
+        write_inputs(self.task.inputs, x, self._no_noise, len(self._no_noise) - 1, previews, self._inputs)
+        forward(self._layers, self._inputs, self._units)
+        write_commands(self.task.commands, x, underway, self._units[-1], self._slope, self._command)
+        return self._command
+
+
 class ServoActor:
     """Gives commands for scaled states (state_size,), with a goal that stays or with previews of a reference."""
 
     def __init__(self, agent: ServoAgent) -> None:
         window = agent.window
-        self.task, self._layers = agent.task, split(agent.policy, agent.sizes)
-        self._units = layers_workspace(agent.sizes, 1)
+        self._network = ServoNetwork(agent, 1)
+        self.task = self._network.task
         self._x = np.zeros((self.task.simulation.hidden.shape[0], 1), np.float32)
-        self._inputs = np.zeros((input_size(self.task.inputs), 1), np.float32)
-        self._command, self._slope = (np.zeros((2 * window.joints, 1), np.float32) for _ in range(2))
         self._underway = np.zeros((window.joints, 1), bool)
-        self._no_noise = np.zeros((window.history, 3 * window.joints, 1), np.float32)
         self._offset = window.of_joints(agent.scaling.observation_offset)[:, 0]
         self._scale = window.of_joints(agent.scaling.observation_scale)[:, 0]
         self._state = np.zeros(window.state_size, np.float32)
@@ -56,7 +77,4 @@ class ServoActor:
         self._underway[:, 0] = underway
         self._x[: state.size, 0] = state
         scaled = ((previews - self._offset) / self._scale).astype(np.float32)[:, :, None]
-        write_inputs(self.task.inputs, self._x, self._no_noise, len(self._no_noise) - 1, scaled, self._inputs)
-        forward(self._layers, self._inputs, self._units)
-        write_commands(self.task.commands, self._x, self._underway, self._units[-1], self._slope, self._command)
-        return self._command.astype(np.float64).reshape(-1, 2)
+        return self._network.command(self._x, scaled, self._underway).astype(np.float64).reshape(-1, 2)

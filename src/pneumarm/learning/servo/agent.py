@@ -15,10 +15,12 @@ from pneumarm.learning.servo.inputs import input_size, seen_parameters
 from pneumarm.learning.servo.predictive import PLANS, PredictiveControl
 from pneumarm.learning.servo.price import PriceParameters, prices_of_errors
 from pneumarm.learning.servo.settings import SOFT, STIFF, USUAL_PERIOD, ServoSettings
+from pneumarm.learning.servo.testing import run_servo
 from pneumarm.networks.layers import trainable
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
+from pneumarm.task.movements import Movements
 
 KIND = "pneumarm servo"
 _PAST_THE_LIMIT = 0.2  # share of the gradient, see ServoTask
@@ -67,6 +69,10 @@ class ServoAgent(NetworkAgent):
             return None
         policy = trainable(self.policy.copy(), self.sizes, PLANS)
         return PredictiveControl(self.simulation, self.task, self.settings.planned, policy)
+
+    def test(self, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]) -> Movements:
+        """Let the servo reach goals in ``simulation``."""
+        return run_servo(self, simulation, begin, episodes, seed)
 
     def adapted(
         self, simulation: Simulation, begin: BeginStates, updates: int, warm_up: int, learning_rate: float, seed: int

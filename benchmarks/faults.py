@@ -89,6 +89,8 @@ AFTERWARDS = 20.0
 """Watched time after a contradiction in which the monitor may go on to say more [s]."""
 LATER = 10.0
 """A fault that is not found in time may be found within this of its contradiction [s]."""
+TRIED = 2000.0
+"""How many times an arm leaks for a moment to find out what that does to it."""
 CONTRADICTS = (0.5, 0.02)
 """A reading contradicts that differs by more than this from that of a sound arm [degrees], [bar]."""
 
@@ -98,7 +100,7 @@ class Kind:
     """A kind of case."""
 
     name: str
-    make: Callable[[int, float, ArmSpec], Fault]
+    make: Callable[[int, float, VirtualArm], Fault]
     """Makes the fault of muscle 1 or 2, of a begin and an arm."""
     found_as: tuple[str, ...]
     """How it may rightly be called."""
@@ -107,37 +109,62 @@ class Kind:
 
 
 KINDS = (
-    Kind("inlet stuck closed", lambda m, t, s: StuckValve(muscle=m, begin=t), ("stuck-valve",)),
-    Kind("inlet stuck open", lambda m, t, s: StuckValve(muscle=m, position="open", begin=t), ("stuck-valve",)),
-    Kind("outlet stuck closed", lambda m, t, s: StuckValve(muscle=m, valve="outlet", begin=t), ("stuck-valve",)),
+    Kind("inlet stuck closed", lambda m, t, a: StuckValve(muscle=m, begin=t), ("stuck-valve",)),
+    Kind("inlet stuck open", lambda m, t, a: StuckValve(muscle=m, position="open", begin=t), ("stuck-valve",)),
+    Kind("outlet stuck closed", lambda m, t, a: StuckValve(muscle=m, valve="outlet", begin=t), ("stuck-valve",)),
     Kind(
         "outlet stuck open",
-        lambda m, t, s: StuckValve(muscle=m, valve="outlet", position="open", begin=t),
+        lambda m, t, a: StuckValve(muscle=m, valve="outlet", position="open", begin=t),
         ("stuck-valve",),
     ),
-    Kind("inlet and outlet swapped", lambda m, t, s: SwappedValves(muscle=m, begin=t), ("swapped-valves",)),
-    Kind("muscles swapped", lambda m, t, s: SwappedMuscles(muscle=m, begin=t), ("swapped-muscles",)),
-    Kind("supply lost", lambda m, t, s: SupplyLoss(begin=t), ("low-supply",), 0.5),
-    Kind("supply halved", lambda m, t, s: SupplyLoss(to=0.5, begin=t), ("low-supply",)),
-    Kind("potentiometer dead", lambda m, t, s: DeadPotentiometer(begin=t), ("dead-potentiometer",), 0.067),
-    Kind("potentiometer frozen", lambda m, t, s: FrozenPotentiometer(begin=t), ("frozen-potentiometer",), 0.5),
-    Kind("potentiometer logarithmic", lambda m, t, s: LogarithmicPotentiometer(begin=t), ("changed",), 60.0),
+    Kind("inlet and outlet swapped", lambda m, t, a: SwappedValves(muscle=m, begin=t), ("swapped-valves",)),
+    Kind("muscles swapped", lambda m, t, a: SwappedMuscles(muscle=m, begin=t), ("swapped-muscles",)),
+    Kind("supply lost", lambda m, t, a: SupplyLoss(begin=t), ("low-supply",), 0.5),
+    Kind("supply halved", lambda m, t, a: SupplyLoss(to=0.5, begin=t), ("low-supply",)),
+    Kind("potentiometer dead", lambda m, t, a: DeadPotentiometer(begin=t), ("dead-potentiometer",), 0.067),
+    Kind("potentiometer frozen", lambda m, t, a: FrozenPotentiometer(begin=t), ("frozen-potentiometer",), 0.5),
+    Kind("potentiometer logarithmic", lambda m, t, a: LogarithmicPotentiometer(begin=t), ("changed",), 60.0),
     Kind(
         "potentiometer worn",
-        lambda m, t, s: WornPotentiometer(angle=5, height=15 * s.angle_unit, contact=8 * s.angle_unit, begin=t),
+        lambda m, t, a: WornPotentiometer(
+            angle=5, height=15 * a.spec.angle_unit, contact=8 * a.spec.angle_unit, begin=t
+        ),
         ("worn-potentiometer",),
         60.0,
     ),
     Kind(
         "noise",
-        lambda m, t, s: SensorNoise(
-            angle=min(6 * s.angle_unit, 1e3), pressure=min(6 * s.pressure_unit, 1e3), begin=t
+        lambda m, t, a: SensorNoise(
+            angle=min(6 * a.spec.angle_unit, 1e3), pressure=min(6 * a.spec.pressure_unit, 1e3), begin=t
         ),
         ("sensor-noise",),
         60.0,
     ),
-    Kind("torn hose (2000 x leak)", lambda m, t, s: Leak(muscle=m, factor=2000, begin=t), ("leak",), 60.0),
+    Kind("large leak (0.5 / s)", lambda m, t, a: leak_of(a, m, t, 0.5), ("leak", "torn-hose"), 60.0),
+    Kind("torn hose (2 / s)", lambda m, t, a: leak_of(a, m, t, 2.0), ("torn-hose", "stuck-valve")),
 )
+
+
+def leak_of(arm: VirtualArm, muscle: int, begin: float, rate: float) -> Leak:
+    """Return a leak from ``begin`` on by which a ``muscle`` of ``arm`` loses its pressure at a ``rate`` [1/s].
+
+    By the same multiple of their usual leaks arms lose it a hundred times faster or slower, so it is tried out.
+    """
+    tried, valves = arm.like(0), np.zeros((arm.spec.joints, 2), np.int8)
+
+    def pressure() -> float:
+        return float(tried.spec.bar(tried.read().pressure)[0, muscle - 1])
+
+    valves[0, muscle - 1] = 1
+    tried.set_valves(valves)
+    while pressure() < 0.5 * tried.spec.max_pressure and tried.time < 10.0:
+        tried.wait(0.05)
+    tried.set_valves(np.zeros_like(valves))
+    tried.wait(0.5)
+    tried.faults = (Leak(muscle=muscle, factor=TRIED, begin=tried.time),)
+    before = pressure()
+    tried.wait(0.3)
+    return Leak(muscle=muscle, factor=TRIED * rate * 0.3 / math.log(before / pressure()), begin=begin)
 
 
 class Turn(NamedTuple):
@@ -319,7 +346,7 @@ def play(
     random = np.random.default_rng([seed, number])
     muscle = int(random.integers(1, 3))
     twins = Twins(opened(draw, number, seed), seed)
-    stage = Stage(twins, lambda time: kind.make(muscle, time, twins.spec), random, warm, max(AFTERWARDS, kind.within))
+    stage = Stage(twins, lambda time: kind.make(muscle, time, twins.arm), random, warm, max(AFTERWARDS, kind.within))
     if agent is None:
         for _ in watched_steps(twins, stage, seed, settings):
             if stage.over:

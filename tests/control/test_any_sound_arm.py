@@ -99,8 +99,8 @@ def test_what_no_sound_arm_does_is_wrong_from_the_start(make, said, tmp_path):
 
 def test_a_valve_that_is_stuck_open_is_open_beside_the_other_and_never_opens():
     found, readings = hypotheses(1)
-    by_detail = {(one.detail, one.muscle): h for h, one in enumerate(found)}
-    stuck_open = by_detail["the outlet is stuck open", 1]
+    by_detail = {(one.detail, one.muscle): h for h, one in enumerate(found) if not readings.leak[h].any()}
+    stuck_open = by_detail["the outlet is stuck open, or the hose is off", 1]
     filling, emptying = (1.0, 0.0), (0.0, 1.0)
     assert [time_open(readings, stuck_open, 0, valve, *filling) for valve in (0, 1)] == [1.0, 1.0]
     assert time_open(readings, stuck_open, 0, 1, 0.0, 0.0) == 1.0

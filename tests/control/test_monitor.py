@@ -52,6 +52,7 @@ def by_name():
         ("supply lost", 0.7),
         ("potentiometer dead", 0.07),
         ("potentiometer frozen", 0.6),
+        ("torn hose (2 / s)", 15.0),  # a muscle that is empty loses nothing
     ],
 )
 def test_finds_faults_with_a_simulation(simulation, name, within):
@@ -93,6 +94,7 @@ def test_a_worn_potentiometer_is_told_with_the_angle(simulation):
         "muscles swapped",
         "supply lost",
         "potentiometer dead",
+        "torn hose (2 / s)",
     ],
 )
 def test_finds_faults_before_there_is_a_simulation(name):
@@ -285,7 +287,7 @@ def test_hypotheses_are_told_apart_for_any_number_of_joints():
     for joints in (1, 2, 3):
         names, readings = hypotheses(joints)
         muscles = 2 * joints
-        assert len(names) == len(readings.source) == 3 + 6 * muscles + muscles * (muscles - 1) // 2
+        assert len(names) == len(readings.source) == 3 + 8 * muscles + muscles * (muscles - 1) // 2
         kept = [np.concatenate([*map(np.ravel, parts)]).tobytes() for parts in zip(*readings, strict=True)]
         assert len(set(kept)) == len(names)
 

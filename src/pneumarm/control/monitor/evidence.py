@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.velocity import derived_velocity
 from pneumarm.control.monitor.expectation import expect_by_simulation
-from pneumarm.control.monitor.hypotheses import independence
+from pneumarm.control.monitor.hypotheses import LEAKING, independence
 from pneumarm.control.monitor.identification import (
     EXPERIENCE,
     expect_by_identification,
@@ -331,9 +331,10 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
             # What has been found brings it so far by itself, and there it looks like other faults.
             telling = telling and (fills or memory.base[m] <= thresholds.over or memory.clock[4] == 0.0)
-            if readings.leak[h, m] > 0.0:  # smaller differences tell, but an empty muscle has nothing to lose
+            if readings.leak[h, m] == LEAKING:  # smaller differences tell, where nothing else does as much
                 telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
                 telling = telling and abs(difference) > _LEAKING * memory.std[m]
+            if readings.leak[h, m] > 0.0:  # an empty muscle has nothing to lose
                 telling = telling and memory.base[m] - lowest >= thresholds.empty
             if telling:
                 unsure = thresholds.unsure * difference

@@ -116,6 +116,12 @@ def expect_by_simulation(predictor, readings, memory):  # type: ignore[no-untype
         expect_further(predictor, lag)
     for h in range(memory.expected.shape[0]):
         expected, doubt = memory.expected[h], memory.doubt[h]
+        if h > 0 and readings.as_told[h].all():  # a leak
+            for m in range(expected.shape[0]):
+                level = memory.observed[0, m // 2, 2 + m % 2] - predictor.lowest[m]
+                lost = predictor.period * readings.leak[h, m] * max(0.0, level)
+                expected[m], doubt[m] = memory.expected[0, m] - lost, 0.0
+            continue
         both_open = expect_under(predictor, readings, memory, h, -1.0)
         for m in range(expected.shape[0]):
             expected[m], doubt[m] = predictor.following[m], 0.0
@@ -158,8 +164,7 @@ def expect_under(predictor, readings, memory, h, both):  # type: ignore[no-untyp
         following = predictor.offset[j, q] + predictor.scale[j, q] * scaled
         if q >= 2:
             m = 2 * j + q - 2
-            lost = predictor.period * readings.leak[h, m]
-            predictor.following[m] = following - lost * max(0.0, memory.observed[0, j, q] - predictor.lowest[m])
+            predictor.following[m] = following
         elif q == 0 and h == 0:
             memory.angle[j] = following
     return both_open

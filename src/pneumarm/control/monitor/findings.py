@@ -23,8 +23,9 @@ class Finding:
     """Something that is wrong with an arm."""
 
     kind: str
-    """As the faults of a virtual arm are called; ``low-supply``; ``changed`` where readings no longer agree with the
-    simulation, and neither noise of a sensor nor a worn potentiometer is the reason."""
+    """As the faults of a virtual arm are called; ``low-supply``; ``torn-hose``, a leak with which no muscle can be
+    held; ``changed`` where readings no longer agree with the simulation, and neither noise of a sensor nor a worn
+    potentiometer is the reason."""
     detail: str
     """What it is in words."""
     joint: int | None

@@ -17,12 +17,15 @@ from pneumarm.kernels import part
 
 LEAKING = 0.45
 """Rate at which a muscle with a large leak loses its pressure [1/s]."""
+TORN, OFF = 1.5, 4.0
+"""... whose hose is torn, and whose hose is off [1/s]: much like one whose outlet is stuck open."""
 HALF_SUPPLY = 0.5
 """A low supply as a part of the usual one; the other one is gone."""
 _WHOLE = math.inf  # the supply of a healthy arm
 _NEAR, _BACK = 0.35, 0.35  # of the usual supply, over which the flow ceases; part of it that runs back above
 _NEVER, _ALWAYS = (0, 0, 0), (1, 1, 1)
 _FILLING, _EMPTYING = (0, 0, 1), (1, 0, 0)
+_DRAINS = "the outlet is stuck open, or the hose is off"
 _TOLD = (_FILLING, _EMPTYING)  # inlet and outlet: whether each is open when told to empty, to close, to fill
 
 
@@ -73,7 +76,7 @@ def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Reading
         hypothesis: Hypothesis,
         change: tuple[int, tuple[tuple[int, int, int], tuple[int, int, int]]] | None = None,
         swap: tuple[int, int] | None = None,
-        leaking: int | None = None,
+        leaking: tuple[int, float] | None = None,
         supply: float = _WHOLE,
     ) -> None:
         source, valves, leak = np.arange(muscles), np.tile(_TOLD, (muscles, 1, 1)), np.zeros(muscles)
@@ -82,7 +85,7 @@ def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Reading
         if swap is not None:
             source[list(swap)] = swap[::-1]
         if leaking is not None:
-            leak[leaking] = LEAKING
+            leak[leaking[0]] = leaking[1]
         found.append(hypothesis)
         sources.append(source)
         opens.append(valves)
@@ -98,11 +101,14 @@ def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Reading
             ("the inlet is stuck closed", _NEVER, _EMPTYING),
             ("the outlet is stuck closed", _FILLING, _NEVER),
             ("the inlet is stuck open", _ALWAYS, _EMPTYING),
-            ("the outlet is stuck open", _FILLING, _ALWAYS),
+            (_DRAINS, _FILLING, _ALWAYS),
         ):
             add(Hypothesis("stuck-valve", detail, joint, muscle), (m, (inlet, outlet)))
         add(Hypothesis("swapped-valves", "inlet and outlet are swapped", joint, muscle), (m, _TOLD[::-1]))
-        add(Hypothesis("leak", "a large leak", joint, muscle), leaking=m)
+        add(Hypothesis("leak", "a large leak", joint, muscle), leaking=(m, LEAKING))
+        torn = "it loses its air, as if its hose were torn"
+        add(Hypothesis("torn-hose", torn, joint, muscle), leaking=(m, TORN))
+        add(Hypothesis("stuck-valve", _DRAINS, joint, muscle), leaking=(m, OFF))
     for first, second in combinations(there, 2):
         other = f"the valves are those of joint {second // 2 + 1}, muscle {second % 2 + 1}"
         add(Hypothesis("swapped-muscles", other, first // 2 + 1, first % 2 + 1), swap=(first, second))

@@ -53,6 +53,7 @@ from pneumarm.arm.virtual import (
     VirtualArm,
     WornPotentiometer,
 )
+from pneumarm.arm.virtual.parameters import BAR
 from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control import AgentController, TransferSettings, transfer
 from pneumarm.control.monitor import Finding, Monitor, marks_of
@@ -90,7 +91,8 @@ AFTERWARDS = 20.0
 LATER = 10.0
 """A fault that is not found in time may be found within this of its contradiction [s]."""
 TRIED = 2000.0
-"""How many times an arm leaks for a moment to find out what that does to it."""
+TRYING = 0.3
+"""How many times as much an arm leaks for a moment [s], to find out what that does to it."""
 CONTRADICTS = (0.5, 0.02)
 """A reading contradicts that differs by more than this from that of a sound arm [degrees], [bar]."""
 
@@ -150,21 +152,22 @@ def leak_of(arm: VirtualArm, muscle: int, begin: float, rate: float) -> Leak:
 
     By the same multiple of their usual leaks arms lose it a hundred times faster or slower, so it is tried out.
     """
+    sound, leaking = (tried_with(arm, muscle, factor) for factor in (1.0, TRIED))
+    return Leak(muscle=muscle, factor=TRIED * rate * TRYING / math.log(sound / leaking), begin=begin)
+
+
+def tried_with(arm: VirtualArm, muscle: int, factor: float) -> float:
+    """Return the pressure [Pa gauge] of a ``muscle`` that was half full and has leaked more for a moment."""
     tried, valves = arm.like(0), np.zeros((arm.spec.joints, 2), np.int8)
-
-    def pressure() -> float:
-        return float(tried.spec.bar(tried.read().pressure)[0, muscle - 1])
-
     valves[0, muscle - 1] = 1
     tried.set_valves(valves)
-    while pressure() < 0.5 * tried.spec.max_pressure and tried.time < 10.0:
+    while tried.pressure[0, muscle - 1] < 0.5 * tried.spec.max_pressure * BAR and tried.time < 10.0:
         tried.wait(0.05)
     tried.set_valves(np.zeros_like(valves))
     tried.wait(0.5)
-    tried.faults = (Leak(muscle=muscle, factor=TRIED, begin=tried.time),)
-    before = pressure()
-    tried.wait(0.3)
-    return Leak(muscle=muscle, factor=TRIED * rate * 0.3 / math.log(before / pressure()), begin=begin)
+    tried.faults = (Leak(muscle=muscle, factor=factor, begin=tried.time),)
+    tried.wait(TRYING)
+    return float(tried.pressure[0, muscle - 1])
 
 
 class Turn(NamedTuple):

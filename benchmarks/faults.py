@@ -57,6 +57,7 @@ from pneumarm.arm.virtual.parameters import BAR
 from pneumarm.checkup.leaks import LeakTest, leak_test, leaking
 from pneumarm.control import AgentController, TransferSettings, transfer
 from pneumarm.control.monitor import Finding, Monitor, marks_of
+from pneumarm.control.monitor.hypotheses import DRAINS
 from pneumarm.control.movement import BEGIN, draw_movement, move
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import AnyAgent, Tracks, goals_of, load_agent, train
@@ -91,8 +92,9 @@ AFTERWARDS = 20.0
 LATER = 10.0
 """A fault that is not found in time may be found within this of its contradiction [s]."""
 TRIED = 2000.0
+"""How many times as much as usual an arm leaks, to find out what that does to it, ..."""
 TRYING = 0.3
-"""How many times as much an arm leaks for a moment [s], to find out what that does to it."""
+"""... and for how long [s]."""
 CONTRADICTS = (0.5, 0.02)
 """A reading contradicts that differs by more than this from that of a sound arm [degrees], [bar]."""
 
@@ -105,7 +107,7 @@ class Kind:
     make: Callable[[int, float, VirtualArm], Fault]
     """Makes the fault of muscle 1 or 2, of a begin and an arm."""
     found_as: tuple[str, ...]
-    """How it may rightly be called."""
+    """How it may rightly be called: kinds, or what is said in detail."""
     within: float = 2.0
     """Time from the contradiction in which it is to be found [s]."""
 
@@ -142,8 +144,8 @@ KINDS = (
         ("sensor-noise",),
         60.0,
     ),
-    Kind("large leak (0.5 / s)", lambda m, t, a: leak_of(a, m, t, 0.5), ("leak", "torn-hose"), 60.0),
-    Kind("torn hose (2 / s)", lambda m, t, a: leak_of(a, m, t, 2.0), ("torn-hose", "stuck-valve")),
+    Kind("large leak (0.5 / s)", lambda m, t, a: leak_of(a, m, t, 0.5), ("leak",), 60.0),
+    Kind("torn hose (2 / s)", lambda m, t, a: leak_of(a, m, t, 2.0), ("torn-hose", DRAINS)),
 )
 
 
@@ -152,8 +154,8 @@ def leak_of(arm: VirtualArm, muscle: int, begin: float, rate: float) -> Leak:
 
     By the same multiple of their usual leaks arms lose it a hundred times faster or slower, so it is tried out.
     """
-    sound, leaking = (tried_with(arm, muscle, factor) for factor in (1.0, TRIED))
-    return Leak(muscle=muscle, factor=TRIED * rate * TRYING / math.log(sound / leaking), begin=begin)
+    sound, leaky = (tried_with(arm, muscle, factor) for factor in (1.0, TRIED))
+    return Leak(muscle=muscle, factor=TRIED * rate * TRYING / math.log(sound / leaky), begin=begin)
 
 
 def tried_with(arm: VirtualArm, muscle: int, factor: float) -> float:
@@ -197,6 +199,8 @@ class Case:
 
     kinds: tuple[str, ...]
     """Of the findings after the fault began, in the order of being found."""
+    details: tuple[str, ...]
+    """What they say."""
     since_begin: float
     """Watched time from the begin of the fault until the first one [s]."""
     since_contradiction: float
@@ -205,6 +209,10 @@ class Case:
     """Readings from the contradiction until then that are not marked."""
     early: int
     """Findings before the fault began."""
+
+    def is_called(self, names: Sequence[str]) -> bool:
+        """Return whether a finding is called by one of ``names``."""
+        return bool({*self.kinds, *self.details} & set(names))
 
 
 class Twins(Arm):
@@ -378,14 +386,16 @@ def judged(played: Played, simulation: Simulation | None) -> Case:
         if number >= played.begin and len(monitor.findings) > early and found == math.inf:
             found = number
     contradiction = math.inf if played.contradiction is None else played.contradiction
-    kinds = tuple(dict.fromkeys(one.kind for one in monitor.findings[early:]))
+    kinds, details = (
+        tuple(dict.fromkeys(getattr(one, name) for one in monitor.findings[early:])) for name in ("kind", "detail")
+    )
     unmarked = 0
     if contradiction <= found < math.inf:
         time = np.array([turn.reading.time for turn in played.turns[int(contradiction) : int(found) + 1]])
         marks = marks_of(monitor.findings[early:], time, np.arange(len(time)))
         unmarked = len(time) - sum(mark.last - mark.first + 1 for mark in marks)
     since = 0.0 if found < contradiction else (found - contradiction) * period
-    return Case(kinds, (found - played.begin + 1) * period, since, unmarked, early)
+    return Case(kinds, details, (found - played.begin + 1) * period, since, unmarked, early)
 
 
 def measure() -> Iterator[str]:
@@ -441,7 +451,7 @@ def line(kind: Kind, way: str, cases: Sequence[Case]) -> str:
     names = Counter(" then ".join(one.kinds) or "nothing" for one in cases)
     return (
         f"{kind.name:27}{way:8}{f'{sum(bool(one.kinds) for one in cases)}/{len(cases)}':>7}"
-        f"{sum(bool(set(one.kinds) & set(kind.found_as)) for one in cases):>7}{begin:>13}{contradiction:>16}"
+        f"{sum(one.is_called(kind.found_as) for one in cases):>7}{begin:>13}{contradiction:>16}"
         f"{f'{np.mean(soon):.0%} ({low:.0%}-{high:.0%}) in {kind.within:.2g} s':>26}"
         f"{np.mean([one.since_contradiction <= LATER for one in cases]):>9.0%}{unmarked:>10}"
         f"{sum(one.early for one in cases):>6}  "

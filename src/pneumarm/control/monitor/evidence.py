@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.velocity import derived_velocity
 from pneumarm.control.monitor.expectation import expect_by_simulation
-from pneumarm.control.monitor.hypotheses import LEAKING, independence
+from pneumarm.control.monitor.hypotheses import TORN, independence
 from pneumarm.control.monitor.identification import (
     EXPERIENCE,
     expect_by_identification,
@@ -331,13 +331,17 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             telling = abs(difference) > least and not (full and not readings.open[h, m, 1, 2])
             # What has been found brings it so far by itself, and there it looks like other faults.
             telling = telling and (fills or memory.base[m] <= thresholds.over or memory.clock[4] == 0.0)
-            if readings.leak[h, m] == LEAKING:  # smaller differences tell, where nothing else does as much
-                telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
-                telling = telling and abs(difference) > _LEAKING * memory.std[m]
-            if readings.leak[h, m] > 0.0:  # an empty muscle has nothing to lose
+            unsure = thresholds.unsure * difference
+            if readings.leak[h, m] > 0.0:
+                if readings.leak[h, m] < TORN:  # smaller differences tell, where a joint that moves makes none
+                    telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
+                # How much a valve lets through is uncertain by as much as the leak is.
+                unsure = max(unsure, thresholds.unsure * abs(memory.expected[0, m] - memory.base[m]))
+                telling = telling and abs(difference) > _LEAKING * math.hypot(memory.std[m], unsure)
+                # An empty muscle has nothing to lose, and one that empties when it is to fill has other valves.
                 telling = telling and memory.base[m] - lowest >= thresholds.empty
+                telling = telling and not (fills and read < memory.base[m])
             if telling:
-                unsure = thresholds.unsure * difference
                 std = math.sqrt(memory.std[m] ** 2 + unsure * unsure + memory.doubt[h, m] ** 2)
                 said = surprise((read - memory.expected[0, m]) / std) - surprise((read - memory.expected[h, m]) / std)
                 evidence += memory.trust[m] * said

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.control.monitor.hypotheses import at_once, carried_out
+from pneumarm.control.monitor.hypotheses import at_once, carried_out, leaked
 from pneumarm.kernels import part
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
@@ -116,11 +116,12 @@ def expect_by_simulation(predictor, readings, memory):  # type: ignore[no-untype
         expect_further(predictor, lag)
     for h in range(memory.expected.shape[0]):
         expected, doubt = memory.expected[h], memory.doubt[h]
-        if h > 0 and readings.as_told[h].all():  # a leak
+        if readings.leak[h].any():
             for m in range(expected.shape[0]):
-                level = memory.observed[0, m // 2, 2 + m % 2] - predictor.lowest[m]
-                lost = predictor.period * readings.leak[h, m] * max(0.0, level)
-                expected[m], doubt[m] = memory.expected[0, m] - lost, 0.0
+                read, rate = memory.observed[0, m // 2, 2 + m % 2], readings.leak[h, m]
+                healthy = memory.expected[0, m]
+                expected[m] = leaked(rate, predictor.period, read, predictor.lowest[m], healthy)
+                doubt[m] = 0.0
             continue
         both_open = expect_under(predictor, readings, memory, h, -1.0)
         for m in range(expected.shape[0]):

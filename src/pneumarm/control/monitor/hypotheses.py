@@ -19,13 +19,14 @@ LEAKING = 0.45
 """Rate at which a muscle with a large leak loses its pressure [1/s]."""
 TORN, OFF = 1.5, 4.0
 """... whose hose is torn, and whose hose is off [1/s]: much like one whose outlet is stuck open."""
+DRAINS = "the outlet is stuck open, or the hose is off"
+"""What is wrong with a muscle that loses its air as fast as it can."""
 HALF_SUPPLY = 0.5
 """A low supply as a part of the usual one; the other one is gone."""
 _WHOLE = math.inf  # the supply of a healthy arm
 _NEAR, _BACK = 0.35, 0.35  # of the usual supply, over which the flow ceases; part of it that runs back above
 _NEVER, _ALWAYS = (0, 0, 0), (1, 1, 1)
 _FILLING, _EMPTYING = (0, 0, 1), (1, 0, 0)
-_DRAINS = "the outlet is stuck open, or the hose is off"
 _TOLD = (_FILLING, _EMPTYING)  # inlet and outlet: whether each is open when told to empty, to close, to fill
 
 
@@ -34,9 +35,9 @@ class Hypothesis:
     """What may be wrong."""
 
     kind: str
-    """As in :mod:`pneumarm.arm.virtual.faults`, or ``low-supply``."""
+    """As in :mod:`pneumarm.arm.virtual.faults`, or ``low-supply`` or ``torn-hose``."""
     detail: str
-    """What it is in words."""
+    """What it is in words. Hypotheses that cannot be told apart have all of this in common."""
     joint: int | None = None
     """Joint from 1; None where it is about the whole arm."""
     muscle: int | None = None
@@ -101,20 +102,27 @@ def hypotheses(joints: int, of_each: int = 2) -> tuple[list[Hypothesis], Reading
             ("the inlet is stuck closed", _NEVER, _EMPTYING),
             ("the outlet is stuck closed", _FILLING, _NEVER),
             ("the inlet is stuck open", _ALWAYS, _EMPTYING),
-            (_DRAINS, _FILLING, _ALWAYS),
+            (DRAINS, _FILLING, _ALWAYS),
         ):
             add(Hypothesis("stuck-valve", detail, joint, muscle), (m, (inlet, outlet)))
         add(Hypothesis("swapped-valves", "inlet and outlet are swapped", joint, muscle), (m, _TOLD[::-1]))
         add(Hypothesis("leak", "a large leak", joint, muscle), leaking=(m, LEAKING))
         torn = "it loses its air, as if its hose were torn"
         add(Hypothesis("torn-hose", torn, joint, muscle), leaking=(m, TORN))
-        add(Hypothesis("stuck-valve", _DRAINS, joint, muscle), leaking=(m, OFF))
+        add(Hypothesis("stuck-valve", DRAINS, joint, muscle), leaking=(m, OFF))  # called as that outlet is
     for first, second in combinations(there, 2):
         other = f"the valves are those of joint {second // 2 + 1}, muscle {second % 2 + 1}"
         add(Hypothesis("swapped-muscles", other, first // 2 + 1, first % 2 + 1), swap=(first, second))
     source, valves, leak, low = map(np.array, (sources, opens, leaks, supplies))
     as_told = (source == np.arange(muscles)) & (valves == _TOLD).all(axis=(2, 3)) & np.isinf(low)[:, None]
     return found, Readings(source, valves, leak, low, as_told)
+
+
+@part
+def leaked(rate, seconds, pressure, lowest, healthy):  # type: ignore[no-untyped-def]
+    """Return what follows ``pressure`` if a muscle loses it at a ``rate`` [1/s], and otherwise ``healthy`` did."""
+    lost = (1.0 - math.exp(-rate * seconds)) * max(0.0, pressure - lowest)
+    return max(healthy - lost, min(healthy, lowest))
 
 
 @part

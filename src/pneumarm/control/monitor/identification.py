@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.control.monitor.hypotheses import independence, reduced, time_open, times_opened
+from pneumarm.control.monitor.hypotheses import independence, leaked, reduced, time_open, times_opened
 from pneumarm.kernels import part
 
 LOOK = 1 / 30
@@ -344,8 +344,8 @@ def expect_by_identification(known, readings, memory, angle, pressure, empty):  
         for h in range(memory.expected.shape[0]):
             memory.expected[h, m], memory.doubt[h, m] = healthy * highest, 0.0
             if readings.leak[h, m] > 0.0:
-                lost = 1.0 - math.exp(-readings.leak[h, m] * known.look[1])
-                memory.expected[h, m] -= lost * (memory.base[m] - memory.lowest[m])
+                rate, seconds = readings.leak[h, m], known.look[1]
+                memory.expected[h, m] = leaked(rate, seconds, memory.base[m], memory.lowest[m], memory.expected[h, m])
             elif h > 0 and not readings.as_told[h, m]:
                 leaving = features(known, readings, h, m, angle, full, known.x[muscles])
                 if is_empty and not takes_air(known.x[m]) and not takes_air(known.x[muscles]):

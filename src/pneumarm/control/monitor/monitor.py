@@ -357,8 +357,9 @@ class Monitor:
         keys = [(one.kind, one.detail, one.joint, one.muscle) for one in self._hypotheses]
         known = [h for h in order.tolist() if keys[h] in self._open]
         if known and weighed[best] - weighed[known[0]] >= self.settings.lead:
-            self._rename(keys[known[0]], keys[best])
-            known = [best, *known[1:]]
+            before = keys[known[0]]
+            self._rename(before, keys[best])
+            known = [best, *(h for h in known if keys[h] != before)]
         found = {keys[h]: float(memory.since[h]) for h in known if memory.score[h] > 0}
         if found:
             return found

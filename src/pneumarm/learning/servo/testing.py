@@ -36,13 +36,13 @@ def run_servo(
         raise UnusableInput(f"a test needs at least one episode, got {episodes}")
     env, n = environment(simulation, begin, agent.settings), min(episodes, _TOGETHER)
     random, arms = random_state(seed), fleet(env, random_states((*seed, NOISE), n))
-    network, joints = ServoNetwork(agent, n), simulation.window.joints
+    network, joints, place = ServoNetwork(agent, n), simulation.window.joints, env.task.goal_place
     underway = np.zeros((joints, n), bool)
     previews = np.zeros((network.task.inputs.steps.size, joints, n), np.float32)
     record, number = movements(episodes, joints), np.full(n, -1)
     begun = _begin(env, arms, random, record, number, 0)
     while (number >= 0).any():
-        previews[:] = arms.x[env.task.goal_place :][:joints]
+        previews[:] = arms.x[place : place + joints]
         pulses = network.command(arms.x, previews, underway).T.reshape(n, joints, 2)
         _take(env, arms, pulses.astype(np.float64), record, number)
         begun = _begin(env, arms, random, record, number, begun)

@@ -274,8 +274,6 @@ def greedy_movements(
         close_while_computing: close the valves between reading and acting.
 
     """
-    if controller is None:
-        warm_up(agent)  # no arm waits for a compiler
     cycle = ControlCycle(guarded(arm), close_while_computing)
     draws, velocity = drawn(goals, seed, numbers), agent.window.velocity
     return list(make_movements(cycle, controller or AgentController(agent), agent.settings, draws, velocity=velocity))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from benchmarks import _environment as environment
 from pneumarm.arm import Arm, open_arm
 from pneumarm.control import AgentController, Monitor
+from pneumarm.control.agent import warm_up
 from pneumarm.control.monitor import Mode
 from pneumarm.control.transfer import monitor_of, transfer
 from pneumarm.errors import ArmFailure
@@ -156,6 +157,7 @@ def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adap
         tried = moved_by(servo, name, settings, seed)
         later = moved_by(adapted(servo, name, db, seed), name, settings, seed) if adapts else None
     reaching = train(single.simulation, begin_single, PolicySettings(), seed).agent
+    warm_up(reaching)  # no arm waits for a compiler
     with open_arm(name, seed) as opened:
         reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), seed)
     return {

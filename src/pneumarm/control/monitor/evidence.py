@@ -336,7 +336,7 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
                 if readings.leak[h, m] < TORN:  # smaller differences tell, where a joint that moves makes none
                     telling = is_calm(thresholds, memory, m) and memory.clock[3] == 1.0
                 # How much a valve lets through is uncertain by as much as the leak is.
-                unsure = max(unsure, thresholds.unsure * abs(memory.expected[0, m] - memory.base[m]))
+                unsure = thresholds.unsure * (memory.expected[0, m] - memory.base[m])
                 telling = telling and abs(difference) > _LEAKING * math.hypot(memory.std[m], unsure)
                 # An empty muscle has nothing to lose, and one that empties when it is to fill has other valves.
                 telling = telling and memory.base[m] - lowest >= thresholds.empty

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
 from pneumarm.networks.tansig import FASTMATH, tansig
 
 Layers = tuple[NDArray[np.float32], ...]
@@ -93,21 +93,32 @@ def workspace(sizes: tuple[int, ...], samples: int) -> Layers:
 
 @kernel(fastmath=FASTMATH)
 def weighted_sums(weights, x, out):  # type: ignore[no-untyped-def]
-    """Set ``out`` (outputs, n) to W^T x, ``weights`` (at least inputs, outputs), ``x`` (inputs, n); no biases."""
-    inputs, n = np.uint64(x.shape[0]), np.uint64(x.shape[1])
-    blocks = inputs - inputs % np.uint64(4)
+    """Set ``out`` (outputs, n) to W^T x, ``weights`` (at least inputs, outputs), ``x`` (inputs, n); no biases.
+
+    Two sums over four inputs at a time: what is loaded of ``x`` is used twice.
+    """
+    inputs, n, outputs = np.uint64(x.shape[0]), np.uint64(x.shape[1]), np.uint64(out.shape[0])
+    blocks, pairs = inputs - inputs % np.uint64(4), outputs - outputs % np.uint64(2)
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    for o in range(np.uint64(out.shape[0])):
-        for e in range(n):
-            out[o, e] = np.float32(0.0)
+    out[:] = np.float32(0.0)
+    for o in range(np.uint64(0), pairs, two):
+        p = o + one
         for i in range(np.uint64(0), blocks, np.uint64(4)):
             j, k, m = i + one, i + two, i + three
             a, b, c, d = weights[i, o], weights[j, o], weights[k, o], weights[m, o]
-            if a == b == c == d == np.float32(0.0):  # an observation that is not read
+            q, r, s, t = weights[i, p], weights[j, p], weights[k, p], weights[m, p]
+            if a == b == c == d == q == r == s == t == np.float32(0.0):  # an observation that is not read
                 continue
             for e in range(n):
                 out[o, e] += a * x[i, e] + b * x[j, e] + (c * x[k, e] + d * x[m, e])
+                out[p, e] += q * x[i, e] + r * x[j, e] + (s * x[k, e] + t * x[m, e])
         for i in range(blocks, inputs):
+            a, q = weights[i, o], weights[i, p]
+            for e in range(n):
+                out[o, e] += a * x[i, e]
+                out[p, e] += q * x[i, e]
+    for o in range(pairs, outputs):
+        for i in range(inputs):
             a = weights[i, o]
             for e in range(n):
                 out[o, e] += a * x[i, e]
@@ -131,51 +142,64 @@ def forward(layers, x, units):  # type: ignore[no-untyped-def]
         below = above
 
 
+@part(fastmath=FASTMATH)
+def product(a, b):  # type: ignore[no-untyped-def]
+    """Return the sum of the products of ``a`` and ``b``, both (n,)."""
+    total = np.float32(0.0)
+    for e in range(a.shape[0]):
+        total += a[e] * b[e]
+    return total
+
+
 @kernel(fastmath=FASTMATH)
 def add_slopes(x, error, slope):  # type: ignore[no-untyped-def]
-    """Add the derivatives by the weights to ``slope`` (inputs + 1, outputs): the sums of x error over the samples."""
-    row = x.shape[0]
-    n = np.uint64(x.shape[1])
-    for o in range(np.uint64(error.shape[0])):
+    """Add the derivatives by the weights to ``slope`` (inputs + 1, outputs): the sums of x error over the samples.
+
+    Eight sums, of two inputs and four outputs, at a time: what is loaded is used several times.
+    """
+    inputs, outputs, n = np.uint64(x.shape[0]), np.uint64(error.shape[0]), np.uint64(x.shape[1])
+    pairs, fours = inputs - inputs % np.uint64(2), outputs - outputs % np.uint64(4)
+    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
+    for o in range(outputs):
         total = np.float32(0.0)
         for e in range(n):
             total += error[o, e]
-        slope[row, o] += total
-    for i in range(np.uint64(row)):
-        pairs = np.uint64(error.shape[0] - error.shape[0] % 2)
-        for o in range(np.uint64(0), pairs, np.uint64(2)):
-            p = o + np.uint64(1)
-            first, second = np.float32(0.0), np.float32(0.0)
+        slope[inputs, o] += total
+    for i in range(np.uint64(0), pairs, two):
+        j = i + one
+        for o in range(np.uint64(0), fours, four):
+            p, q, r = o + one, o + two, o + three
+            a = b = c = d = np.float32(0.0)
+            s = t = u = v = np.float32(0.0)
             for e in range(n):
-                first += x[i, e] * error[o, e]
-                second += x[i, e] * error[p, e]
-            slope[i, o] += first
-            slope[i, p] += second
-        for o in range(pairs, np.uint64(error.shape[0])):
-            first = np.float32(0.0)
-            for e in range(n):
-                first += x[i, e] * error[o, e]
-            slope[i, o] += first
+                a += x[i, e] * error[o, e]
+                b += x[i, e] * error[p, e]
+                c += x[i, e] * error[q, e]
+                d += x[i, e] * error[r, e]
+                s += x[j, e] * error[o, e]
+                t += x[j, e] * error[p, e]
+                u += x[j, e] * error[q, e]
+                v += x[j, e] * error[r, e]
+            slope[i, o] += a
+            slope[i, p] += b
+            slope[i, q] += c
+            slope[i, r] += d
+            slope[j, o] += s
+            slope[j, p] += t
+            slope[j, q] += u
+            slope[j, r] += v
+        for o in range(fours, outputs):
+            slope[i, o] += product(x[i], error[o])
+            slope[j, o] += product(x[j], error[o])
+    for i in range(pairs, inputs):
+        for o in range(outputs):
+            slope[i, o] += product(x[i], error[o])
 
 
 @kernel(fastmath=FASTMATH)
 def through_weights(weights, error, below):  # type: ignore[no-untyped-def]
     """Set ``below`` (inputs, n) to the derivatives by a layer's inputs, from those by its outputs, ``error``."""
-    outputs, n = np.uint64(error.shape[0]), np.uint64(error.shape[1])
-    blocks = outputs - outputs % np.uint64(4)
-    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    for i in range(np.uint64(below.shape[0])):
-        for e in range(n):
-            below[i, e] = np.float32(0.0)
-        for o in range(np.uint64(0), blocks, np.uint64(4)):
-            p, q, r = o + one, o + two, o + three
-            a, b, c, d = weights[i, o], weights[i, p], weights[i, q], weights[i, r]
-            for e in range(n):
-                below[i, e] += a * error[o, e] + b * error[p, e] + (c * error[q, e] + d * error[r, e])
-        for o in range(blocks, outputs):
-            a = weights[i, o]
-            for e in range(n):
-                below[i, e] += a * error[o, e]
+    weighted_sums(weights.T, error, below)
 
 
 @kernel(fastmath=FASTMATH)

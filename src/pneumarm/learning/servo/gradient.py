@@ -68,6 +68,8 @@ class Tape(NamedTuple):
     """1 where a prediction was not cut off, else the share of the gradient that passes, shape (steps, outputs, n)."""
     inputs: NDArray[np.float32]
     """What the policy saw, shape (steps, inputs, n)."""
+    units: NDArray[np.float32]
+    """Hidden units of the policy, layer after layer, shape (steps, units, n)."""
     slope: NDArray[np.float32]
     """Derivatives of the commands by the policy's outputs, shape (steps, 2 joints, n)."""
     noise: NDArray[np.float32]
@@ -89,8 +91,8 @@ class Tape(NamedTuple):
     """Which joints are on their way to a goal that stays, now, shape (joints, n)."""
 
 
-def tape(task: ServoTask, steps: int, n: int) -> Tape:
-    """Return room for movements of ``n`` arms over ``steps``."""
+def tape(task: ServoTask, steps: int, n: int, hidden: int = 0) -> Tape:
+    """Return room for movements of ``n`` arms over ``steps``, by a policy with so many ``hidden`` units if by one."""
     simulation, joints = task.simulation, task.simulation.joints
     (size, units), outputs = simulation.hidden.shape, simulation.output_bias.size
     inputs, previews = input_size(task.inputs), task.inputs.steps.size
@@ -103,6 +105,7 @@ def tape(task: ServoTask, steps: int, n: int) -> Tape:
         hidden=zeros(steps, units),
         free=zeros(steps, outputs),
         inputs=zeros(steps, inputs),
+        units=zeros(steps, hidden),
         slope=zeros(steps, 2 * joints),
         noise=zeros(steps + simulation.history - 1, 3 * joints),
         reference=zeros(steps + 1, joints),
@@ -126,6 +129,10 @@ def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
         x = tape.x[t]
         write_inputs(task.inputs, x, tape.noise, t + simulation.history - 1, tape.preview[t], tape.inputs[t])
         forward(net.layers, tape.inputs[t], net.units)
+        end = 0
+        for layer in range(len(net.units) - 1):
+            begin, end = end, end + net.units[layer].shape[0]
+            tape.units[t, begin:end] = net.units[layer]
         if task.commands.coarse > 0:
             note_underway(task, tape, t)
         write_commands(task.commands, x, tape.underway, net.units[-1], tape.slope[t], x[first : first + commanded])
@@ -228,7 +235,10 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     for back in range(steps):
         t = steps - 1 - back
         total += price_of_a_step(task, tape, t, share)
-        forward(net.layers, tape.inputs[t], net.units)
+        end = 0
+        for layer in range(len(net.units) - 1):
+            begin, end = end, end + net.units[layer].shape[0]
+            net.units[layer][:] = tape.units[t, begin:end]
         for c in range(commanded):
             for e in range(n):
                 net.errors[-1][c, e] = sooner[first + c, e] * tape.slope[t, c, e]

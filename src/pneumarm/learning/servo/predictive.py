@@ -187,7 +187,8 @@ class PredictiveControl:
         self._steps = max(round(_HORIZON / period), 2)
         self.ahead = self._steps + int(task.inputs.steps.max()) - 1
         """Periods to come for which it has to know what is wanted."""
-        self._tape = tape(task, self._steps, PLANS)
+        hidden = 0 if policy is None else sum(len(units) for units in policy.units[:-1])
+        self._tape = tape(task, self._steps, PLANS, hidden)
         self._tape.x[0, window.input_size + window.joints] = 1
         there = np.ones((window.joints, 2), np.float32)
         there[:, 1] = simulation.spec.muscles > 1

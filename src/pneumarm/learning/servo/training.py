@@ -93,7 +93,8 @@ class ServoLearner(Learner[ServoAgent]):
             for layers in (split(weights, sizes), split(mask, sizes)):
                 layers[-1][:, 1::2] = 0.0
         self.net = trainable(weights, sizes, settings.arms, mask)
-        self.tape = tape(self.task, max(round(settings.duration / simulation.spec.period), 2), settings.arms)
+        steps = max(round(settings.duration / simulation.spec.period), 2)
+        self.tape = tape(self.task, steps, settings.arms, sum(settings.hidden))
         self.updates = np.zeros(1, np.int64)
 
     @property

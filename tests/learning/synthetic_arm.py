@@ -15,8 +15,13 @@ OFFSET = np.array([512.0, 0.0, 90.0, 90.0])
 SCALE = np.array([400.0, 5.0, 90.0, 90.0])
 
 
-def synthetic_simulation(joints: int = 1, history: int = 3, hidden: int = 10, direct: bool = False) -> Simulation:
-    """Return an arm whose angle springs towards 0.5 (p1 - p2) and whose valves change the pressures."""
+def synthetic_simulation(
+    joints: int = 1, history: int = 3, hidden: int = 10, direct: bool = False, second: bool = False
+) -> Simulation:
+    """Return an arm whose angle springs towards 0.5 (p1 - p2) and whose valves change the pressures.
+
+    Its networks have one hidden layer; or a ``second`` one; or are ``direct``, without any.
+    """
     window = Window(joints, history)
     networks = []
     for joint in range(joints):
@@ -27,9 +32,9 @@ def synthetic_simulation(joints: int = 1, history: int = 3, hidden: int = 10, di
         if history > 1:
             spring[theta] += 0.5
             spring[older] = -0.5
-        networks.append(_network(window, spring, hidden, joint, direct))
-        networks.append(_network(window, {command: 0.2}, hidden, joint + 10, direct))
-        networks.append(_network(window, {command + 1: 0.2}, hidden, joint + 20, direct))
+        networks.append(_network(window, spring, hidden, joint, direct, second))
+        networks.append(_network(window, {command: 0.2}, hidden, joint + 10, direct, second))
+        networks.append(_network(window, {command + 1: 0.2}, hidden, joint + 20, direct, second))
     return Simulation(
         spec=ArmSpec(joints=joints, name="synthetic"),
         window=window,
@@ -48,7 +53,7 @@ def in_steps(simulation: Simulation, steps: int) -> Simulation:
     return replace(simulation, spec=replace(simulation.spec, shortest_pulse=step, pulse_step=step))
 
 
-def _network(window: Window, linear: dict[int, float], hidden: int, seed: int, direct: bool) -> Network:
+def _network(window: Window, linear: dict[int, float], hidden: int, seed: int, direct: bool, second: bool) -> Network:
     random = np.random.default_rng(seed)
     n = window.input_size
     d = np.zeros((n, 1))
@@ -63,7 +68,11 @@ def _network(window: Window, linear: dict[int, float], hidden: int, seed: int, d
     w2[0] = 1 / small
     b1 = random.normal(0, 0.3, hidden)
     b1[0] = 0
-    return Network(w1, b1, w2, -np.tanh(b1) @ w2)
+    if not second:
+        return Network(w1, b1, w2, -np.tanh(b1) @ w2)
+    between = np.eye(hidden)[:, : hidden - 1] + random.normal(0, 0.01, (hidden, hidden - 1))
+    bias = -np.tanh(b1) @ between  # nothing changes where nothing is done
+    return Network(w1, b1, w2[:-1], np.zeros(1), None, between, bias)
 
 
 def resting_rows(joints: int = 1, sequences: int = 1500, seed: int = 0) -> Rows:

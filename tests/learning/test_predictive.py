@@ -45,9 +45,18 @@ def drawn(simulation: Simulation, n: int = PLANS) -> tuple[ServoTask, Plans, Tap
     return task, plans, here
 
 
-@pytest.mark.parametrize(("joints", "history", "direct"), [(1, 3, False), (2, 2, True), (1, 1, True)])
-def test_the_slopes_are_those_of_the_smooth_price(joints: int, history: int, direct: bool):
-    task, plans, here = drawn(synthetic_simulation(joints, history, direct=direct), 1)
+@pytest.mark.parametrize(
+    "simulation",
+    [
+        synthetic_simulation(1, 3),
+        synthetic_simulation(2, 2, direct=True),
+        synthetic_simulation(1, 1, direct=True),
+        synthetic_simulation(2, 3, second=True),
+    ],
+    ids=["one joint", "two joints, direct", "history 1", "two layers"],
+)
+def test_the_slopes_are_those_of_the_smooth_price(simulation: Simulation):
+    task, plans, here = drawn(simulation, 1)
     commands = task.commands._replace(shortest=1e-6, leak=0.0)  # what has no slope, or jumps
     commands.inlet[:] = 1e6
     # Valve changes are counted in the price and smooth in its slopes: nothing is paid for them here.

@@ -40,9 +40,18 @@ def learner(simulation: Simulation, settings: ServoSettings = SMALL, number: int
 
 
 @pytest.mark.parametrize("slack", [0.0, 3.0])
-@pytest.mark.parametrize(("joints", "history", "direct"), [(1, 3, False), (2, 2, True), (1, 1, True)])
-def test_the_gradient_is_that_of_the_price(joints: int, history: int, direct: bool, slack: float):
-    one = learner(synthetic_simulation(joints, history, direct=direct))
+@pytest.mark.parametrize(
+    "simulation",
+    [
+        synthetic_simulation(1, 3),
+        synthetic_simulation(2, 2, direct=True),
+        synthetic_simulation(1, 1, direct=True),
+        synthetic_simulation(2, 3, second=True),
+    ],
+    ids=["one joint", "two joints, direct", "history 1", "two layers"],
+)
+def test_the_gradient_is_that_of_the_price(simulation: Simulation, slack: float):
+    one = learner(simulation)
     one._prepare(np.random.default_rng(1), np.ones(SMALL.arms, bool))
     weights, random = one.net.flat, np.random.default_rng(2)
     weights[:] = random.normal(0, 0.2, weights.size)  # few valves are open all along, which has no slope

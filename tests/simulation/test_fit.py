@@ -11,7 +11,16 @@ import pytest
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import UnusableInput
-from pneumarm.simulation import FitResult, FitSettings, Simulation, by_quantity, fit, fit_store, refiltered
+from pneumarm.simulation import (
+    SINGLE_STEPS,
+    FitResult,
+    FitSettings,
+    Simulation,
+    by_quantity,
+    fit,
+    fit_store,
+    refiltered,
+)
 from pneumarm.simulation.fit import _rows_to_fit
 from pneumarm.transitions import CollectSettings, GridSettings, Store, collect, filter_transitions, held_out
 from pneumarm.transitions.rows import Recorded, Rows
@@ -68,7 +77,49 @@ def test_a_linear_arm_is_predicted_by_a_line(make_rows: Callable[..., Rows]) -> 
     assert result.importance.ranking(0)[0][0] == "command_1[k]"
 
 
-@pytest.mark.parametrize("options", [{"one_network": True, "hidden": 12}, {"velocity": "network"}, {"joints": 2}])
+def test_two_layers_are_one_network_of_all_outputs(make_fit: Callable[..., Fitted]) -> None:
+    result, _ = make_fit(joints=2, ahead=0.0, layers=2, hidden=None)
+    (network,) = result.simulation.networks
+    assert network.second_bias is not None
+    assert network.second_bias.size == network.hidden_bias.size == 64
+    (curve,) = result.curves
+    relative = result.training.relative[[0, 2, 3, 4, 6, 7]]
+    assert curve[-1] == pytest.approx((relative**2).sum(), rel=0.05)
+    assert (relative < 0.15).all()
+
+
+@pytest.mark.parametrize(
+    ("joints", "rows", "options", "layers"),
+    [
+        (2, 20_000, {}, 2),
+        (2, 2_000, {}, 1),
+        (1, 20_000, {}, 1),
+        (2, 20_000, {"layers": 1}, 1),
+        (1, 2_000, {"layers": 2}, 2),
+        (2, 20_000, {"approximator": "least-squares"}, 1),
+    ],
+)
+def test_several_joints_get_two_layers_where_there_is_enough_to_learn_from(
+    joints: int, rows: int, options: dict[str, Any], layers: int
+) -> None:
+    assert replace(SINGLE_STEPS, **options).with_layers(joints, rows).layers == layers
+    assert FitSettings().with_layers(joints, rows).layers == 1  # which are fitted ahead
+
+
+def test_two_layers_are_not_fitted_ahead() -> None:
+    with pytest.raises(UnusableInput, match="layers"):
+        FitSettings(layers=2)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"one_network": True, "hidden": 12},
+        {"velocity": "network"},
+        {"joints": 2},
+        {"one_network": True, "layers": 2, "ahead": 0.0, "hidden": None},
+    ],
+)
 def test_alternatives_learn_too(options: dict[str, Any], make_fit: Callable[..., Fitted]) -> None:
     result, _ = make_fit(**options)
     relative = np.ravel(result.relative_error["angle"])

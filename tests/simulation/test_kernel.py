@@ -34,6 +34,7 @@ def made_up(
     outputs: list[int] | None = None,
     velocity: str = "derived",
     direct: bool = False,
+    second: bool = False,
 ) -> Simulation:
     """Return a simulation with random networks of different sizes; ``outputs`` of each network."""
     random = np.random.default_rng(joints + 10 * history)
@@ -41,14 +42,16 @@ def made_up(
     outputs = outputs or [1] * (3 * joints if velocity == "derived" else 4 * joints)
     networks = []
     for i, count in enumerate(outputs):
-        hidden = 0 if direct and i == 0 else 7 + i
+        hidden, last = 0 if direct and i == 0 else 7 + i, 5 + i if second else 7 + i
         networks.append(
             Network(
                 random.normal(0, 0.4, (window.input_size, hidden)),
                 random.normal(0, 0.4, hidden),
-                random.normal(0, 0.05, (hidden, count)),
+                random.normal(0, 0.05, (last if hidden else 0, count)),
                 random.normal(0, 0.02, count),
                 random.normal(0, 0.02, (window.input_size, count)) if direct else None,
+                random.normal(0, 0.4, (hidden, last)) if second else None,
+                random.normal(0, 0.4, last) if second else None,
             )
         )
     scaling = Scaling(
@@ -99,8 +102,21 @@ def reference(simulation: Simulation, sigma: NDArray, command: NDArray) -> NDArr
         made_up(velocity="network"),
         made_up(joints=3, history=2, outputs=[9]),
         made_up(joints=2, outputs=[8], velocity="network", direct=True),
+        made_up(second=True),
+        made_up(joints=2, outputs=[6], second=True),
     ],
-    ids=["thesis", "history 1", "two joints", "one network", "direct", "velocity", "three joints", "all of it"],
+    ids=[
+        "thesis",
+        "history 1",
+        "two joints",
+        "one network",
+        "direct",
+        "velocity",
+        "three joints",
+        "all of it",
+        "two layers",
+        "one network of two layers",
+    ],
 )
 def test_twenty_steps_follow_the_definitions(simulation: Simulation) -> None:
     random = np.random.default_rng(0)

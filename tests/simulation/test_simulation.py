@@ -95,6 +95,7 @@ def test_scaling_puts_data_within_about_one(fitted: Fitted) -> None:
         {"one_network": True},
         {"velocity": "network"},
         {"approximator": "least-squares", "history": 1},
+        {"layers": 2, "ahead": 0.0},
     ],
 )
 def test_a_file_gives_the_same_simulation(
@@ -140,6 +141,7 @@ def change_array(path: Path, name: str, array: NDArray[Any]) -> None:
         ("network_0_output_bias", np.zeros(4), r"expected output_weights of the shape|expected output_bias"),
         ("network_0_hidden_weights", np.zeros((3, 0)), "expected hidden_weights of the shape"),
         ("unknown", np.zeros(1), "also holds unknown"),
+        ("network_0_second_bias", np.zeros(3), "a second hidden layer needs weights and a bias"),
         ("goal_range", np.array([[np.nan, 1.0]]), "not finite"),
     ],
 )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pneumarm.learning.agents import Adapts
 from pneumarm.networks import Network
 
-_LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias")
+_LAYERS = ("hidden_weights", "hidden_bias", "second_weights", "second_bias", "output_weights", "output_bias")
 _KNOWN = ("error_std", "pressure_range", "further_std", "further_range")
 
 
@@ -24,8 +24,10 @@ def with_plastic(agent: Adapts, numbers: NDArray[np.float64]) -> Adapts:
     ends = np.cumsum([part.size for part in parts])
     taken = [numbers[e - p.size : e].reshape(p.shape).copy() for e, p in zip(ends, parts, strict=True)]
     weights, known, layers = taken[0], taken[1 : 1 + len(_KNOWN)], taken[1 + len(_KNOWN) :]
-    size = len(_LAYERS)
-    networks = tuple(Network(*layers[i : i + size]) for i in range(0, len(layers), size))
+    left = iter(layers)
+    networks = tuple(
+        Network(**{name: next(left) for name in _layers_of(network)}) for network in agent.simulation.networks
+    )
     changed: dict[str, Any] = dict(zip(_KNOWN, known, strict=True))
     simulation = replace(agent.simulation, networks=networks, **changed)
     return agent.revised(simulation, weights.astype(np.float32))
@@ -33,5 +35,9 @@ def with_plastic(agent: Adapts, numbers: NDArray[np.float64]) -> Adapts:
 
 def _parts(agent: Adapts) -> list[NDArray[np.floating]]:
     simulation = agent.simulation
-    layers = [getattr(network, name) for network in simulation.networks for name in _LAYERS]
+    layers = [getattr(network, name) for network in simulation.networks for name in _layers_of(network)]
     return [agent.weights(), *(getattr(simulation, name) for name in _KNOWN), *layers]
+
+
+def _layers_of(network: Network) -> list[str]:
+    return [name for name in _LAYERS if getattr(network, name) is not None]

@@ -1,7 +1,7 @@
 """Fitting a simulation further to the newest movements of an arm, few or many.
 
     1  the weights of the outputs, by ridge regression around what they were    11 numbers an output
-    2  all weights, by Levenberg-Marquardt around those, on the movements and on rehearsed ones
+    2  all weights of one hidden layer, by Levenberg-Marquardt around those, on the movements and on rehearsed ones
 
 Few movements determine few numbers, so the first step does most of the work then. The second would forget what the
 movements do not show, as those of a policy use few of the actions; it is held by its anchor, and by transitions
@@ -197,8 +197,7 @@ def _outputs_fitted(simulation: Simulation, known: Transitions, ridge: float) ->
     x, y = _scaled(simulation, known)
     unit, fitted = _unit(simulation), []
     for network, of_it in zip(simulation.networks, _columns(simulation), strict=True):
-        hidden = np.tanh(x @ network.hidden_weights + network.hidden_bias)
-        hidden = np.concatenate([hidden, np.ones((len(x), 1))], axis=1)
+        hidden = np.concatenate([network.units(x), np.ones((len(x), 1))], axis=1)
         weights = np.concatenate([network.output_weights, network.output_bias[None]]) / unit[of_it]
         normal = hidden.T @ hidden + ridge * np.eye(hidden.shape[1])
         weights = (weights + np.linalg.solve(normal, hidden.T @ (y[:, of_it] - hidden @ weights))) * unit[of_it]
@@ -207,7 +206,9 @@ def _outputs_fitted(simulation: Simulation, known: Transitions, ridge: float) ->
 
 
 def _all_fitted(simulation: Simulation, x: Floats, y: Floats, settings: RefitSettings) -> tuple[Network, ...]:
-    """Return the networks fitted to ``x`` and ``y``, anchored where they are."""
+    """Return the networks fitted to ``x`` and ``y``, anchored where they are; those of two layers as they are."""
+    if any(network.second_weights is not None for network in simulation.networks):
+        return simulation.networks
     solver = LevenbergMarquardt(epochs=settings.epochs, decay=settings.anchor / len(x), anchored=True)
     unit, read = _unit(simulation), np.flatnonzero(simulation.reads)
     seen = np.ascontiguousarray(x[:, read])

@@ -41,6 +41,8 @@ class SimulatedArms(NamedTuple):
     """Actions taken in the running movement, -1 where it ended and none was begun, shape (n,)."""
     hidden: NDArray[np.float32]
     """Workspace, shape (threads, units)."""
+    second: NDArray[np.float32]
+    """Workspace, shape (threads, second units)."""
     change: NDArray[np.float32]
     """Workspace, shape (threads, outputs)."""
     command: NDArray[np.float32]
@@ -75,6 +77,7 @@ def simulated_arms(environment: Environment, n: int, threads: int) -> SimulatedA
         switched=np.zeros((n, joints), np.int64),
         taken=np.full(n, -1, np.int64),
         hidden=np.zeros((threads, one.state.hidden.size), np.float32),
+        second=np.zeros((threads, one.state.second.size), np.float32),
         change=np.zeros((threads, one.state.change.size), np.float32),
         command=np.zeros((threads, one.command.size), np.float32),
     )
@@ -94,7 +97,9 @@ def outcome(n: int, size: int) -> Outcome:
 @part
 def movement(many, e, thread):  # type: ignore[no-untyped-def]
     """Return movement ``e`` as an episode; for other parts only, because no references are counted."""
-    state = SimulationState(many.x[e], many.average[e], many.random[e], many.hidden[thread], many.change[thread])
+    state = SimulationState(
+        many.x[e], many.average[e], many.random[e], many.hidden[thread], many.second[thread], many.change[thread]
+    )
     return Episode(state, many.goal[e], many.actions[e], many.switched[e], many.command[thread])
 
 

@@ -1,5 +1,6 @@
-"""Tiny networks: one hidden layer, fitted by Levenberg-Marquardt, or a linear model by least squares."""
+"""Tiny networks, fitted by Levenberg-Marquardt or by gradient descent, or a linear model by least squares."""
 
+from pneumarm.networks.gradient_descent import gradient_descent, two_layers
 from pneumarm.networks.initial import nguyen_widrow
 from pneumarm.networks.least_squares import Importance, importance, least_squares
 from pneumarm.networks.levenberg_marquardt import Fit, LevenbergMarquardt, levenberg_marquardt
@@ -10,8 +11,10 @@ __all__ = [
     "Importance",
     "LevenbergMarquardt",
     "Network",
+    "gradient_descent",
     "importance",
     "least_squares",
     "levenberg_marquardt",
     "nguyen_widrow",
+    "two_layers",
 ]

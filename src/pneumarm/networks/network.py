@@ -1,4 +1,4 @@
-"""A multilayer network with one hidden layer: tansig hidden units, linear outputs (thesis section 4.2.6)."""
+"""A multilayer network with one hidden layer, or two: tansig hidden units, linear outputs (thesis section 4.2.6)."""
 
 from dataclasses import dataclass, replace
 
@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 @dataclass(frozen=True)
 class Network:
-    """y = tanh(x W1 + b1) W2 + b2 + x D.
+    """y = h W2 + b2 + x D of the hidden units h = tanh(x W1 + b1), or of a second layer, tanh(h W + b).
 
-    ``D`` leads directly from the inputs to the outputs; the thesis' networks have none. A network without hidden
-    units but with ``D`` is a linear model, so that a least-squares fit stands in the same place as a network.
+    ``D`` leads directly from the inputs to the outputs; the thesis' networks have none, and one hidden layer. A
+    network without hidden units but with ``D`` is a linear model, so that a least-squares fit stands in the same
+    place as a network.
     """
 
     hidden_weights: NDArray[np.float64]
@@ -19,18 +20,29 @@ class Network:
     hidden_bias: NDArray[np.float64]
     """b1, shape (hidden,)."""
     output_weights: NDArray[np.float64]
-    """W2, shape (hidden, outputs)."""
+    """W2, shape (hidden units of the last layer, outputs)."""
     output_bias: NDArray[np.float64]
     """b2, shape (outputs,)."""
     direct: NDArray[np.float64] | None = None
     """D, shape (inputs, outputs), or None."""
+    second_weights: NDArray[np.float64] | None = None
+    """W, shape (hidden, hidden units of the second layer), or None."""
+    second_bias: NDArray[np.float64] | None = None
+    """b, shape (hidden units of the second layer,), or None."""
 
     def __call__(self, x: ArrayLike) -> NDArray[np.float64]:
         """Return the outputs (n, outputs) for the inputs ``x`` (n, inputs)."""
         x = np.asarray(x, np.float64)
-        y: NDArray[np.float64] = np.tanh(x @ self.hidden_weights + self.hidden_bias) @ self.output_weights
-        y += self.output_bias
+        y = self.units(x) @ self.output_weights + self.output_bias
         return y if self.direct is None else y + x @ self.direct
+
+    def units(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the units of the last hidden layer (n, hidden) for the inputs ``x`` (n, inputs)."""
+        units: NDArray[np.float64] = np.tanh(x @ self.hidden_weights + self.hidden_bias)
+        if self.second_weights is None or self.second_bias is None:
+            return units
+        second: NDArray[np.float64] = np.tanh(units @ self.second_weights + self.second_bias)
+        return second
 
     def reading(self, inputs: NDArray[np.int64]) -> "Network":
         """Return it as a network of those ``inputs`` alone, in their order."""

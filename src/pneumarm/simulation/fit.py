@@ -22,9 +22,11 @@ from pneumarm.networks import (
     Importance,
     LevenbergMarquardt,
     Network,
+    gradient_descent,
     least_squares,
     levenberg_marquardt,
     nguyen_widrow,
+    two_layers,
 )
 from pneumarm.networks import importance as importance_of
 from pneumarm.settings import Settings, Valid
@@ -52,7 +54,15 @@ _AGAIN = 0.25
 """Share of the epochs in which it is taught what pulses do on average where none were recorded."""
 _LONGEST_AHEAD = 10.0
 _EPOCHS_ON = 20
-"""Epochs of a fit that goes on from where another ended."""
+"""Epochs, or passes, of a fit that goes on from where another ended."""
+HIDDEN, _HIDDEN_OF_TWO = 10, 32
+"""Hidden units of each layer for each joint, of networks with one layer and with two."""
+_ROWS_FOR_TWO = 5_000
+"""Rows for each joint from which on two layers are as good as one, or better."""
+_PASSES, _ROWS_OF_PASSES = 300, 6_000_000
+"""Most passes of gradient descent over all rows, and most rows of all passes together."""
+_RATE, _RATE_ON = 5e-3, 1e-3
+"""Learning rate of gradient descent, and of one that goes on from where another ended."""
 _EPOCHS_AHEAD = 10
 """Epochs of each network that fitting ahead takes about as long as."""
 _ROWS = 7  # stream of random numbers
@@ -72,8 +82,12 @@ class FitSettings(Settings):
     that settle, and else no more than the networks read (thesis)."""
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
-    hidden: int = 10
-    """Hidden units of each network for each joint of the arm (thesis: 10, one joint)."""
+    layers: Literal[1, 2] | None = None
+    """Hidden layers (thesis: 1). With 2, one network has all outputs, and is fitted by gradient descent; by default
+    where several joints are fitted to many single steps."""
+    hidden: int | None = None
+    """Hidden units of each layer for each joint of the arm; by default 10 (thesis: 10, one joint), or 32 of two
+    layers."""
     epochs: int = 60
     """Epochs of Levenberg-Marquardt at most (thesis: 15)."""
     tolerance: float = 1e-5
@@ -104,7 +118,8 @@ class FitSettings(Settings):
             "history": self.history is None or self.history >= 1 or "1 or more",
             "memory": self.memory is None or self.memory >= 1 or "1 or more",
             "approximator": self.approximator in ("network", "least-squares"),
-            "hidden": 1 <= self.hidden <= 1000,
+            "layers": self.layers != 2 or self.ahead == 0 or "1 where predictions are fitted ahead",
+            "hidden": self.hidden is None or 1 <= self.hidden <= 1000 or "1 to 1000",
             "epochs": self.epochs >= 1,
             "tolerance": 0 <= self.tolerance < 1,
             "decay": 0 <= self.decay < float("inf"),
@@ -125,6 +140,14 @@ class FitSettings(Settings):
         history = self.history or min(chosen_history(store, store.spec, self.sensors), self._longest(store))
         settles = self.ahead > 0 and self.approximator == "network"
         return replace(self, history=history, memory=self.memory or (LONGEST if settles else history))
+
+    def with_layers(self, joints: int, rows: int) -> "FitSettings":
+        """Return the settings with what suits ``joints`` and ``rows`` where no layers or hidden units are chosen."""
+        several = joints > 1 and self.ahead == 0 and self.approximator == "network"
+        enough = rows >= _ROWS_FOR_TWO * joints
+        if (self.layers or (2 if several and enough else 1)) == 1:
+            return replace(self, layers=1, hidden=self.hidden or HIDDEN)
+        return replace(self, layers=2, hidden=self.hidden or _HIDDEN_OF_TWO, one_network=True)
 
     def _longest(self, store: Store) -> int:
         """Return how many observations networks may read that are fitted to ``store``, in sound time."""
@@ -221,7 +244,7 @@ def fit(
         UnusableInput: the transitions do not fit to ``spec`` and ``settings``, or are too few.
 
     """
-    settings = settings or FitSettings()
+    settings = (settings or FitSettings()).with_layers(spec.joints, len(training.inputs))
     window = _window(spec, settings)
     if training.inputs.shape[1] != window.input_size or training.target.shape[1] != window.observation_size:
         raise UnusableInput(
@@ -325,10 +348,13 @@ def _fitted(
     ``x`` are the inputs that the networks ``read``. They begin as they were ``before``, or at random.
     """
     joints, size = simulation.window.joints, simulation.window.input_size
-    targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
-    chosen = _rows_to_fit(len(x), _weights(x.shape[1], settings, joints), settings.seed)
     before = [one.reading(read) for one in before]
-    fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
+    if settings.layers == 2:
+        fits = [_fit_two_layers(x, y, settings, joints, progress, before)]
+    else:
+        targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
+        chosen = _rows_to_fit(len(x), _weights(x.shape[1], settings, joints), settings.seed)
+        fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0
     factors = np.split(factor, len(fits))
     networks = [
@@ -392,7 +418,7 @@ def _fit_networks(
         if before:
             start = before[number]
         else:
-            start = nguyen_widrow(x.shape[1], settings.hidden * joints, y.shape[1], int(seeds[number]))
+            start = nguyen_widrow(x.shape[1], _hidden(settings, joints), y.shape[1], int(seeds[number]))
         if not y.any():  # what never changed needs no fit
             start = replace(start, output_weights=np.zeros_like(start.output_weights))
             return Fit(start, np.zeros(1), 0, converged=True)
@@ -402,9 +428,33 @@ def _fit_networks(
         return list(threads.map(one, range(len(targets))))
 
 
+def _fit_two_layers(
+    x: NDArray[np.float32],
+    y: NDArray[np.float64],
+    settings: FitSettings,
+    joints: int,
+    progress: Callable[[int, int], None],
+    before: Sequence[Network],
+) -> Fit:
+    """Fit a network of two hidden layers to ``y``; it begins as it was ``before``, or at random."""
+    passes = min(_PASSES, -(-_ROWS_OF_PASSES // len(x)))
+    passes, rate = (min(_EPOCHS_ON, passes), _RATE_ON) if before else (passes, _RATE)
+    start = before[0] if before else two_layers(x.shape[1], _hidden(settings, joints), y.shape[1], settings.seed)
+
+    def report(done: int, _: float) -> None:
+        progress(round(done / passes * settings.epochs), settings.epochs)
+
+    return gradient_descent(x, y, start, passes, rate, settings.seed, report)
+
+
+def _hidden(settings: FitSettings, joints: int) -> int:
+    """Return how many hidden units a layer has."""
+    return (settings.hidden or HIDDEN) * joints
+
+
 def _weights(inputs: int, settings: FitSettings, joints: int) -> int:
-    """Return how many weights a network has, about."""
-    return (inputs + 2) * settings.hidden * joints
+    """Return how many weights a network with one hidden layer has, about."""
+    return (inputs + 2) * _hidden(settings, joints)
 
 
 def _rows_to_fit(rows: int, weights: int, seed: int) -> slice | NDArray[np.int64]:
@@ -534,10 +584,10 @@ def fit_store(
 
 
 def fitted_on(simulation: Simulation, store: Store, ahead: float = FitSettings.ahead) -> Simulation:
-    """Return ``simulation``, a network an output, fitted on from where it is to all that ``store`` holds by now.
+    """Return ``simulation``, fitted on from where it is to all that ``store`` holds by now.
 
     Its window, scaling, ranges and goals stay, so that an agent of the one can act in the other. Its errors are those
-    on sequences that are held out. ``ahead`` is how far ahead it is fitted [s].
+    on sequences that are held out. ``ahead`` is how far ahead one with one hidden layer is fitted [s].
     """
     window, places, seed = simulation.window, simulation.outputs, simulation.seed
     filtered = filter_transitions(store, window, seed=seed, hold_out=simulation.held_out)
@@ -547,18 +597,19 @@ def fitted_on(simulation: Simulation, store: Store, ahead: float = FitSettings.a
     spread[spread == 0] = 1.0
     factor = spread / simulation.scaling.observation_scale[places]
     factors, read = np.split(factor, len(simulation.networks)), np.flatnonzero(simulation.reads)
+    layers: Literal[1, 2] = 1 if simulation.networks[0].second_weights is None else 2
     fitted, _ = _fitted(
         simulation,
         simulation.scaling.inputs(training.inputs, window).astype(np.float32)[:, read],
         read,
         change / spread,
         factor,
-        FitSettings(epochs=_EPOCHS_ON, one_network=len(factors) == 1, seed=seed),
+        FitSettings(epochs=_EPOCHS_ON, layers=layers, ahead=0.0, one_network=len(factors) == 1, seed=seed),
         lambda done, total: None,
         [one.times(1 / each) for one, each in zip(simulation.networks, factors, strict=True)],
     )
     steps = round(ahead / simulation.spec.period)
-    if steps > 1:
+    if steps > 1 and layers == 1:
         fitted = fitted_ahead(fitted, stretches(store.blocks(), fitted, steps), seed)
     return fitted.with_errors(statistics(fitted, filtered.stream("held-out")).std)
 

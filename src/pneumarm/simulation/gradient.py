@@ -4,6 +4,8 @@ A state is a column of ``x`` (size, n), laid out as in :mod:`pneumarm.simulation
 
     h = tansig(W1^T x),  change = W2 h + D x + b2,  o' = clip(o + change),  sigma' = (o', o, ..., a, a_{k-1}, ...)
 
+where h may go through a second hidden layer,
+
 and its transpose carries the derivatives of a later cost by sigma' back to those by sigma and a.
 """
 
@@ -13,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel
-from pneumarm.networks.layers import weighted_sums
+from pneumarm.networks.layers import through_layer, weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.kernel import SimulationParameters
 
@@ -23,27 +25,47 @@ class StepWorkspace(NamedTuple):
 
     hidden: NDArray[np.float32]
     """Hidden units, shape (units, n)."""
+    second: NDArray[np.float32]
+    """Those of the second layer, shape (second units, n)."""
     change: NDArray[np.float32]
     """Predicted changes, shape (outputs, n)."""
     free: NDArray[np.float32]
     """1 where a prediction was not cut off at the limits of its sensor, else 0, shape (outputs, n)."""
     slope: NDArray[np.float32]
     """Derivatives by what enters the hidden units, shape (units, n)."""
+    second_slope: NDArray[np.float32]
+    """Derivatives by what enters those of the second layer, shape (second units, n)."""
 
 
 def step_workspace(simulation: SimulationParameters, n: int) -> StepWorkspace:
     """Return workspace for steps of ``n`` states."""
-    units, outputs = simulation.hidden.shape[1], simulation.output_bias.size
-    return StepWorkspace(*(np.zeros((rows, n), np.float32) for rows in (units, outputs, outputs, units)))
+    units, second, outputs = simulation.hidden.shape[1], simulation.second_bias.size, simulation.output_bias.size
+    sizes = units, second, outputs, outputs, units, second
+    return StepWorkspace(*(np.zeros((rows, n), np.float32) for rows in sizes))
+
+
+@kernel(fastmath=FASTMATH)
+def last_units(simulation, work):  # type: ignore[no-untyped-def]
+    """Return the units of the last hidden layer (units, n), those of the first being ``work.hidden``."""
+    if simulation.second.shape[0] == 0:
+        return work.hidden
+    weighted_sums(simulation.second, work.hidden, work.second)
+    for u in range(work.second.shape[0]):
+        row = work.second[u]
+        for e in range(row.shape[0]):
+            row[e] += simulation.second_bias[u]
+        tansig(row)
+    return work.second
 
 
 @kernel(fastmath=FASTMATH)
 def predict_all(simulation, x, work):  # type: ignore[no-untyped-def]
-    """Set ``work.hidden`` and ``work.change`` to what the networks make of ``x`` (size, n), commands in place."""
-    hidden, change = work.hidden, work.change
-    weighted_sums(simulation.hidden, x, hidden)
-    for u in range(hidden.shape[0]):
-        tansig(hidden[u])
+    """Set the hidden units and ``work.change`` to what the networks make of ``x`` (size, n), commands in place."""
+    change = work.change
+    weighted_sums(simulation.hidden, x, work.hidden)
+    for u in range(work.hidden.shape[0]):
+        tansig(work.hidden[u])
+    hidden = last_units(simulation, work)
     for o in range(change.shape[0]):
         row = change[o]
         for e in range(row.shape[0]):
@@ -118,7 +140,8 @@ def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
         for e in range(n):
             work.change[o, e] = work.free[o, e] * later[place, e]
             sooner[place, e] += work.change[o, e]
-    slope, hidden = work.slope, work.hidden
+    hidden = last_units(simulation, work)
+    slope = work.slope if simulation.second.shape[0] == 0 else work.second_slope
     for u in range(slope.shape[0]):
         for e in range(n):
             slope[u, e] = np.float32(0.0)
@@ -129,6 +152,9 @@ def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
                     slope[u, e] += weight * work.change[o, e]
         for e in range(n):
             slope[u, e] *= np.float32(1.0) - hidden[u, e] * hidden[u, e]
+    if simulation.second.shape[0] > 0:
+        through_layer(simulation.second, slope, work.hidden, work.slope)
+        slope = work.slope
     last = command + commanded  # beyond are the goal, the 1 and nothing, which no command changes
     for i in range(last):
         row = sooner[i]

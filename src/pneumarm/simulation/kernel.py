@@ -32,8 +32,14 @@ class SimulationParameters(NamedTuple):
 
     hidden: NDArray[np.float32]
     """W1 and b1 of all networks, shape (inputs, units)."""
+    second: NDArray[np.float32]
+    """Second hidden layers of all networks, with zeros between units of different ones, shape (units, second units);
+    (0, 0) where networks have one layer."""
+    second_bias: NDArray[np.float32]
+    """Shape (second units,)."""
     output: NDArray[np.float32]
-    """W2 of all networks with zeros where an output belongs to another network, shape (outputs, units)."""
+    """W2 of all networks with zeros where an output belongs to another network, shape (outputs, units of the last
+    layer)."""
     output_bias: NDArray[np.float32]
     """b2, shape (outputs,)."""
     direct: NDArray[np.float32]
@@ -62,6 +68,8 @@ class SimulationState(NamedTuple):
     random: RandomState
     hidden: NDArray[np.float32]
     """Shape (units,)."""
+    second: NDArray[np.float32]
+    """Shape (second units,)."""
     change: NDArray[np.float32]
     """Shape (outputs,)."""
 
@@ -92,22 +100,29 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
     window, scaling = simulation.window, simulation.scaling
     joints, place = window.joints, places(window)
     hidden_sizes = [network.hidden_bias.size for network in simulation.networks]
+    second_sizes = [0 if network.second_bias is None else network.second_bias.size for network in simulation.networks]
     output_sizes = [network.output_bias.size for network in simulation.networks]
     inputs, outputs = window.input_size, sum(output_sizes)
-    units = padded(sum(hidden_sizes), UNIT_BLOCK)
+    units, second_units = (padded(sum(sizes), UNIT_BLOCK) for sizes in (hidden_sizes, second_sizes))
     hidden = np.zeros((place.size, units))
-    output, output_bias = np.zeros((outputs, units)), np.zeros(outputs)
+    second, second_bias = np.zeros((units if second_units else 0, second_units)), np.zeros(second_units)
+    output, output_bias = np.zeros((outputs, second_units or units)), np.zeros(outputs)
     has_direct = any(network.direct is not None for network in simulation.networks)
     direct = np.zeros((outputs if has_direct else 0, place.size))
-    u = o = 0
-    for network, h, n in zip(simulation.networks, hidden_sizes, output_sizes, strict=True):
+    u = s = o = 0
+    for network, h, m, n in zip(simulation.networks, hidden_sizes, second_sizes, output_sizes, strict=True):
         hidden[:inputs, u : u + h] = network.hidden_weights
         hidden[place.one, u : u + h] = network.hidden_bias
-        output[o : o + n, u : u + h] = network.output_weights.T
+        if network.second_weights is None:
+            output[o : o + n, u : u + h] = network.output_weights.T
+        else:
+            second[u : u + h, s : s + m] = network.second_weights
+            second_bias[s : s + m] = network.second_bias
+            output[o : o + n, s : s + m] = network.output_weights.T
         output_bias[o : o + n] = network.output_bias
         if network.direct is not None:
             direct[o : o + n, :inputs] = network.direct.T
-        u, o = u + h, o + n
+        u, s, o = u + h, s + m, o + n
 
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     limits = simulation.limits
@@ -116,6 +131,8 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
     velocity = np.stack([rate, -offset[:, 1] / scale[:, 1]], axis=1)
     return SimulationParameters(
         hidden=_float32(hidden),
+        second=_float32(second),
+        second_bias=_float32(second_bias),
         output=_float32(output),
         output_bias=_float32(output_bias),
         direct=_float32(direct),
@@ -141,6 +158,7 @@ def simulation_state(simulation: SimulationParameters, random: RandomState) -> S
         average=np.zeros(outputs, np.float32),
         random=random,
         hidden=np.zeros(units, np.float32),
+        second=np.zeros(simulation.second_bias.size, np.float32),
         change=np.zeros(outputs, np.float32),
     )
 
@@ -178,6 +196,12 @@ def predict_change(simulation, state):  # type: ignore[no-untyped-def]
     """Set ``state.change`` to what the networks predict for the state and the command in ``state.x``."""
     x, hidden = state.x, state.hidden
     hidden_layer(simulation.hidden, x, hidden)
+    if simulation.second.shape[0] > 0:
+        weighted_sums(hidden, simulation.second, 0, state.second)
+        for u in range(state.second.shape[0]):
+            state.second[u] += simulation.second_bias[u]
+        tansig(state.second)
+        hidden = state.second
     for o in range(simulation.output_bias.shape[0]):
         total = np.float32(0.0)
         for u in range(hidden.shape[0]):

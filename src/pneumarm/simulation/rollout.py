@@ -105,6 +105,8 @@ def advance_simulated(world, states, i, valves):  # type: ignore[no-untyped-def]
         for m in range(2):
             world.command[2 * j + m] = valves[j, m] / world.command_scale[j, m]
     workspace = world.workspace
-    state = SimulationState(states.x[i], workspace.average, workspace.random, workspace.hidden, workspace.change)
+    state = SimulationState(
+        states.x[i], workspace.average, workspace.random, workspace.hidden, workspace.second, workspace.change
+    )
     step(world.simulation, world.noise, state, world.command)
     look_simulated(world, states, i)

@@ -221,7 +221,7 @@ class Simulation:
         arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in names}
         arrays |= {name: getattr(self.scaling, name) for name in _SCALINGS}
         for number, network in enumerate(self.networks):
-            layers = {name: getattr(network, name) for name in _LAYERS}
+            layers = {name: getattr(network, name) for name in (*_LAYERS, "direct", *_SECOND)}
             arrays |= {f"network_{number}_{name}": array for name, array in layers.items() if array is not None}
         return asdict(header), arrays
 
@@ -241,9 +241,10 @@ class Simulation:
     @classmethod
     def _assembled(cls, header: "_Header", arrays: dict[str, NDArray[np.float64]]) -> Self:
         def network(number: int) -> Network:
-            layers = {name: arrays.pop(f"network_{number}_{name}") for name in _LAYERS[:-1]}
-            direct = arrays.pop(f"network_{number}_{_LAYERS[-1]}") if header.direct[number] else None
-            return Network(**layers, direct=direct)
+            weights, bias, output_weights, output_bias = (arrays.pop(f"network_{number}_{name}") for name in _LAYERS)
+            direct = arrays.pop(f"network_{number}_direct") if header.direct[number] else None
+            second_weights, second_bias = (arrays.pop(f"network_{number}_{name}", None) for name in _SECOND)
+            return Network(weights, bias, output_weights, output_bias, direct, second_weights, second_bias)
 
         networks = tuple(network(number) for number in range(len(header.direct)))
         scaling = Scaling(**{name: arrays.pop(name) for name in _SCALINGS})
@@ -270,7 +271,8 @@ _ARRAYS = ("error_std", "goal_range", "pressure_range")
 _FURTHER = ("further_std", "further_range")
 _LIMITS = ("goal_ways", "goal_limits")
 _SCALINGS = ("observation_offset", "observation_scale", "command_scale")
-_LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias", "direct")
+_LAYERS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias")
+_SECOND = ("second_weights", "second_bias")
 
 
 @dataclass(frozen=True)
@@ -328,6 +330,11 @@ def _check(simulation: Simulation) -> None:
         hidden = network.hidden_bias.size
         _expect("hidden_weights", network.hidden_weights, (window.input_size, hidden))
         _expect("hidden_bias", network.hidden_bias, (hidden,))
+        if network.second_weights is not None and network.second_bias is not None:
+            _expect("second_weights", network.second_weights, (hidden, network.second_bias.size))
+            hidden = network.second_bias.size
+        elif network.second_weights is not None or network.second_bias is not None:
+            raise ValueError("a second hidden layer needs weights and a bias")
         _expect("output_weights", network.output_weights, (hidden, each))
         _expect("output_bias", network.output_bias, (each,))
         if network.direct is not None:

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.valves import CLOSED, VALVES
 from pneumarm.kernels import inner, kernel, part
-from pneumarm.networks.layers import weighted_sums
-from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.random import RandomState
+from pneumarm.simulation.gradient import predict_all
 from pneumarm.simulation.kernel import SimulationState, places, put_command, settle
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.environment import (
@@ -39,6 +38,8 @@ class Fleet(NamedTuple):
     """Shape (n, 4)."""
     hidden: NDArray[np.float32]
     """Workspace, shape (units, n)."""
+    second: NDArray[np.float32]
+    """Workspace, shape (second units, n)."""
     change: NDArray[np.float32]
     """Workspace, shape (outputs, n)."""
     goal: NDArray[np.float64]
@@ -68,6 +69,7 @@ def fleet(environment: Environment, random: RandomState) -> Fleet:
         average=np.zeros((outputs, n), np.float32),
         random=random,
         hidden=np.zeros((units, n), np.float32),
+        second=np.zeros((environment.simulation.second_bias.size, n), np.float32),
         change=np.zeros((outputs, n), np.float32),
         goal=np.zeros((n, joints)),
         actions=np.full((n, joints), -1, np.int64),
@@ -141,7 +143,12 @@ def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-unty
 def one(fleet, e):  # type: ignore[no-untyped-def]
     """Return arm ``e`` as a single episode; it is a view."""
     state = SimulationState(
-        fleet.x[:, e], fleet.average[:, e], fleet.random[e], fleet.hidden[:, e], fleet.change[:, e]
+        fleet.x[:, e],
+        fleet.average[:, e],
+        fleet.random[e],
+        fleet.hidden[:, e],
+        fleet.second[:, e],
+        fleet.change[:, e],
     )
     return Episode(state, fleet.goal[e], fleet.actions[e], fleet.switched[e], fleet.command[e])
 
@@ -179,7 +186,7 @@ def take_all(environment, limits, fleet, actions, is_reached):  # type: ignore[n
         arm = one(fleet, e)
         order(environment.task, arm, actions[e])
         put_command(simulation, arm.state.x, arm.command)
-    predict_changes(simulation, fleet)
+    predict_all(simulation, fleet.x, fleet)
     for e in range(actions.shape[0]):
         advance(environment, limits, fleet, e)
         is_reached[e] = reached(environment.task, one(fleet, e))
@@ -194,33 +201,11 @@ def take_alive(environment, limits, fleet, actions, alive, is_reached):  # type:
             arm = one(fleet, e)
             order(environment.task, arm, actions[e])
             put_command(simulation, arm.state.x, arm.command)
-    predict_changes(simulation, fleet)
+    predict_all(simulation, fleet.x, fleet)
     for e in range(actions.shape[0]):
         if alive[e]:
             advance(environment, limits, fleet, e)
             is_reached[e] = reached(environment.task, one(fleet, e))
-
-
-@kernel(fastmath=FASTMATH)
-def predict_changes(simulation, fleet):  # type: ignore[no-untyped-def]
-    """Set ``fleet.change`` to what the networks predict for the states and commands in ``fleet.x``."""
-    x, hidden, change = fleet.x, fleet.hidden, fleet.change
-    weighted_sums(simulation.hidden, x, hidden)
-    for u in range(hidden.shape[0]):
-        tansig(hidden[u])
-    for o in range(change.shape[0]):
-        for e in range(change.shape[1]):
-            change[o, e] = simulation.output_bias[o]
-        for u in range(hidden.shape[0]):
-            weight = simulation.output[o, u]
-            if weight != np.float32(0.0):  # the unit of another network
-                for e in range(change.shape[1]):
-                    change[o, e] += weight * hidden[u, e]
-    for o in range(simulation.direct.shape[0]):
-        for i in range(x.shape[0]):
-            weight = simulation.direct[o, i]
-            for e in range(change.shape[1]):
-                change[o, e] += weight * x[i, e]
 
 
 @kernel

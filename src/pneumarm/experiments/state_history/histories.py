@@ -25,6 +25,7 @@ from pneumarm.experiments.there_and_back import (
 from pneumarm.experiments.words import words_of
 from pneumarm.networks import LevenbergMarquardt, levenberg_marquardt, nguyen_widrow
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, fit
+from pneumarm.simulation.fit import HIDDEN
 from pneumarm.simulation.quality import propagation
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.task import BeginStates, begin_states
@@ -97,7 +98,7 @@ def errors_with_period(
     x, apart = inputs(kept), inputs(held_out)
     error = np.empty(held_out.target.shape)
     for column, (one, seed) in enumerate(zip(places, seeds, strict=True)):
-        start = nguyen_widrow(x.shape[1], settings.hidden, 1, int(seed))
+        start = nguyen_widrow(x.shape[1], settings.hidden or HIDDEN, 1, int(seed))
         network = levenberg_marquardt(x, change_of[:, [column]] / scale[column], start, solver).network
         told = held_out.observation[:, one] + scale[column] * network(apart)[:, 0]
         error[:, one] = np.clip(told, *limits[:, one]) - held_out.target[:, one]

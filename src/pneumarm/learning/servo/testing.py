@@ -10,11 +10,12 @@ from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
 from pneumarm.learning.servo.actor import ServoNetwork
 from pneumarm.random import random_state, random_states
+from pneumarm.simulation.gradient import predict_all
 from pneumarm.simulation.kernel import put_command, settle
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import begin_episode, environment, order_pulses, reached
-from pneumarm.task.fleet import fleet, one, predict_changes
+from pneumarm.task.fleet import fleet, one
 from pneumarm.task.movements import NOISE, Movements, movements
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
 
@@ -74,7 +75,7 @@ def _take(environment, arms, pulses, record, number):  # type: ignore[no-untyped
             arm = one(arms, e)
             order_pulses(task, arm, pulses[e])
             put_command(simulation, arm.state.x, arm.command)
-    predict_changes(simulation, arms)
+    predict_all(simulation, arms.x, arms)
     for e in range(number.shape[0]):
         if number[e] >= 0:
             arm = one(arms, e)

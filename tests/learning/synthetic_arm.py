@@ -70,7 +70,8 @@ def _network(window: Window, linear: dict[int, float], hidden: int, seed: int, d
     b1[0] = 0
     if not second:
         return Network(w1, b1, w2, -np.tanh(b1) @ w2)
-    between = np.eye(hidden)[:, : hidden - 1] + random.normal(0, 0.01, (hidden, hidden - 1))
+    between = np.eye(hidden)[:, : hidden - 1]
+    between[:, 1:] += random.normal(0, 0.1, (hidden, hidden - 2))
     bias = -np.tanh(b1) @ between  # nothing changes where nothing is done
     return Network(w1, b1, w2[:-1], np.zeros(1), None, between, bias)
 

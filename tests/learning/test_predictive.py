@@ -51,7 +51,7 @@ def drawn(simulation: Simulation, n: int = PLANS) -> tuple[ServoTask, Plans, Tap
         synthetic_simulation(1, 3),
         synthetic_simulation(2, 2, direct=True),
         synthetic_simulation(1, 1, direct=True),
-        synthetic_simulation(2, 3, second=True),
+        synthetic_simulation(2, 2, second=True),
     ],
     ids=["one joint", "two joints, direct", "history 1", "two layers"],
 )

@@ -1,7 +1,8 @@
 """Fitting a simulation further to the newest movements of an arm, few or many.
 
     1  the weights of the outputs, by ridge regression around what they were    11 numbers an output
-    2  all weights of one hidden layer, by Levenberg-Marquardt around those, on the movements and on rehearsed ones
+    2  all weights, by Levenberg-Marquardt around those, on the movements and on rehearsed ones; with two hidden
+       layers by some steps of gradient descent
 
 Few movements determine few numbers, so the first step does most of the work then. The second would forget what the
 movements do not show, as those of a policy use few of the actions; it is held by its anchor, and by transitions
@@ -30,13 +31,14 @@ import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.adaptation.change import error_squares
 from pneumarm.arm.valves import VALVES
-from pneumarm.networks import LevenbergMarquardt, Network, levenberg_marquardt
+from pneumarm.networks import LevenbergMarquardt, Network, gradient_descent, levenberg_marquardt
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.fit import fitted_on
 from pneumarm.simulation.quality import residue
@@ -48,6 +50,7 @@ from pneumarm.transitions.window import Transitions, Window, transitions
 
 Floats = NDArray[np.float64]
 _SWITCHES = 0.2  # how often a rehearsed action is another than the one before
+_PASSES, _RATE = 10, 3e-4  # of gradient descent: passes for an epoch, and its learning rate
 _REHEARSED_STEPS = 20  # of a rehearsed movement; the policy's take about ten
 
 
@@ -206,17 +209,19 @@ def _outputs_fitted(simulation: Simulation, known: Transitions, ridge: float) ->
 
 
 def _all_fitted(simulation: Simulation, x: Floats, y: Floats, settings: RefitSettings) -> tuple[Network, ...]:
-    """Return the networks fitted to ``x`` and ``y``, anchored where they are; those of two layers as they are."""
-    if any(network.second_weights is not None for network in simulation.networks):
-        return simulation.networks
+    """Return the networks fitted to ``x`` and ``y``, anchored where they are."""
     solver = LevenbergMarquardt(epochs=settings.epochs, decay=settings.anchor / len(x), anchored=True)
     unit, read = _unit(simulation), np.flatnonzero(simulation.reads)
     seen = np.ascontiguousarray(x[:, read])
 
     def fitted(network: Network, of_it: NDArray[np.int64]) -> Network:
-        scale = unit[of_it]
-        start = network.reading(read).times(1 / scale)
-        return levenberg_marquardt(seen, y[:, of_it], start, solver).network.times(scale).widened(read, x.shape[1])
+        if network.second_weights is None:
+            scale, fit = unit[of_it], partial(levenberg_marquardt, settings=solver)
+        else:  # short steps, and few, leave it where it was as an anchor does
+            scale = unit[of_it] * y[:, of_it].std(axis=0)
+            fit = partial(gradient_descent, passes=_PASSES * settings.epochs, rate=_RATE)
+        start, target = network.reading(read).times(1 / scale), y[:, of_it] * unit[of_it] / scale
+        return fit(seen, target, start).network.times(scale).widened(read, x.shape[1])
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as threads:  # kernels, which release Python's lock
         return tuple(threads.map(fitted, simulation.networks, _columns(simulation)))

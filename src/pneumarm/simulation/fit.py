@@ -59,7 +59,7 @@ HIDDEN, _HIDDEN_OF_TWO = 10, 32
 """Hidden units of each layer for each joint, of networks with one layer and with two."""
 _ROWS_FOR_TWO = 5_000
 """Rows for each joint from which on two layers are as good as one, or better."""
-_PASSES, _ROWS_OF_PASSES = 300, 6_000_000
+_PASSES, _ROWS_OF_PASSES = 600, 12_000_000
 """Most passes of gradient descent over all rows, and most rows of all passes together."""
 _RATE, _RATE_ON = 5e-3, 1e-3
 """Learning rate of gradient descent, and of one that goes on from where another ended."""

@@ -39,6 +39,8 @@ class PolicySettings(FleetSettings):
     what the policy would do; 0: each joint looks ahead for itself."""
     practice: int = 4
     """With several joints: there are so many times as many updates."""
+    noise_share: float = 0.5
+    """With several joints: the share of the simulation's noise that it learns and looks ahead in."""
     clear: float = 0.001
     """Actions less probable than this are not looked at; where only one is left the decision is clear."""
     fillings: float = 2.0
@@ -60,6 +62,7 @@ class PolicySettings(FleetSettings):
             "horizon": self.horizon >= 1,
             "nodes": 0 <= self.nodes <= 10_000_000,
             "practice": self.practice >= 1,
+            "noise_share": 0 <= self.noise_share <= 1 or "0 to 1",
             "clear": 0 <= self.clear < 1,
             "fillings": 0 <= self.fillings <= 100 or "0 to 100",
         }

@@ -54,9 +54,11 @@ def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
 
 
 def practised(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
-    """Return ``settings`` with as many updates as the joints of this arm need."""
-    several = simulation.spec.joints > 1
-    return replace(settings, updates=settings.updates * settings.practice) if several else settings
+    """Return ``settings`` with as many updates, and as little noise, as suit the joints of this arm."""
+    if simulation.spec.joints == 1:
+        return settings
+    noise = replace(settings.noise, factor=settings.noise.factor * settings.noise_share)
+    return replace(settings, updates=settings.updates * settings.practice, noise=noise)
 
 
 class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -76,8 +76,12 @@ def test_there_is_no_stretch_over_a_gap(single: Simulation, store: Path) -> None
     assert parted > whole - 4 * STEPS
 
 
-def test_the_gradient_is_that_of_the_cost(store: Path, single: Simulation) -> None:
+@pytest.mark.parametrize("layers", [1, 2])
+def test_the_gradient_is_that_of_the_cost(store: Path, single: Simulation, layers: int) -> None:
     """Compared with differences of the cost along random directions."""
+    if layers == 2:
+        with Store.open(store) as opened:
+            single = fit_store(opened, FitSettings(layers=2, hidden=8, ahead=0.0)).simulation
     found = recorded(store, single)
     net, parameters = _trainable(simulation_parameters(single))
     tape = _tape(single, parameters, found)
@@ -86,7 +90,7 @@ def test_the_gradient_is_that_of_the_cost(store: Path, single: Simulation) -> No
 
     def cost(step: np.ndarray[Any, np.dtype[np.float32]]) -> float:
         net.flat[:] += step
-        parameters.output[:] = net.layers[1][:-1].T
+        parameters.output[:] = net.layers[-1][:-1].T
         move_ahead(parameters, tape)
         net.flat[:] -= step
         error = (tape.x[1:, parameters.place] - tape.observed) * tape.weight[:, :, None]
@@ -102,10 +106,13 @@ def test_the_gradient_is_that_of_the_cost(store: Path, single: Simulation) -> No
         assert slope == pytest.approx(float(gradient @ way), rel=0.05, abs=0.05 * float(np.linalg.norm(gradient)))
 
 
-def test_later_steps_are_predicted_better(store: Path, single: Simulation) -> None:
+@pytest.mark.parametrize("layers", [1, 2])
+def test_later_steps_are_predicted_better(store: Path, single: Simulation, layers: Literal[1, 2]) -> None:
     """And single ones about as well, on sequences that were not fitted."""
     with Store.open(store) as opened:
-        fitted = fit_store(opened, FitSettings(epochs=10, memory=1)).simulation
+        chosen = FitSettings(epochs=10, memory=1, layers=layers)
+        single = single if layers == 1 else fit_store(opened, replace(chosen, ahead=0.0, spread=False)).simulation
+        fitted = fit_store(opened, chosen).simulation
         blocks = [rows.where(held_out(rows.sequence, single.held_out, single.seed)) for rows in opened.blocks()]
     apart = stretches(blocks, replace(single, held_out=0.0), STEPS)
     later = [_errors(one, apart) for one in (single, fitted)]

@@ -106,11 +106,6 @@ def test_several_joints_get_two_layers_where_there_is_enough_to_learn_from(
     assert FitSettings().with_layers(joints, rows).layers == 1  # which are fitted ahead
 
 
-def test_two_layers_are_not_fitted_ahead() -> None:
-    with pytest.raises(UnusableInput, match="layers"):
-        FitSettings(layers=2)
-
-
 @pytest.mark.parametrize(
     "options",
     [

@@ -138,7 +138,7 @@ def fitted_ahead(
         adam(net, _RATE * (1 - number / updates), _LONGEST_GRADIENT, number + 1)
         if progress is not None and number % _BLOCK == 0:
             progress(number / updates)
-    parameters.output[:] = net.layers[1][:-1].T
+    parameters.output[:] = net.layers[-1][:-1].T
     return replace(simulation, networks=_networks(simulation, parameters))
 
 
@@ -149,14 +149,20 @@ def _trainable(parameters: SimulationParameters) -> tuple[Trainable, SimulationP
     """
     (size, units), outputs = parameters.hidden.shape, len(parameters.output_bias)
     unused = np.zeros((1, units), np.float32)  # the biases are weights of the 1 in the state
-    layers = [
-        np.concatenate([parameters.hidden, unused]),
-        np.concatenate([parameters.output.T, parameters.output_bias[None]]),
-    ]
+    layers = [np.concatenate([parameters.hidden, unused])]
+    sizes = [size, units]
+    if len(parameters.second):
+        layers.append(np.concatenate([parameters.second, parameters.second_bias[None]]))
+        sizes.append(len(parameters.second_bias))
+    layers.append(np.concatenate([parameters.output.T, parameters.output_bias[None]]))
     flat = np.concatenate([layer.ravel() for layer in layers])
-    net = trainable(flat, (size, units, outputs), 1, (flat != 0).astype(np.float32))
-    hidden, output = net.layers
-    return net, parameters._replace(hidden=hidden[:-1], output=parameters.output.copy(), output_bias=output[-1])
+    net = trainable(flat, (*sizes, outputs), 1, (flat != 0).astype(np.float32))
+    trained = parameters._replace(
+        hidden=net.layers[0][:-1], output=parameters.output.copy(), output_bias=net.layers[-1][-1]
+    )
+    if len(parameters.second):
+        trained = trained._replace(second=net.layers[1][:-1], second_bias=net.layers[1][-1])
+    return net, trained
 
 
 def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: Stretches) -> Tape:
@@ -215,9 +221,10 @@ def move_ahead(simulation, tape):  # type: ignore[no-untyped-def]
 @kernel(fastmath=FASTMATH)
 def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost of a step to ``net.gradient``."""
+    last = len(net.layers) - 1
     for o in range(simulation.output.shape[0]):
         for u in range(simulation.output.shape[1]):
-            simulation.output[o, u] = net.layers[1][u, o]
+            simulation.output[o, u] = net.layers[last][u, o]
     move_ahead(simulation, tape)
     commanded, clip = 2 * simulation.joints, np.float32(_CLIP)
     first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
@@ -236,7 +243,9 @@ def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
         work.free[:] = tape.free[t]
         step_back(simulation, later, sooner, work)
         add_slopes(tape.x[t], work.slope, net.slopes[0])
-        add_slopes(work.hidden, work.change, net.slopes[1])
+        if last == 2:
+            add_slopes(work.hidden, work.second_slope, net.slopes[1])
+        add_slopes(work.second if last == 2 else work.hidden, work.change, net.slopes[last])
         later[:] = sooner
         later[first : first + commanded] = np.float32(0.0)  # commands are as they were
 
@@ -244,17 +253,25 @@ def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
 def _networks(simulation: Simulation, parameters: SimulationParameters) -> tuple[Network, ...]:
     """Return the networks of which ``parameters`` are made."""
     inputs, one = simulation.window.input_size, places(simulation.window).one
-    networks, u, o = [], 0, 0
+    networks, u, s, o = [], 0, 0, 0
     for network in simulation.networks:
-        units = slice(u, u + network.hidden_bias.size)
+        units = last = slice(u, u + network.hidden_bias.size)
         outputs = slice(o, o + network.output_bias.size)
         u, o = units.stop, outputs.stop
+        if network.second_bias is not None:
+            last = slice(s, s + network.second_bias.size)
+            s = last.stop
+            network = replace(
+                network,
+                second_weights=parameters.second[units, last].astype(np.float64),
+                second_bias=parameters.second_bias[last].astype(np.float64),
+            )
         networks.append(
             replace(
                 network,
                 hidden_weights=parameters.hidden[:inputs, units].astype(np.float64),
                 hidden_bias=parameters.hidden[one, units].astype(np.float64),
-                output_weights=parameters.output[outputs, units].T.astype(np.float64),
+                output_weights=parameters.output[outputs, last].T.astype(np.float64),
                 output_bias=parameters.output_bias[outputs].astype(np.float64),
             )
         )

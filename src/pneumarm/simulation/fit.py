@@ -118,7 +118,7 @@ class FitSettings(Settings):
             "history": self.history is None or self.history >= 1 or "1 or more",
             "memory": self.memory is None or self.memory >= 1 or "1 or more",
             "approximator": self.approximator in ("network", "least-squares"),
-            "layers": self.layers != 2 or self.ahead == 0 or "1 where predictions are fitted ahead",
+            "layers": self.layers in (None, 1, 2) or "1 or 2",
             "hidden": self.hidden is None or 1 <= self.hidden <= 1000 or "1 to 1000",
             "epochs": self.epochs >= 1,
             "tolerance": 0 <= self.tolerance < 1,

@@ -234,9 +234,11 @@ class Adaptation:
         self._tried = self.movements
         tuned, now = self._settings, self.agent.simulation
         updates, rate = tuned.updates, tuned.learning_rate
-        recording = recorded if self._is_thorough() else None
+        is_thorough = self._is_thorough()
+        recording = recorded if is_thorough or self._knows_on() else None
         if recording is not None:
-            updates, rate = tuned.thorough_updates, tuned.thorough_rate
+            if is_thorough:
+                updates, rate = tuned.thorough_updates, tuned.thorough_rate
             found: Refit | None = refit_to_all(now, recording, rows)
         else:
             found = refit(now, self._origin.simulation, rows, tuned.refit, self._seed)
@@ -246,7 +248,7 @@ class Adaptation:
             simulation = found.simulation
             begin = begin_states(rows, simulation.window, simulation.scaling, simulation.spec)
             seed = self._seed + self.movements
-            if recording is not None and not self._anew and isinstance(self.agent, Stiffens):
+            if recording is not None and is_thorough and not self._anew and isinstance(self.agent, Stiffens):
                 self.agent, self._stiff, self._anew = self.agent.stiffer().anew(simulation, begin, seed), True, True
             else:
                 self.agent = self.agent.adapted(simulation, begin, updates, tuned.warm_up, rate, seed)
@@ -270,6 +272,12 @@ class Adaptation:
             and self._began == 0
             and not simulation.spread  # or what it was taught of pulses would be forgotten
         )
+
+    def _knows_on(self) -> bool:
+        """Whether the simulation is fitted on with the recording: one of two layers, on an arm that is as it was."""
+        simulation = self.agent.simulation
+        two_layers = simulation.networks[0].second_weights is not None
+        return two_layers and self._began == 0 and not simulation.spread
 
     def _figures(self, found: Refit) -> dict[str, Any]:
         unit = np.sqrt(error_squares(self._origin.simulation))

@@ -144,8 +144,8 @@ def refit_to_all(now: Simulation, store: Store, rows: Rows) -> Refit:
 
     It is meant for an arm that is as it was when it was recorded, and taken to be better: it knows more.
     """
-    whole = fitted_on(now, store)
     found = transitions(rows, now.window)
+    whole = fitted_on(now, store, newest=found)
     pressure, further = now.window.of_joints(found.target)[..., -2:], found.target[:, now.window.joint_size :]
     reached = replace(
         whole,

@@ -327,10 +327,8 @@ class Transfer:
             self._keep_version(adapting.version, adapting.agent)
 
     def _recording(self) -> Store | None:
-        """Return the store where it holds the recording that an agent that settles was made of."""
-        if not isinstance(self._arrived, Tracks) or not any(one.kind in KINDS for one in self._store.catalogue()):
-            return None
-        return self._store
+        """Return the store where it holds the recording that the agent was made of."""
+        return self._store if any(one.kind in KINDS for one in self._store.catalogue()) else None
 
     def _note(self, phase: Phase, movement: Movement) -> None:
         """Keep what came of a movement, and let the agent take notice of it."""

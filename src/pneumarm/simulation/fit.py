@@ -57,6 +57,8 @@ _EPOCHS_ON = 20
 """Epochs, or passes, of a fit that goes on from where another ended."""
 HIDDEN, _HIDDEN_OF_TWO = 10, 32
 """Hidden units of each layer for each joint, of networks with one layer and with two."""
+_NEWEST_COUNT = 5
+"""Times that movements of an agent count in a fit that goes on, beside what was recorded before."""
 _ROWS_FOR_TWO = 5_000
 """Rows for each joint from which on two layers are as good as one, or better."""
 _PASSES, _ROWS_OF_PASSES = 600, 12_000_000
@@ -583,21 +585,27 @@ def fit_store(
     return StoreFit(result._replace(simulation=result.simulation.with_goals(goals)), filtered)
 
 
-def fitted_on(simulation: Simulation, store: Store, ahead: float = FitSettings.ahead) -> Simulation:
+def fitted_on(
+    simulation: Simulation, store: Store, ahead: float = FitSettings.ahead, newest: Transitions | None = None
+) -> Simulation:
     """Return ``simulation``, fitted on from where it is to all that ``store`` holds by now.
 
     Its window, scaling, ranges and goals stay, so that an agent of the one can act in the other. Its errors are those
-    on sequences that are held out. ``ahead`` is how far ahead one with one hidden layer is fitted [s].
+    on sequences that are held out. ``ahead`` is how far ahead one with one hidden layer is fitted [s]. The ``newest``
+    transitions in ``store``, made by an agent, so where it has to know most, count several times with two layers.
     """
     window, places, seed = simulation.window, simulation.outputs, simulation.seed
+    layers: Literal[1, 2] = 1 if simulation.networks[0].second_weights is None else 2
     filtered = filter_transitions(store, window, seed=seed, hold_out=simulation.held_out)
     training = filtered.transitions
+    if newest is not None and layers == 2:
+        parts = zip(training, *[newest] * (_NEWEST_COUNT - 1), strict=True)
+        training = Transitions(*(np.concatenate(part) for part in parts))
     change = training.target[:, places].astype(np.float64) - training.observation[:, places]
     spread = change.std(axis=0)
     spread[spread == 0] = 1.0
     factor = spread / simulation.scaling.observation_scale[places]
     factors, read = np.split(factor, len(simulation.networks)), np.flatnonzero(simulation.reads)
-    layers: Literal[1, 2] = 1 if simulation.networks[0].second_weights is None else 2
     fitted, _ = _fitted(
         simulation,
         simulation.scaling.inputs(training.inputs, window).astype(np.float32)[:, read],

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import repeat
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.quality import residue
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.transitions import Store, collect
 from pneumarm.transitions.rows import Recorded, Rows, joined
 from pneumarm.transitions.window import transitions
 
@@ -172,6 +174,24 @@ def test_all_that_an_adaptation_changes_are_numbers(second: bool) -> None:
     np.testing.assert_array_equal(plastic(other), 1.5 * numbers.astype(np.float32).astype(np.float64))
     x = np.random.default_rng(0).normal(size=(5, simulation.window.input_size))
     np.testing.assert_array_equal(with_plastic(other, numbers).simulation.networks[0](x), simulation.networks[0](x))
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_a_simulation_of_two_layers_goes_on_learning_from_its_recording(tmp_path: Path, recorded: bool) -> None:
+    simulation = replace(synthetic_simulation(2, second=True), held_out=0.2)
+    agent = train_any(
+        simulation, synthetic_begin_states(simulation), replace(POLICY, updates=1, practice=1), threads=1
+    ).agent
+    assert isinstance(agent, PolicyAgent)
+    never = replace(SETTINGS, updates=1, warm_up=1, refit=RefitSettings(gain=0.99, fewest_rehearsed=300))
+    adapting, arm = Adaptation(agent, never), SimulationArm(changed(simulation), noise=NoiseSettings(factor=0.1))
+    rows = moved(changed(simulation), 12)
+    with Store.for_arm(tmp_path / "transitions.db", arm.spec) as store:
+        collect(arm, store, 2500, 1)
+        assert adapting.learn(rows, store if recorded else None) == recorded
+    fresh = moved(changed(simulation), 5, seed=9)
+    before, after = (squares(one, fresh)[[1, 2, 4, 5]] for one in (simulation, adapting.agent.simulation))
+    assert (after < 0.7 * before).all() == recorded
 
 
 def test_too_few_movements_are_left_alone(agent: PolicyAgent, changed_rows: Rows) -> None:

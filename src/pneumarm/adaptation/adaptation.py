@@ -8,7 +8,8 @@
 An agent that does not settle at some of its goals, on an arm whose recording is at hand and that is as it was then,
 learns more thoroughly: the simulation is fitted on to the recording and to the movements together, and the agent
 is made anew in it, for joints that are kept stiffer; later on, whichever was better learns in it for longer. What
-keeps a joint from its rest is mostly what a recording of large movements did not show.
+keeps a joint from its rest is mostly what a recording of large movements did not show. A simulation of two layers,
+whose fit goes on within a second, always is.
 
 The three questions are answered by :mod:`~pneumarm.adaptation.change`, :mod:`~pneumarm.adaptation.trial` and
 :mod:`~pneumarm.adaptation.refit`. "Now and then" is after few movements at first, and then each time that their

@@ -351,10 +351,11 @@ def _fitted(
     """
     joints, size = simulation.window.joints, simulation.window.input_size
     before = [one.reading(read) for one in before]
+    targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
     if settings.layers == 2:
-        fits = [_fit_two_layers(x, y, settings, joints, progress, before)]
+        starts: list[Network | None] = list(before) or [None] * len(targets)
+        fits = [_fit_two_layers(x, *pair, settings, joints, progress) for pair in zip(targets, starts, strict=True)]
     else:
-        targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
         chosen = _rows_to_fit(len(x), _weights(x.shape[1], settings, joints), settings.seed)
         fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0
@@ -433,15 +434,15 @@ def _fit_networks(
 def _fit_two_layers(
     x: NDArray[np.float32],
     y: NDArray[np.float64],
+    before: Network | None,
     settings: FitSettings,
     joints: int,
     progress: Callable[[int, int], None],
-    before: Sequence[Network],
 ) -> Fit:
     """Fit a network of two hidden layers to ``y``; it begins as it was ``before``, or at random."""
     passes = min(_PASSES, -(-_ROWS_OF_PASSES // len(x)))
-    passes, rate = (min(_EPOCHS_ON, passes), _RATE_ON) if before else (passes, _RATE)
-    start = before[0] if before else two_layers(x.shape[1], _hidden(settings, joints), y.shape[1], settings.seed)
+    passes, rate = (passes, _RATE) if before is None else (min(_EPOCHS_ON, passes), _RATE_ON)
+    start = before or two_layers(x.shape[1], _hidden(settings, joints), y.shape[1], settings.seed)
 
     def report(done: int, _: float) -> None:
         progress(round(done / passes * settings.epochs), settings.epochs)

@@ -39,6 +39,7 @@ from pneumarm.adaptation.trial import TrialSettings, verdict
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.agents import Acts, Adapts, Stiffens, Tracks
 from pneumarm.settings import Settings, Valid
+from pneumarm.simulation import FitSettings
 from pneumarm.task.begin import begin_states
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
@@ -238,9 +239,10 @@ class Adaptation:
         is_thorough = self._is_thorough()
         recording = recorded if is_thorough or self._knows_on() else None
         if recording is not None:
+            ahead = FitSettings.ahead if is_thorough else 0.0
             if is_thorough:
                 updates, rate = tuned.thorough_updates, tuned.thorough_rate
-            found: Refit | None = refit_to_all(now, recording, rows)
+            found: Refit | None = refit_to_all(now, recording, rows, ahead)
         else:
             found = refit(now, self._origin.simulation, rows, tuned.refit, self._seed)
         if found is None:
@@ -275,10 +277,13 @@ class Adaptation:
         )
 
     def _knows_on(self) -> bool:
-        """Whether the simulation is fitted on with the recording: one of two layers, on an arm that is as it was."""
+        """Whether the simulation is fitted on with the recording, on an arm that is as it was.
+
+        One of two layers is, of an agent that is to reach goals: one that settles learns more thoroughly if at all.
+        """
         simulation = self.agent.simulation
         two_layers = simulation.networks[0].second_weights is not None
-        return two_layers and self._began == 0 and not simulation.spread
+        return two_layers and self._began == 0 and not isinstance(self._origin, Tracks)
 
     def _figures(self, found: Refit) -> dict[str, Any]:
         unit = np.sqrt(error_squares(self._origin.simulation))

@@ -40,7 +40,7 @@ from pneumarm.adaptation.change import error_squares
 from pneumarm.arm.valves import VALVES
 from pneumarm.networks import LevenbergMarquardt, Network, gradient_descent, levenberg_marquardt
 from pneumarm.settings import Settings, Valid
-from pneumarm.simulation.fit import fitted_on
+from pneumarm.simulation.fit import FitSettings, fitted_on
 from pneumarm.simulation.quality import residue
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.simulation.spread import spread_over_periods
@@ -139,13 +139,15 @@ def refit(now: Simulation, origin: Simulation, rows: Rows, settings: RefitSettin
     )
 
 
-def refit_to_all(now: Simulation, store: Store, rows: Rows) -> Refit:
+def refit_to_all(now: Simulation, store: Store, rows: Rows, ahead: float = FitSettings.ahead) -> Refit:
     """Return ``now`` fitted on to all that ``store`` holds: a recording, and the movements, whose ``rows`` are given.
+
+    ``ahead`` is how far ahead [s]; 0 for single steps alone.
 
     It is meant for an arm that is as it was when it was recorded, and taken to be better: it knows more.
     """
     found = transitions(rows, now.window)
-    whole = fitted_on(now, store, newest=found)
+    whole = fitted_on(now, store, ahead, found)
     pressure, further = now.window.of_joints(found.target)[..., -2:], found.target[:, now.window.joint_size :]
     reached = replace(
         whole,

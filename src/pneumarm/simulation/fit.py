@@ -86,7 +86,7 @@ class FitSettings(Settings):
     """Function approximator: a network (thesis), or a linear model by least squares."""
     layers: Literal[1, 2] | None = None
     """Hidden layers (thesis: 1). With 2, one network has all outputs, and is fitted by gradient descent; by default
-    where several joints are fitted to many single steps."""
+    with several joints, where there are 5,000 rows for each."""
     hidden: int | None = None
     """Hidden units of each layer for each joint of the arm; by default 10 (thesis: 10, one joint), or 32 of two
     layers."""
@@ -145,7 +145,7 @@ class FitSettings(Settings):
 
     def with_layers(self, joints: int, rows: int) -> "FitSettings":
         """Return the settings with what suits ``joints`` and ``rows`` where no layers or hidden units are chosen."""
-        several = joints > 1 and self.ahead == 0 and self.approximator == "network"
+        several = joints > 1 and self.approximator == "network"
         enough = rows >= _ROWS_FOR_TWO * joints
         if (self.layers or (2 if several and enough else 1)) == 1:
             return replace(self, layers=1, hidden=self.hidden or HIDDEN)
@@ -592,8 +592,8 @@ def fitted_on(
     """Return ``simulation``, fitted on from where it is to all that ``store`` holds by now.
 
     Its window, scaling, ranges and goals stay, so that an agent of the one can act in the other. Its errors are those
-    on sequences that are held out. ``ahead`` is how far ahead one with one hidden layer is fitted [s]. The ``newest``
-    transitions in ``store``, made by an agent, so where it has to know most, count several times with two layers.
+    on sequences that are held out. ``ahead`` is how far ahead it is fitted [s]. The ``newest`` transitions in
+    ``store``, made by an agent, so where it has to know most, count several times with two layers.
     """
     window, places, seed = simulation.window, simulation.outputs, simulation.seed
     layers: Literal[1, 2] = 1 if simulation.networks[0].second_weights is None else 2
@@ -618,7 +618,7 @@ def fitted_on(
         [one.times(1 / each) for one, each in zip(simulation.networks, factors, strict=True)],
     )
     steps = round(ahead / simulation.spec.period)
-    if steps > 1 and layers == 1:
+    if steps > 1:
         fitted = fitted_ahead(fitted, stretches(store.blocks(), fitted, steps), seed)
     return fitted.with_errors(statistics(fitted, filtered.stream("held-out")).std)
 

@@ -28,7 +28,7 @@ from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent, LearnSettings, PolicySettings, Training, test, train
-from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
+from pneumarm.simulation import SINGLE_STEPS, FitSettings, Simulation, fit_store
 from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
 from pneumarm.transitions import KINDS, Store
@@ -73,17 +73,20 @@ def measure() -> Iterator[str]:
         yield total(method, each, failures[method])
 
 
-def prepared(folder: Path, arm: str, minutes: float = 0.0) -> tuple[Simulation, BeginStates]:
+def prepared(
+    folder: Path, arm: str, minutes: float = 0.0, settings: FitSettings = SINGLE_STEPS
+) -> tuple[Simulation, BeginStates]:
     """Return the simulation of an arm and its begin states; collect and fit where that is not done yet.
 
-    It is recorded for so many ``minutes`` of its time, or for :data:`TRANSITIONS`.
+    It is recorded for so many ``minutes`` of its time, or for :data:`TRANSITIONS`, and fitted by ``settings``; a
+    ``folder`` has fits of one kind.
     """
     db, seed = store_of(folder, arm), seed_of(arm)
     file = db.with_suffix(".sim")
     if not file.exists():
         there_and_back.collected(db, arm, seed, Recipe(minutes=minutes) if minutes else Recipe(TRANSITIONS))
         with Store.open(db) as store:
-            fit_store(store, replace(SINGLE_STEPS, seed=seed)).simulation.save(file)
+            fit_store(store, replace(settings, seed=seed)).simulation.save(file)
     simulation = Simulation.load(file)
     with Store.open(db) as store:
         return simulation, begin_states(

@@ -29,6 +29,7 @@ from benchmarks.agents import prepared, store_of
 from benchmarks.baselines import greedy_movements
 from pneumarm.learning import AnyAgent, PolicyAgent, PolicySettings, test, train
 from pneumarm.planning import PlanAgent
+from pneumarm.simulation import SINGLE_STEPS
 from pneumarm.task.movements import of_rows
 
 ARMS = " ".join(f"virtual:joints=2,seed={seed}" for seed in (1, 2, 3))
@@ -45,6 +46,8 @@ class Variant:
     """Settings that it was trained with."""
     acting: Mapping[str, Any] = field(default_factory=dict)
     """Settings that it acts by."""
+    fit: Mapping[str, Any] = field(default_factory=dict)
+    """Settings that its simulation was fitted with."""
     share: float = 1.0
     """Of the recording that it was made from."""
     learns: bool = True
@@ -59,6 +62,8 @@ VARIANTS: Mapping[str, Variant] = {
     "a quarter of the updates": Variant(training={"practice": 1}),
     "16 hidden units": Variant(training={"hidden": (16, 16)}),
     "64 hidden units": Variant(training={"hidden": (64, 64)}),
+    "the whole noise": Variant(training={"noise_share": 1.0}),
+    "simulation of one layer": Variant(fit={"layers": 1}),
     "no squashed errors": Variant(training={"squash": ()}),
     "half of the recording": Variant(share=0.5),
     "a quarter of the recording": Variant(share=0.25),
@@ -96,8 +101,9 @@ def trial(folder: Path, arm: str, seed: int, name: str, minutes: int, movements:
     variant = VARIANTS[name]
     goals = prepared(folder, arm, minutes)[0].goals
     place = folder if variant.share == 1 else folder / f"share-{variant.share:g}"
+    place /= "".join(f"{key}-{value}" for key, value in variant.fit.items())
     place.mkdir(exist_ok=True)
-    simulation, begin = prepared(place, arm, variant.share * minutes)
+    simulation, begin = prepared(place, arm, variant.share * minutes, replace(SINGLE_STEPS, **variant.fit))
     agent: AnyAgent = PlanAgent(simulation)
     if variant.learns:
         trained = "".join(f"-{key}-{value}" for key, value in variant.training.items())

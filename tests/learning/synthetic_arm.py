@@ -92,3 +92,12 @@ def synthetic_begin_states(simulation: Simulation) -> BeginStates:
     return begin_states(
         resting_rows(simulation.window.joints), simulation.window, simulation.scaling, simulation.spec
     )
+
+
+KINDS_OF_SIMULATION = {
+    "one joint": synthetic_simulation(1, 3),
+    "two joints, direct": synthetic_simulation(2, 2, direct=True),
+    "history 1": synthetic_simulation(1, 1, direct=True),
+    "two layers": synthetic_simulation(2, 2, second=True),
+}
+"""Of all that a gradient may have to go through."""

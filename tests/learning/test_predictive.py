@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from learning.synthetic_arm import synthetic_begin_states, synthetic_simulation
+from learning.synthetic_arm import KINDS_OF_SIMULATION, synthetic_begin_states, synthetic_simulation
 from pneumarm.arm import Reading
 from pneumarm.arm.reference import Reference
 from pneumarm.learning.servo import ServoAgent, ServoSettings
@@ -45,16 +45,7 @@ def drawn(simulation: Simulation, n: int = PLANS) -> tuple[ServoTask, Plans, Tap
     return task, plans, here
 
 
-@pytest.mark.parametrize(
-    "simulation",
-    [
-        synthetic_simulation(1, 3),
-        synthetic_simulation(2, 2, direct=True),
-        synthetic_simulation(1, 1, direct=True),
-        synthetic_simulation(2, 2, second=True),
-    ],
-    ids=["one joint", "two joints, direct", "history 1", "two layers"],
-)
+@pytest.mark.parametrize("simulation", KINDS_OF_SIMULATION.values(), ids=KINDS_OF_SIMULATION)
 def test_the_slopes_are_those_of_the_smooth_price(simulation: Simulation):
     task, plans, here = drawn(simulation, 1)
     commands = task.commands._replace(shortest=1e-6, leak=0.0)  # what has no slope, or jumps

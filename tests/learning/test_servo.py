@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from learning.synthetic_arm import synthetic_begin_states, synthetic_simulation
+from learning.synthetic_arm import KINDS_OF_SIMULATION, synthetic_begin_states, synthetic_simulation
 from pneumarm.arm import Reading, guarded
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.errors import UnusableInput
@@ -40,16 +40,7 @@ def learner(simulation: Simulation, settings: ServoSettings = SMALL, number: int
 
 
 @pytest.mark.parametrize("slack", [0.0, 3.0])
-@pytest.mark.parametrize(
-    "simulation",
-    [
-        synthetic_simulation(1, 3),
-        synthetic_simulation(2, 2, direct=True),
-        synthetic_simulation(1, 1, direct=True),
-        synthetic_simulation(2, 2, second=True),
-    ],
-    ids=["one joint", "two joints, direct", "history 1", "two layers"],
-)
+@pytest.mark.parametrize("simulation", KINDS_OF_SIMULATION.values(), ids=KINDS_OF_SIMULATION)
 def test_the_gradient_is_that_of_the_price(simulation: Simulation, slack: float):
     one = learner(simulation)
     one._prepare(np.random.default_rng(1), np.ones(SMALL.arms, bool))

@@ -35,7 +35,7 @@ from pneumarm.simulation.history import LONGEST, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
 from pneumarm.simulation.spread import spread_over_periods
-from pneumarm.transitions.choice import share_held_out
+from pneumarm.transitions.choice import held_out, picked, share_held_out
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
 from pneumarm.transitions.goals import held_range, seen_goals
@@ -600,7 +600,8 @@ def fitted_on(
     filtered = filter_transitions(store, window, seed=seed, hold_out=simulation.held_out)
     training = filtered.transitions
     if newest is not None and layers == 2:
-        parts = zip(training, *[newest] * (_NEWEST_COUNT - 1), strict=True)
+        known = picked(newest, ~held_out(newest.sequence, simulation.held_out, seed))
+        parts = zip(training, *[known] * (_NEWEST_COUNT - 1), strict=True)
         training = Transitions(*(np.concatenate(part) for part in parts))
     change = training.target[:, places].astype(np.float64) - training.observation[:, places]
     spread = change.std(axis=0)

@@ -325,6 +325,8 @@ def _check(simulation: Simulation) -> None:
     outputs = len(simulation.outputs)
     if len(simulation.networks) not in (1, outputs):
         raise ValueError(f"expected 1 or {outputs} networks, got {len(simulation.networks)}")
+    if len({network.second_bias is None for network in simulation.networks}) > 1:
+        raise ValueError("either all of its networks have a second hidden layer or none has")
     each = outputs // len(simulation.networks)
     for network in simulation.networks:
         hidden = network.hidden_bias.size

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from learning.synthetic_arm import synthetic_simulation
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
@@ -190,3 +191,10 @@ def test_the_range_of_an_angle_is_that_of_the_arm() -> None:
     wider = replace(simulation, spec=replace(simulation.spec, angle_range=(-50.0, 2000.0)))
     np.testing.assert_array_equal(wider.limits[:, 0], [-50.0, 2000.0])
     np.testing.assert_array_equal(wider.limits[:, 2], [0.0, 200.0])
+
+
+def test_all_networks_have_as_many_layers(tmp_path: Path) -> None:
+    one, two = synthetic_simulation(), synthetic_simulation(second=True)
+    replace(one, networks=(two.networks[0], *one.networks[1:])).save(tmp_path / "mixed.sim")
+    with pytest.raises(UnusableInput, match="all of its networks have a second hidden layer or none"):
+        Simulation.load(tmp_path / "mixed.sim")

@@ -23,6 +23,7 @@ from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
 from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
 from pneumarm.moving.movement import MoveSettings
+from pneumarm.moving.settling import settled_at
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import KINDS, Store
@@ -349,11 +350,10 @@ class Transfer:
         self._waiting.append(replace(movement.recorded, info=info))
 
     def _has_settled(self, recorded: Recorded, goal: NDArray[np.float64]) -> bool:
-        """Return whether all joints were within a degree of the ``goal`` (joints,) for the dwell time at the end."""
+        """Return whether the arm has settled at the ``goal`` (joints,), as it would have by default."""
         usual = MoveSettings()
-        late = recorded.time >= recorded.time[-1] - usual.dwell
-        off = np.abs(recorded.angle[late] - goal) / self._arm.spec.counts_per_degree
-        return bool((off <= usual.tolerance).all())
+        off = (recorded.angle - goal) / self._arm.spec.counts_per_degree
+        return settled_at(recorded.time, off, usual.tolerance, usual.dwell) is not None
 
     def _judge_arm(self, time: float) -> None:
         """Give up, with all movements stored, where what is wrong with the arm is no passing trouble.

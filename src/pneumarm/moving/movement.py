@@ -1,9 +1,9 @@
 """Moving to a goal and holding it, and following a reference, on any arm, with figures for people.
 
 A goal is *settled* when all joints are within the tolerance from a moment on until the end of the hold, and for a
-dwell time at least: an arm that happens to pass its goal at the end is not. The *rest
-error* is the mean absolute error over the last second of the hold. A *valve change* is a change of the setting of a
-muscle's valves; a pulse within a control period is two.
+dwell time at least: an arm that happens to pass its goal at the end is not (see :mod:`.settling`). The *rest error* is
+the mean absolute error over the last second of the hold. A *valve change* is a change of the setting of a muscle's
+valves; a pulse within a control period is two.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -18,6 +18,7 @@ from pneumarm.arm.controller import Controller, TrackingController
 from pneumarm.arm.hand import hand
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
+from pneumarm.moving.settling import settled_at
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.goals import Goal
 from pneumarm.transitions.rows import Recorded
@@ -336,7 +337,7 @@ def _move_to(
         switches += valve_changes(recorded.command[:-1], closed)
         error = (recorded.angle - goal) / spec.counts_per_degree
         dwell = min(settings.dwell, settings.hold / 2)
-        settled = _settled(recorded.time, np.abs(error).max(axis=1), settings.tolerance, dwell)
+        settled = settled_at(recorded.time, error, settings.tolerance, dwell)
         if settled is not None or number == settings.tries:
             break
         arm.wait(settings.pause)
@@ -357,16 +358,6 @@ def _move_to(
 
 def _last_second(times: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(times > times[-1] - 1)
-
-
-def _settled(times: NDArray[np.float64], error: NDArray[np.float64], tolerance: float, dwell: float) -> float | None:
-    """Return the first of the ``times`` (n,) from which on the ``error`` (n,) stays within ``tolerance``.
-
-    None where it did not, or for less than ``dwell`` before the last of the times.
-    """
-    outside = np.flatnonzero(error > tolerance)
-    first = int(outside[-1]) + 1 if len(outside) else 0
-    return float(times[first]) if first < len(times) and times[-1] - times[first] >= dwell else None
 
 
 def _air_since(arm: GuardedArm, before: float | None) -> float | None:

@@ -1,8 +1,8 @@
 """Moving to a goal and holding it, and following a reference, on any arm, with figures for people.
 
 A goal is *settled* when all joints are within the tolerance from a moment on until the end of the hold, and for a
-dwell time at least: an arm that happens to pass its goal at the end is not (see :mod:`.settling`). The *rest error* is
-the mean absolute error over the last second of the hold. A *valve change* is a change of the setting of a muscle's
+dwell time at least: an arm that happens to pass its goal at the end is not (see :mod:`.settling`). The *rest error*
+is the mean absolute error over the last second of the hold. A *valve change* is a change of the setting of a muscle's
 valves; a pulse within a control period is two.
 """
 

@@ -1,10 +1,10 @@
 """When an arm has settled at its goal, told by readings that scatter.
 
 An arm has *settled* from the moment on from which all of its joints stay within the tolerance until the end, for a
-dwell time at least. Where readings hardly scatter, each of them says whether its joint is there. Where they scatter by
-as much as the tolerance, an arm that stands still at its goal would leave it several times a second; then what counts
-is the mean of a joint and how far it swings, over each stretch of the dwell time, without what the scatter alone
-explains.
+dwell time at least. Where readings hardly scatter, each of them says whether its joint is there. Where they scatter
+by as much as the tolerance, an arm that stands still at its goal would leave it several times a second; then what
+counts is the mean of a joint and how far it swings, over each stretch of the dwell time, without what the scatter
+alone explains.
 """
 
 import math

@@ -11,7 +11,7 @@ RATES = 20.0, 45.0, 90.0
 
 
 def movement(rate: float, rest: float, swing: float, frequency: float = 2.5) -> tuple[NDArray[np.float64], ...]:
-    """Return the times and the error of an arm that comes from 20 degrees, and rests and swings from ``REACHED`` on."""
+    """Return times and errors of an arm that comes from 20 degrees, and rests and swings from ``REACHED`` on."""
     times = np.arange(0.0, 2.0, 1 / rate)
     coming = 20.0 * np.maximum(1 - times / REACHED, 0.0)
     return times, coming + rest + swing * np.sin(2 * np.pi * frequency * times)

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 _DIFFERENCES = 4  # of readings, to which motion of up to a few Hz adds little: 1, -4, 6, -4, 1 ...
 _SHARE = math.comb(2 * _DIFFERENCES, _DIFFERENCES)  # ... and independent noise so many times its variance
-_SCATTERED = (
-    0.25  # of the tolerance: with more scatter, one reading in a thousand is wrong by a tolerance or nearly so
-)
+_SCATTERED = 0.25  # of the tolerance; with more scatter, single readings are off by all of it now and then
 _FARTHEST = 3.0  # standard deviations by which a single reading may be farther off than the tolerance
 _DOUBT = 1.0  # standard errors by which means and swings of scattered readings may be too large
 

@@ -31,7 +31,18 @@ from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
 from pneumarm.errors import UnusableInput
-from pneumarm.planning.search import CERTAIN, Plan, PlanSettings, Uncertainty, find, problem, tree, workspace_of
+from pneumarm.planning.agility import agility_of
+from pneumarm.planning.search import (
+    CERTAIN,
+    Agility,
+    Plan,
+    PlanSettings,
+    Uncertainty,
+    find,
+    problem,
+    tree,
+    workspace_of,
+)
 from pneumarm.random import random_state
 from pneumarm.simulation.rollout import look_simulated, simulated_states, simulated_world
 from pneumarm.simulation.simulation import Simulation
@@ -61,6 +72,8 @@ class Model(Protocol):
     """Workspace for a search; the first state is where the arm is."""
     uncertainty: Uncertainty
     """How far readings are from what the model says."""
+    agility: Agility | None
+    """How fast several joints are; None for one, whose plans are proven to be the best."""
 
     def reset(self) -> None:
         """Begin a movement: the next reading is one at rest."""
@@ -91,6 +104,10 @@ class PhysicsModel:
         self.world = physics_of(inner)
         self.states = physics_states(self.world, workspace_of(settings, self.spec.joints))
         self.uncertainty = CERTAIN if foresight else _sensor_noise(inner)
+        self.agility: Agility | None = None
+        if self.spec.joints > 1:
+            capture(inner, self.world, self.states, 0)
+            self.agility = agility_of(self.world, self.states, self.spec)
         self._due: float | None = None
 
     def reset(self) -> None:
@@ -138,6 +155,10 @@ class SimulationModel:
         self.states = simulated_states(self.world, workspace_of(settings, self.spec.joints))
         angle, velocity = simulation.error_std[:, :2].max(axis=0).tolist()
         self.uncertainty = Uncertainty(angle, velocity)
+        self.agility: Agility | None = None
+        if self.spec.joints > 1:
+            look_simulated(self.world, self.states, 0)
+            self.agility = agility_of(self.world, self.states, self.spec)
         self._tracker = StateTracker(simulation.window, simulation.scaling)
 
     def reset(self) -> None:
@@ -184,7 +205,12 @@ class Planner:
         spec = self.model.spec
         self._workspace = tree(self.settings, spec.joints)
         self._problem = problem(
-            np.zeros(spec.joints), self.reward.on(spec), self.settings, self.model.uncertainty, spec.muscles
+            np.zeros(spec.joints),
+            self.reward.on(spec),
+            self.settings,
+            self.model.uncertainty,
+            spec.muscles,
+            self.model.agility,
         )
         self._turn = 0
         self._last = -1

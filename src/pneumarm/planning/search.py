@@ -4,13 +4,17 @@ Every action costs, and every switch costs more (thesis eq. 4.2, section 5.4.1),
 the shortest path to the goal, found by uniform-cost search (Dijkstra):
 
     take the cheapest entry from the queue
-        hold:    repeat the last action for one period                        (cost of an action)
-        branch:  change to each of the other actions                          (cost of an action and of switches)
+        repeat the last action for one period                                 (cost of an action)
+        or switch one joint to each of its other actions                      (cost of an action and of a switch)
+        or switch two joints, three ...
     until an entry costs as much as the best plan that reached the goal
 
-A node is simulated once, from its parent's state, so that plans with the same beginning share it; the branches of a
-node wait in the queue until they are due, as one entry and one copy of its state. No plan of at most ``switches``
-switches is better than one that is found ``proven``.
+A node is simulated once, from its parent's state, so that plans with the same beginning share it; switches from a
+node wait in the queue until they are due, by the number of joints, as one entry and one copy of its state. No plan of
+at most ``switches`` switches is better than one that is found ``proven``.
+
+Where it is known how fast joints are, entries also cost what the rest of the way takes at least (A*; with a guess in
+place of a bound, what is found may cost a little more than the best).
 
 Only what the guard would let through is planned: an action with an inlet into a muscle that reads over its limit is
 not taken. So what is planned is what is applied, and switches are counted as they are on an arm.
@@ -104,6 +108,17 @@ class Uncertainty(NamedTuple):
 CERTAIN = Uncertainty(0.0, 0.0)
 
 
+class Agility(NamedTuple):
+    """How fast joints can be, by which a search knows how long the rest of a plan takes at least."""
+
+    speed: NDArray[np.float64]
+    """At which joints move at most, shape (joints,) [counts a period]."""
+    acceleration: NDArray[np.float64]
+    """Likewise, shape (joints,) [counts a period, a period]."""
+    period: float
+    """[ms]"""
+
+
 class PlanProblem(NamedTuple):
     """What is sought. Made by :func:`problem`."""
 
@@ -121,6 +136,12 @@ class PlanProblem(NamedTuple):
     """[counts]"""
     velocity_std: float
     """[counts/ms]"""
+    speed: NDArray[np.float64]
+    """Of joints at most, shape (joints,) [counts a period]; infinite where that is unknown."""
+    acceleration: NDArray[np.float64]
+    """Likewise, shape (joints,) [counts a period, a period]."""
+    period: float
+    """[ms]"""
     failure_cost: float
     action_cost: float
     switch_cost: float
@@ -135,6 +156,8 @@ class Tree(NamedTuple):
     """Actions to each node, shape (nodes,)."""
     switches: NDArray[np.int64]
     """Switches to each node, shape (nodes,)."""
+    ahead: NDArray[np.float64]
+    """Periods that at least are needed from each node to the goal, shape (nodes,)."""
     cost: NDArray[np.float64]
     """Shape (nodes,)."""
     held: NDArray[np.int64]
@@ -156,7 +179,7 @@ class Plan(NamedTuple):
     """Cost of the actions and switches, infinite where the goal is not reached."""
     reached: bool
     proven: bool
-    """Whether no plan within the settings is cheaper."""
+    """Whether no plan within the settings is cheaper, which a guess of the rest of the way cannot prove."""
     simulated: int
     """Control periods that were simulated."""
 
@@ -167,6 +190,7 @@ def problem(
     settings: PlanSettings,
     uncertainty: Uncertainty = CERTAIN,
     muscles: int = 2,
+    agility: Agility | None = None,
 ) -> PlanProblem:
     """Return the problem of moving to ``goal`` (joints,) [counts] for ``reward``, with so many ``muscles`` a joint.
 
@@ -187,6 +211,9 @@ def problem(
         velocity_tolerance=float(reward.velocity_tolerance),
         angle_std=uncertainty.angle,
         velocity_std=uncertainty.velocity,
+        speed=np.full(len(goal), math.inf) if agility is None else agility.speed,
+        acceleration=np.full(len(goal), math.inf) if agility is None else agility.acceleration,
+        period=1.0 if agility is None else agility.period,
         failure_cost=float(settings.failure_cost),
         action_cost=-float(reward.action),
         switch_cost=-float(reward.switch),
@@ -201,6 +228,7 @@ def tree(settings: PlanSettings, joints: int) -> Tree:
     return Tree(
         depth=np.empty(n, np.int64),
         switches=np.empty(n, np.int64),
+        ahead=np.empty(n),
         cost=np.empty(n),
         held=np.empty((n, holds, 2), np.int64),
         holds=np.empty(n, np.int64),
@@ -228,7 +256,8 @@ def find(
     """
     begin = len(sought.commands) if last < 0 else last
     length, cost, proven, simulated = search(world, states, sought, workspace, begin, may_hold)
-    return Plan(workspace.plan[:length].copy(), cost, math.isfinite(cost), proven, simulated)
+    is_guessed = bool(np.isfinite(sought.speed).any())
+    return Plan(workspace.plan[:length].copy(), cost, math.isfinite(cost), proven and not is_guessed, simulated)
 
 
 @part
@@ -271,6 +300,49 @@ def success(states, i, sought):  # type: ignore[no-untyped-def]
     return probability
 
 
+@part(entry=True)
+def fewest_periods(way, speed, slow, fastest, sharpest):  # type: ignore[no-untyped-def]
+    """Return a lower bound of the periods in which a joint gets to its goal and slow.
+
+    It goes at full acceleration, at full speed, and at full deceleration; a period less, as speeds are means over
+    periods.
+
+    Args:
+        way: to the goal, without the tolerance [counts].
+        speed: towards the goal [counts a period].
+        slow: speed at which it may arrive.
+        fastest: highest speed.
+        sharpest: highest acceleration [counts a period, a period].
+
+    """
+    if math.isinf(fastest):
+        return 0.0
+    if way <= 0.0:
+        needed = (abs(speed) - slow) / sharpest
+    else:
+        peak = math.sqrt(max(sharpest * way + 0.5 * (speed * speed + slow * slow), 0.0))
+        if speed > peak or slow > peak:
+            needed = max((speed - slow) / sharpest, way / max(fastest, speed))
+        elif peak <= fastest:
+            needed = (2.0 * peak - speed - slow) / sharpest
+        else:
+            while_changing = (2.0 * fastest * fastest - speed * speed - slow * slow) / (2.0 * sharpest)
+            needed = (2.0 * fastest - speed - slow) / sharpest + (way - while_changing) / fastest
+    return max(math.ceil(needed) - 1.0, 0.0)
+
+
+@part
+def at_least(states, i, sought):  # type: ignore[no-untyped-def]
+    """Return a lower bound of the periods from state ``i`` to the goal."""
+    most = 0.0
+    for j in range(sought.goal.shape[0]):
+        off = sought.goal[j] - states.angle[i, j]
+        towards = states.velocity[i, j] * sought.period * (1.0 if off > 0.0 else -1.0)
+        way, slow = abs(off) - sought.angle_tolerance, sought.velocity_tolerance * sought.period
+        most = max(most, fewest_periods(way, towards, slow, sought.speed[j], sought.acceleration[j]))
+    return most
+
+
 @part
 def last_action(workspace, i):  # type: ignore[no-untyped-def]
     """Return the action that led to node ``i``."""
@@ -304,6 +376,13 @@ def descend(world, states, sought, workspace, i, parent, action):  # type: ignor
 
 
 @part
+def due(sought, workspace, i, changed):  # type: ignore[no-untyped-def]
+    """Return what a plan costs at least that goes on from node ``i`` with switches of so many joints."""
+    periods = max(workspace.ahead[i], 1.0)
+    return workspace.cost[i] + sought.action_cost * periods + sought.switch_cost * changed
+
+
+@part
 def write_plan(workspace, i):  # type: ignore[no-untyped-def]
     """Write the actions that led to node ``i`` into the plan; return how many they are."""
     for k in range(1, workspace.holds[i]):
@@ -330,8 +409,12 @@ def search(world, states, sought, workspace, begin, may_hold):  # type: ignore[n
     left = count - 1  # node 0 is the begin
     workspace.depth[0], workspace.switches[0], workspace.cost[0], workspace.holds[0] = 0, 0, 0.0, 1
     workspace.held[0, 0, 0], workspace.held[0, 0, 1] = begin, 0
-    # Entries are cost, a number that settles ties, and 2 * node + 1 to branch or + 0 to hold.
-    queue = [(sought.action_cost, 0, 0 if may_hold and begin < actions else 1)]
+    # Entries are cost, a number that settles ties, and which children of which node are due: those that `changed`
+    # joints switch to. An entry costs as much as these children.
+    kinds = sought.goal.shape[0] + 1
+    changed = 0 if may_hold or begin == actions else 1
+    workspace.ahead[0] = at_least(states, 0, sought)
+    queue = [(due(sought, workspace, 0, changed), 0, changed)]
     order, simulated, proven, length = 1, 0, True, 0
     best, nearest = math.inf, math.inf
     while len(queue) > 0:
@@ -341,21 +424,14 @@ def search(world, states, sought, workspace, begin, may_hold):  # type: ignore[n
         if left < actions:
             proven = False
             break
-        i, branches = entry // 2, entry % 2 == 1
-        may_branch = workspace.switches[i] < sought.switches
-        first, last = 0, actions
-        if not branches:
-            if may_branch:
-                heapq.heappush(queue, (cost + sought.switch_cost, order, entry + 1))
-                order += 1
-            first = last_action(workspace, i)
-            last = first + 1
-        for action in range(first, last):
-            if branches and action == last_action(workspace, i):
-                continue
-            if not permitted(world, states, i, sought, action):
-                continue
-            if workspace.switches[i] + sought.switched[last_action(workspace, i), action] > sought.switches:
+        i, changed = entry // kinds, entry % kinds
+        before = last_action(workspace, i)
+        goes_on = changed + 1 < kinds and workspace.switches[i] + changed < sought.switches and before < actions
+        if goes_on:
+            heapq.heappush(queue, (due(sought, workspace, i, changed + 1), order, entry + 1))
+            order += 1
+        for action in range(actions):
+            if sought.switched[before, action] != changed or not permitted(world, states, i, sought, action):
                 continue
             left -= 1
             child = workspace.free[left]
@@ -373,9 +449,10 @@ def search(world, states, sought, workspace, begin, may_hold):  # type: ignore[n
                 workspace.free[left] = child
                 left += 1
             else:
-                heapq.heappush(queue, (workspace.cost[child] + sought.action_cost, order, 2 * child))
+                workspace.ahead[child] = at_least(states, child, sought)
+                heapq.heappush(queue, (due(sought, workspace, child, 0), order, kinds * child))
                 order += 1
-        if branches or not may_branch:
+        if not goes_on:
             workspace.free[left] = i
             left += 1
     return length, best, proven, simulated

@@ -89,7 +89,8 @@ class _Search:
         joints, plan = simulation.window.joints, PlanSettings(nodes=settings.nodes)
         self._model = SimulationModel(simulation, plan)
         reward, muscles = settings.reward.on(simulation.spec), simulation.spec.muscles
-        self._problem = problem(np.zeros(joints), reward, plan, self._model.uncertainty, muscles)
+        uncertainty, agility = self._model.uncertainty, self._model.agility
+        self._problem = problem(np.zeros(joints), reward, plan, uncertainty, muscles, agility)
         self.goal = self._problem.goal
         """Shape (joints,) [counts]."""
         self._tree, self._find, self._halved = tree(plan, joints), find, halved

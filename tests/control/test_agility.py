@@ -1,0 +1,80 @@
+"""How fast joints are, and what a search makes of it."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from synthetic_arm import synthetic_begin_states, synthetic_simulation
+
+from pneumarm.planning.agility import agility_of
+from pneumarm.planning.planner import SimulationModel
+from pneumarm.planning.search import Agility, PlanProblem, PlanSettings, fewest_periods, find, problem, tree
+from pneumarm.task import Reward
+
+TOLERANCE, SLOW, FASTEST, SHARPEST = 25.0, 20.0, 80.0, 40.0
+
+
+def fewest_tried(off: float, speed: float, longest: int) -> float:
+    """Return in how many periods a joint ``off`` its goal gets there at best, of all ways to gain and lose speed."""
+    gains = np.array(list(product((-1.0, -0.5, 0.0, 0.5, 1.0), repeat=longest))).T * SHARPEST
+    speeds, way = np.full(gains.shape[1], speed), np.full(gains.shape[1], off)
+    for period, gain in enumerate(gains):
+        if ((np.abs(way) <= TOLERANCE) & (np.abs(speeds) <= SLOW)).any():
+            return period
+        speeds = np.clip(speeds + gain, -FASTEST, FASTEST)
+        way = way - speeds
+    return longest
+
+
+@pytest.mark.parametrize("speed", [-60.0, -20.0, 0.0, 30.0, 80.0])
+@pytest.mark.parametrize("off", [10.0, 60.0, 130.0, 240.0])
+def test_no_joint_gets_to_its_goal_sooner_than_the_bound_says(off: float, speed: float) -> None:
+    bound = fewest_periods(off - TOLERANCE, speed, SLOW, FASTEST, SHARPEST)
+    found = fewest_tried(off, speed, 6)
+    assert 0 <= bound <= found
+    assert bound >= found - 4
+
+
+def test_without_agility_nothing_is_known_of_the_rest_of_the_way() -> None:
+    assert fewest_periods(500.0, 0.0, SLOW, np.inf, np.inf) == 0.0
+
+
+@pytest.fixture(scope="module")
+def model() -> SimulationModel:
+    return SimulationModel(synthetic_simulation(joints=2), PlanSettings())
+
+
+def sought(model: SimulationModel, goal: np.ndarray, agility: Agility | None) -> PlanProblem:
+    return problem(goal, Reward().on(model.spec), PlanSettings(), agility=agility)
+
+
+def test_three_of_four_periods_are_slower(model: SimulationModel) -> None:
+    agility = agility_of(model.world, model.states, model.spec)
+    assert model.agility is not None
+    np.testing.assert_array_equal(agility.speed, model.agility.speed)
+    assert (agility.speed > 0).all()
+    assert (agility.acceleration > 0).all()
+    assert agility.period == 1e3 * model.spec.period
+
+
+def test_plans_are_found_among_fewer_states_and_cost_hardly_more(model: SimulationModel) -> None:
+    begin = synthetic_begin_states(synthetic_simulation(joints=2))
+    workspace = tree(PlanSettings(), 2)
+    simulated, costs = [], []
+    for number in (100, 700, 1300):
+        for away in ([150.0, -100.0], [100.0, 60.0]):
+            pair = []
+            for agility in (None, model.agility):
+                model.put(begin.states[number])
+                pair.append(
+                    find(model.world, model.states, sought(model, begin.angle[number] + away, agility), workspace)
+                )
+            whole, guessed = pair
+            assert not guessed.proven
+            if whole.proven and whole.reached:
+                assert guessed.reached
+                simulated.append(guessed.simulated / whole.simulated)
+                costs.append(guessed.cost / whole.cost)
+    assert len(costs) >= 2
+    assert np.mean(simulated) < 0.7
+    assert np.mean(costs) < 1.15

@@ -207,21 +207,22 @@ def line(name: str, rows: list[dict[str, Any]]) -> str:
 
 def quantiles(task: str, rows: list[dict[str, Any]]) -> Iterator[str]:
     """Yield how well the arms of ``rows`` do, from the worst to the best."""
-    found = []
-    for arm in {row["arm"] for row in rows}:
-        own = [row for row in rows if row["arm"] == arm]
-        movements = [row["movements"] for row in own]
-        succeeded = 1 - sum(row["failed"] for row in own) / sum(movements)
-        found.append((succeeded, np.average([row["worth"] for row in own], weights=movements)))
-    if not found:
+    arms = [[row for row in rows if row["arm"] == arm] for arm in sorted({row["arm"] for row in rows})]
+    if not arms:
         return
-    levels = 1 - np.array(QUANTILES) if task == "settle" else QUANTILES  # the fewer seconds the better
-    succeeded, worth = zip(*found, strict=True)
-    for name, values in (
-        ("success at once", np.quantile(succeeded, QUANTILES)),
-        (WORTH[task], np.quantile(worth, levels)),
+    once, twice = (
+        [1 - sum(row[kind] for row in own) / sum(row["movements"] for row in own) for own in arms]
+        for kind in ("failed", "failed_twice")
+    )
+    worth = [np.average([row["worth"] for row in own], weights=[row["movements"] for row in own]) for own in arms]
+    levels = 1 - np.array(QUANTILES) if task == "settle" else np.array(QUANTILES)  # the fewer seconds the better
+    for name, values, at in (
+        ("success at once", once, np.array(QUANTILES)),
+        ("success in two tries", twice, np.array(QUANTILES)),
+        (WORTH[task], worth, levels),
     ):
-        yield f"  {name + ', by arm':40}" + " ".join(f"{value:10.4f}" for value in values)
+        found = np.quantile(values, at, method="nearest")  # between a time and none there is nothing
+        yield f"  {name + ', by arm':40}" + " ".join(f"{value:10.4f}" for value in found)
 
 
 def rate(failed: int, movements: int) -> str:

@@ -317,6 +317,8 @@ def test_the_commands_and_the_program_of_the_readme_run(tmp_path: Path) -> None:
     found = commands("sh")
     assert len(found) >= 7
     for command in found:
+        if command[1:3] == ["arm", "errors"]:
+            continue  # takes minutes, as does the test of its own, which looks at all that it finds
         done = python("-m", "pneumarm", *command[1:], cwd=tmp_path)
         assert done.returncode == 0, (command, done.stderr)
     (program,) = blocks("python")

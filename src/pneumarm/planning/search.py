@@ -112,7 +112,7 @@ class Agility(NamedTuple):
     """How fast joints can be, by which a search knows how long the rest of a plan takes at least."""
 
     speed: NDArray[np.float64]
-    """At which joints move at most, shape (joints,) [counts a period]."""
+    """At which joints move at most, shape (joints,) [counts a period]; infinite where that is unknown."""
     acceleration: NDArray[np.float64]
     """Likewise, shape (joints,) [counts a period, a period]."""
     period: float
@@ -136,12 +136,7 @@ class PlanProblem(NamedTuple):
     """[counts]"""
     velocity_std: float
     """[counts/ms]"""
-    speed: NDArray[np.float64]
-    """Of joints at most, shape (joints,) [counts a period]; infinite where that is unknown."""
-    acceleration: NDArray[np.float64]
-    """Likewise, shape (joints,) [counts a period, a period]."""
-    period: float
-    """[ms]"""
+    agility: Agility
     failure_cost: float
     action_cost: float
     switch_cost: float
@@ -211,9 +206,7 @@ def problem(
         velocity_tolerance=float(reward.velocity_tolerance),
         angle_std=uncertainty.angle,
         velocity_std=uncertainty.velocity,
-        speed=np.full(len(goal), math.inf) if agility is None else agility.speed,
-        acceleration=np.full(len(goal), math.inf) if agility is None else agility.acceleration,
-        period=1.0 if agility is None else agility.period,
+        agility=agility or Agility(np.full(len(goal), math.inf), np.full(len(goal), math.inf), 1.0),
         failure_cost=float(settings.failure_cost),
         action_cost=-float(reward.action),
         switch_cost=-float(reward.switch),
@@ -256,7 +249,7 @@ def find(
     """
     begin = len(sought.commands) if last < 0 else last
     length, cost, proven, simulated = search(world, states, sought, workspace, begin, may_hold)
-    is_guessed = bool(np.isfinite(sought.speed).any())
+    is_guessed = bool(np.isfinite(sought.agility.speed).any())
     return Plan(workspace.plan[:length].copy(), cost, math.isfinite(cost), proven and not is_guessed, simulated)
 
 
@@ -334,12 +327,12 @@ def fewest_periods(way, speed, slow, fastest, sharpest):  # type: ignore[no-unty
 @part
 def at_least(states, i, sought):  # type: ignore[no-untyped-def]
     """Return a lower bound of the periods from state ``i`` to the goal."""
-    most = 0.0
+    agility, most = sought.agility, 0.0
     for j in range(sought.goal.shape[0]):
         off = sought.goal[j] - states.angle[i, j]
-        towards = states.velocity[i, j] * sought.period * (1.0 if off > 0.0 else -1.0)
-        way, slow = abs(off) - sought.angle_tolerance, sought.velocity_tolerance * sought.period
-        most = max(most, fewest_periods(way, towards, slow, sought.speed[j], sought.acceleration[j]))
+        towards = states.velocity[i, j] * agility.period * (1.0 if off > 0.0 else -1.0)
+        way, slow = abs(off) - sought.angle_tolerance, sought.velocity_tolerance * agility.period
+        most = max(most, fewest_periods(way, towards, slow, agility.speed[j], agility.acceleration[j]))
     return most
 
 

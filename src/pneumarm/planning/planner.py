@@ -14,6 +14,9 @@ simulated                 learned simulation   every turn  what planning makes o
 A planner that knows the true physics and the commands has little to learn from noisy sensors, so it is given the
 true state at each reading. What it does not know in closed loop is the noise to come: whether the goal is reached is
 judged by noisy readings, turns end late, and the supply fluctuates. In open loop even that fluctuation is foreseen.
+
+Plans of one joint are proven to be the best within their settings. Those of several joints are sought by a guess of
+the rest of the way (see :mod:`.agility`): they can be achieved, and a little better ones may be missed.
 """
 
 import math

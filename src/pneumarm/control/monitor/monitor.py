@@ -38,8 +38,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
-_LONG = 1 / 3  # s; equal angles for less show nothing ...
-_LONGER = 1.0  # ... and before there is a simulation: joints that stick, seen by few bits, were still for up to 0.8
+_LONG = 1 / 3  # s; equal angles for less show nothing
 _RARE = math.log(1e6)  # of so many equal angles of a sound arm, about one is called frozen
 _OVER = 1.3  # highest pressures; a closed muscle that is compressed comes to 1.15
 _FEWEST = 10  # residuals of which a mean square is taken seriously
@@ -157,7 +156,7 @@ class Monitor:
             high=spec.angle_range[1],
             jump=settings.jump * spec.counts_per_degree,
             acted=settings.acted * spec.max_pressure_counts,
-            frozen=max(settings.frozen, math.ceil((_LONGER if self._simulation is None else _LONG) / spec.period)),
+            frozen=max(settings.frozen, math.ceil(_LONG / spec.period)),
             edge=settings.edge * (spec.angle_range[1] - spec.angle_range[0]),
             experience=EXPERIENCE / spec.period,
         )

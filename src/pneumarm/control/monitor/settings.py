@@ -74,7 +74,7 @@ class MonitorSettings(Settings):
     """Least angle that counts as a jump onto a rail [degrees]; more where the arm was moving there."""
     frozen: int = 10
     """Equal angles in a row, while the pressures change, that show a potentiometer which is frozen; more of them
-    where they take less than a third of a second, or less than a second where there is no simulation yet."""
+    where they take less than a third of a second."""
     acted: float = 0.10
     """Change of the difference of a joint's pressures that shows that valves act, as a part of the highest; more on
     an arm whose angle has stayed the same during larger ones."""

@@ -171,6 +171,7 @@ def measured(folder: Path, arm: str, method: str, seed: int, wanted: Wanted) -> 
         planned = bound(folder, arm, BOUNDS[method], wanted)
         made, p99 = planned.made, planned.results()["decision_ms"]["p99"]
         row |= {"wall": 0.0, "cpu": 0.0, "curve": [], "simulation": None, "unproven": planned.unproven}
+        row["at_most"] = planned.results().get("at_most")
     else:
         learned = learn(method, simulation, begin, seed, wanted.steps)
         if method != PLANNING:

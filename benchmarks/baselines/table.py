@@ -97,6 +97,9 @@ def pooled(rows: list[Row]) -> Iterator[str]:
         means = [np.mean(row["reward"]) for row in own]
         lost = below(own, bound_of(found))
         distance = "" if lost is None or method in PLANNED else f", below the bound {lost.mean():.2f}"
+        if all(row.get("at_most") is not None for row in own):  # planned once
+            unproven, most = sum(row["unproven"] for row in own), np.mean([row["at_most"] for row in own])
+            distance = f"; {unproven} not proven, and no plans earn more than {most:.2f}"
         yield (
             f"{'all':28}{method:18}{len(own):5d}{cells(own)}; an agent {min(means):.2f} to {max(means):.2f}{distance}"
         )

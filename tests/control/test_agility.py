@@ -98,3 +98,27 @@ def test_plans_are_found_among_fewer_states_and_cost_hardly_more(model: Simulati
     assert len(costs) >= 2
     assert np.mean(simulated) < 0.7
     assert np.mean(costs) < 1.15
+
+
+def test_a_second_search_tells_how_much_cheaper_a_plan_could_be(model: SimulationModel) -> None:
+    begin = synthetic_begin_states(synthetic_simulation(joints=2))
+    workspace, little = tree(PlanSettings(), 2), tree(PlanSettings(nodes=300), 2)
+    proven = []
+    for number in (100, 700, 1300):
+        for away in ([150.0, -100.0], [100.0, 60.0], [20.0, 30.0]):
+            model.put(begin.states[number])
+            goal = begin.angle[number] + away
+            unguided = sought(model, goal, None)
+            whole = find(model.world, model.states, unguided, workspace)
+            guessed = find(model.world, model.states, sought(model, goal, model.agility), workspace)
+            assert guessed.least == 0
+            surer = find(model.world, model.states, unguided, workspace, known=guessed)
+            assert surer.cost <= guessed.cost
+            assert surer.simulated > guessed.simulated
+            if whole.proven:
+                assert (surer.cost, surer.least) == (whole.cost, whole.cost)
+                proven.append(guessed.cost > surer.cost)
+            doubtful = find(model.world, model.states, unguided, little, known=guessed)
+            assert 0 < doubtful.least <= surer.cost <= doubtful.cost
+            assert doubtful.proven or doubtful.least < doubtful.cost
+    assert len(proven) >= 3

@@ -36,6 +36,8 @@ def test_planners_reach_the_same_goals_and_none_beats_the_bound_by_far(planned) 
         assert results["reward"] == pytest.approx(np.mean(51 * made.success - made.actions - 8 * made.all_switches))
         assert results["decision_ms"]["p99"] >= results["decision_ms"]["median"] > 0
     assert planned["open_loop"].results()["reward"] > 30
+    assert planned["open_loop"].results()["at_most"] == planned["open_loop"].results()["reward"]  # proven
+    assert "at_most" not in planned["closed_loop"].results()
 
 
 def test_the_same_seed_gives_the_same_movements(planned) -> None:  # type: ignore[no-untyped-def]
@@ -44,6 +46,20 @@ def test_the_same_seed_gives_the_same_movements(planned) -> None:  # type: ignor
         assert again[baseline].made.rows() == planned[baseline].made.rows()
     other = measure_bound(VirtualArm(draw_parameters(9)), GOALS, FEW, seed=4)
     assert other["open_loop"].made.rows() != planned["open_loop"].made.rows()
+
+
+def test_plans_of_two_joints_are_proven_or_it_is_said_what_no_plan_exceeds() -> None:
+    goals, arm = np.array([[400.0, 560.0]] * 2), VirtualArm(draw_parameters(2, joints=2))
+    at_most = []
+    for nodes in (500, 20_000):
+        settings = BoundSettings(episodes=4, plan=PlanSettings(nodes=nodes))
+        found = measure_bound(arm, goals, settings, seed=3, baselines=("open_loop",))["open_loop"]
+        assert found.at_most is not None
+        assert (found.at_most >= found.made.reward).all()
+        assert (found.at_most > found.made.reward).sum() <= found.unproven
+        at_most.append(found.at_most)
+    assert (at_most[1] <= at_most[0]).all()
+    assert (at_most[1] < at_most[0]).any()
 
 
 def test_the_arm_that_is_asked_about_is_not_moved() -> None:

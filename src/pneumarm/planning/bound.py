@@ -55,12 +55,15 @@ class Planned:
     """How long each decision took, shape (decisions,) [s]."""
     unproven: int
     """Plans of which it is not proven that none is better."""
+    at_most: NDArray[np.float64] | None = None
+    """Reward that no plan exceeds, of movements that are planned once, shape (n,)."""
 
     def results(self) -> dict[str, Any]:
         """Return the figures as of a transfer, with the times of a decision [ms]."""
         milliseconds = 1e3 * self.seconds
         times = {"median": float(np.median(milliseconds)), "p99": float(np.quantile(milliseconds, 0.99))}
-        return {**self.made.results(), "decision_ms": times, "unproven_plans": self.unproven}
+        found = {**self.made.results(), "decision_ms": times, "unproven_plans": self.unproven}
+        return found if self.at_most is None else found | {"at_most": float(self.at_most.mean())}
 
     def distance(self, reward: NDArray[np.float64]) -> dict[str, Any]:
         """Return how far another controller stays below, by its ``reward`` (n,) in the first of the same movements.
@@ -151,11 +154,21 @@ def _movements(
 ) -> Planned:
     task = TaskSettings(reward=planner.reward, cutoff=settings.plan.cutoff)
     planner.warm_up()
-    rows = []
+    rows, at_most = [], []
     for made in make_movements(arm, planner, task, drawn(goals, seed, range(settings.episodes))):
         rows.append(made.row())
+        at_most.append(_at_most(planner, made.reward))
         report(len(rows))
-    return Planned(of_rows(rows), np.array(planner.seconds), planner.unproven)
+    once = None if planner.replan else np.array(at_most)
+    return Planned(of_rows(rows), np.array(planner.seconds), planner.unproven, once)
+
+
+def _at_most(planner: Planner, earned: float) -> float:
+    """Return the reward that no other plan than the last, which ``earned`` so much, could exceed."""
+    found, reward = planner.found, planner.reward
+    if found is None or found.proven:
+        return earned
+    return max(earned, reward.goal - reward.action - found.least)
 
 
 def known_bound(

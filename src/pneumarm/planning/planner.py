@@ -16,7 +16,8 @@ true state at each reading. What it does not know in closed loop is the noise to
 judged by noisy readings, turns end late, and the supply fluctuates. In open loop even that fluctuation is foreseen.
 
 Plans of one joint are proven to be the best within their settings. Those of several joints are sought by a guess of
-the rest of the way (see :mod:`.agility`): they can be achieved, and a little better ones may be missed.
+the rest of the way (see :mod:`.agility`): they can be achieved, and a little better ones may be missed. In open loop
+a second search, for what is cheaper and without the guess, says how much better they can be at most.
 """
 
 import math
@@ -39,11 +40,13 @@ from pneumarm.planning.search import (
     CERTAIN,
     Agility,
     Plan,
+    PlanProblem,
     PlanSettings,
     Uncertainty,
     find,
     problem,
     tree,
+    unknown_agility,
     workspace_of,
 )
 from pneumarm.random import random_state
@@ -195,6 +198,8 @@ class Planner:
     replan: bool = True
     patience: int = 0
     """Turns without any effect after which an action is given up, whatever the model says of it; 0 for never."""
+    prove: bool = False
+    """Whether, where a plan was sought by a guess, it is told by how much another could be better."""
     clock: Callable[[], float] = perf_counter
     """Tells the time of a decision [s]."""
     seconds: list[float] = field(default_factory=list, init=False)
@@ -248,9 +253,10 @@ class Planner:
         """Return the valves (joints, 2) to set where the model is."""
         if self.found is None or self.replan:
             may_hold = not self._is_stuck()
-            self.found = find(
-                self.model.world, self.model.states, self._problem, self._workspace, self._last, may_hold
-            )
+            self.found = self._find(self._problem, may_hold)
+            if self.prove and not self.found.proven:
+                unguided = self._problem._replace(agility=unknown_agility(self.model.spec.joints))
+                self.found = self._find(unguided, may_hold, self.found)
             self.unproven += not self.found.proven
             self._turn = 0
         plan = self.found.actions
@@ -261,6 +267,9 @@ class Planner:
             self._since = self._read()
         valves: NDArray[np.int8] = self._problem.commands[action].copy()
         return valves
+
+    def _find(self, sought: PlanProblem, may_hold: bool, known: Plan | None = None) -> Plan:
+        return find(self.model.world, self.model.states, sought, self._workspace, self._last, may_hold, known)
 
     def _read(self) -> NDArray[np.float64]:
         """Return angles and pressures where the model is [counts of the thesis' sensors]."""
@@ -287,7 +296,8 @@ def physics_planner(
         UnusableInput: another kind of arm.
 
     """
-    return Planner(PhysicsModel(arm, settings, foresight=open_loop), settings, reward, replan=not open_loop)
+    model = PhysicsModel(arm, settings, foresight=open_loop)
+    return Planner(model, settings, reward, replan=not open_loop, prove=open_loop)
 
 
 def simulated_planner(

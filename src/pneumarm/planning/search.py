@@ -10,11 +10,12 @@ the shortest path to the goal, found by uniform-cost search (Dijkstra):
     until an entry costs as much as the best plan that reached the goal
 
 A node is simulated once, from its parent's state, so that plans with the same beginning share it; switches from a
-node wait in the queue until they are due, by the number of joints, as one entry and one copy of its state. No plan of
-at most ``switches`` switches is better than one that is found ``proven``.
+node wait in the queue until they are due, by the number of joints, as one entry and one copy of its state. Where a
+search ends for want of room, no plan of at most ``switches`` switches costs less than the cheapest entry left.
 
 Where it is known how fast joints are, entries also cost what the rest of the way takes at least (A*; with a guess in
-place of a bound, what is found may cost a little more than the best).
+place of a bound, what is found may cost a little more than the best). A second search without that guess, for what
+is cheaper, tells by how much at most.
 
 Only what the guard would let through is planned: an action with an inlet into a muscle that reads over its limit is
 not taken. So what is planned is what is applied, and switches are counted as they are on an arm.
@@ -119,6 +120,11 @@ class Agility(NamedTuple):
     """[ms]"""
 
 
+def unknown_agility(joints: int) -> Agility:
+    """Return that nothing is known of how fast so many ``joints`` are."""
+    return Agility(np.full(joints, math.inf), np.full(joints, math.inf), 1.0)
+
+
 class PlanProblem(NamedTuple):
     """What is sought. Made by :func:`problem`."""
 
@@ -173,10 +179,15 @@ class Plan(NamedTuple):
     cost: float
     """Cost of the actions and switches, infinite where the goal is not reached."""
     reached: bool
-    proven: bool
-    """Whether no plan within the settings is cheaper, which a guess of the rest of the way cannot prove."""
+    least: float
+    """No plan within the settings costs less; 0 where a guess of the rest of the way was all there was."""
     simulated: int
     """Control periods that were simulated."""
+
+    @property
+    def proven(self) -> bool:
+        """Whether no plan within the settings is cheaper."""
+        return self.least >= self.cost
 
 
 def problem(
@@ -206,7 +217,7 @@ def problem(
         velocity_tolerance=float(reward.velocity_tolerance),
         angle_std=uncertainty.angle,
         velocity_std=uncertainty.velocity,
-        agility=agility or Agility(np.full(len(goal), math.inf), np.full(len(goal), math.inf), 1.0),
+        agility=agility or unknown_agility(len(goal)),
         failure_cost=float(settings.failure_cost),
         action_cost=-float(reward.action),
         switch_cost=-float(reward.switch),
@@ -241,16 +252,27 @@ def workspace_of(settings: PlanSettings, joints: int) -> int:
 
 
 def find(
-    world: Any, states: Any, sought: PlanProblem, workspace: Tree, last: int = -1, may_hold: bool = True
+    world: Any,
+    states: Any,
+    sought: PlanProblem,
+    workspace: Tree,
+    last: int = -1,
+    may_hold: bool = True,
+    known: Plan | None = None,
 ) -> Plan:
     """Return the best plan from state 0 of ``states``, after the action ``last`` (-1 at the begin of a movement).
 
-    Unless it ``may_hold``, the plan begins with another action than ``last``.
+    Unless it ``may_hold``, the plan begins with another action than ``last``. Where a plan is ``known``, it is
+    returned unless a cheaper one is found, with what all plans cost at least.
     """
     begin = len(sought.commands) if last < 0 else last
-    length, cost, proven, simulated = search(world, states, sought, workspace, begin, may_hold)
-    is_guessed = bool(np.isfinite(sought.agility.speed).any())
-    return Plan(workspace.plan[:length].copy(), cost, math.isfinite(cost), proven and not is_guessed, simulated)
+    most = known.cost if known is not None else math.inf
+    length, cost, least, simulated = search(world, states, sought, workspace, begin, may_hold, most)
+    if np.isfinite(sought.agility.speed).any():  # a guess
+        least = 0.0
+    if known is not None and (length == 0 or not cost < most):
+        return known._replace(least=max(least, known.least), simulated=known.simulated + simulated)
+    return Plan(workspace.plan[:length].copy(), cost, math.isfinite(cost), least, simulated)
 
 
 @part
@@ -390,16 +412,17 @@ def write_plan(workspace, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def search(world, states, sought, workspace, begin, may_hold):  # type: ignore[no-untyped-def]
+def search(world, states, sought, workspace, begin, may_hold, most):  # type: ignore[no-untyped-def]
     """Seek the best plan from state 0 after the action ``begin``, which goes on only if it ``may_hold``.
 
-    Returns the length of the plan in ``workspace.plan``, its cost, whether it is proven, and the periods simulated.
+    Returns the length of the plan in ``workspace.plan``, its cost, what all plans cost at least, and the periods
+    simulated. Plans that cost at least ``most`` are none.
     """
     count = workspace.free.shape[0]
     actions = sought.commands.shape[0]
     for k in range(count):
         workspace.free[k] = count - 1 - k
-    left = count - 1  # node 0 is the begin
+    left = count - 1  # node 0 is the begin, and stays as it is
     workspace.depth[0], workspace.switches[0], workspace.cost[0], workspace.holds[0] = 0, 0, 0.0, 1
     workspace.held[0, 0, 0], workspace.held[0, 0, 1] = begin, 0
     # Entries are cost, a number that settles ties, and which children of which node are due: those that `changed`
@@ -408,14 +431,14 @@ def search(world, states, sought, workspace, begin, may_hold):  # type: ignore[n
     changed = 0 if may_hold or begin == actions else 1
     workspace.ahead[0] = at_least(states, 0, sought)
     queue = [(due(sought, workspace, 0, changed), 0, changed)]
-    order, simulated, proven, length = 1, 0, True, 0
-    best, nearest = math.inf, math.inf
+    order, simulated, length, best, nearest = 1, 0, 0, most, math.inf
+    least = math.inf
     while len(queue) > 0:
         cost, _, entry = heapq.heappop(queue)
         if cost >= best:
             break
         if left < actions:
-            proven = False
+            least = cost
             break
         i, changed = entry // kinds, entry % kinds
         before = last_action(workspace, i)
@@ -443,9 +466,14 @@ def search(world, states, sought, workspace, begin, may_hold):  # type: ignore[n
                 left += 1
             else:
                 workspace.ahead[child] = at_least(states, child, sought)
-                heapq.heappush(queue, (due(sought, workspace, child, 0), order, kinds * child))
-                order += 1
-        if not goes_on:
+                child_cost = due(sought, workspace, child, 0)
+                if child_cost < best:
+                    heapq.heappush(queue, (child_cost, order, kinds * child))
+                    order += 1
+                else:
+                    workspace.free[left] = child
+                    left += 1
+        if not goes_on and i > 0:
             workspace.free[left] = i
             left += 1
-    return length, best, proven, simulated
+    return length, best, min(least, best), simulated

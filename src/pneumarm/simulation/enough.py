@@ -36,6 +36,8 @@ _HELD_OUT = 0.25
 """Share of the sequences that the errors are measured on."""
 _SETTINGS = replace(SINGLE_STEPS, epochs=15)
 """Of both fits: further epochs change both alike."""
+_SEVERAL_JOINTS = replace(_SETTINGS, layers=2)
+"""Of several joints: both with two layers, though the first half may be too short for them to be better than one."""
 _WORTH = 1.05
 """A record that may grow by less, until the time for it is over, is not judged again."""
 _FEWEST_SEQUENCES = 8
@@ -169,7 +171,7 @@ def enough_data(store: Store) -> Enough | None:
     sequences = [entry.number for entry in store.catalogue()]
     if store.transitions < 2 * FEWEST_TRANSITIONS or len(sequences) < _FEWEST_SEQUENCES:
         return None
-    settings = _SETTINGS.of_arm(store)
+    settings = (_SETTINGS if store.joints == 1 else _SEVERAL_JOINTS).of_arm(store)
     assert settings.history is not None
     window = Window.of(store.spec, settings.history)
     first = sequences[: len(sequences) // 2]

@@ -62,7 +62,7 @@ _NEWEST_COUNT = 5
 _ROWS_FOR_TWO = 5_000
 """Rows for each joint from which on two layers are as good as one, or better."""
 _PASSES, _ROWS_OF_PASSES = 600, 12_000_000
-"""Most passes of gradient descent over all rows, and most rows of all passes together."""
+"""Most passes of gradient descent over all rows, and most rows of all passes together, in all epochs."""
 _RATE, _RATE_ON = 5e-3, 1e-3
 """Learning rate of gradient descent, and of one that goes on from where another ended."""
 _EPOCHS_AHEAD = 10
@@ -91,7 +91,7 @@ class FitSettings(Settings):
     """Hidden units of each layer for each joint of the arm; by default 10 (thesis: 10, one joint), or 32 of two
     layers."""
     epochs: int = 60
-    """Epochs of Levenberg-Marquardt at most (thesis: 15)."""
+    """Epochs of Levenberg-Marquardt at most (thesis: 15); with two layers ten passes each of gradient descent."""
     tolerance: float = 1e-5
     """A fit ends early when three epochs in a row lower its error by less than this part; 0: never."""
     decay: float = 0.0
@@ -440,8 +440,11 @@ def _fit_two_layers(
     progress: Callable[[int, int], None],
 ) -> Fit:
     """Fit a network of two hidden layers to ``y``; it begins as it was ``before``, or at random."""
-    passes = min(_PASSES, -(-_ROWS_OF_PASSES // len(x)))
-    passes, rate = (passes, _RATE) if before is None else (min(_EPOCHS_ON, passes), _RATE_ON)
+    passes, rate = min(_PASSES, -(-_ROWS_OF_PASSES // len(x))), _RATE
+    if before is None:
+        passes = max(1, round(passes * settings.epochs / FitSettings.epochs))
+    else:
+        passes, rate = min(_EPOCHS_ON, passes), _RATE_ON
     start = before or two_layers(x.shape[1], _hidden(settings, joints), y.shape[1], settings.seed)
 
     def report(done: int, _: float) -> None:

@@ -126,6 +126,15 @@ def leaked(rate, seconds, pressure, lowest, healthy):  # type: ignore[no-untyped
 
 
 @part
+def loses_air(readings, h):  # type: ignore[no-untyped-def]
+    """Return whether under hypothesis ``h`` a muscle loses its air, as by a torn hose, when told to be closed."""
+    loses = False
+    for m in range(readings.leak.shape[1]):
+        loses = loses or readings.leak[h, m] >= TORN or readings.open[h, m, 1, 1] == 1
+    return loses
+
+
+@part
 def carried_out(readings, h, m, told, level, both):  # type: ignore[no-untyped-def]
     """Return what muscle ``m`` at a ``level`` of the usual supply does under hypothesis ``h`` if ``told`` a command.
 

@@ -140,6 +140,7 @@ class Monitor:
         return Thresholds(
             most=settings.most,
             kept=math.exp(-spec.period / settings.fading),
+            losing=math.exp(-spec.period / settings.losing),
             alarm=weighing.alarm,
             telling=weighing.telling,
             inflation=settings.inflation,

@@ -26,7 +26,7 @@ from pneumarm.report import (
     write_report,
 )
 from pneumarm.report.data import MovingData
-from pneumarm.report.ledger import beside_thesis, ledger
+from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.run_report import TEST
 from pneumarm.report.sections import adapted, moving, overview
 from pneumarm.task import Movements, read_episodes, write_episodes
@@ -211,6 +211,13 @@ def test_the_summary_names_the_better_of_the_two_bounds(closed_loop, told):
         run_page(RunData(ArmSpec(), results, test=movements(0), transfer=builders.transfer(counts=(3, 3, 3))))
     )
     assert f"In the first 150 movements after adaptation the controller {told}." in " ".join(page.text)
+
+
+@pytest.mark.parametrize(("at_most", "told"), [({"at_most": 41.3}, True), ({"at_most": 40.2}, False), ({}, False)])
+def test_the_bound_says_what_no_plan_exceeds_where_that_is_more(at_most, told):
+    bound = builders.results()["bound"]
+    bound["open_loop"] |= at_most
+    assert ("No such sequences earn more than 41.30 in open loop." in bound_table(bound).caption) == told
 
 
 def test_comparison_of_an_unfinished_run_leaves_out_what_is_not_known():

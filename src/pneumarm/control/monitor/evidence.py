@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.velocity import derived_velocity
 from pneumarm.control.monitor.expectation import expect_by_simulation
-from pneumarm.control.monitor.hypotheses import TORN, independence, loses_air
+from pneumarm.control.monitor.hypotheses import TORN, has_torn_hose, independence
 from pneumarm.control.monitor.identification import (
     EXPERIENCE,
     expect_by_identification,
@@ -60,8 +60,8 @@ class Thresholds(NamedTuple):
     """Evidence of a single reading at most."""
     kept: float
     """Part of the evidence that is left after a period, while nothing was found."""
-    losing: float
-    """Likewise of the evidence that a muscle loses air, of an arm that has no simulation."""
+    torn: float
+    """Likewise of the evidence of a torn hose, of an arm that has no simulation."""
     alarm: float
     """Evidence of a fault from which on it counts as found; that of none grows beyond twice this."""
     telling: float
@@ -199,7 +199,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
 def see_by_identification(known, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
     """Weigh a reading by what is known of the arm; the valves chosen after it go into ``memory.command[0]``."""
     is_experienced = known.clock[2] * known.look[1] >= EXPERIENCE
-    forget_losses(thresholds, readings, memory)
+    forget_torn_hoses(thresholds, readings, memory)
     identify(known, readings, thresholds, memory, time, angle, pressure, is_experienced)
     look_at_potentiometers(thresholds, memory, time, angle, pressure)
     observe(memory, time, angle, pressure)
@@ -275,16 +275,16 @@ def forget(thresholds, memory):  # type: ignore[no-untyped-def]
 
 
 @part
-def forget_losses(thresholds, readings, memory):  # type: ignore[no-untyped-def]
-    """Let evidence fade that a muscle loses air, while nothing was found.
+def forget_torn_hoses(thresholds, readings, memory):  # type: ignore[no-untyped-def]
+    """Let evidence of torn hoses fade while nothing was found.
 
-    A muscle that settles after it was filled looks a little like one that does, and what is identified is no more
-    than an approximation; a hose that is off shows in a second.
+    A muscle that settles after it was filled looks a little like one that loses its air, and what is identified is no
+    more than an approximation; a torn hose shows in a second.
     """
     if memory.clock[5] == 0.0:
         for h in range(1, memory.score.shape[0]):
-            if loses_air(readings, h):
-                memory.score[h] = faded(thresholds.losing, memory.score[h])
+            if has_torn_hose(readings, h):
+                memory.score[h] = faded(thresholds.torn, memory.score[h])
 
 
 @part

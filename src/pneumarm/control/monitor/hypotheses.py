@@ -126,12 +126,12 @@ def leaked(rate, seconds, pressure, lowest, healthy):  # type: ignore[no-untyped
 
 
 @part
-def loses_air(readings, h):  # type: ignore[no-untyped-def]
-    """Return whether under hypothesis ``h`` a muscle loses its air, as by a torn hose, when told to be closed."""
-    loses = False
+def has_torn_hose(readings, h):  # type: ignore[no-untyped-def]
+    """Return whether under hypothesis ``h`` a hose is torn or off."""
+    torn = False
     for m in range(readings.leak.shape[1]):
-        loses = loses or readings.leak[h, m] >= TORN or readings.open[h, m, 1, 1] == 1
-    return loses
+        torn = torn or readings.leak[h, m] >= TORN
+    return torn
 
 
 @part

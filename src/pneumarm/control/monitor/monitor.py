@@ -140,7 +140,7 @@ class Monitor:
         return Thresholds(
             most=settings.most,
             kept=math.exp(-spec.period / settings.fading),
-            losing=math.exp(-spec.period / settings.losing),
+            torn=math.exp(-spec.period / settings.torn),
             alarm=weighing.alarm,
             telling=weighing.telling,
             inflation=settings.inflation,

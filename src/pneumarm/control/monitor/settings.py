@@ -52,8 +52,8 @@ class MonitorSettings(Settings):
     fading: float = 20.0
     """Time in which, with a simulation, evidence of what has not been found fades to 37 % [s]: faults show in
     seconds, and what takes minutes to add up, while an arm is held at a goal, is an error of the simulation."""
-    losing: float = 6.0
-    """The same of evidence that a muscle loses air, without a simulation [s]."""
+    torn: float = 6.0
+    """The same of evidence of a torn hose, without a simulation [s]."""
     inflation: float = 1.5
     """Standard deviations of the simulation's error on held-out sequences that count as one."""
     calm: float = 20.0
@@ -88,7 +88,7 @@ class MonitorSettings(Settings):
             "lead": 0 <= self.lead < math.inf,
             "most": 0 < self.most < math.inf,
             "fading": 0 < self.fading < math.inf,
-            "losing": 0 < self.losing < math.inf,
+            "torn": 0 < self.torn < math.inf,
             "inflation": 0 < self.inflation < math.inf,
             "calm": 0 < self.calm < math.inf,
             "fast": 0 < self.fast < math.inf,

@@ -37,7 +37,7 @@ class PolicySettings(FleetSettings):
     nodes: int = 20_000
     """With several joints: states of the simulation that may be kept in the search for a plan, which is compared with
     what the policy would do; 0: each joint looks ahead for itself."""
-    practice: int = 4
+    practice: int = 2
     """With several joints: there are so many times as many updates."""
     noise_share: float = 0.5
     """With several joints: the share of the simulation's noise that it learns and looks ahead in."""

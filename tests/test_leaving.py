@@ -12,9 +12,10 @@ from subprocess import Popen
 from time import sleep
 
 import pytest
+from llvmlite.binding.executionengine import ExecutionEngine
 
 from children import child, end, python, wait_until
-from pneumarm import cli
+from pneumarm import cli, leaving
 from pneumarm.transitions import Store
 
 TESTS = Path(__file__).parent
@@ -107,6 +108,26 @@ def test_without_an_arm_none_is_said_to_be_closed(
     done = python("-c", script, *words.format(run=small_run, out=tmp_path / "out").split(), "--log", "warning")
     assert done.stderr == "pneumarm: interrupted (SIGINT)\n"
     assert done.returncode == 128 + signal.SIGINT
+
+
+COMPILING = """
+import ctypes, signal, time
+from pneumarm.leaving import Interrupted, leave_by_exceptions
+leave_by_exceptions()
+def _raw_object_cache_notify():
+    signal.raise_signal(signal.SIGINT)
+try:
+    ctypes.CFUNCTYPE(None)(_raw_object_cache_notify)()
+    time.sleep(100)
+except Interrupted as error:
+    print(error)
+"""
+
+
+def test_a_signal_that_comes_while_llvm_compiles_is_not_lost() -> None:
+    done = python("-c", COMPILING, check=True)
+    assert (done.stdout, done.stderr) == ("SIGINT\n", "")
+    assert all(callable(getattr(ExecutionEngine, name)) for name in leaving._CALLBACKS)
 
 
 def test_every_command_that_opens_anybodys_arm_says_that_it_is_closed() -> None:

@@ -9,6 +9,7 @@ import ctypes
 import os
 import signal
 import sys
+from threading import Timer
 from time import monotonic
 from types import FrameType
 from typing import Any
@@ -20,6 +21,11 @@ _PATIENCE = 2.0
 _PARENT_GONE: Any = getattr(signal, "SIGUSR2", None)
 _GONE = 1
 """The number of SIGHUP."""
+_CALLBACKS = "_raw_object_cache_notify", "_raw_object_cache_getbuffer"
+"""What LLVM calls while it compiles. An exception is printed there and forgotten, and there it would be raised, since
+no other Python is executed while LLVM works."""
+_AGAIN = 0.05
+"""So much later [s] it is tried once more."""
 _PR_SET_PDEATHSIG = 1  # from linux/prctl.h
 
 
@@ -48,6 +54,11 @@ def leave_by_exceptions() -> None:
         now = monotonic()
         if first is not None and now - first < _PATIENCE:
             return
+        if _is_called_back(frame):
+            again = Timer(_AGAIN, signal.raise_signal, (number,))
+            again.daemon = True
+            again.start()
+            return
         if first is None:
             # While the interpreter ends it forgets its handlers, but not what it ignores.
             atexit.register(ignore)
@@ -71,3 +82,12 @@ def leave_by_exceptions() -> None:
             return  # a C library without it: the other ways remain
         if os.getppid() != parent:
             raise Interrupted(_GONE, "the process that started it has ended")
+
+
+def _is_called_back(frame: FrameType | None) -> bool:
+    """Return whether LLVM waits for what is executed in ``frame``."""
+    while frame is not None:
+        if frame.f_code.co_name in _CALLBACKS:
+            return True
+        frame = frame.f_back
+    return False

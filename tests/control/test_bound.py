@@ -58,6 +58,7 @@ def test_plans_of_two_joints_are_proven_or_it_is_said_what_no_plan_exceeds() -> 
         assert (found.at_most >= found.made.reward).all()
         assert (found.at_most > found.made.reward).sum() <= found.unproven
         at_most.append(found.at_most)
+    assert (found.made.reward <= at_most[0]).all()  # what more room found is within what less room allowed
     assert (at_most[1] <= at_most[0]).all()
     assert (at_most[1] < at_most[0]).any()
 

@@ -10,6 +10,7 @@ from pneumarm.report import figures
 from pneumarm.report.figures import Classification
 from pneumarm.report.sections import RunData, all_sections, classifications, levels, phases_of
 from pneumarm.report.style import DARK, LIGHT, MIDDLE, svg
+from pneumarm.statistics import Estimate
 from pneumarm.task.movements import movements
 
 SPEC = ArmSpec()
@@ -213,6 +214,18 @@ def test_the_alternative_of_distributions_holds_their_numbers():
 def test_a_run_without_anything_has_its_results_only():
     sections = all_sections(RunData(SPEC, {}, test=movements(0)))
     assert [s.title for s in sections] == ["Results", "Test in the simulation"]
+
+
+def test_rewards_far_below_are_cut_off_but_never_those_of_the_best_method():
+    def method(name, *rewards):
+        mean = float(np.mean(rewards))
+        interval = Estimate(mean, mean - 9, mean + 9, 9)
+        return figures.Baseline(name, np.full(len(rewards), 50.0), np.array(rewards), interval)
+
+    spread, bad = method("spread", -33.0, -107.0), method("bad", -300.0)
+    assert figures.baselines([spread, bad], {}).axes[0].get_ylim() == (-109.0, -31.0)
+    good = method("good", 30.0, 28.0)
+    assert figures.baselines([good, spread], {}).axes[0].get_ylim() == (-17.0, 32.0)
 
 
 def test_baselines_stand_at_their_rewards_beside_the_bound():

@@ -9,7 +9,7 @@ import pytest
 
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.simulation import enough
+from pneumarm.simulation import FitResult, enough, fit
 from pneumarm.simulation.enough import Enough, EnoughSettings, collect_enough, enough_data
 from pneumarm.transitions import CollectResult, Store, collect
 
@@ -33,6 +33,26 @@ def test_five_minutes_are_enough_and_two_cannot_be_judged(grown: Path) -> None:
     assert five is not None
     assert five.enough
     assert five.verdict.startswith("enough: ")
+
+
+def test_both_halves_of_several_joints_are_judged_by_networks_of_one_kind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    networks = []
+
+    def noted(*given: Any, **options: Any) -> FitResult:
+        result = fit(*given, **options)
+        networks.append(result.simulation.networks)
+        return result
+
+    monkeypatch.setattr(enough, "fit", noted)
+    with open_arm("virtual:joints=2,seed=3") as arm, Store.for_arm(tmp_path / "db", arm.spec) as store:
+        collect(arm, store, 4_000, 1)
+        judged = enough_data(store)
+    assert judged is not None
+    assert judged.gain > 0  # a minute of two joints is not enough
+    assert [len(each) for each in networks] == [1, 1]
+    assert all(network.second_weights is not None for each in networks for network in each)
 
 
 def test_the_verdict_says_what_was_gained() -> None:

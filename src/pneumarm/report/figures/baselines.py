@@ -70,15 +70,17 @@ def baselines(trained: Sequence[Baseline], untrained: Mapping[str, Estimate]) ->
         place.set_xticks([], minor=True)
         place.set_xlim(low, high)
     paid = [level.mean for level in untrained.values()]
-    paid += [
-        value
-        for baseline in trained
-        for value in (*baseline.reward.tolist(), baseline.mean.low)
-        if np.isfinite(value)
-    ]
-    place.set_ylim(max(min(paid), max(paid) - _MOST_BELOW) - _AIR, max(paid) + _AIR)
+    paid += [value for baseline in trained for value in _paid(baseline)]
+    worst = max(paid) - _MOST_BELOW
+    if trained:  # the best method is shown as a whole
+        worst = min(worst, *_paid(max(trained, key=lambda baseline: baseline.mean.mean)))
+    place.set_ylim(max(min(paid), worst) - _AIR, max(paid) + _AIR)
     legend_below(figure, handles, labels)
     return figure
+
+
+def _paid(baseline: Baseline) -> list[float]:
+    return [value for value in (*baseline.reward.tolist(), baseline.mean.low) if np.isfinite(value)]
 
 
 def _marked(place: Axes, baseline: Baseline, ink: str, marker: str) -> None:

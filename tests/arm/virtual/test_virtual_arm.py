@@ -47,6 +47,15 @@ def test_a_restored_arm_has_the_same_future_bit_for_bit():
     assert np.array_equal(run(stranger, 100, seed=1), future)
 
 
+def test_a_state_from_a_computer_that_draws_other_last_digits_is_taken():
+    parameters = draw_parameters(1)
+    air = replace(parameters.air, supply=np.nextafter(parameters.air.supply, np.inf))
+    arm, there = VirtualArm(parameters), VirtualArm(replace(parameters, air=air))
+    run(there, 5)
+    arm.set_state(there.get_state())
+    assert arm.get_state() == there.get_state()
+
+
 def test_a_wrong_state_is_refused_and_changes_nothing():
     arm = VirtualArm()
     run(arm, 5)

@@ -34,7 +34,7 @@ LONGEST_WAIT = 1e8
 _sense, _pass_time, _drawn_lateness = direct(sense), direct(pass_time), direct(drawn_lateness)
 _open_valves, _open_pulses = direct(command), direct(command)
 _HEADER = struct.Struct("<8sI16s")
-_MAGIC, _VERSION = b"pneumarm", 3
+_MAGIC, _VERSION = b"pneumarm", 4
 
 
 class VirtualArm(Arm):
@@ -338,11 +338,13 @@ class VirtualArm(Arm):
         return body.muscles, body.joints, body.surroundings, *random, *further
 
     def _digest(self) -> bytes:
+        """Return what tells arms apart; computers may draw parameters whose last digits differ."""
         digest = hashlib.blake2b(digest_size=16)
         player = self._player
         for record in self.body.constants if player is None else player.sound:
-            digest.update(record.tobytes())
-        digest.update(struct.pack("<d", self.body.lateness))
+            for field in record.dtype.names:
+                digest.update(record[field].astype(np.float32).tobytes())
+        digest.update(struct.pack("<f", self.body.lateness))
         if self._further is not None:
             digest.update(repr((self.spec.velocity_sensor, self.spec.sensors)).encode())
         if player is not None:

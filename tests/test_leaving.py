@@ -118,7 +118,7 @@ def _raw_object_cache_notify():
     signal.raise_signal(signal.SIGINT)
 try:
     ctypes.CFUNCTYPE(None)(_raw_object_cache_notify)()
-    time.sleep(100)
+    time.sleep(10_000)
 except Interrupted as error:
     print(error)
 """

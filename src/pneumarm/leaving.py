@@ -9,7 +9,7 @@ import ctypes
 import os
 import signal
 import sys
-from threading import Timer
+from threading import Timer, main_thread
 from time import monotonic
 from types import FrameType
 from typing import Any
@@ -55,7 +55,7 @@ def leave_by_exceptions() -> None:
         if first is not None and now - first < _PATIENCE:
             return
         if _is_called_back(frame):
-            again = Timer(_AGAIN, signal.raise_signal, (number,))
+            again = Timer(_AGAIN, _raise_in_main_thread, (number,))
             again.daemon = True
             again.start()
             return
@@ -82,6 +82,15 @@ def leave_by_exceptions() -> None:
             return  # a C library without it: the other ways remain
         if os.getppid() != parent:
             raise Interrupted(_GONE, "the process that started it has ended")
+
+
+def _raise_in_main_thread(number: int) -> None:
+    """Raise a signal where exceptions are raised, so that it also ends a wait there."""
+    main = main_thread().ident
+    if sys.platform == "win32" or main is None:
+        signal.raise_signal(number)
+    else:
+        signal.pthread_kill(main, number)
 
 
 def _is_called_back(frame: FrameType | None) -> bool:

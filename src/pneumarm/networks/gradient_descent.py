@@ -16,7 +16,6 @@ from pneumarm.networks.levenberg_marquardt import Fit
 from pneumarm.networks.network import Network
 from pneumarm.networks.tansig import FASTMATH
 
-_BATCH = 64
 _DECAY = 0.01  # of all weights, in learning rates
 _LONGEST = 1.0  # gradients are cut to this length
 _FIRST_OUTPUT = 0.1  # the first outputs are small
@@ -26,7 +25,7 @@ _START, _ORDER = 0, 1  # streams of random numbers
 def two_layers(inputs: int, hidden: int, outputs: int, seed: int) -> Network:
     """Return a network with random weights and two layers of so many ``hidden`` units."""
     sizes = (inputs, hidden, hidden, outputs)
-    net = trainable(initial_weights(sizes, _FIRST_OUTPUT, np.random.default_rng([seed, _START])), sizes, _BATCH)
+    net = trainable(initial_weights(sizes, _FIRST_OUTPUT, np.random.default_rng([seed, _START])), sizes, 1)
     return _network(net)
 
 
@@ -38,6 +37,7 @@ def gradient_descent(
     rate: float,
     seed: int = 0,
     progress: Callable[[int, float], None] | None = None,
+    batch: int = 64,
 ) -> Fit:
     """Fit a network of two hidden layers to the targets ``y`` (n, outputs) at ``x`` (n, inputs), both about 1.
 
@@ -49,6 +49,7 @@ def gradient_descent(
         rate: learning rate of Adam at the start; falls to 0 as a cosine does.
         seed: of the order.
         progress: called as ``progress(pass, mse)`` after every pass.
+        batch: rows that one step is made of.
 
     Raises:
         ValueError: ``start`` has one hidden layer, or direct connections.
@@ -58,7 +59,7 @@ def gradient_descent(
         raise ValueError("gradient descent is for networks of two hidden layers, without direct connections")
     rows, targets = (np.ascontiguousarray(np.asarray(one).T, np.float32) for one in (x, y))
     count = rows.shape[1]
-    batch = min(_BATCH, count)
+    batch = min(batch, count)
     sizes = (len(rows), start.hidden_bias.size, start.second_bias.size, len(targets))
     layers = (
         (start.hidden_weights, start.hidden_bias),

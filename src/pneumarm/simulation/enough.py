@@ -36,7 +36,7 @@ _HELD_OUT = 0.25
 """Share of the sequences that the errors are measured on."""
 _SETTINGS = replace(SINGLE_STEPS, epochs=15)
 """Of both fits: further epochs change both alike."""
-_SEVERAL_JOINTS = replace(_SETTINGS, layers=2)
+_SEVERAL_JOINTS = replace(SINGLE_STEPS, epochs=6, layers=2)
 """Of several joints: both with two layers, though the first half may be too short for them to be better than one."""
 _WORTH = 1.05
 """A record that may grow by less, until the time for it is over, is not judged again."""

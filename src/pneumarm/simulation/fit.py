@@ -61,10 +61,12 @@ _NEWEST_COUNT = 5
 """Times that movements of an agent count in a fit that goes on, beside what was recorded before."""
 _ROWS_FOR_TWO = 5_000
 """Rows for each joint from which on two layers are as good as one, or better."""
-_PASSES, _ROWS_OF_PASSES = 600, 12_000_000
+_PASSES, _ROWS_OF_PASSES = 2400, 48_000_000
 """Most passes of gradient descent over all rows, and most rows of all passes together, in all epochs."""
-_RATE, _RATE_ON = 5e-3, 1e-3
-"""Learning rate of gradient descent, and of one that goes on from where another ended."""
+_BATCH, _BATCH_ON = 256, 64
+"""Rows of a step of gradient descent, and of one that goes on from where another ended."""
+_RATE, _RATE_ON = 1e-2, 1e-3
+"""Likewise its learning rate."""
 _EPOCHS_AHEAD = 10
 """Epochs of each network that fitting ahead takes about as long as."""
 _ROWS = 7  # stream of random numbers
@@ -91,7 +93,7 @@ class FitSettings(Settings):
     """Hidden units of each layer for each joint of the arm; by default 10 (thesis: 10, one joint), or 32 of two
     layers."""
     epochs: int = 60
-    """Epochs of Levenberg-Marquardt at most (thesis: 15); with two layers ten passes each of gradient descent."""
+    """Epochs of Levenberg-Marquardt at most (thesis: 15); with two layers 40 passes each of gradient descent."""
     tolerance: float = 1e-5
     """A fit ends early when three epochs in a row lower its error by less than this part; 0: never."""
     decay: float = 0.0
@@ -440,17 +442,17 @@ def _fit_two_layers(
     progress: Callable[[int, int], None],
 ) -> Fit:
     """Fit a network of two hidden layers to ``y``; it begins as it was ``before``, or at random."""
-    passes, rate = min(_PASSES, -(-_ROWS_OF_PASSES // len(x))), _RATE
+    passes, rate, batch = min(_PASSES, -(-_ROWS_OF_PASSES // len(x))), _RATE, _BATCH
     if before is None:
         passes = max(1, round(passes * settings.epochs / FitSettings.epochs))
     else:
-        passes, rate = min(_EPOCHS_ON, passes), _RATE_ON
+        passes, rate, batch = min(_EPOCHS_ON, passes), _RATE_ON, _BATCH_ON
     start = before or two_layers(x.shape[1], _hidden(settings, joints), y.shape[1], settings.seed)
 
     def report(done: int, _: float) -> None:
         progress(round(done / passes * settings.epochs), settings.epochs)
 
-    return gradient_descent(x, y, start, passes, rate, settings.seed, report)
+    return gradient_descent(x, y, start, passes, rate, settings.seed, report, batch)
 
 
 def _hidden(settings: FitSettings, joints: int) -> int:

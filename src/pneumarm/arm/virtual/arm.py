@@ -342,7 +342,7 @@ class VirtualArm(Arm):
         digest = hashlib.blake2b(digest_size=16)
         player = self._player
         for record in self.body.constants if player is None else player.sound:
-            for field in record.dtype.names:
+            for field in record.dtype.names or ():
                 digest.update(record[field].astype(np.float32).tobytes())
         digest.update(struct.pack("<f", self.body.lateness))
         if self._further is not None:

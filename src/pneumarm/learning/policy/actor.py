@@ -19,8 +19,8 @@ _HURRIES = 2  # times that looking ahead is made faster, at most: turns may be l
 class PolicyActor:
     """A policy acting greedily, looking ahead where its settings say so; see :class:`~.OnlineLearner` for its use.
 
-    It does not learn. What it does in vain it stops doing, see :mod:`.vain`; several joints may do what a plan says,
-    see :mod:`.courses`.
+    It does not learn. What it does in vain it stops doing, see :mod:`.vain`; several joints do what a plan says where
+    there is a good one, see :mod:`.courses`.
     """
 
     def __init__(self, mind: Mind, sizes: tuple[int, ...], settings: PolicySettings, simulation: Simulation) -> None:
@@ -46,9 +46,10 @@ class PolicyActor:
         """Return the actions (joints,) of the current state; they stay the same until the next state."""
         single = self._single
         if not self._decided:
-            decide(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
-            if self._courses is not None:
-                self._courses.improve(self._mind, single, self._lanes, self._samples)
+            if self._courses is None or not self._courses.plan(self._mind, single):
+                decide(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
+                if self._courses is not None:
+                    self._courses.improve(self._mind, single, self._lanes, self._samples)
             take_up(single, self._vain)
             self._decided = True
         return single.actions[0].copy()

@@ -2,13 +2,15 @@
 
 A policy that decides joint by joint sees neither that an action of all joints, held for ten periods, brings all of
 them to their goals at the same time, nor that what it does already would: each switch costs as much as eight actions
-(thesis section 5.4.1). So what it would do is compared with other *courses*: the best plan that a search in the
-simulation finds, the course that was taken last, and going on as before for some periods more. Each is followed in
-many copies of the simulated arm with the noise of the simulation, and after its end the policy goes on greedily. What
-has the highest mean return is done, for one period; then all is compared again.
+(thesis section 5.4.1). So several joints do what the best plan says that a search in the simulation finds, every
+turn anew.
 
-A plan alone trusts the simulation to be right for ten periods, and a policy to be right everywhere; compared in the
-noise, each stands in for the other.
+Where no plan is found, or a movement takes twice as long as was planned at first, so that the simulation is wrong
+there, what the policy would do is compared with other *courses*: the plan, the course that was taken last, and going
+on as before for some periods more. Each is followed in many copies of the simulated arm with the noise of the
+simulation, and after its end the policy goes on greedily. What has the highest mean return is done, for one period;
+then all is compared again. So each stands in for the other: plans need fewer switches, and hold on for long to what
+does not come true.
 """
 
 import numpy as np
@@ -26,29 +28,54 @@ _POLICY = -1  # in a course: what the policy says
 _HELD = (1, 3, 6, 12)  # periods for which the last actions may go on
 _MOST = 3 + len(_HELD)  # courses: that of the policy, the plan, the last one, and these
 _MOST_ACTIONS = 1_000  # of the whole arm, among which a plan can be sought in time
+_LATE = 2  # times as long as the first plan a movement does what plans say
+_MISSED = 24.0  # what it costs to miss the goal at the end of a plan, about two joints' switches and the way back
 
 
 class Courses:
-    """Compares courses of several joints in a movement; for one joint looking ahead action by action is enough."""
+    """Plans and compares what several joints could do in a movement; for one, looking ahead at actions is enough."""
 
     def __init__(self, simulation: Simulation, settings: PolicySettings) -> None:
         joints = simulation.window.joints
         actions = int(possible_actions(simulation.spec.muscles).sum()) ** joints
         self._search = _Search(simulation, settings) if actions <= _MOST_ACTIONS else None
-        self._horizon = settings.horizon
+        self._horizon, self._patience = settings.horizon, settings.patience
         self._courses = np.empty((_MOST, self._horizon, joints), np.int64)
-        self._last = self._courses[0, :0]
+        self._plan = self._last = self._courses[0, :0]
+        self._turn, self._late = 0, 0
 
     def begin(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts]."""
         if self._search is not None:
             self._search.goal[:] = goal
         self._last = self._last[:0]
+        self._turn, self._late = 0, 0
 
     def hurry(self) -> None:
         """Seek plans for about half as long from now on."""
         if self._search is not None:
             self._search.hurry()
+
+    def plan(self, mind: Mind, single: Lanes) -> bool:
+        """Seek a plan; return whether it is to be followed, and then let ``single.actions`` (1, joints) do so.
+
+        Where the same actions have changed nothing at any joint, a plan begins with others: there the arm sticks,
+        while the simulation may drift on.
+        """
+        if self._search is None:
+            return False
+        before = single.fleet.actions[0]
+        sticks = self._patience > 0 and bool((single.fleet.still[0] >= self._patience).all())
+        state = single.fleet.x[: mind.inputs.state_size, 0]
+        self._plan, reached = self._search.plan(state, before, may_hold=before[0] >= 0 and not sticks)
+        if self._late == 0 and reached:
+            self._late = self._turn + _LATE * len(self._plan)
+        self._turn += 1
+        if not reached or self._turn > self._late:
+            return False
+        single.actions[0] = self._plan[0]
+        self._last = self._plan[1 : self._horizon]
+        return True
 
     def improve(self, mind: Mind, single: Lanes, lanes: Lanes, samples: NDArray[np.int64]) -> None:
         """Set ``single.actions`` (1, joints), which are what the policy would do, to what is best.
@@ -58,19 +85,14 @@ class Courses:
         before, courses = single.fleet.actions[0], self._courses
         allowed = single.bias[:, 0].reshape(len(before), ACTIONS) > FORBIDDEN
         joints = np.arange(len(before))
-        goes_on = before[0] >= 0 and bool(allowed[joints, before].all())
         courses[...] = _POLICY
         courses[0, :1] = single.actions
-        known = [self._last]
-        if self._search is not None:
-            state = single.fleet.x[: mind.inputs.state_size, 0]
-            known.append(self._search.plan(state, before, goes_on)[: self._horizon])
         count = 1
-        for course in known:
+        for course in (self._last, self._plan[: self._horizon]):
             if len(course) and allowed[joints, course[0]].all():
                 courses[count, : len(course)] = course
                 count += 1
-        if goes_on:
+        if before[0] >= 0 and allowed[joints, before].all():
             for periods in _HELD:
                 courses[count, : min(periods, self._horizon)] = before
                 count += 1
@@ -86,7 +108,7 @@ class _Search:
         from pneumarm.planning.planner import SimulationModel  # planning stands above agents
         from pneumarm.planning.search import PlanSettings, find, halved, problem, tree
 
-        joints, plan = simulation.window.joints, PlanSettings(nodes=settings.nodes)
+        joints, plan = simulation.window.joints, PlanSettings(nodes=settings.nodes, failure_cost=_MISSED)
         self._model = SimulationModel(simulation, plan)
         reward, muscles = settings.reward.on(simulation.spec), simulation.spec.muscles
         uncertainty, agility = self._model.uncertainty, self._model.agility
@@ -97,17 +119,18 @@ class _Search:
         self._actions = to_actions(self._problem.commands)
         """Actions of each joint by those of the whole arm, shape (9**joints, joints)."""
 
-    def plan(self, state: NDArray[np.float32], before: NDArray[np.int64], may_hold: bool) -> NDArray[np.int64]:
-        """Return the actions (n, joints) of the best plan from the scaled ``state`` after the actions ``before``.
+    def plan(
+        self, state: NDArray[np.float32], before: NDArray[np.int64], may_hold: bool
+    ) -> tuple[NDArray[np.int64], bool]:
+        """Return the actions (n, joints) of the best plan from the scaled ``state``, and whether it reaches the goal.
 
-        Unless it ``may_hold``, the plan begins with others than these.
+        It comes after the actions ``before``, and unless it ``may_hold`` it begins with others than these.
         """
         self._model.put(state)
         same = np.flatnonzero((self._actions == before).all(axis=1))
         last = int(same[0]) if same.size else -1  # none before the first
         found = self._find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
-        actions: NDArray[np.int64] = self._actions[found.actions]
-        return actions
+        return self._actions[found.actions], found.reached
 
     def hurry(self) -> None:
         """Keep half as many states from now on."""

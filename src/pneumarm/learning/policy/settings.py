@@ -35,8 +35,8 @@ class PolicySettings(FleetSettings):
     horizon: int = 25
     """Longest of these movements [steps]."""
     nodes: int = 20_000
-    """With several joints: states of the simulation that may be kept in the search for a plan, which is compared with
-    what the policy would do; 0: each joint looks ahead for itself."""
+    """With several joints: states of the simulation that may be kept in the search for a plan, which is followed as
+    long as it may come true; 0: each joint looks ahead for itself."""
     practice: int = 2
     """With several joints: there are so many times as many updates."""
     noise_share: float = 0.5

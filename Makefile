@@ -18,7 +18,7 @@ run: setup  ## the whole job on the virtual arm, into runs/first
 	$(BIN)/pneumarm run --out runs/first
 
 test: setup
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
+	$(BIN)/python -m pytest -n 3 --dist worksteal
 
 lint: setup
 	$(BIN)/ruff check .

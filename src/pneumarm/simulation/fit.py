@@ -63,6 +63,8 @@ _ROWS_FOR_TWO = 5_000
 """Rows for each joint from which on two layers are as good as one, or better."""
 _PASSES, _ROWS_OF_PASSES = 2400, 48_000_000
 """Most passes of gradient descent over all rows, and most rows of all passes together, in all epochs."""
+_SHARE_BEFORE_AHEAD = 0.5
+"""Share of the passes that is as good where predictions are fitted ahead afterwards."""
 _BATCH, _BATCH_ON = 256, 64
 """Rows of a step of gradient descent, and of one that goes on from where another ended."""
 _RATE, _RATE_ON = 1e-2, 1e-3
@@ -93,7 +95,8 @@ class FitSettings(Settings):
     """Hidden units of each layer for each joint of the arm; by default 10 (thesis: 10, one joint), or 32 of two
     layers."""
     epochs: int = 60
-    """Epochs of Levenberg-Marquardt at most (thesis: 15); with two layers 40 passes each of gradient descent."""
+    """Epochs of Levenberg-Marquardt at most (thesis: 15); with two layers 40 passes each of gradient descent,
+    and half of them before a fit ahead."""
     tolerance: float = 1e-5
     """A fit ends early when three epochs in a row lower its error by less than this part; 0: never."""
     decay: float = 0.0
@@ -444,7 +447,8 @@ def _fit_two_layers(
     """Fit a network of two hidden layers to ``y``; it begins as it was ``before``, or at random."""
     passes, rate, batch = min(_PASSES, -(-_ROWS_OF_PASSES // len(x))), _RATE, _BATCH
     if before is None:
-        passes = max(1, round(passes * settings.epochs / FitSettings.epochs))
+        share = settings.epochs / FitSettings.epochs * (_SHARE_BEFORE_AHEAD if settings.ahead > 0 else 1)
+        passes = max(1, round(passes * share))
     else:
         passes, rate, batch = min(_EPOCHS_ON, passes), _RATE_ON, _BATCH_ON
     start = before or two_layers(x.shape[1], _hidden(settings, joints), y.shape[1], settings.seed)

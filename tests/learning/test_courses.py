@@ -167,4 +167,4 @@ def test_what_little_is_looked_ahead_is_not_halved(compared: list[int]) -> None:
 def test_several_joints_practise_more() -> None:
     settings = PolicySettings(updates=10, practice=3)
     assert practised(settings, simulation(1)) == settings
-    assert practised(settings, simulation(2)).updates == 30
+    assert [practised(settings, simulation(joints)).updates for joints in (2, 3)] == [30, 90]

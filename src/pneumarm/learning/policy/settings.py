@@ -38,7 +38,7 @@ class PolicySettings(FleetSettings):
     """With several joints: states of the simulation that may be kept in the search for a plan, which is followed as
     long as it may come true; 0: each joint looks ahead for itself."""
     practice: int = 2
-    """With several joints: there are so many times as many updates."""
+    """With several joints: there are so many times as many updates for each joint after the first."""
     noise_share: float = 0.5
     """With several joints: the share of the simulation's noise that it learns and looks ahead in."""
     clear: float = 0.001

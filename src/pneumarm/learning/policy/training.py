@@ -55,10 +55,11 @@ def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
 
 def practised(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     """Return ``settings`` with as many updates, and as little noise, as suit the joints of this arm."""
-    if simulation.spec.joints == 1:
+    joints = simulation.spec.joints
+    if joints == 1:
         return settings
     noise = replace(settings.noise, factor=settings.noise.factor * settings.noise_share)
-    return replace(settings, updates=settings.updates * settings.practice, noise=noise)
+    return replace(settings, updates=settings.updates * settings.practice ** (joints - 1), noise=noise)
 
 
 class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):

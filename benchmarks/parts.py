@@ -28,7 +28,7 @@ from benchmarks._trials import Rows, names_of
 from benchmarks.agents import prepared, store_of
 from benchmarks.baselines import greedy_movements
 from pneumarm.learning import AnyAgent, PolicyAgent, PolicySettings, test, train
-from pneumarm.learning.policy.courses import MISSED
+from pneumarm.learning.policy.courses import missed
 from pneumarm.planning import PlanAgent
 from pneumarm.planning.search import PlanSettings
 from pneumarm.simulation import SINGLE_STEPS
@@ -106,7 +106,9 @@ def trial(folder: Path, arm: str, seed: int, name: str, minutes: int, movements:
     place /= "".join(f"{key}-{value}" for key, value in variant.fit.items())
     place.mkdir(exist_ok=True)
     simulation, begin = prepared(place, arm, variant.share * minutes, replace(SINGLE_STEPS, **variant.fit))
-    agent: AnyAgent = PlanAgent(simulation, plan=PlanSettings(nodes=PolicySettings.nodes, failure_cost=MISSED))
+    usual = PolicySettings()
+    plan = PlanSettings(nodes=usual.nodes, failure_cost=missed(usual.reward))
+    agent: AnyAgent = PlanAgent(simulation, plan=plan)
     if variant.learns:
         trained = "".join(f"-{key}-{value}" for key, value in variant.training.items())
         file = place / f"{store_of(place, arm).stem}-{seed}{trained}.agent"

@@ -23,14 +23,18 @@ from pneumarm.learning.policy.proximal import FORBIDDEN
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.fleet import gained_by, take_alive
+from pneumarm.task.reward import Reward
 
-MISSED = 24.0
-"""What it costs to miss the goal at the end of a plan: about a switch of two joints, and the way back."""
 _POLICY = -1  # in a course: what the policy says
 _HELD = (1, 3, 6, 12)  # periods for which the last actions may go on
 _MOST = 3 + len(_HELD)  # courses: that of the policy, the plan, the last one, and these
 _MOST_ACTIONS = 1_000  # of the whole arm, among which a plan can be sought in time
 _LATE = 2  # times as long as the first plan a movement does what plans say
+
+
+def missed(reward: Reward) -> float:
+    """Return what it costs to miss the goal at the end of a plan: two switches, and eight actions to come back."""
+    return max(0.0, -2 * reward.switch - 8 * reward.action)
 
 
 class Courses:
@@ -109,7 +113,8 @@ class _Search:
         from pneumarm.planning.planner import SimulationModel  # planning stands above agents
         from pneumarm.planning.search import PlanSettings, find, halved, problem, tree
 
-        joints, plan = simulation.window.joints, PlanSettings(nodes=settings.nodes, failure_cost=MISSED)
+        joints = simulation.window.joints
+        plan = PlanSettings(nodes=settings.nodes, failure_cost=missed(settings.reward))
         self._model = SimulationModel(simulation, plan)
         reward, muscles = settings.reward.on(simulation.spec), simulation.spec.muscles
         uncertainty, agility = self._model.uncertainty, self._model.agility

@@ -74,14 +74,14 @@ def measure() -> Iterator[str]:
 
 
 def prepared(
-    folder: Path, arm: str, minutes: float = 0.0, settings: FitSettings = SINGLE_STEPS
+    folder: Path, arm: str, minutes: float = 0.0, settings: FitSettings = SINGLE_STEPS, recording: int = 0
 ) -> tuple[Simulation, BeginStates]:
     """Return the simulation of an arm and its begin states; collect and fit where that is not done yet.
 
     It is recorded for so many ``minutes`` of its time, or for :data:`TRANSITIONS`, and fitted by ``settings``; a
-    ``folder`` has fits of one kind.
+    ``folder`` has fits of one kind, and one ``recording`` of an arm.
     """
-    db, seed = store_of(folder, arm), seed_of(arm)
+    db, seed = store_of(folder, arm), seed_of(arm) + recording
     file = db.with_suffix(".sim")
     if not file.exists():
         there_and_back.collected(db, arm, seed, Recipe(minutes=minutes) if minutes else Recipe(TRANSITIONS))

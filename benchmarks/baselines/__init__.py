@@ -2,15 +2,16 @@
 
 python -m benchmarks baselines
 
-On every arm there is one collection and one fit, and every baseline gets the same simulation, begin states and goals:
-in the simulation those of ``pneumarm test --seed 0``, on the arm those of the test on arrival of
-``pneumarm transfer --seed 0``. Methods of other libraries train through our Gymnasium environment on the same
-simulation, where stable-baselines3 and sb3-contrib are installed (the extra ``stable-baselines``).
+On every arm there is one collection and one fit, unless more are asked for, and every baseline gets the same
+simulation, begin states and goals: in the simulation those of ``pneumarm test --seed 0``, on the arm those of the
+test on arrival of ``pneumarm transfer --seed 0``. Methods of other libraries train through our Gymnasium environment
+on the same simulation, where stable-baselines3 and sb3-contrib are installed (the extra ``stable-baselines``).
 
 PNEUMARM_BASELINES_ARMS       virtual arms by seeds, by default those of the held-out arms, "1001,...,1010", or by
                               names divided by blanks, such as "virtual:joints=2,seed=1001 virtual:joints=2,seed=1002"
 PNEUMARM_BASELINES_MINUTES    minutes of an arm's time that it is recorded for; by default 200,000 transitions
 PNEUMARM_BASELINES_SEEDS      how many agents each method trains, 3
+PNEUMARM_BASELINES_RECORDINGS how many recordings of an arm there are, 1; its agents learn from one after the other
 PNEUMARM_BASELINES_METHODS    "open loop,closed loop,planning,policy,batched,sarsa,ppo,dqn,qr-dqn:1"; ":1" trains one;
                               "sarsa own" and "sarsa one" are other teams of the thesis' agents, for several joints
 PNEUMARM_BASELINES_MOVEMENTS  greedy movements on the arm for each agent, 500
@@ -78,6 +79,7 @@ class Wanted:
     planned: int
     adapting: int
     minutes: float
+    recordings: int = 1
 
 
 def measure() -> Iterator[str]:
@@ -90,6 +92,7 @@ def measure() -> Iterator[str]:
         min(environment.whole("PNEUMARM_BASELINES_PLANNED", movements), movements),
         environment.whole("PNEUMARM_BASELINES_ADAPTING", 0, 0),
         environment.whole("PNEUMARM_BASELINES_MINUTES", 0, 0),
+        environment.whole("PNEUMARM_BASELINES_RECORDINGS", 1),
     )
     arms = names_of(environment.text("PNEUMARM_BASELINES_ARMS", HELD_OUT), "virtual:seed=")
     folder = environment.folder("PNEUMARM_BASELINES_FOLDER", "runs/baselines")
@@ -165,7 +168,10 @@ def append(file: Path, row: Row) -> None:
 
 def measured(folder: Path, arm: str, method: str, seed: int, wanted: Wanted) -> Row:
     """Return the row of an agent: what its training took, and what came of it in the simulation and on the arm."""
-    simulation, begin = prepared(folder, arm, wanted.minutes)
+    goals, recording = prepared(folder, arm, wanted.minutes)[0].goals, seed % wanted.recordings
+    place = place_of(folder, recording)
+    simulation, begin = prepared(place, arm, wanted.minutes, recording=recording)
+    simulation = simulation.with_goals(goals)  # the same movements for all agents of an arm
     row: Row = {"arm": arm, "method": method, "seed": seed, "wanted": vars(wanted), "adapted": None}
     if method in BOUNDS:
         planned = bound(folder, arm, BOUNDS[method], wanted)
@@ -175,16 +181,23 @@ def measured(folder: Path, arm: str, method: str, seed: int, wanted: Wanted) -> 
     else:
         learned = learn(method, simulation, begin, seed, wanted.steps)
         if method != PLANNING:
-            agent = folder / f"{store_of(folder, arm).stem}-{method.replace(' ', '-')}-{seed}.agent"
+            agent = place / f"{store_of(place, arm).stem}-{method.replace(' ', '-')}-{seed}.agent"
             learned.agent.save(agent)
             learned = replace(learned, agent=load_agent(agent))  # what is measured is what anyone could use
         row |= {"wall": learned.wall, "cpu": learned.cpu, "curve": learned.curve}
         row["simulation"] = tested(learned.agent, simulation, begin, wanted.tests)
-        rows, p99 = greedy_movements(learned.agent, arm, simulation.goals, wanted.movements)
+        rows, p99 = greedy_movements(learned.agent, arm, goals, wanted.movements)
         made = of_rows((one.row() for one in rows), simulation.spec.joints)
         if wanted.adapting and isinstance(learned.agent, Adapts | Learns):
-            row["adapted"] = told(adapted(folder, learned.agent, arm, wanted))
+            row["adapted"] = told(adapted(place, learned.agent, arm, wanted))
     return row | told(made) | {"p99_ms": p99, "memory_mb": peak_memory()}
+
+
+def place_of(folder: Path, recording: int) -> Path:
+    """Return where this recording of arms lies, and what is made from it."""
+    place = folder / f"recording-{recording}" if recording else folder
+    place.mkdir(exist_ok=True)
+    return place
 
 
 def told(made: Movements) -> Row:

@@ -59,7 +59,7 @@ def sought(model: SimulationModel, goal: np.ndarray, agility: Agility | None) ->
     return problem(goal, Reward().on(model.spec), PlanSettings(), agility=agility)
 
 
-def test_three_of_four_periods_of_random_valves_are_slower(model: SimulationModel) -> None:
+def test_nine_of_ten_periods_of_valves_that_change_rarely_are_slower(model: SimulationModel) -> None:
     agility = agility_of(model.world, model.states, model.spec)
     assert agility.period == 1e3 * model.spec.period
     random, speeds = np.random.default_rng(5), []
@@ -67,12 +67,12 @@ def test_three_of_four_periods_of_random_valves_are_slower(model: SimulationMode
         copy(model.states, 1, 0)
         valves = VALVES[random.integers(0, 9, 2)]
         for _ in range(40):
-            if random.random() < 0.3:
+            if random.random() < 0.05:
                 valves = VALVES[random.integers(0, 9, 2)]
             advance(model.world, model.states, 1, valves)
             speeds.append(np.abs(model.states.velocity[1]) * agility.period)
     slower = np.mean(np.array(speeds) <= agility.speed, axis=0)
-    assert ((slower > 0.55) & (slower < 0.9)).all()
+    assert ((slower > 0.75) & (slower < 0.99)).all()
     assert (agility.acceleration > 0).all()
     assert (agility.acceleration < 2 * np.max(speeds, axis=0)).all()
 

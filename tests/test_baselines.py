@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.baselines import METHODS, Wanted, append, each, read_rows
+from benchmarks.baselines import METHODS, Wanted, append, each, place_of, read_rows
 from benchmarks.baselines.table import (
     and_adapted,
     below,
@@ -44,6 +44,12 @@ def row(arm: int, method: str, seed: int = 0) -> dict:
 
 
 ROWS = [row(arm, method, seed) for arm in (1, 2) for method in LEVELS for seed in range(2 if method == "ppo" else 1)]
+
+
+def test_recordings_of_an_arm_lie_apart(tmp_path: Path) -> None:
+    assert place_of(tmp_path, 0) == tmp_path
+    assert place_of(tmp_path, 2) == place_of(tmp_path, 2) == tmp_path / "recording-2"
+    assert (tmp_path / "recording-2").is_dir()
 
 
 def test_rows_come_back_and_one_that_was_cut_short_is_measured_again(tmp_path: Path) -> None:

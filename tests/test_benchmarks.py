@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks import _environment as environment
-from benchmarks import minutes, success
+from benchmarks import chosen, minutes, success
 from benchmarks.__main__ import main
 from benchmarks._trials import Rows, collected, greedy_movements, names_of, recorded
 
+from pneumarm.arm.seam import Reading
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import load_agent
-from pneumarm.transitions import Recorded
+from pneumarm.transitions import CollectSettings, Recorded, Store
 
 
 @pytest.mark.parametrize(
@@ -103,6 +104,29 @@ def test_collecting_ends_with_the_first_sequence_after_the_minutes(tmp_path: Pat
     assert again == (transitions, took)
     more, longer = collected(tmp_path / "db", arm=3, seed=0, transitions=transitions + 1)
     assert (more, longer > took) == (transitions + 200, True)
+
+
+def test_what_is_chosen_is_what_simulations_disagree_about(tmp_path: Path) -> None:
+    collected(tmp_path / "db", arm=3, seed=0, transitions=2_000)
+    with Store.open(tmp_path / "db") as store:
+        first, second, third = chosen.quickly_fitted(store)
+        chooser = chosen.Chooser(store, CollectSettings(pulses=0.0), seed=0, of_a_kind=False)
+        chooser.reset(np.zeros(1))
+        middle = store.percentiles().mean(axis=1)
+    reading = Reading(0.0, middle, np.full((1, 2), 400.0))
+    filling, nothing = np.ones((1, 30, 1, 2)), np.zeros((1, 30, 1, 2))
+    pair = [first, second]
+    (same,), (little,), (much,) = (
+        chosen.disagreement(simulations, sequences, reading)
+        for simulations, sequences in (([first, first], filling), (pair, nothing), (pair, filling))
+    )
+    assert same == 0
+    assert 0 < little < much  # muscles that fill for a second burst; nobody has seen it
+    candidates = np.array(chooser._candidates)
+    assert len(candidates) == chosen.CANDIDATES
+    found = chosen.disagreement([first, second, third], candidates, reading)
+    taken = np.array([chooser.act(reading) for _ in range(candidates.shape[1])])
+    np.testing.assert_array_equal(taken, candidates[found.argmax()])
 
 
 def test_arms_are_recorded_as_in_a_default_run(tmp_path: Path) -> None:

@@ -80,6 +80,8 @@ class Model(Protocol):
     """How far readings are from what the model says."""
     agility: Agility | None
     """How fast several joints are; None for one, whose plans are proven to be the best."""
+    hasty: Agility | None
+    """A guess of it by which plans are sought where the search by the other finds none."""
 
     def reset(self) -> None:
         """Begin a movement: the next reading is one at rest."""
@@ -111,9 +113,10 @@ class PhysicsModel:
         self.states = physics_states(self.world, workspace_of(settings, self.spec.joints))
         self.uncertainty = CERTAIN if foresight else _sensor_noise(inner)
         self.agility: Agility | None = None
+        self.hasty: Agility | None = None
         if self.spec.joints > 1:
             capture(inner, self.world, self.states, 0)
-            self.agility = agility_of(self.world, self.states, self.spec)
+            self.agility, self.hasty = agility_of(self.world, self.states, self.spec)
         self._due: float | None = None
 
     def reset(self) -> None:
@@ -162,9 +165,10 @@ class SimulationModel:
         angle, velocity = simulation.error_std[:, :2].max(axis=0).tolist()
         self.uncertainty = Uncertainty(angle, velocity)
         self.agility: Agility | None = None
+        self.hasty: Agility | None = None
         if self.spec.joints > 1:
             look_simulated(self.world, self.states, 0)
-            self.agility = agility_of(self.world, self.states, self.spec)
+            self.agility, self.hasty = agility_of(self.world, self.states, self.spec)
         self._tracker = StateTracker(simulation.window, simulation.scaling)
 
     def reset(self) -> None:
@@ -254,6 +258,8 @@ class Planner:
         if self.found is None or self.replan:
             may_hold = not self._is_stuck()
             self.found = self._find(self._problem, may_hold)
+            if not self.found.reached and self.model.hasty is not None:
+                self.found = self._find(self._problem._replace(agility=self.model.hasty), may_hold)
             if self.prove and not self.found.proven:
                 unguided = self._problem._replace(agility=unknown_agility(self.model.spec.joints))
                 self.found = self._find(unguided, may_hold, self.found)

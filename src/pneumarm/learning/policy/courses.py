@@ -117,7 +117,9 @@ class _Search:
         plan = PlanSettings(nodes=settings.nodes, failure_cost=missed(settings.reward))
         self._model = SimulationModel(simulation, plan)
         reward, muscles = settings.reward.on(simulation.spec), simulation.spec.muscles
-        uncertainty, agility = self._model.uncertainty, self._model.agility
+        uncertainty = self._model.uncertainty
+        # Three joints have so many actions that most surer searches end for want of room.
+        agility = self._model.agility if joints == 2 else self._model.hasty
         self._problem = problem(np.zeros(joints), reward, plan, uncertainty, muscles, agility)
         self.goal = self._problem.goal
         """Shape (joints,) [counts]."""

@@ -73,11 +73,15 @@ def test_a_plan_is_followed_as_long_as_it_may_come_true() -> None:
     agent = untrained(2)
     actor, state = agent.actor(), np.zeros(agent.window.state_size)
     actor.begin(state, [560.0, 440.0])
-    mind, single, plans = actor._mind, actor._single, actor._courses
-    followed = [plans.plan(mind, single) for _ in range(60)]
-    length = len(plans._plan)
-    assert followed == [True] * 2 * length + [False] * (60 - 2 * length)
-    np.testing.assert_array_equal(single.actions[0], plans._plan[0])
+    mind, single, plans, followed = actor._mind, actor._single, actor._courses, []
+    for _ in range(20):
+        followed.append(plans.plan(mind, single))
+        single.fleet.actions[0] = IN_OUT, OUT_IN  # time passes, and the arm stays where it is
+    periods = round(-SETTINGS.reward.switch / -SETTINGS.reward.action)
+    assert followed == [True] * (periods + 1) + [False] * (19 - periods)
+    np.testing.assert_array_equal(plans._plan[0], (IN_OUT, OUT_IN))
+    actor.begin(state, [560.0, 440.0])
+    assert plans.plan(mind, single)  # another movement
     actor.begin(state, [5_000.0, 440.0])  # there is no plan to where the arm cannot be
     assert not any(plans.plan(mind, single) for _ in range(3))
 
@@ -122,7 +126,8 @@ def sought(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def compared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Return in how many simulated arms courses are compared each time, from now on in every turn."""
     seen: list[int] = []
-    monkeypatch.setattr(courses, "_LATE", 0)
+    plan = courses.Courses.plan
+    monkeypatch.setattr(courses.Courses, "plan", lambda self, mind, single: plan(self, mind, single) and False)
 
     def noted(mind: Any, single: Any, many: Any, *how: Any) -> int:
         seen.append(len(many.total))

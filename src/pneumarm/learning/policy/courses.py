@@ -5,13 +5,15 @@ them to their goals at the same time, nor that what it does already would: each 
 (thesis section 5.4.1). So several joints do what the best plan says that a search in the simulation finds, every
 turn anew.
 
-Where no plan is found, or a movement takes twice as long as was planned at first, so that the simulation is wrong
-there, what the policy would do is compared with other *courses*: the plan, the course that was taken last, and going
-on as before for some periods more. Each is followed in many copies of the simulated arm with the noise of the
-simulation, and after its end the policy goes on greedily. What has the highest mean return is done, for one period;
-then all is compared again. So each stands in for the other: plans need fewer switches, and hold on for long to what
-does not come true.
+Where no plan is found, or once a movement is to cost a switch more than was planned at first, so that the simulation
+is wrong there, what the policy would do is compared with other *courses*: the plan, the course that was taken last,
+and going on as before for some periods more. Each is followed in many copies of the simulated arm with the noise of
+the simulation, and after its end the policy goes on greedily. What has the highest mean return is done, for one
+period; then all is compared again. So each stands in for the other: plans need fewer switches, and hold on for long
+to what does not come true.
 """
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +31,6 @@ _POLICY = -1  # in a course: what the policy says
 _HELD = (1, 3, 6, 12)  # periods for which the last actions may go on
 _MOST = 3 + len(_HELD)  # courses: that of the policy, the plan, the last one, and these
 _MOST_ACTIONS = 1_000  # of the whole arm, among which a plan can be sought in time
-_LATE = 2  # times as long as the first plan a movement does what plans say
 
 
 def missed(reward: Reward) -> float:
@@ -44,17 +45,17 @@ class Courses:
         joints = simulation.window.joints
         actions = int(possible_actions(simulation.spec.muscles).sum()) ** joints
         self._search = _Search(simulation, settings) if actions <= _MOST_ACTIONS else None
-        self._horizon, self._patience = settings.horizon, settings.patience
+        self._horizon, self._patience, self._reward = settings.horizon, settings.patience, settings.reward
         self._courses = np.empty((_MOST, self._horizon, joints), np.int64)
         self._plan = self._last = self._courses[0, :0]
-        self._turn, self._late = 0, 0
+        self._spent, self._planned, self._comes_true = 0.0, math.inf, True
 
     def begin(self, goal: NDArray[np.float64]) -> None:
         """Begin a movement to ``goal`` (joints,) [counts]."""
         if self._search is not None:
             self._search.goal[:] = goal
         self._last = self._last[:0]
-        self._turn, self._late = 0, 0
+        self._spent, self._planned, self._comes_true = 0.0, math.inf, True
 
     def hurry(self) -> None:
         """Seek plans for about half as long from now on."""
@@ -72,11 +73,16 @@ class Courses:
         before = single.fleet.actions[0]
         sticks = self._patience > 0 and bool((single.fleet.still[0] >= self._patience).all())
         state = single.fleet.x[: mind.inputs.state_size, 0]
-        self._plan, reached = self._search.plan(state, before, may_hold=before[0] >= 0 and not sticks)
-        if self._late == 0 and reached:
-            self._late = self._turn + _LATE * len(self._plan)
-        self._turn += 1
-        if not reached or self._turn > self._late:
+        begins = before[0] < 0
+        if not begins:
+            self._spent -= self._reward.action + self._reward.switch * int(single.fleet.switched[0].sum())
+        self._plan, cost = self._search.plan(state, before, may_hold=not begins and not sticks)
+        if math.isinf(cost):
+            return False
+        if math.isinf(self._planned):
+            self._planned = self._spent + cost
+        self._comes_true = self._comes_true and self._spent + cost <= self._planned - self._reward.switch
+        if not self._comes_true:
             return False
         single.actions[0] = self._plan[0]
         self._last = self._plan[1 : self._horizon]
@@ -129,16 +135,17 @@ class _Search:
 
     def plan(
         self, state: NDArray[np.float32], before: NDArray[np.int64], may_hold: bool
-    ) -> tuple[NDArray[np.int64], bool]:
-        """Return the actions (n, joints) of the best plan from the scaled ``state``, and whether it reaches the goal.
+    ) -> tuple[NDArray[np.int64], float]:
+        """Return the actions (n, joints) of the best plan from the scaled ``state``, and what it costs.
 
-        It comes after the actions ``before``, and unless it ``may_hold`` it begins with others than these.
+        It comes after the actions ``before``, and unless it ``may_hold`` it begins with others than these. Its cost
+        is infinite where none reaches the goal.
         """
         self._model.put(state)
         same = np.flatnonzero((self._actions == before).all(axis=1))
         last = int(same[0]) if same.size else -1  # none before the first
         found = self._find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
-        return self._actions[found.actions], found.reached
+        return self._actions[found.actions], found.cost
 
     def hurry(self) -> None:
         """Keep half as many states from now on."""

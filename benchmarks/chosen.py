@@ -4,8 +4,9 @@ python -m benchmarks chosen
 
 Of twelve random sequences that one is carried out about whose steps three quickly fitted simulations disagree most,
 from where the arm stands. Sequences are chosen from all kinds, or from those of the kind that was drawn, so that the
-mixture stays. Beside them, all of the random sequences hold their actions, as most of the chosen ones do. All collect for as long on the arm's clock, and simulations and agents for reaching are made of nothing
-else, by the defaults. The movements are the same for all agents of an arm. Settings come from the environment:
+mixture stays. Beside them, all of the random sequences hold their actions, as most of the chosen ones do. All collect
+for as long on the arm's clock, and simulations and agents for reaching are made of nothing else, by the defaults. The
+movements are the same for all agents of an arm. Settings come from the environment:
 
 PNEUMARM_CHOSEN_ARMS       seeds of virtual arms; the ten held-out arms by default
 PNEUMARM_CHOSEN_SEEDS      of collecting, fitting and training, "0,1,2,3,4"

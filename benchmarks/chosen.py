@@ -4,9 +4,8 @@ python -m benchmarks chosen
 
 Of twelve random sequences that one is carried out about whose steps three quickly fitted simulations disagree most,
 from where the arm stands. Sequences are chosen from all kinds, or from those of the kind that was drawn, so that the
-mixture stays. Beside them, all of the random sequences hold their actions, as most of the chosen ones do. All collect
-for as long on the arm's clock, and simulations and agents for reaching are made of nothing else, by the defaults. The
-movements are the same for all agents of an arm. Settings come from the environment:
+mixture stays. All collect for as long on the arm's clock, and simulations and agents for reaching are made of nothing
+else, by the defaults. The movements are the same for all agents of an arm. Settings come from the environment:
 
 PNEUMARM_CHOSEN_ARMS       seeds of virtual arms; the ten held-out arms by default
 PNEUMARM_CHOSEN_SEEDS      of collecting, fitting and training, "0,1,2,3,4"
@@ -42,7 +41,7 @@ from pneumarm.transitions.players import Trajectory
 from pneumarm.transitions.rows import joined
 from pneumarm.transitions.window import Window, transitions
 
-RANDOM, CHOSEN, OF_A_KIND, HELD = WAYS = ("random", "chosen", "chosen of a kind", "held actions")
+RANDOM, CHOSEN, OF_A_KIND = WAYS = ("random", "chosen", "chosen of a kind")
 CANDIDATES, SIMULATIONS = 12, 3
 GROWN = 1.3
 """Simulations are fitted again once the record is so many times as long."""
@@ -178,8 +177,7 @@ def trial(arm: int, seed: int, minutes: float, movements: int, way: str) -> dict
 def collected(path: Path, arm: int, seed: int, minutes: float, way: str) -> int:
     """Collect into the store ``path`` for so many minutes on the arm's clock; return the transitions."""
     with open_arm(f"virtual:seed={arm}", seed) as there, Store.for_arm(path, there.spec) as store:
-        share = 1.0 if way == HELD else CollectSettings.velocity_share
-        settings = CollectSettings(pulses=0.0, velocity_share=share).for_arm(find_fill_times(guarded(there)))
+        settings = CollectSettings(pulses=0.0).for_arm(find_fill_times(guarded(there)))
         chooser = Chooser(store, settings, seed, of_a_kind=way == OF_A_KIND) if way in (CHOSEN, OF_A_KIND) else None
         done = collect(there, store, FEWEST_TRANSITIONS, seed, settings=settings, controller=chooser)
         while done.seconds < 60 * minutes:

@@ -26,12 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import _environment as environment
-from benchmarks._trials import HELD_OUT, Rows, fitted, greedy_movements
-from benchmarks.minutes import differences, half_width
+from benchmarks._trials import HELD_OUT, Rows
+from benchmarks.minutes import differences, half_width, learned_from
 from pneumarm.arm import guarded, open_arm
 from pneumarm.arm.seam import Reading
 from pneumarm.arm.valves import Command
-from pneumarm.learning import PolicySettings, test, train
 from pneumarm.simulation import FitSettings, Simulation, fit
 from pneumarm.simulation.quality import advanced
 from pneumarm.transitions import FEWEST_TRANSITIONS, CollectSettings, Store, collect
@@ -155,23 +154,9 @@ def trial(arm: int, seed: int, minutes: float, movements: int, way: str) -> dict
         collected(span, arm, 0, _MINUTES_OF_GOALS, RANDOM)
         with Store.open(span) as store:
             goals = store.percentiles()
-        rows = collected(db, arm, seed, minutes, way)
-        made, begin = fitted(db, seed)
-    trained = train(made.simulation, begin, PolicySettings(), seed)
-    simulated = test(trained.agent, made.simulation, begin, 1_000, seed)
-    on_arm = greedy_movements(trained.agent, arm, goals, range(movements), seed)
-    return {
-        "arm": arm,
-        "seed": seed,
-        "minutes": minutes,
-        "movements": movements,
-        "way": way,
-        "transitions": rows,
-        "angle": float(made.result.std["angle"]),
-        "simulated": float(simulated.reward.mean()),
-        "reward": float(np.mean([one.reward for one in on_arm])),
-        "success": float(np.mean([one.success for one in on_arm])),
-    }
+        transitions = collected(db, arm, seed, minutes, way)
+        made = learned_from(db, arm, seed, movements, goals)
+    return {"minutes": minutes, "way": way, "transitions": transitions, **made}
 
 
 def collected(path: Path, arm: int, seed: int, minutes: float, way: str) -> int:
@@ -191,10 +176,11 @@ def line(minutes: float, way: str, each: list[dict[str, Any]], random: list[dict
     def mean(name: str) -> float:
         return float(np.mean([row[name] for row in each]))
 
-    difference = ""
+    difference, success = "", mean("successes") / mean("movements")
+    angle = float(np.mean([row["std"]["angle"] for row in each]))
     if each is not random:
         difference = f"{np.mean(differences(each, random)):+.2f} ± {half_width(differences(each, random)):.2f}"
     return (
-        f"{minutes:8g} {way:18}{mean('transitions'):12,.0f}{mean('angle'):7.2f}{mean('simulated'):15.2f}"
-        f"{mean('reward'):12.2f}{min(row['reward'] for row in each):8.2f}{difference:>17}{mean('success'):10.4f}"
+        f"{minutes:8g} {way:18}{mean('transitions'):12,.0f}{angle:7.2f}{mean('simulated'):15.2f}"
+        f"{mean('reward'):12.2f}{min(row['reward'] for row in each):8.2f}{difference:>17}{success:10.4f}"
     )

@@ -81,6 +81,12 @@ def trial(
 ) -> dict[str, Any]:
     """Return what an agent reaches that was made from so many minutes on the arm."""
     transitions, took = collected(db, arm, seed, minutes=minutes)
+    made = learned_from(db, arm, seed, movements, goals)
+    return {"asked": minutes, "minutes": took, "transitions": transitions, **made}
+
+
+def learned_from(db: Path, arm: int, seed: int, movements: int, goals: NDArray[np.float64]) -> dict[str, Any]:
+    """Return what an agent reaches that learned from the recording ``db`` of a virtual arm."""
     made, begin = fitted(db, seed)
     trained = train(made.simulation, begin, PolicySettings(), seed)
     simulated = test(trained.agent, made.simulation, begin, 2_000, seed)
@@ -88,10 +94,7 @@ def trial(
     return {
         "arm": arm,
         "seed": seed,
-        "asked": minutes,
         "movements": movements,
-        "minutes": took,
-        "transitions": transitions,
         "fitted": made.result.rows,
         "std": made.result.std,
         "simulated": float(simulated.reward.mean()),

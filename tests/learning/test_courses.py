@@ -77,13 +77,20 @@ def test_a_plan_is_followed_as_long_as_it_may_come_true() -> None:
     for _ in range(20):
         followed.append(plans.plan(mind, single))
         single.fleet.actions[0] = IN_OUT, OUT_IN  # time passes, and the arm stays where it is
-    periods = round(-SETTINGS.reward.switch / -SETTINGS.reward.action)
+    periods = round(courses.behind(SETTINGS.reward) / -SETTINGS.reward.action)
+    assert periods == 8
     assert followed == [True] * (periods + 1) + [False] * (19 - periods)
     np.testing.assert_array_equal(plans._plan[0], (IN_OUT, OUT_IN))
     actor.begin(state, [560.0, 440.0])
     assert plans.plan(mind, single)  # another movement
     actor.begin(state, [5_000.0, 440.0])  # there is no plan to where the arm cannot be
     assert not any(plans.plan(mind, single) for _ in range(3))
+
+
+def test_plans_are_followed_where_switches_cost_nothing_too() -> None:
+    reward = SETTINGS.reward
+    assert courses.behind(replace(reward, switch=0.0)) == courses.behind(reward) == 8
+    assert courses.behind(replace(reward, switch=-20.0)) == 20
 
 
 def test_one_joint_decides_as_without_plans() -> None:

@@ -38,6 +38,11 @@ def missed(reward: Reward) -> float:
     return max(0.0, -2 * reward.switch - 8 * reward.action)
 
 
+def behind(reward: Reward) -> float:
+    """Return how much more than planned a movement may cost while plans are followed: a switch, or eight actions."""
+    return max(-reward.switch, -8 * reward.action)
+
+
 class Courses:
     """Plans and compares what several joints could do in a movement; for one, looking ahead at actions is enough."""
 
@@ -81,7 +86,7 @@ class Courses:
             return False
         if math.isinf(self._planned):
             self._planned = self._spent + cost
-        self._comes_true = self._comes_true and self._spent + cost <= self._planned - self._reward.switch
+        self._comes_true = self._comes_true and self._spent + cost <= self._planned + behind(self._reward)
         if not self._comes_true:
             return False
         single.actions[0] = self._plan[0]

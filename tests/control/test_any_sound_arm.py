@@ -65,6 +65,21 @@ def test_a_sound_arm_is_collected_from_without_a_mark(name, tmp_path):
     assert result.transitions >= enough
 
 
+def test_a_muscle_that_is_stretched_and_reads_less_than_an_empty_one_is_no_fault(tmp_path):
+    arm = open_arm("python:benchmarks.strangers:two_1003")
+    watch = Monitor(arm.spec)
+    with Store.for_arm(tmp_path / "db", arm.spec) as store:
+        assert collect(arm, store, 3_000, 0, watch=watch).marked == {}
+
+
+@pytest.mark.parametrize("seed", [7304, 7415])  # their angles have 9 bits and stay the same at the ends
+def test_an_angle_that_stays_at_an_end_is_no_fault(seed, tmp_path):
+    arm = open_arm(f"virtual:wide,seed={seed}", seed)
+    watch = Monitor(arm.spec)
+    with Store.for_arm(tmp_path / "db", arm.spec) as store:
+        assert collect(arm, store, 4_000, seed, watch=watch).marked == {}
+
+
 @pytest.mark.parametrize("name", PRESSURES)
 def test_a_fault_of_any_arm_is_what_differs_from_this_arm(name, tmp_path):
     arm = Broken(open_arm(name), BREAKS, valves=stuck)

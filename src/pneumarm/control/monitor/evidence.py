@@ -94,7 +94,9 @@ class Thresholds(NamedTuple):
     jump: float
     """An angle that goes farther than this, and than its usual movement, onto a rail has jumped [counts]."""
     acted: float
-    """Change of a pressure that shows that valves act [counts]."""
+    """Change of a pressure that shows that valves act [counts] ..."""
+    pressed: float
+    """... and of one that shows it of a joint at the farthest angles."""
     frozen: float
     """Equal angles in a row that may show a frozen potentiometer."""
     edge: float

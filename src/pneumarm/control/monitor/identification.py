@@ -83,7 +83,7 @@ class Identified(NamedTuple):
     turning: NDArray[np.float64]
     """Mean of how far each joint turns from look to look, shape (joints,) [ranges]."""
     span: NDArray[np.float64]
-    """Lowest and highest pressure seen, shape (m, 2) [highest pressures]."""
+    """Lowest pressure of a muscle that empties, and highest, shape (m, 2) [highest pressures]."""
     clock: NDArray[np.float64]
     """Periods since the last look, looks in a row, looks in all; shape (3,)."""
     agreement: NDArray[np.float64]
@@ -408,13 +408,25 @@ def note_answers(known, pressure):  # type: ignore[no-untyped-def]
 
 @part
 def doubt_what_counts_from(known, m, fall):  # type: ignore[no-untyped-def]
-    """Trust less what was learned of muscle ``m`` near empty: its lowest pressure is lower by ``fall`` than thought.
+    """Trust less what was learned of muscle ``m`` near empty: empty it reads less by ``fall`` than thought.
 
     Features that count from there now say something else of the same pressure; their weights are to be learned anew.
     """
     part = min(fall / _EMPTY, 1.0) * _BY_CHANGE
     for i in (_CURVES + 1, _CURVES + 16, _CURVES + 17, _CURVES + 18):
         known.covariance[m, i, i] += part * part
+
+
+@part
+def is_vented(known, m):  # type: ignore[no-untyped-def]
+    """Return whether muscle ``m`` was told to empty for two looks.
+
+    What is read then is at least that of an empty one. A closed muscle that is stretched may read less.
+    """
+    told = 0.0
+    for slot in range(2 * SLOTS):
+        told += known.open[m, slot, 1]
+    return told > 2 * SLOTS - 0.01  # a sum of parts is rounded
 
 
 @part
@@ -426,7 +438,8 @@ def remember_look(known, angle, pressure, fresh):  # type: ignore[no-untyped-def
         known.last[m, 1] = 0.0 if fresh else level - known.last[m, 0]
         known.last[m, 0] = level
         before = lowest_level(known, m)
-        known.span[m, 0] = min(known.span[m, 0], level)
+        if is_vented(known, m):
+            known.span[m, 0] = min(known.span[m, 0], level)
         known.span[m, 1] = max(known.span[m, 1], level)
         doubt_what_counts_from(known, m, before - lowest_level(known, m))
     for j in range(angle.shape[0]):

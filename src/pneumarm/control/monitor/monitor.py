@@ -39,7 +39,7 @@ from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
 _LONG = 1 / 3  # s; equal angles for less show nothing
-_RARE = math.log(1e6)  # of so many equal angles of a sound arm, about one is called frozen
+_RARE = math.log(1e8)  # of so many equal angles of a sound arm, about one is called frozen
 _OVER = 1.3  # highest pressures; a closed muscle that is compressed comes to 1.15
 _FEWEST = 10  # residuals of which a mean square is taken seriously
 
@@ -157,6 +157,7 @@ class Monitor:
             high=spec.angle_range[1],
             jump=settings.jump * spec.counts_per_degree,
             acted=settings.acted * spec.max_pressure_counts,
+            pressed=settings.pressed * spec.max_pressure_counts,
             frozen=max(settings.frozen, math.ceil(_LONG / spec.period)),
             edge=settings.edge * (spec.angle_range[1] - spec.angle_range[0]),
             experience=EXPERIENCE / spec.period,
@@ -347,7 +348,7 @@ class Monitor:
         if readings < limits.experience or there - count < limits.experience / 4:
             return math.inf
         beyond = _RARE / math.log1p(times) if times else 0.0
-        return max(limits.acted, beyond * float(most))
+        return max(limits.pressed if edge else limits.acted, beyond * float(most))
 
     def _judge_valves(self) -> dict[Key, float]:
         """What was found stays until nothing speaks for it, or is renamed where another fault explains more."""

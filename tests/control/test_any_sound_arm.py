@@ -72,12 +72,11 @@ def test_a_muscle_that_is_stretched_and_reads_less_than_an_empty_one_is_no_fault
         assert collect(arm, store, 3_000, 0, watch=watch).marked == {}
 
 
-@pytest.mark.parametrize("seed", [7304, 7415])  # their angles have 9 bits and stay the same at the ends
-def test_an_angle_that_stays_at_an_end_is_no_fault(seed, tmp_path):
-    arm = open_arm(f"virtual:wide,seed={seed}", seed)
+def test_an_angle_that_stays_at_an_end_is_no_fault(tmp_path):
+    arm = open_arm("virtual:wide,seed=7304", 7304)  # its angle has 9 bits
     watch = Monitor(arm.spec)
     with Store.for_arm(tmp_path / "db", arm.spec) as store:
-        assert collect(arm, store, 4_000, seed, watch=watch).marked == {}
+        assert collect(arm, store, 4_000, 7304, watch=watch).marked == {}
 
 
 @pytest.mark.parametrize("name", PRESSURES)

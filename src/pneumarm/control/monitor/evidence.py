@@ -94,9 +94,7 @@ class Thresholds(NamedTuple):
     jump: float
     """An angle that goes farther than this, and than its usual movement, onto a rail has jumped [counts]."""
     acted: float
-    """Change of a pressure that shows that valves act [counts] ..."""
-    pressed: float
-    """... and of one that shows it of a joint at the farthest angles."""
+    """Change of a pressure that shows that valves act [counts]."""
     frozen: float
     """Equal angles in a row that may show a frozen potentiometer."""
     edge: float

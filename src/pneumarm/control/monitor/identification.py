@@ -54,6 +54,7 @@ SIDES, SPEEDS, LEVELS = 3, 3, 4
 """Classes of errors: closed, filling, emptying; slow, usual, fast; empty, low, high, full."""
 _SLOW, _FAST = 0.5, 2.0
 _EMPTY, _LOW, _FULL = 0.12, 0.4, 0.7
+_SETTLED = 0.02  # of what is left over the lowest reading; a muscle that empties in seconds loses more in two looks
 _HIGHEST_EMPTY = 0.3  # highest pressures; no sensor says so much of an empty muscle
 
 
@@ -83,7 +84,10 @@ class Identified(NamedTuple):
     turning: NDArray[np.float64]
     """Mean of how far each joint turns from look to look, shape (joints,) [ranges]."""
     span: NDArray[np.float64]
-    """Lowest pressure of a muscle that empties, and highest, shape (m, 2) [highest pressures]."""
+    """Lowest and highest pressure seen, shape (m, 2) [highest pressures]."""
+    empty: NDArray[np.float64]
+    """Lowest pressure that they settled at when told to empty; infinite before they did; shape (m,) [highest
+    pressures]."""
     clock: NDArray[np.float64]
     """Periods since the last look, looks in a row, looks in all; shape (3,)."""
     agreement: NDArray[np.float64]
@@ -125,6 +129,7 @@ def identified(spec: ArmSpec) -> Identified:
         angle=np.zeros(spec.joints),
         turning=np.zeros(spec.joints),
         span=span,
+        empty=np.full(muscles, np.inf),
         clock=np.zeros(3),
         agreement=np.zeros((muscles, muscles)),
         squares=np.zeros((muscles, 2)),
@@ -177,7 +182,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     pressures].
     """
     source, joint, level = readings.source[h, m], m // 2, known.last[m, 0]
-    filled = level - lowest_level(known, m)
+    filled = max(level - lowest_level(known, m), 0.0)
     supply = 1.0
     if readings.supply[h] < math.inf:
         supply = reduced(readings.supply[h], filled / (full - lowest_level(known, m)))
@@ -277,9 +282,11 @@ def class_of(known, m, angle):  # type: ignore[no-untyped-def]
 def lowest_level(known, m):  # type: ignore[no-untyped-def]
     """Return what is read of muscle ``m`` when it is empty, as far as is known [highest pressures].
 
-    The sensors of an arm may say anything where there is only the air of the room.
+    The sensors of an arm may say anything where there is only the air of the room. A muscle that is stretched reads
+    less, so the lowest of all readings counts only until an empty one has been seen.
     """
-    return min(known.span[m, 0], _HIGHEST_EMPTY)
+    least = known.span[m, 0] if known.empty[m] == math.inf else known.empty[m]
+    return min(least, _HIGHEST_EMPTY)
 
 
 @part
@@ -407,26 +414,29 @@ def note_answers(known, pressure):  # type: ignore[no-untyped-def]
 
 
 @part
-def doubt_what_counts_from(known, m, fall):  # type: ignore[no-untyped-def]
-    """Trust less what was learned of muscle ``m`` near empty: empty it reads less by ``fall`` than thought.
+def doubt_what_counts_from(known, m, change):  # type: ignore[no-untyped-def]
+    """Trust less what was learned of muscle ``m`` near empty: empty it reads less or more by ``change`` than thought.
 
     Features that count from there now say something else of the same pressure; their weights are to be learned anew.
     """
-    part = min(fall / _EMPTY, 1.0) * _BY_CHANGE
+    part = min(abs(change) / _EMPTY, 1.0) * _BY_CHANGE
     for i in (_CURVES + 1, _CURVES + 16, _CURVES + 17, _CURVES + 18):
         known.covariance[m, i, i] += part * part
 
 
 @part
-def is_vented(known, m):  # type: ignore[no-untyped-def]
-    """Return whether muscle ``m`` was told to empty for two looks.
+def is_settled(known, m, angle):  # type: ignore[no-untyped-def]
+    """Return whether muscle ``m`` is as empty as it gets.
 
-    What is read then is at least that of an empty one. A closed muscle that is stretched may read less.
+    It was told to empty for as long as is remembered, and hardly does any more, although more than the lowest reading
+    is left; and its joint is slow, so that it is not stretched.
     """
     told = 0.0
-    for slot in range(2 * SLOTS):
+    for slot in range(_SLOTS):
         told += known.open[m, slot, 1]
-    return told > 2 * SLOTS - 0.01  # a sum of parts is rounded
+    fallen, left = -known.last[m, 1] - known.last[m, 2], known.last[m, 0] - known.span[m, 0]
+    _, speed, _ = class_of(known, m, angle)
+    return told > _SLOTS - 0.01 and speed == 0 and fallen <= _SETTLED * left  # a sum of parts is rounded
 
 
 @part
@@ -438,9 +448,11 @@ def remember_look(known, angle, pressure, fresh):  # type: ignore[no-untyped-def
         known.last[m, 1] = 0.0 if fresh else level - known.last[m, 0]
         known.last[m, 0] = level
         before = lowest_level(known, m)
-        if is_vented(known, m):
-            known.span[m, 0] = min(known.span[m, 0], level)
+        known.span[m, 0] = min(known.span[m, 0], level)
         known.span[m, 1] = max(known.span[m, 1], level)
+        if not fresh and is_settled(known, m, angle):
+            mean = level - (2.0 * known.last[m, 1] + known.last[m, 2]) / 3.0  # of the last three readings
+            known.empty[m] = min(known.empty[m], mean)
         doubt_what_counts_from(known, m, before - lowest_level(known, m))
     for j in range(angle.shape[0]):
         if not fresh:

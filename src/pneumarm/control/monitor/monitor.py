@@ -157,7 +157,6 @@ class Monitor:
             high=spec.angle_range[1],
             jump=settings.jump * spec.counts_per_degree,
             acted=settings.acted * spec.max_pressure_counts,
-            pressed=settings.pressed * spec.max_pressure_counts,
             frozen=max(settings.frozen, math.ceil(_LONG / spec.period)),
             edge=settings.edge * (spec.angle_range[1] - spec.angle_range[0]),
             experience=EXPERIENCE / spec.period,
@@ -338,17 +337,16 @@ class Monitor:
         ``count`` equal readings are not asked: before them this arm may have shown the same angle during large
         changes, with a sensor of few bits, dry friction, or at an end stop. Of changes whose sizes follow an
         exponential law the largest of n is about log n times their mean, so one that is k times that is as rare as
-        n to the power of -k.
+        n to the power of -k. At the farthest angles a joint stays during changes at least as large as elsewhere.
         """
         memory, limits = self._memory, self._thresholds
         readings, _, low, high = memory.moved[j]
         angle = memory.observed[0, j, 0]
         edge = min(angle - low, high - angle) < limits.edge
-        there, times, most = memory.stayed[j, int(edge)]
-        if readings < limits.experience or there - count < limits.experience / 4:
+        if readings < limits.experience or memory.stayed[j, int(edge), 0] - count < limits.experience / 4:
             return math.inf
-        beyond = _RARE / math.log1p(times) if times else 0.0
-        return max(limits.pressed if edge else limits.acted, beyond * float(most))
+        stays = [(times, most) for _, times, most in memory.stayed[j, : 2 if edge else 1] if times]
+        return max([limits.acted, *(float(most) * _RARE / math.log1p(times) for times, most in stays)])
 
     def _judge_valves(self) -> dict[Key, float]:
         """What was found stays until nothing speaks for it, or is renamed where another fault explains more."""
@@ -522,6 +520,5 @@ class Monitor:
 
 def _identified_of(saved: Mapping[str, str], mine: Identified) -> Identified:
     """Return what was saved of what is known of an arm; ValueError where it is not of one like ``mine``."""
-    return Identified(
-        **{name: np.frombuffer(b64decode(text)).reshape(getattr(mine, name).shape) for name, text in saved.items()}
-    )
+    arrays = {name: np.frombuffer(b64decode(text)).reshape(getattr(mine, name).shape) for name, text in saved.items()}
+    return Identified(**{**mine._asdict(), **arrays})  # an earlier version remembered less

@@ -79,9 +79,7 @@ class MonitorSettings(Settings):
     where they take less than a third of a second."""
     acted: float = 0.10
     """Change of the difference of a joint's pressures that shows that valves act, as a part of the highest; more on
-    an arm whose angle has stayed the same during larger ones ..."""
-    pressed: float = 0.5
-    """... and this at the farthest angles: a joint that is pressed against a stop stays there."""
+    an arm whose angle has stayed the same during larger ones."""
     edge: float = 0.04
     """An angle that is nearer to the farthest ones seen, as a part of its range, may be at an end stop."""
 
@@ -103,6 +101,5 @@ class MonitorSettings(Settings):
             "jump": 0 < self.jump < math.inf,
             "frozen": self.frozen >= 2,
             "acted": 0 < self.acted < math.inf,
-            "pressed": self.acted <= self.pressed < math.inf,
             "edge": 0 <= self.edge < 0.5,
         }

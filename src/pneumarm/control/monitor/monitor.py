@@ -39,7 +39,7 @@ from pneumarm.transitions.rows import Mark, Recorded
 
 _QUANTITIES = ("angle", "pressure 1", "pressure 2")
 _LONG = 1 / 3  # s; equal angles for less show nothing
-_RARE = math.log(1e8)  # of so many equal angles of a sound arm, about one is called frozen
+_RARE = math.log(1e6)  # of so many equal angles of a sound arm, about one is called frozen
 _OVER = 1.3  # highest pressures; a closed muscle that is compressed comes to 1.15
 _FEWEST = 10  # residuals of which a mean square is taken seriously
 

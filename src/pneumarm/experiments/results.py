@@ -1,5 +1,6 @@
 """What an experiment leaves: its page and its results as JSON, from the rows and what was recorded of its arms."""
 
+import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 from pneumarm.console import jsonable
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment
-from pneumarm.experiments.preparation import STORE
+from pneumarm.experiments.preparation import SETTINGS, STORE
 from pneumarm.experiments.sweep import arm_folder
 from pneumarm.files import write_json, write_text
 from pneumarm.report.page import Section, Table, render
@@ -48,8 +49,13 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
 
 
 def _recorded(laboratory: Path, arm: str) -> Section | None:
-    """Return ``arm`` moving as it was recorded for experiments; None where no recording is left."""
+    """Return ``arm`` moving as it was recorded for experiments; None where no recording is left.
+
+    Recordings of arms that were made from it, such as one of its joints alone, lie beside its own.
+    """
     for store in sorted(arm_folder(laboratory, arm).rglob(STORE)):
+        if json.loads(store.with_name(SETTINGS).read_bytes())["arm"] != arm:
+            continue
         try:
             shown = read_shown(store, seconds=_SHOWN)
         except UnusableInput:

@@ -1,8 +1,11 @@
 """Sweeps: every row once, whatever is interrupted, and the same rows however they are computed."""
 
+import json
 import os
+import re
 import signal
 import sys
+from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +13,15 @@ import pytest
 from toy import Toy
 
 from children import child, end, wait_until
+from pneumarm.arm import open_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import LaboratorySettings, Row, run_seed, sorted_rows
+from pneumarm.experiments.preparation import SETTINGS, STORE
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.row_file import RowWriter, read_rows
 from pneumarm.experiments.sweep import ROWS, arm_folder, sweep
+from pneumarm.transitions import Store, collect
 
 ROW = Row("virtual", 1, 1, {"sum": 1.5}, 0.25)
 
@@ -140,6 +146,25 @@ def test_a_page_is_drawn_from_rows_alone(tmp_path: Path) -> None:
     assert "It does." in page.read_text()
     assert "How the arm moved" not in page.read_text()  # no recording of it is left
     assert '"shape"' in (tmp_path / "toy" / "results.json").read_text()
+
+
+def test_a_page_plays_the_arm_itself(tmp_path: Path) -> None:
+    """Not an arm that was made from it, such as one of its joints, whose recording lies beside its own."""
+    arm, done = "virtual:joints=2,seed=1", sweep(Toy(), tmp_path)
+    for place, name in (("0", arm), ("1", "virtual:seed=1"), ("2", arm)):
+        folder = arm_folder(tmp_path, arm) / place
+        folder.mkdir(parents=True)
+        (folder / SETTINGS).write_text(json.dumps({"arm": name}))
+        if place in ("1", "2"):
+            with open_arm(name) as opened, Store.for_arm(folder / STORE, opened.spec) as store:
+                collect(opened, store, 2000, 0)
+        else:  # what is damaged is left out
+            (folder / STORE).write_bytes(b"")
+            (folder / SETTINGS).write_text("{")
+    page = write_page(Toy(), tmp_path / "toy", Toy().analyse(done.rows), 1, (arm,)).read_text()
+    assert "How the arm moved" in page
+    pictures = [b64decode(data).decode() for data in re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)]
+    assert "joint 2" in pictures[0]
 
 
 def test_a_cluster_gives_the_same_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

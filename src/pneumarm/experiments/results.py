@@ -54,7 +54,7 @@ def _recorded(laboratory: Path, arm: str) -> Section | None:
     Recordings of arms that were made from it, such as one of its joints alone, lie beside its own.
     """
     for store in sorted(arm_folder(laboratory, arm).rglob(STORE)):
-        if json.loads(store.with_name(SETTINGS).read_bytes())["arm"] != arm:
+        if _arm_of(store) != arm:
             continue
         try:
             shown = read_shown(store, seconds=_SHOWN)
@@ -65,6 +65,14 @@ def _recorded(laboratory: Path, arm: str) -> Section | None:
             "How the arm moved", (), [playing(shown.time, shown.angle, None, shown.spec, caption)], opens=True
         )
     return None
+
+
+def _arm_of(store: Path) -> str | None:
+    """Return the name of the arm that ``store`` was recorded on; None where the settings beside it do not say."""
+    try:
+        return str(json.loads(store.with_name(SETTINGS).read_bytes())["arm"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
 
 
 def _listed(arms: Sequence[str]) -> str:

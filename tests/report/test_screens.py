@@ -24,7 +24,7 @@ from pneumarm.checkup import diagnose, measure
 from pneumarm.cli import main
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import Row, sorted_rows
-from pneumarm.experiments.preparation import STORE
+from pneumarm.experiments.preparation import STORE, claim
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.sweep import arm_folder
 from pneumarm.report import RunData, run_page
@@ -76,7 +76,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     laboratory = folder / "laboratory"
     (laboratory / ALL_GOALS.name).mkdir(parents=True)
     recording = arm_folder(laboratory, table.arms[0])
-    recording.mkdir(parents=True)
+    claim(recording, {"arm": table.arms[0]})
     with open_arm(table.arms[0]) as arm, Store.for_arm(recording / STORE, arm.spec) as store:
         collect(arm, store, 2000)
     analysis = ALL_GOALS.analyse(table)

@@ -167,6 +167,40 @@ def test_division_follows_numpy():
     assert np.isnan(divide(0.0, 0.0))
 
 
+# The second process finds `two` in the cache and numbers `by_three` as the first one numbered `by_two`.
+FAMILY = """
+from pneumarm.kernels import kernel
+def make(factor):
+    @kernel
+    def times(x):
+        return x * factor
+    return times
+by_two, by_three = make(2.0), make(3.0)
+@kernel
+def two(x):
+    return by_two(x)
+@kernel
+def three(x):
+    return by_three(x)
+@kernel
+def first(x):
+    return two(x)
+@kernel
+def both(x):
+    return two(x) + 100.0 * three(x)
+"""
+
+
+def test_kernels_of_one_factory_are_told_apart_also_where_one_comes_from_the_cache(package, tmp_path):
+    (package / "family.py").write_text(FAMILY)
+    inside = os.environ | {"PYTHONPATH": str(package.parent), "PNEUMARM_CACHE": str(tmp_path / "cache")}
+    found = [
+        python("-c", f"from pneumarm.family import *; print({name}(1.0))", env=inside, check=True).stdout
+        for name in ("first", "both")
+    ]
+    assert found == ["2.0\n", "302.0\n"]
+
+
 # Sums run in another order where a kernel calls another copy of a kernel than it did: the last bits show it.
 IMPROVED = """
 import hashlib

@@ -1,6 +1,6 @@
 """How pneumarm compiles its hot loops: one decorator, and a cache that cannot serve stale or broken code.
 
-Three traps of Numba are closed here:
+Four traps of Numba are closed here:
 
 1. It does not see a change in a jitted function of *another* file. So the cache folder's name holds a hash
    of every source file that compiles anything and of Numba's version: any change starts a fresh folder.
@@ -8,11 +8,20 @@ Three traps of Numba are closed here:
 3. A kernel's machine code holds copies of the kernels that it calls, optimised once more than the originals, so that
    sums may run in another order. Numba lets a process call whichever it has loaded first, and results would depend
    on what it has compiled or called before. Here every kernel calls its own copies.
+4. It numbers functions in each process, and links by names and numbers. Two that one factory made in two processes,
+   one of them come by way of the cache, could have the same number, and one would be called for both. Here each
+   process begins at a number of its own.
+
+What a kernel calls is compiled as code alone, and becomes machine code in its callers: a kernel that Python calls as
+well is compiled twice, as code for kernels and with an entry for Python. With machine code of each, a first run
+compiled for half as long again.
 """
 
 import getpass
 import hashlib
+import itertools
 import os
+import secrets
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -23,9 +32,11 @@ import llvmlite.binding as llvm
 import numba
 import platformdirs
 from numba import config as numba_config
-from numba.core.caching import FunctionCache
-from numba.core.codegen import JITCodeLibrary
+from numba.core.bytecode import FunctionIdentity
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.dispatcher import Dispatcher
+from numba.core.environment import lookup_environment
 from numba.core.registry import cpu_target
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -86,25 +97,96 @@ numba_config.CACHE_DIR = str(CACHE_FOLDER)  # type: ignore[attr-defined]
 
 
 class _OwnCopies(JITCodeLibrary):
-    """A kernel's machine code that calls its own copies of other kernels, whatever the process has loaded before."""
+    """A kernel's code with copies of all that it calls; machine code once an address in it is asked for."""
 
-    def _optimize_final_module(self) -> None:
-        super()._optimize_final_module()
-        # What callers link is as it comes from the cache: then their code is the same too.
-        self._shared_module = llvm.parse_bitcode(self._final_module.as_bitcode())
-        for function in self._shared_module.functions:
-            if not function.is_declaration and function.linkage == llvm.Linkage.external:
-                function.linkage = "linkonce_odr"
+    _bitcode: bytes
+    _is_machine_code = False
+
+    def finalize(self) -> None:
+        """Link what is called."""
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._final_module.verify()
+        self._bitcode = self._final_module.as_bitcode()
+        self._finalized = True
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the code for callers, as it comes from the cache, too: then theirs is the same."""
+        self._ensure_finalized()
+        if self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(self._bitcode)
+            for function in self._shared_module.functions:
+                if not function.is_declaration and function.linkage == llvm.Linkage.external:
+                    function.linkage = "linkonce_odr"
+        return self._shared_module
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return the address of ``name``, 0 where it is not defined here."""
+        self._ensure_finalized()
+        if not self._is_machine_code and name in self._defined():
+            self._make_machine_code()
+        return int(super().get_pointer_to_function(name))
+
+    def _defined(self) -> set[str]:
+        module = self._final_module
+        return {one.name for one in (*module.functions, *module.global_variables) if not one.is_declaration}
+
+    def _make_machine_code(self) -> None:
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
-                function.linkage = "internal"
+                function.linkage = "internal"  # never those of another kernel
+        self._optimize_final_module()
+        self._final_module.verify()
+        self._finalize_final_module()
+        self._is_machine_code = True
+        for variable in self._final_module.global_variables:
+            if (environment := lookup_environment(variable.name)) is not None:
+                self._codegen.set_env(variable.name, environment)
+
+    def serialize_using_object_code(self) -> tuple[str, str, Any]:
+        """Return what the cache keeps."""
+        self._ensure_finalized()
+        machine_code = (self._get_compiled_object(), self._defined()) if self._is_machine_code else None
+        return self.name, "own copies", (machine_code, self._bitcode)
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> Any:
+        name, _, (machine_code, bitcode) = state
+        library = codegen.create_library(name)
+        library._bitcode, library._finalized = bitcode, True
+        if machine_code is not None:
+            compiled, defined = machine_code
+            library.enable_object_caching()
+            library._set_compiled_object(compiled)
+            library._finalize_final_module()
+            library._is_machine_code = True
+            codegen._engine._defined_symbols.update(defined)
+        return library
 
 
-cpu_target.target_context.codegen()._library_class = _OwnCopies
+_codegen: Any = cpu_target.target_context.codegen()
+_codegen._library_class = _OwnCopies
+
+
+def _set_env(name: str, environment: Any) -> None:
+    """Tell machine code where its globals in Python are; what is code alone has nowhere to keep it."""
+    if _codegen._engine.is_symbol_defined(name):
+        JITCPUCodegen.set_env(_codegen, name, environment)  # type: ignore[attr-defined]
+
+
+_codegen.set_env = _set_env
+FunctionIdentity._unique_ids = itertools.count(secrets.randbits(48))
 
 
 class _ForgivingCache(FunctionCache):
     """Numba's function cache, except that an entry that cannot be read is compiled again."""
+
+    def __init__(self, function: Any, prefix: str) -> None:
+        super().__init__(function)
+        base = f"{prefix}{self._impl.filename_base}"
+        self._cache_file = IndexDataCacheFile(self._cache_path, base, self._impl.locator.get_source_stamp())
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         try:
@@ -128,8 +210,7 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
     Division follows NumPy's rules (no check for zero), because that check alone keeps a loop with a
     rational function in it from being vectorised. Options are passed on to ``numba.njit``.
 
-    Nothing here is called as a C function, so no kernel gets the entry for that: each entry is compiled and optimised
-    as the kernel itself is, which took a first run a fifth of its time.
+    Nothing here is called as a C function, so no kernel gets the entry for that.
     """
 
     def compile_(f: _Function) -> Any:
@@ -141,7 +222,12 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
         if settings.get("no_cpython_wrapper"):
             _refuse_python(dispatcher)
         if settings.get("inline", "never") == "never":
-            dispatcher._cache = _ForgivingCache(dispatcher.py_func)
+            dispatcher._cache = _ForgivingCache(f, "")
+            if not settings.get("no_cpython_wrapper"):
+                for_kernels = numba.njit(**{**settings, "no_cpython_wrapper": True})(f)
+                for_kernels._cache = _ForgivingCache(f, "for-kernels-")
+                dispatcher.get_call_template = for_kernels.get_call_template
+                dispatcher.get_overload = for_kernels.get_overload
         return dispatcher
 
     return compile_ if function is None else compile_(function)

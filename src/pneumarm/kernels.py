@@ -143,7 +143,7 @@ class _OwnCopies(JITCodeLibrary):
         self._is_machine_code = True
         for variable in self._final_module.global_variables:
             if (environment := lookup_environment(variable.name)) is not None:
-                self._codegen.set_env(variable.name, environment)
+                _set_env(variable.name, environment)
 
     def serialize_using_object_code(self) -> tuple[str, str, Any]:
         """Return what the cache keeps."""
@@ -173,7 +173,7 @@ _codegen._library_class = _OwnCopies
 def _set_env(name: str, environment: Any) -> None:
     """Tell machine code where its globals in Python are; what is code alone has nowhere to keep it."""
     if _codegen._engine.is_symbol_defined(name):
-        JITCPUCodegen.set_env(_codegen, name, environment)  # type: ignore[attr-defined]
+        JITCPUCodegen.set_env(_codegen, name, environment)
 
 
 _codegen.set_env = _set_env

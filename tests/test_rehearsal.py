@@ -11,18 +11,22 @@ import pytest
 from pneumarm import rehearsal
 from pneumarm.arm import open_arm
 from pneumarm.learning import ServoSettings
-from pneumarm.rehearsal import Piece, Rehearsal, installed, rehearse
+from pneumarm.rehearsal import PARTS, Piece, Rehearsal, installed, rehearse
 from pneumarm.run import Run, RunSettings
 from pneumarm.simulation import FitSettings
 
 SMALL = ServoSettings(arms=4, hidden=(8, 8))
-STAGES = ["simulation", "training", "test", "transfer", "settle"]
 
 
 @pytest.fixture
 def marker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(rehearsal, "_REHEARSED", tmp_path / "rehearsed")
     return tmp_path / "rehearsed"
+
+
+def rehearsed(marker: Path) -> set[str]:
+    """Return the parts that are noted as rehearsed."""
+    return {found.name.removeprefix(f"{marker.name}-") for found in marker.parent.glob(f"{marker.name}-*")}
 
 
 def test_the_same_sources_elsewhere_or_newer_are_rehearsed_anew(tmp_path: Path) -> None:
@@ -43,8 +47,10 @@ def test_the_same_sources_elsewhere_or_newer_are_rehearsed_anew(tmp_path: Path) 
 def test_every_stage_is_rehearsed(name: str, marker: Path, tmp_path: Path) -> None:
     with open_arm(name) as arm:
         piece = Piece(arm.spec, FitSettings(), SMALL, None)
-    assert list(rehearse(piece, tmp_path)) == [*STAGES, "bound"]
-    assert marker.exists()
+    for part, stages in PARTS.items():
+        (tmp_path / part).mkdir()
+        assert tuple(rehearse(piece, part, tmp_path / part)) == stages
+        assert rehearsed(marker) == {part} | ({"learning"} if part == "moving" else set())
 
 
 def test_a_rehearsal_is_waited_for_and_ended(marker: Path) -> None:
@@ -54,7 +60,7 @@ def test_a_rehearsal_is_waited_for_and_ended(marker: Path) -> None:
         beside.begin(piece)
         beside.wait_for("simulation")
         beside.wait_for("bound")
-        assert beside._done == {*STAGES, "bound"}
+        assert not beside._coming - {"test"}
     assert beside.memory > 100
 
 
@@ -72,15 +78,14 @@ def test_a_rehearsal_that_hangs_is_ended_and_not_begun_again(
     began = monotonic()
     with Rehearsal(patience=1.0) as beside:
         beside.begin(piece)
-        process = beside._process
-        assert process is not None
+        process = beside._processes["learning"]
         beside.wait_for("simulation")
+        assert (process.returncode is None) == (says != "true")
         beside.wait_for("training")
         assert process.returncode == -signal.SIGKILL
-        assert ("simulation" in beside._done) == (says != "true")
         beside.wait_for("test")  # nothing is waited for any more
     assert 1.0 <= monotonic() - began < 10.0
-    assert marker.exists()
+    assert "learning" in rehearsed(marker)
 
 
 def test_a_rehearsal_that_fails_is_not_waited_for(
@@ -93,18 +98,41 @@ def test_a_rehearsal_that_fails_is_not_waited_for(
     with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
         beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
         beside.wait_for("simulation")
-    assert not marker.exists()
+        beside.wait_for("bound")
+    assert not rehearsed(marker)
+
+
+def test_a_rehearsal_that_cannot_begin_is_not_waited_for(
+    marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "missing"))
+    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
+        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        beside.wait_for("simulation")
+        beside.wait_for("bound")
+    assert not rehearsed(marker)
 
 
 def test_a_second_run_needs_none(marker: Path) -> None:
-    marker.touch()
+    for part in PARTS:
+        marker.with_name(f"{marker.name}-{part}").touch()
     with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
         beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
-        assert beside._process is None
+        beside.wait_for("simulation")
+        assert not beside._processes
+
+
+def test_a_part_that_has_been_is_not_rehearsed_again(marker: Path) -> None:
+    marker.with_name(f"{marker.name}-learning").touch()
+    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
+        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        beside.wait_for("training")
+        beside.wait_for("settle")
+        assert list(beside._processes) == ["moving"]
 
 
 def test_a_run_of_another_method_begins_none(marker: Path, tmp_path: Path) -> None:
     run = Run(tmp_path / "run", RunSettings(arm="virtual:seed=2", method="sarsa"))
     with open_arm("virtual:seed=2") as arm:
         run._rehearse(arm)
-    assert run._rehearsal._process is None
+    assert not run._rehearsal._processes

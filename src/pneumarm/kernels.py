@@ -30,6 +30,7 @@ from typing import Any, TypeVar
 
 import llvmlite.binding as llvm
 import numba
+import numba.extending
 import platformdirs
 from numba import config as numba_config
 from numba.core.bytecode import FunctionIdentity
@@ -38,6 +39,7 @@ from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.dispatcher import Dispatcher
 from numba.core.environment import lookup_environment
 from numba.core.registry import cpu_target
+from numba.np import arrayobj
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 KERNEL: Any = {"nogil": True, "error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True}
@@ -178,6 +180,24 @@ def _set_env(name: str, environment: Any) -> None:
 
 _codegen.set_env = _set_env
 FunctionIdentity._unique_ids = itertools.count(secrets.randbits(48))
+
+
+def _refuse_sizes(given: Any, place: Any) -> None:
+    """Refuse an array that does not fit into the slice it is assigned to; as Numba does where it knows no texts.
+
+    With a message that names the sizes, each kernel that assigns to a slice holds all that texts are made with.
+    """
+
+
+@numba.extending.overload(_refuse_sizes)
+def _refuse_sizes_in_kernels(given: Any, place: Any) -> Callable[[Any, Any], None]:
+    def refuse(given: Any, place: Any) -> None:
+        raise ValueError("an array of another size is assigned to a slice")
+
+    return refuse
+
+
+arrayobj.raise_with_shape_context = _refuse_sizes
 
 
 class _ForgivingCache(FunctionCache):

@@ -1,8 +1,10 @@
-"""The later stages of a run, rehearsed on made-up data in a process beside it, so that their kernels are compiled.
+"""The later stages of a run, rehearsed on made-up data in processes beside it, so that their kernels are compiled.
 
 On a fresh machine most of a first run is compiling. The arm's moving compiles kernels of its own meanwhile; what is
 compiled here goes to the same cache on the disk (:mod:`pneumarm.kernels`), and the run takes it from there. Nothing
 else comes of a rehearsal: a run without one gives the same results, later.
+
+What learns and what moves the arm afterwards are rehearsed beside each other, once there is a simulation for both.
 """
 
 import hashlib
@@ -16,9 +18,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
-from threading import Thread
+from threading import Lock, Thread
 from time import monotonic
-from typing import IO, Self
+from typing import Self
 
 import msgspec
 import numpy as np
@@ -29,11 +31,12 @@ from pneumarm.console import peak_memory
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.kernels import CACHE_FOLDER
 from pneumarm.learning import ServoSettings, test, train
+from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.leaving import leave_by_exceptions
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning.bound import BoundSettings, measure_bound
-from pneumarm.simulation import FitSettings, SimulationArm, fit_store
-from pneumarm.task import begin_states
+from pneumarm.simulation import FitSettings, Simulation, SimulationArm, fit_store
+from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import FEWEST_TRANSITIONS, Store
 from pneumarm.transitions.rows import Recorded
 
@@ -46,6 +49,10 @@ _ENDING = 10.0
 """For so long [s] a process that was killed is waited for; the system keeps one that hangs in a disk."""
 
 
+PARTS = {"learning": ("simulation", "training", "test"), "moving": ("transfer", "settle", "bound")}
+"""The stages that a process rehearses, in their order; ``moving`` begins when ``simulation`` has been."""
+
+
 def installed(package: Path) -> str:
     """Return a name for the sources below ``package`` where they lie and as old as they are.
 
@@ -56,6 +63,7 @@ def installed(package: Path) -> str:
 
 
 _REHEARSED = CACHE_FOLDER / f"rehearsed-{installed(Path(__file__).parent)}"
+"""How the names of files begin that say which parts have been."""
 
 
 @dataclass(frozen=True)
@@ -70,50 +78,78 @@ class Piece:
 
 
 class Rehearsal:
-    """A rehearsal in a process of its own, where none has been before; ended with the block it is in.
+    """A rehearsal of the parts that have not been before, in a process each; ended with the block it is in.
 
-    A process that is silent for ``patience`` [s] is ended when it is waited for, and the run compiles for itself.
+    Processes that are silent for ``patience`` [s] are ended when they are waited for; the run compiles for itself.
     """
 
     def __init__(self, patience: float = _PATIENCE) -> None:
         self._patience = patience
-        self._process: subprocess.Popen[str] | None = None
-        self._said = SimpleQueue[tuple[str, float]]()
+        self._processes: dict[str, subprocess.Popen[str]] = {}
+        self._starting = Lock()
+        self._ended = False
+        self._said = SimpleQueue[tuple[str, str, float]]()
         self._heard = 0.0
-        self._done: set[str] = set()
+        self._coming: set[str] = set()
+        """Stages that are not rehearsed yet, but will be."""
         self.memory = 0.0
-        """The most that the process has held [MB]; told when it has ended."""
+        """The most that a process has held [MB]; told when it has ended."""
 
     def begin(self, piece: Piece) -> None:
         """Begin, unless all of it is in the kernel cache."""
-        if _REHEARSED.exists() or self._process is not None:
+        if self._processes:
             return
-        command = [sys.executable, "-m", "pneumarm.rehearsal"]
+        self._heard = monotonic()
+        coming = [part for part in PARTS if not _marker(part).exists()]
+        self._coming = {stage for part in coming for stage in PARTS[part]}
+        if coming:
+            self._start(coming[0], piece)
+
+    def _start(self, part: str, piece: Piece) -> None:
+        command = [sys.executable, "-m", "pneumarm.rehearsal", part]
         errors = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # it is no part of the run
-        with suppress(OSError):
-            self._process = process = subprocess.Popen(
+        with self._starting, suppress(OSError):
+            if self._ended:
+                return
+            process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True
             )
-            assert process.stdin is not None
-            assert process.stdout is not None
-            self._heard = monotonic()
+            self._processes[part] = process
             # Daemonic, for a pipe may stay open where its process has gone.
-            Thread(target=_listen, args=(process.stdout, self._said), name="rehearsal", daemon=True).start()
+            Thread(target=self._listen, args=(part, piece), name=f"rehearsal, {part}", daemon=True).start()
+            assert process.stdin is not None
             process.stdin.write(json.dumps(asdict(piece)))
             process.stdin.close()
+            return
+        for ended in PARTS:  # what is not running will not
+            if ended == part or ended not in self._processes:
+                self._said.put((ended, "", monotonic()))
+
+    def _listen(self, part: str, piece: Piece) -> None:
+        """Put what the process of ``part`` says, with its time, and at the end nothing, where it is waited for."""
+        lines = self._processes[part].stdout
+        assert lines is not None
+        rest = [other for other in PARTS if other != part and not _marker(other).exists()]
+        with lines:
+            for line in lines:
+                self._said.put((part, line.strip(), monotonic()))
+                if part == "learning" and rest:
+                    self._start(rest.pop(), piece)
+        for ended in (part, *rest):
+            self._said.put((ended, "", monotonic()))
 
     def wait_for(self, stage: str) -> None:
         """Return when the kernels of ``stage`` are in the cache, or will not be."""
-        while self._process is not None and stage not in self._done:
+        while stage in self._coming:
             try:
-                line, self._heard = self._said.get(timeout=max(self._heard + self._patience - monotonic(), 0.0))
+                part, line, self._heard = self._said.get(timeout=max(self._heard + self._patience - monotonic(), 0.0))
             except Empty:
-                with suppress(OSError):
-                    _REHEARSED.touch()  # or it would hang in every run
-                line = ""
-            if not line:
+                for part in self._processes:
+                    with suppress(OSError):
+                        _marker(part).touch()  # or it would hang in every run
                 self._end()
-            self._done.add(line)
+                return
+            self._coming -= {line} if line else set(PARTS[part])
 
     def __enter__(self) -> Self:
         return self
@@ -122,40 +158,49 @@ class Rehearsal:
         self._end()
 
     def _end(self) -> None:
-        process, self._process = self._process, None
-        if process is not None:
-            process.kill()
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(_ENDING)
+        with self._starting:
+            self._ended = True
+            self._coming.clear()
+            for process in self._processes.values():
+                process.kill()
+            for process in self._processes.values():
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(_ENDING)
+        if self._processes:
             self.memory = peak_memory(children=True)
 
 
-def _listen(lines: IO[str], said: SimpleQueue[tuple[str, float]]) -> None:
-    """Put each of ``lines`` with its time, and at their end an empty one, into ``said``."""
-    with lines:
-        for line in lines:
-            said.put((line.strip(), monotonic()))
-    said.put(("", monotonic()))
+def _marker(part: str) -> Path:
+    return _REHEARSED.with_name(f"{_REHEARSED.name}-{part}")
 
 
-def rehearse(piece: Piece, folder: Path) -> Iterator[str]:
-    """Do each stage with as little as possible in ``folder``, and name those whose kernels are compiled."""
+def rehearse(piece: Piece, part: str, folder: Path) -> Iterator[str]:
+    """Do the stages of ``part`` with as little as possible in ``folder``; name those whose kernels are compiled."""
     with Store.create(folder / "made-up.db", piece.spec) as store:
         store.append_all(_made_up(piece.spec))
         simulation = fit_store(store, replace(piece.fit, epochs=1)).simulation
         begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
-        yield "simulation"
-        agent = train(simulation, begin, replace(piece.servo, agents=1, updates=1, validation_movements=8)).agent
-        yield "training"
-        test(agent, simulation, begin, 8)
-        yield "test"
-        monitor = Monitor(piece.spec, simulation, mode="warn")
-        with SimulationArm(simulation) as arm:
-            transfer(agent, arm, store, TransferSettings(episodes=1, test_episodes=1), watch=monitor)
-            yield "transfer"
-            moves = MoveTrialSettings(goals=1, hold=0.2, frequencies=(1.0,), seconds=0.5)
-            try_moving(arm, agent.controller(), simulation.goal_range, moves)
-            yield "settle"
+        yield from (_learn if part == "learning" else _move)(piece, simulation, begin, store)
+    _marker(part).touch()
+
+
+def _learn(piece: Piece, simulation: Simulation, begin: BeginStates, _: Store) -> Iterator[str]:
+    yield "simulation"
+    agent = train(simulation, begin, replace(piece.servo, agents=1, updates=1, validation_movements=8)).agent
+    yield "training"
+    test(agent, simulation, begin, 8)
+    yield "test"
+
+
+def _move(piece: Piece, simulation: Simulation, begin: BeginStates, store: Store) -> Iterator[str]:
+    agent = ServoLearner(simulation, begin, replace(piece.servo, coarse=0.0), 0, 0).agent()  # it has learned nothing
+    monitor = Monitor(piece.spec, simulation, mode="warn")
+    with SimulationArm(simulation) as arm:
+        transfer(agent, arm, store, TransferSettings(episodes=1, test_episodes=1), watch=monitor)
+        yield "transfer"
+        moves = MoveTrialSettings(goals=1, hold=0.2, frequencies=(1.0,), seconds=0.5)
+        try_moving(arm, agent.controller(), simulation.goal_range, moves)
+        yield "settle"
     if piece.physics is not None:
         with open_arm(piece.physics) as arm:
             assert isinstance(arm, VirtualArm)
@@ -163,7 +208,6 @@ def rehearse(piece: Piece, folder: Path) -> Iterator[str]:
             # To a goal that cannot be reached no plan is sought.
             middle = np.stack([0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high], axis=1)
             measure_bound(arm, middle, BoundSettings(episodes=_PLANNED))
-    _REHEARSED.touch()
     yield "bound"
 
 
@@ -187,11 +231,11 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
 
 
 def main() -> None:
-    """Rehearse the piece on the standard input, and write the stages that are done."""
+    """Rehearse a part of the piece on the standard input, and write the stages that are done."""
     leave_by_exceptions()  # also when the run that it is for has ended
     piece = msgspec.convert(json.load(sys.stdin), Piece)
     with TemporaryDirectory() as folder:
-        for stage in rehearse(piece, Path(folder)):
+        for stage in rehearse(piece, sys.argv[1], Path(folder)):
             print(stage, flush=True)
 
 

@@ -4,7 +4,7 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks import _environment as environment
 from pneumarm.arm import Arm, open_arm
+from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import AgentController, Monitor
 from pneumarm.control.agent import warm_up
 from pneumarm.control.monitor import Mode
@@ -25,6 +26,8 @@ from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent, PolicySettings, Tracks, goals_of, train
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
+from pneumarm.planning import PlanSettings
+from pneumarm.planning.bound import BoundSettings, measure_bound
 from pneumarm.run import RunTransferSettings
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, StoreFit
 from pneumarm.simulation.enough import collect_enough
@@ -35,6 +38,8 @@ from pneumarm.transitions.watch import Watch
 HELD_OUT = ",".join(str(seed) for seed in range(1001, 1011))
 """The arms to judge on; nothing is developed on them."""
 SEED_OF_MOVEMENTS = 0
+TASKS = "settle", "reach"
+"""What agents are trained for: to settle at goals, hold them and follow, and to reach them."""
 
 
 class Rows:
@@ -138,36 +143,60 @@ def greedy_movements(
         return there_and_back.greedy_movements(agent, opened, goals, numbers, SEED_OF_MOVEMENTS, controller)
 
 
-def on_arrival(name: str, goals: int, seed: int = 0, monitor: bool = False, adapts: bool = False) -> dict[str, Any]:
+def on_arrival(
+    name: str,
+    goals: int,
+    seed: int = 0,
+    *,
+    monitor: bool = False,
+    adapts: bool = False,
+    tasks: Collection[str] = TASKS,
+    planned: int = 0,
+) -> dict[str, Any]:
     """Return what the agents of the arm ``name`` do when they arrive on it; with ``adapts`` what one does later, too.
 
     Made as ``pneumarm run`` makes them by default: collecting until more would not help, the fit, and a training of
     the default agent and of the one for reaching. The first settles at ``goals`` and follows sinusoids, the second
-    reaches as many. With ``monitor`` the arm is watched while it is recorded, as in a run: ``marked`` rows are then
-    told, and whether the arm was ``refused``, in which case it is recorded again with a monitor that only warns.
-    ``adapts``: the first adapts to as many movements as in a run, and settles and follows again.
+    reaches as many; ``tasks`` says which of them are asked for. With ``monitor`` the arm is watched while it is
+    recorded, as in a run: ``marked`` rows are then told, and whether the arm was ``refused``, in which case it is
+    recorded again with a monitor that only warns. ``adapts``: the first adapts to as many movements as in a run, and
+    settles and follows again. ``planned`` of the movements to reach goals are also planned with the true physics.
     """
     with tempfile.TemporaryDirectory() as folder:
         db = Path(folder) / "arm.db"
-        how = recorded(name, db, seed) if monitor else _recorded(name, db, seed, "off")
-        made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
-        single, begin_single = fitted(db, seed)
-        servo = train(made.simulation, begin, seed=seed).agent
-        settings = MoveTrialSettings(goals=goals)
-        tried = moved_by(servo, name, settings, seed)
-        later = moved_by(adapted(servo, name, db, seed), name, settings, seed) if adapts else None
-    reaching = train(single.simulation, begin_single, PolicySettings(), seed).agent
-    warm_up(reaching)  # no arm waits for a compiler
+        row = recorded(name, db, seed) if monitor else _recorded(name, db, seed, "off")
+        if "settle" in tasks:
+            row |= _settling(name, db, goals, seed, adapts)
+        single, begin = fitted(db, seed)
+    if "reach" in tasks:
+        row |= _reaching(name, train(single.simulation, begin, PolicySettings(), seed).agent, goals, seed, planned)
+    return row
+
+
+def _settling(name: str, db: Path, goals: int, seed: int, adapts: bool) -> dict[str, Any]:
+    """Return how the default agent settles and follows, on arrival and, if it ``adapts``, later."""
+    made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
+    agent = train(made.simulation, begin, seed=seed).agent
+    settings = MoveTrialSettings(goals=goals)
+    found = {"history": made.simulation.window.history, **_moving_figures(moved_by(agent, name, settings, seed))}
+    later = moved_by(adapted(agent, name, db, seed), name, settings, seed) if adapts else None
+    return found | {"adapted": None if later is None else _moving_figures(later)}
+
+
+def _reaching(name: str, agent: AnyAgent, goals: int, seed: int, planned: int) -> dict[str, Any]:
+    """Return how ``agent`` reaches goals, and what planning with the true physics earns in the first movements."""
+    warm_up(agent)  # no arm waits for a compiler
     with open_arm(name, seed) as opened:
-        reached = there_and_back.greedy_movements(reaching, opened, reaching.goal_range, range(goals), seed)
-    return {
-        **how,
-        "history": made.simulation.window.history,
-        **_moving_figures(tried),
-        "adapted": None if later is None else _moving_figures(later),
-        "success": [int(one.success) for one in reached],
-        "reward": [float(one.reward) for one in reached],
-    }
+        reached = there_and_back.greedy_movements(agent, opened, agent.goal_range, range(goals), seed)
+        found: dict[str, Any] = {
+            "success": [int(one.success) for one in reached],
+            "reward": [float(one.reward) for one in reached],
+        }
+        if planned and isinstance(opened, VirtualArm):
+            settings = BoundSettings(planned, PlanSettings(cutoff=agent.settings.cutoff))
+            best = measure_bound(opened, agent.goal_range, settings, seed=seed, baselines=["closed_loop"])
+            found["planned_rewards"] = best["closed_loop"].made.reward.tolist()
+    return found
 
 
 def recorded(name: str, db: Path, seed: int) -> dict[str, Any]:

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import _environment as environment
-from benchmarks._trials import Rows, fitted, in_processes, names_of, recorded
+from benchmarks._trials import TASKS, Rows, fitted, in_processes, names_of, recorded
 from benchmarks.agents import KINDS_OF_FAILURE, kind
 from pneumarm.arm import ArmSpec, ControlCycle, guarded, open_arm
 from pneumarm.control import AgentController, drawn
@@ -48,7 +48,6 @@ from pneumarm.transitions.rows import Recorded
 SEED = 0
 """Of everything but the arm, as ``pneumarm run`` has it."""
 BLOCK = 500
-TASKS = "settle", "reach"
 WORTH = {"settle": "median of the seconds to settle", "reach": "reward"}
 """What a row tells of a block besides its failures, by task."""
 PAUSE = MoveSettings().pause

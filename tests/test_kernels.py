@@ -201,6 +201,73 @@ def test_kernels_of_one_factory_are_told_apart_also_where_one_comes_from_the_cac
     assert found == ["2.0\n", "302.0\n"]
 
 
+FOREIGN = """
+import numba
+import numpy as np
+import pneumarm.kernels
+from numba.experimental import jitclass
+
+@numba.njit(cache=True)
+def more(x):
+    return x + 1.0
+@numba.njit(cache=True)
+def twice(x):
+    return 2.0 * more(x)
+@numba.njit(parallel=True, cache=True)
+def total(x):
+    sum_ = 0.0
+    for i in numba.prange(len(x)):
+        sum_ += more(x[i])
+    return sum_
+@numba.vectorize(["float64(float64)"])
+def each(x):
+    return more(x)
+@numba.guvectorize(["void(float64[:], float64[:])"], "(n)->(n)")
+def all_(x, out):
+    for i in range(len(x)):
+        out[i] = more(x[i])
+@numba.cfunc("float64(float64)")
+def address(x):
+    return more(x)
+@numba.njit
+def applied(function, x):
+    return function(x)
+@numba.njit
+def factorial(n):
+    return 1 if n < 2 else n * factorial(n - 1)
+@numba.njit
+def text(x):
+    with numba.objmode(y="float64"):
+        y = float(str(x))
+    return y
+@numba.njit
+def refused(x):
+    if x > 1.0:
+        raise ValueError("above 1", x)
+@jitclass([("a", numba.float64)])
+class Holder:
+    def __init__(self, a):
+        self.a = a
+    def more(self):
+        return more(self.a)
+
+print(twice(1.0), total(np.ones(3)), each(np.ones(1))[0], all_(np.ones(1))[0], address.ctypes(2.0))
+print(applied(more, 1.0), factorial(4), text(2.5), Holder(1.0).more())
+try:
+    refused(2.0)
+except ValueError as error:
+    print(error.args)
+"""
+
+
+def test_what_others_compile_with_numba_in_the_same_process_works(package, tmp_path):
+    (tmp_path / "foreign.py").write_text(FOREIGN)
+    inside = os.environ | {"PYTHONPATH": str(package.parent), "PNEUMARM_CACHE": str(tmp_path / "cache")}
+    for _ in ("compiled", "from the cache"):
+        said = python(str(tmp_path / "foreign.py"), env=inside, check=True).stdout
+        assert said == "4.0 6.0 2.0 2.0 3.0\n2.0 24 2.5 2.0\n('above 1', 2.0)\n"
+
+
 # Sums run in another order where a kernel calls another copy of a kernel than it did: the last bits show it.
 IMPROVED = """
 import hashlib

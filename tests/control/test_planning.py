@@ -17,7 +17,13 @@ from pneumarm.errors import UnusableInput
 from pneumarm.planning import PhysicsModel, Planner, PlanSettings, SimulationModel, physics_planner, simulated_planner
 from pneumarm.planning.search import Uncertainty, find, problem, tree, within, workspace_of
 from pneumarm.simulation import NoiseSettings, SimulationArm
-from pneumarm.simulation.rollout import advance_simulated, copy_simulated, simulated_states, simulated_world
+from pneumarm.simulation.rollout import (
+    advance_simulated,
+    copy_simulated,
+    look_simulated,
+    simulated_states,
+    simulated_world,
+)
 from pneumarm.task import Movement, Reward, TaskSettings
 
 BEGIN = BeginState(deflate=0.5, inflate=0.8, settle=0.5)
@@ -252,6 +258,7 @@ def test_two_joints_are_planned_together() -> None:
         for distance in ([0.0, 0.0], [30.0, -30.0], [50.0, 20.0]):
             goal = begin.angle[number] + distance
             states.x[0] = start
+            look_simulated(world, states, 0)
             found = find(world, states, problem(goal, REWARD, settings), workspace)
             assert found.proven
             assert found.cost == simulated_best(start, goal, settings)

@@ -9,7 +9,7 @@ learned on the arm. Settings come from the environment:
 
 PNEUMARM_MINUTES_ARMS       seeds of virtual arms; the ten held-out arms by default
 PNEUMARM_MINUTES_SEEDS      of collecting, fitting and training, "0"
-PNEUMARM_MINUTES_MINUTES    "1.7,5,10,20,60,110"; the first are the fewest transitions that are allowed, 2,000
+PNEUMARM_MINUTES_MINUTES    "1,3,5,10,20,60,110"; 1 stands for the fewest transitions that are allowed, 1,000
 PNEUMARM_MINUTES_MOVEMENTS  of each agent, 500
 PNEUMARM_MINUTES_FOLDER     where rows and the figure are kept; a call with the same folder goes on where another
                             ended. runs/minutes by default
@@ -45,7 +45,7 @@ def measure() -> Iterator[str]:
     folder = environment.folder("PNEUMARM_MINUTES_FOLDER", "runs/minutes")
     arms = environment.seeds("PNEUMARM_MINUTES_ARMS", HELD_OUT)
     seeds = environment.seeds("PNEUMARM_MINUTES_SEEDS", "0")
-    minutes = sorted(environment.numbers("PNEUMARM_MINUTES_MINUTES", "1.7,5,10,20,60,110"), reverse=True)
+    minutes = sorted(environment.numbers("PNEUMARM_MINUTES_MINUTES", "1,3,5,10,20,60,110"), reverse=True)
     movements = environment.whole("PNEUMARM_MINUTES_MOVEMENTS", 500)
     rows = Rows(folder / "rows.jsonl", "arm", "seed", "asked", "movements")
     for arm in arms:

@@ -61,7 +61,7 @@ def collect(
     meanwhile is said on stderr, and nothing is learned from it unless ``monitor`` is ``warn`` or ``off``.
 
     Raises:
-        UnusableInput: fewer than 2,000 transitions, or ``db`` is the store of another arm or another collection.
+        UnusableInput: fewer than 1,000 transitions, or ``db`` is the store of another arm or another collection.
         ArmFailure: the arm failed; what was stored before stays.
 
     """

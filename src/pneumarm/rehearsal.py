@@ -37,10 +37,10 @@ from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning.bound import BoundSettings, measure_bound
 from pneumarm.simulation import FitSettings, Simulation, SimulationArm, fit_store
 from pneumarm.task import BeginStates, begin_states
-from pneumarm.transitions import FEWEST_TRANSITIONS, Store
+from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded
 
-_SEQUENCE = 100  # rows of a made-up sequence
+_ROWS, _SEQUENCE = 4_000, 100  # made up, and of a sequence of them
 _PLANNED = 4  # movements
 _PATIENCE = 600.0
 """For so long [s] a stage may be rehearsed before it is taken to hang: eight times what the longest takes (80 s on a
@@ -178,7 +178,8 @@ def rehearse(piece: Piece, part: str, folder: Path) -> Iterator[str]:
     """Do the stages of ``part`` with as little as possible in ``folder``; name those whose kernels are compiled."""
     with Store.create(folder / "made-up.db", piece.spec) as store:
         store.append_all(_made_up(piece.spec))
-        simulation = fit_store(store, replace(piece.fit, epochs=1)).simulation
+        layers = piece.fit.layers or (1 if piece.spec.joints == 1 else 2)  # as a longer recording will have
+        simulation = fit_store(store, replace(piece.fit, epochs=1, layers=layers)).simulation
         begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
         yield from (_learn if part == "learning" else _move)(piece, simulation, begin, store)
     _marker(part).touch()
@@ -215,7 +216,7 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
     """Return a recording, just long enough to be fitted, of an arm that nobody has seen."""
     random = np.random.default_rng(0)
     (low, high), n = spec.angle_range, _SEQUENCE
-    for number in range(2 * FEWEST_TRANSITIONS // n):
+    for number in range(_ROWS // n):
         command = random.integers(-1, 2, (n, spec.joints, 2)).astype(np.float64)
         command[-1] = np.nan
         yield Recorded(

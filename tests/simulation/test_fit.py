@@ -268,7 +268,7 @@ def test_a_small_store_is_refused(make_rows: Callable[..., Rows], tmp_path: Path
     stored(tmp_path / "store.db", make_rows(sequences=2))
     with (
         Store.open(tmp_path / "store.db") as store,
-        pytest.raises(UnusableInput, match=r"120 transitions are too few to fit; collect at least 2,000"),
+        pytest.raises(UnusableInput, match=r"120 transitions are too few to fit; collect at least 1,000"),
     ):
         fit_store(store)
 

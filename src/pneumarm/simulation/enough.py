@@ -18,7 +18,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.fit import SINGLE_STEPS, FitResult, fit
 from pneumarm.transitions.choice import share_held_out
-from pneumarm.transitions.collect import FEWEST_TRANSITIONS, CollectResult
+from pneumarm.transitions.collect import CollectResult
 from pneumarm.transitions.filtering import filter_transitions
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import Window
@@ -43,7 +43,9 @@ _WORTH = 1.05
 _FEWEST_SEQUENCES = 8
 _PURPOSE = "enough"
 """The purpose of the runs that note a judgement in a store; no sequence belongs to them."""
-TOO_LITTLE = f"collect more: {2 * FEWEST_TRANSITIONS:,} transitions in {_FEWEST_SEQUENCES} sequences can be judged"
+FEWEST_JUDGED = 4_000
+"""Transitions that can be judged."""
+TOO_LITTLE = f"collect more: {FEWEST_JUDGED:,} transitions in {_FEWEST_SEQUENCES} sequences can be judged"
 """What to tell a person where there is too little to compare."""
 
 
@@ -95,7 +97,7 @@ class Enough:
 class EnoughSettings(Settings):
     """When collecting ends by itself."""
 
-    first: float = 2 * FEWEST_TRANSITIONS / 30
+    first: float = FEWEST_JUDGED / 30
     """Seconds of sequences after which it is first judged whether they are enough, because an arm that is read
     oftener moves no more; no fewer transitions than can be judged."""
     growth: float = 1.5
@@ -114,7 +116,7 @@ class EnoughSettings(Settings):
 
     def first_of(self, spec: ArmSpec) -> int:
         """Return after how many transitions of an arm it is first judged."""
-        return max(round(self.first / spec.period), 2 * FEWEST_TRANSITIONS)
+        return max(round(self.first / spec.period), FEWEST_JUDGED)
 
     def most_of(self, spec: ArmSpec) -> float:
         """Return after which time on an arm's clock collecting ends [s]."""
@@ -165,11 +167,10 @@ def collect_enough(
 def enough_data(store: Store) -> Enough | None:
     """Fit a simulation to the first half of ``store`` and one to all of it, and compare their errors.
 
-    None where there is too little to compare: fewer than twice the fewest transitions that can be fitted, or fewer
-    than eight sequences.
+    None where there is too little to compare: fewer transitions than can be judged, or fewer than eight sequences.
     """
     sequences = [entry.number for entry in store.catalogue()]
-    if store.transitions < 2 * FEWEST_TRANSITIONS or len(sequences) < _FEWEST_SEQUENCES:
+    if store.transitions < FEWEST_JUDGED or len(sequences) < _FEWEST_SEQUENCES:
         return None
     settings = (_SETTINGS if store.joints == 1 else _SEVERAL_JOINTS).of_arm(store)
     assert settings.history is not None

@@ -259,7 +259,9 @@ def fit(
             f"{window.input_size} inputs, got {training.inputs.shape[1]}; make them with the same window"
         )
     if len(training.inputs) <= window.input_size:
-        raise UnusableInput(f"{len(training.inputs)} transitions are too few to fit; collect at least 2,000")
+        raise UnusableInput(
+            f"{len(training.inputs)} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}"
+        )
     began = time.perf_counter()
     simulation = _unfitted(training, spec, goal_range, valves, settings)
     scaling, places = simulation.scaling, simulation.outputs
@@ -564,7 +566,7 @@ def fit_store(
     Memory holds the filtered set; the rest is streamed.
 
     Raises:
-        UnusableInput: fewer than 2,000 transitions are stored, or no sequence is held out.
+        UnusableInput: fewer than 1,000 transitions are stored, or no sequence is held out.
 
     """
     settings = settings or FitSettings()

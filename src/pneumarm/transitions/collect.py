@@ -43,7 +43,7 @@ from pneumarm.transitions.watch import Patience, Watch, keep_watch, warm_up, wat
 
 KINDS = ("zero-velocity", "velocity", "pulses", "sparse", "controller")
 """Kinds of the sequences made here."""
-FEWEST_TRANSITIONS = 2_000
+FEWEST_TRANSITIONS = 1_000
 """Fewer cannot be learnt from."""
 PURPOSE = "collect"
 """The purpose of the runs made here."""
@@ -256,7 +256,7 @@ def collect(
             whole, and asking for some and then for more gives what asking for all of them at once does.
 
     Raises:
-        UnusableInput: fewer than 2,000 transitions, another arm or other settings than the store was begun with.
+        UnusableInput: fewer than 1,000 transitions, another arm or other settings than the store was begun with.
         ArmFailure: the arm failed, or something has been wrong for several sequences; what was stored before stays.
             The sequence that it failed in is not stored of an arm with a state, which can make it again; of one
             without, such as hardware, all of it that was read is, its last row marked.

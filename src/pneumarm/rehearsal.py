@@ -43,6 +43,8 @@ from pneumarm.transitions.watch import warm_up
 
 _ROWS, _SEQUENCE = 4_000, 100  # made up, and of a sequence of them
 _PLANNED = 4  # movements
+_NICE = 10
+"""Who moves an arm in time comes first, with two processes beside it on two cores."""
 _PATIENCE = 600.0
 """For so long [s] a stage may be rehearsed before it is taken to hang: eight times what the longest takes (80 s on a
 machine of 2 cores)."""
@@ -236,6 +238,8 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
 def main() -> None:
     """Rehearse a part of the piece on the standard input, and write the stages that are done."""
     leave_by_exceptions()  # also when the run that it is for has ended
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
     piece = msgspec.convert(json.load(sys.stdin), Piece)
     with TemporaryDirectory() as folder:
         for stage in rehearse(piece, sys.argv[1], Path(folder)):

@@ -44,8 +44,9 @@ from pneumarm.transitions.watch import warm_up
 _ROWS, _SEQUENCE = 4_000, 100  # made up, and of a sequence of them
 _PLANNED = 4  # movements
 _NICE = 4
-"""So that the run, which moves an arm in time, has one of two cores for itself with two processes beside it; more would
-starve them on a computer that has other things to do, while the run waits for them."""
+"""So that the run, which moves an arm in time, has one of two cores for itself with two processes beside it.
+
+More would starve them on a computer that has other things to do, while the run waits for them."""
 _PATIENCE = 600.0
 """For so long [s] a stage may be rehearsed before it is taken to hang: eight times what the longest takes (80 s on a
 machine of 2 cores)."""

@@ -75,7 +75,7 @@ class Rows:
         return row
 
     def _key(self, row: dict[str, Any]) -> tuple[Any, ...]:
-        return tuple(row[key] for key in self.keys)
+        return tuple(row.get(key) for key in self.keys)
 
 
 def names_of(arms: str, seeded: str) -> list[str]:
@@ -167,9 +167,10 @@ def on_arrival(
         row = recorded(name, db, seed) if monitor else _recorded(name, db, seed, "off")
         if "settle" in tasks:
             row |= _settling(name, db, goals, seed, adapts)
-        single, begin = fitted(db, seed)
-    if "reach" in tasks:
-        row |= _reaching(name, train(single.simulation, begin, PolicySettings(), seed).agent, goals, seed, planned)
+        if "reach" in tasks:
+            single, begin = fitted(db, seed)
+            agent = train(single.simulation, begin, PolicySettings(), seed).agent
+            row |= _reaching(name, agent, goals, seed, planned)
     return row
 
 

@@ -50,6 +50,10 @@ def measure() -> Iterator[str]:
     processes = environment.whole("PNEUMARM_WIDE_PROCESSES", 2)
     tasks = environment.words("PNEUMARM_WIDE_TASKS", ",".join(TASKS))
     planned = environment.whole("PNEUMARM_WIDE_PLANNED", 0, least=0)
+    if unknown := [task for task in tasks if task not in TASKS]:
+        raise UnusableInput(f"PNEUMARM_WIDE_TASKS: expected some of {', '.join(TASKS)}, got {unknown[0]!r}")
+    if planned and not all(name.startswith("virtual") for name in arms):
+        raise UnusableInput("PNEUMARM_WIDE_PLANNED: the true physics is known of virtual arms only")
     if planned > goals or (planned and "reach" not in tasks):
         raise UnusableInput(f"PNEUMARM_WIDE_PLANNED: {planned} movements cannot be planned, of {goals} to {tasks[0]}")
     asked = {"goals": goals, "tasks": ",".join(tasks), "planned": planned}

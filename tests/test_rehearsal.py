@@ -88,6 +88,22 @@ def test_a_rehearsal_that_hangs_is_ended_and_not_begun_again(
     assert "learning" in rehearsed(marker)
 
 
+def test_what_learns_is_waited_for_also_where_what_moves_has_ended_before(
+    marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quick = tmp_path / "python"
+    quick.write_text(
+        '#!/bin/sh\n[ "$3" = moving ] && exit 0\necho simulation; sleep 1; echo training; sleep 1; echo test\n'
+    )
+    quick.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(quick))
+    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
+        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        began = monotonic()
+        beside.wait_for("test")
+        assert monotonic() - began >= 1.5
+
+
 def test_a_rehearsal_that_fails_is_not_waited_for(
     marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

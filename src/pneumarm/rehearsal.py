@@ -134,11 +134,11 @@ class Rehearsal:
         """Put what the process of ``part`` says, with its time, and at the end nothing, where it is waited for."""
         lines = self._processes[part].stdout
         assert lines is not None
-        rest = [other for other in PARTS if other != part and not _marker(other).exists()]
+        rest = ["moving"] if part == "learning" and not _marker("moving").exists() else []
         with lines:
             for line in lines:
                 self._said.put((part, line.strip(), monotonic()))
-                if part == "learning" and rest:
+                if rest:
                     self._start(rest.pop(), piece)
         for ended in (part, *rest):
             self._said.put((ended, "", monotonic()))

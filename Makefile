@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+INSTALLED := $(VENV)/.installed
 
 .PHONY: setup run test lint bench held-out baselines soak walk site clean
 
@@ -11,9 +12,14 @@ setup: $(READY)
 $(READY): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	touch $(READY)
+	touch $(READY) $(INSTALLED)
 
-run: setup  ## the whole job on the virtual arm, into runs/first
+$(INSTALLED): pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --no-compile --disable-pip-version-check --editable .
+	touch $(INSTALLED)
+
+run: $(INSTALLED)  ## the whole job on the virtual arm, into runs/first
 	mkdir -p runs
 	$(BIN)/pneumarm run --out runs/first
 

@@ -56,9 +56,10 @@ def measure() -> Iterator[str]:
     result = made.result
     yield f"fit of {result.rows:,} rows: {result.seconds:.2f} s; with filtering and errors {worked:.2f} s of a core"
     trained = train(made.simulation, begin, PolicySettings(), SEED)
+    speed = trained.steps.sum() / trained.core_seconds / 1e6
     yield (
         f"training of {len(trained.validation)} policies: {trained.seconds:.2f} s with validation, "
-        f"{trained.core_seconds:.2f} s of cores, {trained.steps / trained.core_seconds / 1e6:.2f} M steps/s a core"
+        f"{trained.core_seconds:.2f} s of cores, {speed:.2f} M steps/s a core"
     )
     controller = Timed(trained.agent)
     greedy_movements(trained.agent, ARM, made.simulation.goal_range, range(1), SEED, controller)

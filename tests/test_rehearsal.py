@@ -150,5 +150,5 @@ def test_a_part_that_has_been_is_not_rehearsed_again(marker: Path) -> None:
 def test_a_run_of_another_method_begins_none(marker: Path, tmp_path: Path) -> None:
     run = Run(tmp_path / "run", RunSettings(arm="virtual:seed=2", method="sarsa"))
     with open_arm("virtual:seed=2") as arm:
-        run._rehearse(arm)
+        run._rehearse(arm.spec)
     assert not run._rehearsal._processes

@@ -55,6 +55,7 @@ def test_the_arm_is_to_be_seen_moving_once_it_was_recorded(tmp_path: Path) -> No
     """Long before the report: a person waits for the later stages."""
     told: list[str] = []
     run = Run(tmp_path / "run", SMALL, tell=told.append)
+    run._begin()
     run._collect()
     picture = tmp_path / "run" / "recorded.svg"
     assert "<animate" in picture.read_text()
@@ -127,11 +128,11 @@ def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> Non
 
 def test_nothing_is_left_behind_by_settings_that_cannot_be_used(tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match="expected virtual"):
-        Run(tmp_path / "run", replace(SMALL, arm="wirtual"))
+        Run(tmp_path / "run", replace(SMALL, arm="wirtual")).do()
     with pytest.raises(UnusableInput, match="expected 1,000 or more"):
         replace(SMALL, transitions=100)
     with pytest.raises(UnusableInput, match="1 joint"):
-        Run(tmp_path / "run", replace(SMALL, joints=2))
+        Run(tmp_path / "run", replace(SMALL, joints=2)).do()
     with pytest.raises(UnusableInput, match="does not exist"):
         Run(tmp_path / "no" / "run", SMALL)
     assert not list(tmp_path.iterdir())

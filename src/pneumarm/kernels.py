@@ -14,7 +14,8 @@ Four traps of Numba are closed here:
 
 What a kernel calls is compiled as code alone, and becomes machine code in its callers: a kernel that Python calls as
 well is compiled twice, as code for kernels and with an entry for Python. With machine code of each, a first run
-compiled for half as long again.
+compiled for half as long again. LLVM optimises at its first level, which makes loops as fast as the third does here
+(``python -m benchmarks`` with ``NUMBA_OPT=3`` shows it) in four fifths of the time.
 """
 
 import getpass
@@ -32,7 +33,6 @@ import llvmlite.binding as llvm
 import numba
 import numba.extending
 import platformdirs
-from numba import config as numba_config
 from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
@@ -41,6 +41,7 @@ from numba.core.environment import lookup_environment
 from numba.core.registry import cpu_target
 from numba.np import arrayobj
 
+numba_config: Any = numba.config
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 KERNEL: Any = {"nogil": True, "error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True}
 """Options of Numba's for a :func:`kernel`."""
@@ -52,11 +53,11 @@ _KEEP = 3  # folders of earlier sources kept, so that switching back and forth d
 
 
 def sources_hash(package: Path) -> str:
-    """Return a hash of all kernel sources below ``package`` and of Numba's version.
+    """Return a hash of all kernel sources below ``package``, of Numba's version and of how well it optimises.
 
     A kernel source is a file that names this module: it jits functions, or is called by those that do.
     """
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(f"{numba.__version__} {numba_config.OPT!r}".encode())
     for path in sorted(package.rglob("*.py")):
         source = path.read_bytes()
         if b"pneumarm.kernels" in source:
@@ -93,9 +94,11 @@ def _forget_old(root: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+if "NUMBA_OPT" not in os.environ:
+    numba_config.OPT = type(numba_config.OPT)(1)
 CACHE_FOLDER = _cache_folder()
 """Where the kernels of these sources are."""
-numba_config.CACHE_DIR = str(CACHE_FOLDER)  # type: ignore[attr-defined]
+numba_config.CACHE_DIR = str(CACHE_FOLDER)
 
 
 class _OwnCopies(JITCodeLibrary):

@@ -192,7 +192,9 @@ def rehearse(piece: Piece, part: str, folder: Path) -> Iterator[str]:
 
 def _learn(piece: Piece, simulation: Simulation, begin: BeginStates, _: Store) -> Iterator[str]:
     yield "simulation"
-    agent = train(simulation, begin, replace(piece.servo, agents=1, updates=1, validation_movements=8)).agent
+    settings = replace(piece.servo, agents=1, updates=1, validation_movements=8)
+    ServoLearner(simulation, begin, settings, 0, 0).validate(8)  # first what those who move need, too
+    agent = train(simulation, begin, settings).agent
     yield "training"
     test(agent, simulation, begin, 8)
     yield "test"

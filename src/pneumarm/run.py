@@ -17,8 +17,8 @@ from typing import Any, Self
 import msgspec
 
 from pneumarm.analysis import analyse
-from pneumarm.arm import Arm, open_arm
-from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm import Arm, ArmSpec, open_arm
+from pneumarm.arm.open import shape_of
 from pneumarm.console import jsonable, peak_memory
 from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper
 from pneumarm.control.condition import collected_results
@@ -144,7 +144,7 @@ class Run:
         monitor: Mode = "stop",
         tell: Callable[[str], None] = lambda line: None,
     ) -> None:
-        """Take up the run in ``folder``, or begin it; ``seen_by`` may put something around the arm that shows it.
+        """Take up the run in ``folder``, if there is one; ``seen_by`` may put something around the arm that shows it.
 
         What there is to be seen before the end is told by ``tell``, in a line.
 
@@ -165,9 +165,14 @@ class Run:
         compiling.watch()
         self._claim()
 
-    def _claim(self) -> None:
-        folder, wanted = self.folder, json.loads(json.dumps(asdict(self.settings)))
+    @property
+    def _wanted(self) -> dict[str, Any]:
+        wanted: dict[str, Any] = json.loads(json.dumps(asdict(self.settings)))
         del wanted["joints"]  # what the arm must have is no choice
+        return wanted
+
+    def _claim(self) -> None:
+        folder, wanted = self.folder, self._wanted
         require_folder(folder)
         file = folder / SETTINGS
         if file.exists():
@@ -183,17 +188,18 @@ class Run:
             raise UnusableInput(f"{folder}: is not empty and holds no run; give another folder")
         elif folder.exists() and not folder.is_dir():
             raise UnusableInput(f"{folder}: is a file; give a folder")
-        else:
-            open_arm_checked(self.settings).close()  # a wrong arm is found before anything is written
-            folder.mkdir(exist_ok=True)
-            write_json(file, wanted)
 
     @property
     def _results_file(self) -> Path:
         return self.folder / "results.json"
 
     def do(self) -> dict[str, Any]:
-        """Do all stages that are not done yet and return the results."""
+        """Do all stages that are not done yet and return the results.
+
+        Raises:
+            UnusableInput: there is no such arm, or it has another number of joints; nothing was written.
+
+        """
         stages = {
             "collect": self._collect,
             "simulation": self._fit,
@@ -207,6 +213,7 @@ class Run:
         counted = [name for name in stages if not left_out.get(name)]
         last = len(counted) + 1
         with self._rehearsal:
+            self._begin()
             for name, stage in stages.items():
                 if name in counted:
                     self._stage = f"stage {counted.index(name) + 1} of {last}"
@@ -222,6 +229,17 @@ class Run:
                 write_report(self.folder)
                 report(1, 1)
         return self.results
+
+    def _begin(self) -> None:
+        """Begin the folder, if there is such an arm."""
+        if "collect" in self.results:
+            return
+        if (shape := shape_of(self.settings.arm)) is not None:
+            self._rehearse(shape)
+        if not (self.folder / SETTINGS).exists():
+            open_arm_checked(self.settings).close()
+            self.folder.mkdir(exist_ok=True)
+            write_json(self.folder / SETTINGS, self._wanted)
 
     def numbered(self, title: str) -> str:
         """Return ``title``, of something that is being done, with the stage that it belongs to."""
@@ -251,7 +269,7 @@ class Run:
             self._seen_by(open_arm_checked(wanted)) as arm,
             Store.for_arm(self.store, arm.spec) as store,
         ):
-            self._rehearse(arm)
+            self._rehearse(arm.spec)
             watch = Monitor(arm.spec, mode=self._monitor)
 
             def record(transitions: int) -> CollectResult:
@@ -276,12 +294,12 @@ class Run:
         self._tell(f"the arm as it moved: {self.folder / RECORDED}, which plays in a browser; the report follows")
         return {"collect": collected_results(collected, watch) | decided}
 
-    def _rehearse(self, arm: Arm) -> None:
-        """Have the kernels of the later stages compiled while ``arm`` is moved."""
+    def _rehearse(self, spec: ArmSpec) -> None:
+        """Have the kernels of the later stages compiled from now on, while an arm that is like ``spec`` is moved."""
         wanted = self.settings
         if isinstance(wanted.chosen, ServoSettings):
-            physics = wanted.arm if isinstance(arm, VirtualArm) and wanted.planned else None
-            self._rehearsal.begin(Piece(arm.spec, wanted.fit, wanted.chosen, physics))
+            physics = wanted.arm if wanted.planned and shape_of(wanted.arm) is not None else None
+            self._rehearsal.begin(Piece(spec, wanted.fit, wanted.chosen, physics))
 
     def _fit(self) -> dict[str, Any]:
         with Store.open(self.store) as store:

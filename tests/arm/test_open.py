@@ -1,9 +1,11 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pneumarm.arm import open_arm
+from pneumarm.arm.open import shape_of
 from pneumarm.arm.spec_file import save_spec
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, draw_wide, preset_parameters
 from pneumarm.errors import ArmFailure, UnusableInput
@@ -95,6 +97,33 @@ def test_options_come_in_any_order(tmp_path):
 def test_options_that_cannot_be_are_refused(name, said):
     with pytest.raises(UnusableInput, match=said):
         open_arm(name)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "virtual",
+        "virtual:seed=7",
+        "virtual:preset=A",
+        "virtual:wide,seed=3",
+        "virtual:joints=2,seed=1,coupling=0.5",
+        "virtual:seed=7,sensors=velocity+acceleration",
+        "virtual:seed=7,pressure_sensors=off,pulses=off",
+        "virtual:seed=7,muscles=1,rate=200",
+    ],
+)
+def test_what_a_virtual_arm_reads_and_is_told_is_known_without_opening_it(name):
+    shape = shape_of(name)
+    with open_arm(name) as arm:
+        numbers = ("counts_per_degree", "counts_per_bar", "angle_range", "max_pressure", "links", "period", "latency")
+        assert shape == replace(arm.spec, **{number: getattr(shape, number) for number in numbers})
+
+
+def test_of_other_arms_nothing_is_known_before_they_are_opened():
+    assert shape_of("python:tests.plain_arms:linear") is None
+    assert shape_of("virtual:spec=arm.toml") is None
+    with pytest.raises(UnusableInput, match="a joint has 1 or 2 muscles"):
+        shape_of("virtual:muscles=3")
 
 
 def test_a_virtual_arm_is_opened_at_another_rate(tmp_path):

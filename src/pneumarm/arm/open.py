@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.arm.slower import SlowerArm, usual_turns
@@ -139,32 +139,54 @@ def _option(given: tuple[str, str]) -> str:
     return "=".join(given) if given[1] else given[0]
 
 
+def shape_of(name: str) -> ArmSpec | None:
+    """Return the spec of a virtual arm of the same make as the one called ``name``; None of another kind of arm.
+
+    This is known at once; what draws the arm itself is compiled first, which takes seconds.
+
+    Raises:
+        UnusableInput: no arm has this name.
+
+    """
+    place, options = _parts(name)
+    if place != "virtual" or "spec" in options:
+        return None
+    from pneumarm.arm.virtual.arm import spec_of
+
+    parameters = _parameters(name, {key: options[key] for key in options.keys() & {"joints", "coupling"}})
+    return spec_of(parameters, **_make(name, options, None, parameters))
+
+
 def _virtual(name: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None) -> Arm:
     """Return the virtual arm with ``options``: which one, a rate, kinds of sensors, a file of faults.
 
     Without them it has the rate and the further sensors of its ``spec``, if it has one.
     """
-    from pneumarm.arm.virtual import VirtualArm, read_plan, usual_sensors
+    from pneumarm.arm.virtual import VirtualArm, read_plan
 
     parameters = _parameters(name, options)
+    faults = read_plan(options["faults"]) if "faults" in options else ()
+    return VirtualArm(parameters, seed=seed, faults=faults, **_make(name, options, spec, parameters))
+
+
+def _make(name: str, options: Mapping[str, str], spec: ArmSpec | None, parameters: "ArmParameters") -> dict[str, Any]:
+    """Return what the ``options`` of a virtual arm, or its ``spec``, say beside its ``parameters``."""
+    from pneumarm.arm.virtual import usual_sensors
+
     if "sensors" in options:
         velocity, sensors = usual_sensors(options["sensors"].split("+"), len(parameters.joints))
     else:
         velocity, sensors = (spec.velocity_sensor, spec.sensors) if spec is not None else (False, ())
-    faults = read_plan(options["faults"]) if "faults" in options else ()
     usual = usual_turns(parameters.period) * parameters.period
-    return VirtualArm(
-        parameters,
-        seed=seed,
-        name=name,
-        faults=faults,
-        period=_period(name, options, usual if spec is None else spec.period),
-        velocity_sensor=velocity,
-        sensors=sensors,
-        pressure_sensors=_on(name, options, "pressure_sensors", spec is None or spec.pressure_sensors),
-        pulses=_on(name, options, "pulses", spec is None or spec.pulses),
-        muscles=_muscles(name, options, 2 if spec is None else spec.muscles),
-    )
+    return {
+        "name": name,
+        "period": _period(name, options, usual if spec is None else spec.period),
+        "velocity_sensor": velocity,
+        "sensors": sensors,
+        "pressure_sensors": _on(name, options, "pressure_sensors", spec is None or spec.pressure_sensors),
+        "pulses": _on(name, options, "pulses", spec is None or spec.pulses),
+        "muscles": _muscles(name, options, 2 if spec is None else spec.muscles),
+    }
 
 
 def _muscles(name: str, options: Mapping[str, str], usual: int) -> int:

@@ -37,6 +37,43 @@ _HEADER = struct.Struct("<8sI16s")
 _MAGIC, _VERSION = b"pneumarm", 4
 
 
+def spec_of(
+    parameters: ArmParameters,
+    *,
+    name: str,
+    period: float,
+    velocity_sensor: bool,
+    sensors: Sequence[Sensor],
+    pressure_sensors: bool,
+    pulses: bool,
+    muscles: int,
+) -> ArmSpec:
+    """Return the spec of the virtual arm with ``parameters``; the rest is as for :class:`VirtualArm`."""
+    converter = parameters.sensors
+    return ArmSpec(
+        joints=len(parameters.joints),
+        muscles=muscles,
+        period=period,
+        counts_per_degree=converter.counts_per_degree,
+        counts_per_bar=converter.counts_per_bar,
+        angle_range=(0.0, converter.highest),
+        max_pressure=parameters.max_pressure / BAR,
+        latency=LATENCY * _share(period),
+        links=parameters.links,
+        name=name,
+        velocity_sensor=velocity_sensor,
+        sensors=tuple(sensors),
+        pressure_sensors=pressure_sensors,
+        safe_supply=not pressure_sensors,
+        pulses=pulses,
+    )
+
+
+def _share(period: float) -> float:
+    """Return which share of the usual latency and jitter a computer has that controls with ``period`` [s]."""
+    return min(1.0, period / PERIOD)
+
+
 class VirtualArm(Arm):
     """An arm that exists only as physics: valves, air, braided muscles, a chain of links with weights, and sensors.
 
@@ -84,29 +121,20 @@ class VirtualArm(Arm):
             self.parameters = _with_safe_supply(self.parameters)
         if muscles == 1:
             self.parameters = with_springs(self.parameters)
-        joints, converter = len(self.parameters.joints), self.parameters.sensors
         period = self.parameters.period if period is None else period
-        faster = min(1.0, period / PERIOD)
-        self.spec = ArmSpec(
-            joints=joints,
-            muscles=muscles,
-            period=period,
-            counts_per_degree=converter.counts_per_degree,
-            counts_per_bar=converter.counts_per_bar,
-            angle_range=(0.0, converter.highest),
-            max_pressure=self.parameters.max_pressure / BAR,
-            latency=LATENCY * faster,
-            links=self.parameters.links,
+        self.spec = spec_of(
+            self.parameters,
             name=name,
+            period=period,
             velocity_sensor=velocity_sensor,
-            sensors=tuple(sensors),
+            sensors=sensors,
             pressure_sensors=pressure_sensors,
-            safe_supply=not pressure_sensors,
             pulses=pulses,
+            muscles=muscles,
         )
         if seed < 0:
             raise UnusableInput(f"the seed of a virtual arm must be 0 or more, got {seed}")
-        self.body = body_of(replace(self.parameters, jitter=self.parameters.jitter * faster), seed)
+        self.body = body_of(replace(self.parameters, jitter=self.parameters.jitter * _share(period)), seed)
         """The arm itself, not a copy, for kernels; read it, and leave it alone."""
         start(self.body)
         self._player: FaultPlayer | None = None

@@ -45,8 +45,9 @@ from pneumarm.planning.bound import BoundSettings, known_bound
 from pneumarm.progress import Report, compiling
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
 from pneumarm.rehearsal import Piece, Rehearsal
-from pneumarm.report import save_demonstration, save_spec, write_report
-from pneumarm.report.run_report import TEST
+from pneumarm.report import save_demonstration, save_spec
+from pneumarm.report.beside import ReportBeside
+from pneumarm.report.run_report import REPORT, TEST
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
 from pneumarm.settings import Valid
@@ -63,6 +64,8 @@ Progress = Callable[[str], AbstractContextManager[Report]]
 
 
 _PLANNED = 40  # movements, by default
+_ON_THE_ARM = ("transfer", "settle", "bound")
+"""Stages that change nothing of what the report says of those before."""
 
 
 @contextmanager
@@ -212,22 +215,25 @@ class Run:
         left_out = {"settle": not self.settings.settles, "bound": self.settings.planned == 0}  # these only note that
         counted = [name for name in stages if not left_out.get(name)]
         last = len(counted) + 1
-        with self._rehearsal:
-            self._begin()
-            for name, stage in stages.items():
-                if name in counted:
-                    self._stage = f"stage {counted.index(name) + 1} of {last}"
-                if name not in self.results:
-                    with self._noted(name):
-                        if name != "collect":
-                            self._rehearsal.wait_for(name)
-                        self.results |= stage()
-        self._stage = f"stage {last} of {last}"
-        if not (self.folder / "report.html").exists():
-            with self._noted("report"), self.progress("writing the report") as report:
-                report(0, 1)
-                write_report(self.folder)
-                report(1, 1)
+        with ReportBeside(self.folder) as page:
+            with self._rehearsal:
+                self._begin()
+                for name, stage in stages.items():
+                    if name in counted:
+                        self._stage = f"stage {counted.index(name) + 1} of {last}"
+                    if name not in self.results:
+                        if name in _ON_THE_ARM:
+                            page.begin()
+                        with self._noted(name):
+                            if name != "collect":
+                                self._rehearsal.wait_for(name)
+                            self.results |= stage()
+            self._stage = f"stage {last} of {last}"
+            if not (self.folder / REPORT).exists():
+                with self._noted("report"), self.progress("writing the report") as report:
+                    report(0, 1)
+                    page.write()
+                    report(1, 1)
         return self.results
 
     def _begin(self) -> None:

@@ -1,7 +1,7 @@
 """The report of a run: from the files in its folder to one HTML page."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -23,7 +23,7 @@ from pneumarm.report.data import (
     TransferData,
 )
 from pneumarm.report.health import summary_of_health
-from pneumarm.report.page import render
+from pneumarm.report.page import Section, render
 from pneumarm.report.sections import (
     RunData,
     all_sections,
@@ -48,8 +48,10 @@ DEMONSTRATIONS = "demonstration-*.safetensors"
 _Record = TypeVar("_Record", bound=Record)
 
 
-def write_report(folder: Path) -> Path:
+def write_report(folder: Path, drawn: Sequence[Section] | None = None) -> Path:
     """Write ``report.html`` of the run in ``folder`` and return its path.
+
+    ``drawn`` are its sections on what was learned, if they have been drawn already.
 
     The folder holds ``results.json`` and ``arm.json`` (:func:`save_spec`); what else there is of the records
     (:class:`CoverageData`, ...), of ``episodes.csv`` and of demonstrations (:func:`save_demonstration`) enters it.
@@ -59,7 +61,7 @@ def write_report(folder: Path) -> Path:
 
     """
     path = folder / REPORT
-    write_text(path, run_page(read_run(folder)))
+    write_text(path, run_page(read_run(folder), drawn))
     return path
 
 
@@ -79,9 +81,9 @@ def write_analysis(
     return path
 
 
-def run_page(run: RunData) -> str:
-    """Return the HTML page of ``run``."""
-    return render(f"An arm learns to move: {run.spec.name}", _summary(run), all_sections(run))
+def run_page(run: RunData, drawn: Sequence[Section] | None = None) -> str:
+    """Return the HTML page of ``run``; ``drawn`` are its sections on what was learned, if there are such already."""
+    return render(f"An arm learns to move: {run.spec.name}", _summary(run), all_sections(run, drawn))
 
 
 def save_spec(folder: Path, spec: ArmSpec) -> None:

@@ -51,11 +51,9 @@ class RunData:
     moving: MovingData | None = None
 
 
-def all_sections(run: RunData) -> list[Section]:
-    """Return the sections of ``run`` in the order of the way of the data."""
-    shown = run.moving or one_after_the_other(run.demonstrations)
-    sections = [] if shown is None else [moving(shown, run.results, run.spec)]
-    sections.append(overview(run))
+def learned(run: RunData) -> list[Section]:
+    """Return the sections of ``run`` on what is done before an agent moves the arm."""
+    sections = []
     if run.coverage is not None:
         sections.append(collected(run.coverage, run.spec))
     if run.quality is not None:
@@ -67,6 +65,15 @@ def all_sections(run: RunData) -> list[Section]:
         sections.append(trained(run.training, run.spec))
     if run.test is not None:
         sections.append(tested(run.test))
+    return sections
+
+
+def all_sections(run: RunData, drawn: Sequence[Section] | None = None) -> list[Section]:
+    """Return the sections of ``run`` in the order of the way of the data; ``drawn`` are :func:`learned` ones."""
+    shown = run.moving or one_after_the_other(run.demonstrations)
+    sections = [] if shown is None else [moving(shown, run.results, run.spec)]
+    sections.append(overview(run))
+    sections += learned(run) if drawn is None else drawn
     if run.transfer is not None:
         sections.append(transferred(run.transfer, run.test))
         if run.adaptation is not None:

@@ -16,7 +16,7 @@ $(READY): pyproject.toml
 
 $(INSTALLED): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --no-compile --disable-pip-version-check --editable .
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable .
 	touch $(INSTALLED)
 
 run: $(INSTALLED)  ## the whole job on the virtual arm, into runs/first

@@ -34,6 +34,8 @@ class Reference:
     """Whether a controller may look at times that have not come yet."""
     duration: float | None = None
     """When it ends [s]; None for one that goes on."""
+    stays: bool = False
+    """Whether it asks for the same at all times."""
 
     def wanted(self, time: float, ahead: float = 0.0) -> Wanted:
         """Return what is wanted ``ahead`` [s] of ``time``, extrapolated where the future is not known."""
@@ -51,4 +53,4 @@ class Reference:
 def constant(goal: ArrayLike) -> Reference:
     """Return the reference that stays at ``goal`` (joints,) [counts]; it is reached from elsewhere, so it jumps."""
     angles = np.array(goal, np.float64).reshape(-1)
-    return Reference(lambda time: angles, smooth=False)
+    return Reference(lambda time: angles, smooth=False, stays=True)

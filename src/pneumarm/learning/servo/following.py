@@ -40,6 +40,8 @@ class Following:
         ``time`` [s] counts from its begin; ``ahead`` periods matter, and one after them says how it goes on.
         """
         now, steps = self._reference.at(time), np.arange(1, 2 + ahead)
+        if self._reference.stays:
+            return np.tile(now, (3 + ahead, 1))
         if self._reference.known_ahead:
             coming = np.array([self._reference.at(time + k * self._spec.period) for k in steps])
         else:
@@ -55,6 +57,8 @@ class Following:
 
         ``angle`` (joints,) is what is read now; returned are (1 + ahead, joints), from now on [counts].
         """
+        if self._reference.stays:
+            return np.zeros_like(path[1:-1])
         features = features_of(path, self._middle)
         self._correction.learn(np.where(moves, path[1] - angle, 0.0), features[0])
         return self._correction.of(features)

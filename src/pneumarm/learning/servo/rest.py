@@ -1,13 +1,13 @@
 """A joint that is to stay at a goal: when it is nearly at rest there, and what moves it then."""
 
 import math
-from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.kernels import kernel
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.foresight import Foresight
 from pneumarm.learning.servo.settings import ServoSettings
@@ -44,6 +44,48 @@ _ARRIVED = 0.5  # s after a joint was first near its goal, from which on it is n
 _FARTHER = 4.0  # most that is added where the policy acts in every period
 _COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an error that count, most that is added
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
+
+
+@kernel
+def look_back(readings, look, mean, drift):  # type: ignore[no-untyped-def]
+    """Set the ``mean`` (joints,) of the last ``look`` readings (n, joints), and how far that of each half differs.
+
+    Where there are fewer readings their halves are taken. Loops, as NumPy takes ten times as long for so few numbers.
+    """
+    n, half = min(look, len(readings)), look // 2
+    first = len(readings) - n
+    for j in range(readings.shape[1]):
+        total, early, late = 0.0, 0.0, 0.0
+        for i in range(n):
+            total += readings[first + i, j]
+        for i in range(min(half, n)):
+            early += readings[first + i, j]
+        for i in range(len(readings) - min(half, n), len(readings)):
+            late += readings[i, j]
+        mean[j], drift[j] = total / n, abs(late / half - early / half)
+
+
+@kernel
+def extent(readings, span):  # type: ignore[no-untyped-def]
+    """Set how far ``readings`` (n, joints) extend, ``span`` (joints,)."""
+    for j in range(readings.shape[1]):
+        low = high = readings[0, j]
+        for i in range(1, len(readings)):
+            low, high = min(low, readings[i, j]), max(high, readings[i, j])
+        span[j] = high - low
+
+
+@kernel
+def variance(readings, scatter):  # type: ignore[no-untyped-def]
+    """Set the variance of ``readings`` (n, joints), ``scatter`` (joints,)."""
+    n = len(readings)
+    for j in range(readings.shape[1]):
+        total, squares = 0.0, 0.0
+        for i in range(n):
+            total += readings[i, j]
+        for i in range(n):
+            squares += (readings[i, j] - total / n) ** 2
+        scatter[j] = squares / n
 
 
 class Rest:
@@ -93,7 +135,8 @@ class Rest:
         self._slowly, self._waited, self._foreseen = (
             max(self._look, round(time / spec.period)) for time in (_SLOWLY, waited, _FORESEEN)
         )
-        self._angles: deque[NDArray[np.float64]] = deque(maxlen=max(self._slowly, self._waited, self._foreseen))
+        self._angles = np.zeros((max(self._slowly, self._waited, self._foreseen), spec.joints))  # the newest last
+        self._seen = 0  # how many of them
         self._foresight = Foresight(simulation) if fine else None
         self._after = slice(*(round(time / spec.period) for time in _AFTER))
         self._stays = _STAYS * tolerance + _STAYS_NOISE * noise
@@ -131,7 +174,7 @@ class Rest:
 
     def forget_readings(self) -> None:
         """Note that the arm was moved by others."""
-        self._angles.clear()
+        self._seen = 0
 
     def leave(self) -> None:
         """Note that something else is asked for."""
@@ -154,25 +197,28 @@ class Rest:
         ``now`` is what is asked for, ``stays`` whether that will stay as it is, and ``angle`` what is read, all
         (joints,), and ``state`` the scaled state (state_size,).
         """
-        self._angles.append(np.asarray(angle, np.float64))
-        readings = np.array(self._angles)
-        read, longer = readings[-self._look :], readings[-self._slowly :]
-        error, half = now - read.mean(axis=0), self._look // 2
-        drift = np.abs(read[-half:].mean(axis=0) - read[:half].mean(axis=0))
-        slow = (len(longer) == self._slowly) & (np.ptp(longer, axis=0) < self._still + _EASY * np.abs(error))
-        waited = readings[-self._waited :]
-        steady = (len(waited) == self._waited) & (waited.var(axis=0) < self._steady)
-        lately = readings[-self._foreseen :]
-        lain = (len(lately) == self._foreseen) & (np.ptp(lately, axis=0) < self._lain)
+        self._angles[:-1] = self._angles[1:]
+        self._angles[-1] = angle
+        self._seen = seen = min(self._seen + 1, len(self._angles))
+        mean, drift, longer, scatter, lately = np.empty((5, now.size))
+        readings = self._angles[-seen:]
+        look_back(readings, self._look, mean, drift)
+        extent(readings[-self._slowly :], longer)
+        extent(readings[-self._foreseen :], lately)
+        variance(readings[-self._waited :], scatter)
+        error = now - mean
+        slow = (seen >= self._slowly) & (longer < self._still + _EASY * np.abs(error))
+        steady = (seen >= self._waited) & (scatter < self._steady)
+        lain = (seen >= self._foreseen) & (lately < self._lain)
         asked = stays & ~lain & (np.abs(error) <= self._near) & [not rest.calm for rest in self._joints]
         steady &= lain | self._stay(asked, state)
         acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
         for j, rest in enumerate(self._joints):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
-            off = now[j] - read[-1, j]
+            off = now[j] - readings[-1, j]
             if rest.swings >= _SWINGS or rest.damped.is_tried:
                 rest.damped.see(off / self.tolerance)
-            if len(read) < self._look or not stays[j]:
+            if seen < self._look or not stays[j]:
                 rest.leave()
                 continue
             rest.near += abs(off) <= self._near or rest.near > 0

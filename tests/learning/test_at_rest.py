@@ -11,6 +11,7 @@ from pneumarm.arm import Reading
 from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
 from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.foresight import Foresight
+from pneumarm.learning.servo.rest import extent, look_back, variance
 from pneumarm.learning.servo.two_ways import TwoWays
 from pneumarm.simulation.kernel import scaled_state
 
@@ -151,3 +152,18 @@ def test_being_thrown_far_off_counts_while_it_is_tried_and_another_goal_ends_tha
     assert ways.is_tried
     ways.leave()
     assert not ways.is_tried
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+@pytest.mark.parametrize("seen", [4, 7, 12])
+def test_readings_are_averaged_as_numpy_does(joints: int, seen: int) -> None:
+    readings, look = np.random.default_rng(0).normal(500.0, 20.0, (seen, joints)), 4
+    mean, drift, span, scatter = np.empty((4, joints))
+    look_back(readings, look, mean, drift)
+    extent(readings, span)
+    variance(readings, scatter)
+    read = readings[-look:]
+    np.testing.assert_allclose(mean, read.mean(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(drift, np.abs(read[-2:].mean(axis=0) - read[:2].mean(axis=0)), atol=1e-12)
+    np.testing.assert_array_equal(span, np.ptp(readings, axis=0))
+    np.testing.assert_allclose(scatter, readings.var(axis=0), rtol=1e-12)

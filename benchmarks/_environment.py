@@ -28,6 +28,13 @@ def choice(name: str, choices: Collection[str]) -> str:
     return _read(name, next(iter(choices)), lambda value: _among(value, choices), f"one of {', '.join(choices)}")
 
 
+def several(name: str, choices: Collection[str]) -> list[str]:
+    """Return some of the ``choices``, divided by commas, in the order of the choices; by default all."""
+    usual, expected = ",".join(choices), f"some of {', '.join(choices)}, divided by commas"
+    found = _read(name, usual, lambda value: [_among(one, choices) for one in value.split(",")], expected)
+    return [one for one in choices if one in found]
+
+
 def whole(name: str, usual: int, least: int = 1) -> int:
     """Return a whole number that is ``least`` or more."""
     return _read(name, str(usual), lambda value: _at_least(int(value), least), f"a whole number, {least} or more")

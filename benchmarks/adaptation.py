@@ -48,7 +48,8 @@ from pneumarm.arm.virtual.parameters import JointParameters, MuscleParameters
 from pneumarm.control import BEGIN, TransferSettings, transfer
 from pneumarm.files import write_json
 from pneumarm.learning import PolicyAgent, PolicySettings, train
-from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, key, legend_below, panels, styled
+from pneumarm.report.colours import DARK, GREY, LIGHT, MIDDLE
+from pneumarm.report.style import key, legend_below, panels, styled
 from pneumarm.simulation import SINGLE_STEPS, fit_store
 from pneumarm.statistics import moving_mean
 from pneumarm.task import begin_states

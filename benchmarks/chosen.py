@@ -10,6 +10,7 @@ else, by the defaults. The movements are the same for all agents of an arm. Sett
 PNEUMARM_CHOSEN_ARMS       seeds of virtual arms; the ten held-out arms by default
 PNEUMARM_CHOSEN_SEEDS      of collecting, fitting and training, "0,1,2,3,4"
 PNEUMARM_CHOSEN_MINUTES    "2,3"
+PNEUMARM_CHOSEN_WAYS       of coming by sequences, "random,chosen,chosen of a kind"; random is always among them
 PNEUMARM_CHOSEN_MOVEMENTS  of each agent, 200
 PNEUMARM_CHOSEN_FOLDER     where rows are kept, runs/chosen; a call with the same folder goes on where another ended
 
@@ -131,9 +132,10 @@ def measure() -> Iterator[str]:
     arms = environment.seeds("PNEUMARM_CHOSEN_ARMS", HELD_OUT)
     seeds = environment.seeds("PNEUMARM_CHOSEN_SEEDS", "0,1,2,3,4")
     minutes = environment.numbers("PNEUMARM_CHOSEN_MINUTES", "2,3")
+    ways = dict.fromkeys((RANDOM, *environment.several("PNEUMARM_CHOSEN_WAYS", WAYS)))
     movements = environment.whole("PNEUMARM_CHOSEN_MOVEMENTS", 200)
     rows = Rows(folder / "rows.jsonl", "arm", "seed", "minutes", "movements", "way")
-    found: dict[tuple[float, str], list[dict[str, Any]]] = {(one, way): [] for one in minutes for way in WAYS}
+    found: dict[tuple[float, str], list[dict[str, Any]]] = {(one, way): [] for one in minutes for way in ways}
     for arm in arms:
         for seed in seeds:
             for one, way in found:

@@ -21,7 +21,8 @@ from pneumarm.learning import load_agent
 from pneumarm.learning.servo import ServoAgent
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.planning.moving_bound import MovingBoundSettings, measure_moving_bound
-from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, styled
+from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
+from pneumarm.report.style import styled
 from pneumarm.task.reference import counts_of, parse_reference
 
 DOCS = Path(__file__).parent.parent / "docs"

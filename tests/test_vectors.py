@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pneumarm.kernels import kernel
-from pneumarm.vectors import LANES, ROWS, add_products, follow, weighted_sums
+from pneumarm.vectors import LANES, ROWS, add_products, add_sums, follow, weighted_sums
 
 SIZES = [
     (ROWS, LANES),
@@ -72,3 +72,35 @@ def test_sums_are_made_in_the_order_of_the_inputs(units: int) -> None:
 @kernel
 def compiled_sums(x: Any, weights: Any, sums: Any) -> None:
     weighted_sums(x, weights, 0, sums)
+
+
+@kernel
+def added_in_kernels(weights: Any, x: Any, out: Any) -> None:
+    add_sums(weights, x, out)
+
+
+@pytest.mark.parametrize("samples", [1, 7, LANES, 2 * LANES + 3, 3 * LANES, 12 * LANES, 61])
+@pytest.mark.parametrize(("inputs", "outputs"), [(0, 3), (1, 1), (3, 5), (12, 32), (45, 48)])
+@pytest.mark.parametrize("turned", [False, True])
+def test_sums_over_many_samples_are_those_of_plain_python(
+    samples: int, inputs: int, outputs: int, turned: bool
+) -> None:
+    shape = inputs + SPARE, outputs + SPARE
+    weights = numbers(*shape[::-1]).T if turned else numbers(*shape)
+    x, out = numbers(inputs, samples), numbers(outputs + SPARE, samples)
+    expected = out.copy()
+    added_in_kernels(weights, x, out[:outputs])
+
+    add_sums(weights, x, expected[:outputs])
+    np.testing.assert_array_equal(out, expected)
+
+
+def test_sums_of_a_sample_do_not_depend_on_those_beside_it() -> None:
+    random = np.random.default_rng(0)
+    weights, x = random.random((45, 48), np.float32), random.random((45, 61), np.float32)
+    together, alone = np.zeros((48, 61), np.float32), np.zeros((48, 1), np.float32)
+    added_in_kernels(weights, x, together)
+    for sample in range(61):
+        alone[:] = 0
+        added_in_kernels(weights, np.ascontiguousarray(x[:, sample : sample + 1]), alone)
+        np.testing.assert_array_equal(alone[:, 0], together[:, sample])

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from pneumarm.files import write_text
-from pneumarm.report import Section, Table, render
 from pneumarm.report.figures import Baseline, baselines, baselines_alt
 from pneumarm.report.ledger import with_interval
-from pneumarm.report.page import Picture
+from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.style import RASTER_DPI
 from pneumarm.statistics import mean_estimate, rate_estimate, summarise
 

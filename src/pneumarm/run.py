@@ -45,9 +45,8 @@ from pneumarm.planning.bound import BoundSettings, known_bound
 from pneumarm.progress import Report, compiling
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
 from pneumarm.rehearsal import Piece, Rehearsal
-from pneumarm.report import save_demonstration, save_spec
 from pneumarm.report.beside import ReportBeside
-from pneumarm.report.run_report import REPORT, TEST
+from pneumarm.report.files import REPORT, TEST, save_demonstration, save_spec
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
 from pneumarm.settings import Valid
@@ -64,8 +63,8 @@ Progress = Callable[[str], AbstractContextManager[Report]]
 
 
 _PLANNED = 40  # movements, by default
-_ON_THE_ARM = ("transfer", "settle", "bound")
-"""Stages that change nothing of what the report says of those before."""
+_DRAWN = {"transfer": ("learned",), "settle": ("learned", "moved")}
+"""Parts of the report that can be drawn once a stage begins: nothing that it says in them changes any more."""
 
 
 @contextmanager
@@ -218,12 +217,14 @@ class Run:
         with ReportBeside(self.folder) as page:
             with self._rehearsal:
                 self._begin()
+                if not (self.folder / REPORT).exists():
+                    page.begin()
                 for name, stage in stages.items():
                     if name in counted:
                         self._stage = f"stage {counted.index(name) + 1} of {last}"
                     if name not in self.results:
-                        if name in _ON_THE_ARM:
-                            page.begin()
+                        for part in _DRAWN.get(name, ()):
+                            page.draw(part)
                         with self._noted(name):
                             if name != "collect":
                                 self._rehearsal.wait_for(name)

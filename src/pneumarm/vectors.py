@@ -10,7 +10,8 @@ Each is an ordinary function, which says what it does and runs as plain Python, 
 (:mod:`pneumarm.kernels`). Arrays are float32 and C-contiguous.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from llvmlite import ir
@@ -78,6 +79,20 @@ def follow(table: _Floats, traces: _Floats, first: int, units: int, factor: floa
     traces[:, first : first + units] *= decay
 
 
+def add_sums(weights: _Floats, x: _Floats, out: _Floats) -> None:
+    """Add W^T x to ``out``: to each row of it the rows of ``x``, weighted, in their order.
+
+    Args:
+        weights: shape (at least inputs, at least outputs), of any strides.
+        x: shape (inputs, n), rows contiguous.
+        out: shape (outputs, n), rows contiguous; not overlapping the others.
+
+    """
+    for o in range(out.shape[0]):
+        for i in range(x.shape[0]):
+            out[o] += weights[i, o] * x[i]
+
+
 class _Table:
     """An array of a kernel while code for the kernel is made: what is at an index, in as many lanes as are wanted."""
 
@@ -85,6 +100,7 @@ class _Table:
         array = make_array(kind)(context, builder, value)
         self._builder, self._data = builder, array.data
         self.shape = cgutils.unpack_tuple(builder, array.shape)
+        self._strides = cgutils.unpack_tuple(builder, array.strides)  # bytes
 
     def _place(self, index: Any, lanes: int) -> Any:
         kind = ir.VectorType(ir.FloatType(), lanes).as_pointer()
@@ -99,6 +115,12 @@ class _Table:
     def spread(self, index: Any, lanes: int) -> Any:
         """Return the number at ``index`` in every lane."""
         return _spread(self._builder, self._builder.load(self._builder.gep(self._data, [index])), lanes)
+
+    def place(self, row: Any, column: Any) -> Any:
+        """Return the index of ``column`` in ``row`` of a matrix, whatever its strides are."""
+        size = ir.Constant(row.type, 4)
+        parts = [self._builder.mul(at, stride) for at, stride in zip((row, column), self._strides, strict=True)]
+        return self._builder.sdiv(self._builder.add(*parts), size, flags=["exact"])
 
 
 def _spread(builder: Any, number: Any, lanes: int) -> Any:
@@ -219,10 +241,68 @@ def _follow(typing: Any, table: Any, traces: Any, first: Any, units: Any, factor
     return types.void(table, traces, types.intp, types.intp, types.float32, types.float32), generate
 
 
+_TILES = (LANES, 3, (4, 2, 1)), (LANES, 1, (8, 4, 1)), (1, 1, (4, 1))
+"""What is added up at once: lanes of a vector, vectors, rows of them; sixteen registers hold it with its factors."""
+
+
+@intrinsic
+def _add_sums(typing: Any, weights: Any, x: Any, out: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> Any:
+        weights, x, out = _tables(context, builder, signature, args)
+        kind = x.shape[0].type
+
+        def tile(e: Any, lanes: int, vectors: int, first: Any, rows: int) -> None:
+            """Add to so many ``rows`` of ``out``, from ``first`` on, at the samples from ``e`` on."""
+            outputs = [builder.add(first, kind(r)) for r in range(rows)]
+            samples = [builder.add(e, kind(v * lanes)) for v in range(vectors)]
+            places = [out.place(o, at) for o in outputs for at in samples]
+            totals = [cgutils.alloca_once_value(builder, out.load(place, lanes)) for place in places]
+            with cgutils.for_range(builder, x.shape[0]) as loop:
+                seen = [x.load(x.place(loop.index, at), lanes) for at in samples]
+                factors = [weights.spread(weights.place(loop.index, o), lanes) for o in outputs]
+                terms = [(factor, one) for factor in factors for one in seen]
+                for total, (factor, one) in zip(totals, terms, strict=True):
+                    builder.store(_multiply_add(builder, factor, one, builder.load(total)), total)
+            for total, place in zip(totals, places, strict=True):
+                out.store(builder.load(total), place, lanes)
+
+        begin = kind(0)
+        for lanes, vectors, heights in _TILES:
+            with _steps(builder, begin, x.shape[1], lanes * vectors) as e:
+                first = kind(0)
+                for rows in heights:
+                    with _steps(builder, first, out.shape[0], rows) as o:
+                        tile(e, lanes, vectors, o, rows)
+                    first = _last(builder, first, out.shape[0], rows)
+            begin = _last(builder, begin, x.shape[1], lanes * vectors)
+        return context.get_dummy_value()
+
+    return types.void(weights, x, out), generate
+
+
+def _last(builder: Any, begin: Any, end: Any, step: int) -> Any:
+    """Return where whole steps from ``begin`` on, that do not go beyond ``end``, lead."""
+    left = builder.sub(end, begin)
+    return builder.sub(end, builder.urem(left, begin.type(step)))
+
+
+@contextmanager
+def _steps(builder: Any, begin: Any, end: Any, step: int) -> Iterator[Any]:
+    """Give a number for each whole step from ``begin`` on, none of which goes beyond ``end``."""
+    last = _last(builder, begin, end, step)
+    with cgutils.for_range_slice(builder, begin, last, begin.type(step)) as (at, _):
+        yield at
+
+
 # Translations for kernels.
+overload(add_sums, jit_options=PART)(lambda weights, x, out: _call_add_sums)
 overload(weighted_sums, jit_options=PART)(lambda x, weights, first, sums: _call_weighted_sums)
 overload(add_products, jit_options=PART)(lambda table, first, x, factors: _call_add_products)
 overload(follow, jit_options=PART)(lambda table, traces, first, units, factor, decay: _call_follow)
+
+
+def _call_add_sums(weights, x, out):  # type: ignore[no-untyped-def]
+    _add_sums(weights, x, out)  # type: ignore[call-arg]
 
 
 def _call_weighted_sums(x, weights, first, sums):  # type: ignore[no-untyped-def]

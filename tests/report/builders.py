@@ -11,16 +11,9 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.control import Adapted, Finding
 from pneumarm.control.condition import Condition
 from pneumarm.learning import CURVES
-from pneumarm.report import (
-    CoverageData,
-    Demonstration,
-    MarkedData,
-    QualityData,
-    RunData,
-    TrainingData,
-    TransferData,
-)
+from pneumarm.report.data import CoverageData, Demonstration, MarkedData, QualityData, TrainingData, TransferData
 from pneumarm.report.figures import Baseline
+from pneumarm.report.sections import RunData
 from pneumarm.report.style import of_joint
 from pneumarm.statistics import Estimate
 from pneumarm.task import Movements

@@ -8,8 +8,10 @@ from time import monotonic, sleep
 import pytest
 
 from pneumarm.errors import UnusableInput
-from pneumarm.report import beside, write_report
+from pneumarm.report import beside
 from pneumarm.report.beside import ReportBeside
+from pneumarm.report.run_report import write_report
+from pneumarm.report.sections import PARTS
 
 PATIENCE = 120.0
 
@@ -35,6 +37,18 @@ def test_the_page_is_the_one_that_is_written_at_once(run: Path) -> None:
     at_once = written(run)
     with ReportBeside(run) as page:
         page.begin()
+        for part in PARTS:
+            page.draw(part)
+        page.write()
+    assert written(run) == at_once
+
+
+def test_parts_that_are_not_asked_for_are_drawn_at_the_end(run: Path) -> None:
+    write_report(run)
+    at_once = written(run)
+    with ReportBeside(run) as page:
+        page.begin()
+        page.draw("learned")
         page.write()
     assert written(run) == at_once
 
@@ -46,6 +60,7 @@ def test_what_the_arm_changes_is_read_when_it_is_written(run: Path) -> None:
     results.write_text(moved)
     with ReportBeside(run) as page:
         page.begin()
+        page.draw("learned")
         results.write_text(text)
         page.write()
     beside_it = written(run)

@@ -7,9 +7,10 @@ import pytest
 
 from pneumarm.arm import ArmSpec
 from pneumarm.report import figures
+from pneumarm.report.colours import DARK, LIGHT, MIDDLE
 from pneumarm.report.figures import Classification
 from pneumarm.report.sections import RunData, all_sections, classifications, levels, phases_of
-from pneumarm.report.style import DARK, LIGHT, MIDDLE, svg
+from pneumarm.report.style import svg
 from pneumarm.statistics import Estimate
 from pneumarm.task.movements import movements
 

@@ -6,8 +6,8 @@ import builders
 
 from pneumarm.arm import ArmSpec
 from pneumarm.control.condition import complaints
-from pneumarm.report import read_run
 from pneumarm.report.health import health, summary_of_health
+from pneumarm.report.run_report import read_run
 
 SPEC = ArmSpec()
 

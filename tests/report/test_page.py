@@ -10,25 +10,12 @@ import pytest
 from pneumarm.arm import ArmSpec
 from pneumarm.control import save_history
 from pneumarm.errors import UnusableInput
-from pneumarm.report import (
-    CoverageData,
-    Demonstration,
-    QualityData,
-    RunData,
-    Section,
-    Table,
-    TrainingData,
-    read_run,
-    render,
-    run_page,
-    save_demonstration,
-    save_spec,
-    write_report,
-)
-from pneumarm.report.data import MovingData
+from pneumarm.report.data import CoverageData, Demonstration, MovingData, QualityData, TrainingData
+from pneumarm.report.files import TEST, save_demonstration, save_spec
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
-from pneumarm.report.run_report import TEST
-from pneumarm.report.sections import adapted, moving, overview
+from pneumarm.report.page import Section, Table, render
+from pneumarm.report.run_report import read_run, run_page, write_report
+from pneumarm.report.sections import RunData, adapted, moving, overview
 from pneumarm.task import Movements, read_episodes, write_episodes
 from pneumarm.task.movements import COLUMNS, movements
 

@@ -27,9 +27,9 @@ from pneumarm.experiments.experiment import Row, sorted_rows
 from pneumarm.experiments.preparation import STORE, claim
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.sweep import arm_folder
-from pneumarm.report import RunData, run_page
 from pneumarm.report.checkup import checkup_page
-from pneumarm.report.run_report import write_analysis
+from pneumarm.report.run_report import run_page, write_analysis
+from pneumarm.report.sections import RunData
 from pneumarm.task import Movements
 from pneumarm.transitions import Store, collect
 

@@ -10,8 +10,8 @@ from PIL import Image
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
-from pneumarm.report import figures
 from pneumarm.report.figures.film import chain, still
+from pneumarm.report.moving_arm import moving_arm
 from pneumarm.report.shown import Shown, read_shown
 from pneumarm.report.viewing import write_view
 from pneumarm.transitions import Store
@@ -114,5 +114,5 @@ def test_two_joints_are_a_chain() -> None:
 
 def test_without_a_goal_none_is_drawn() -> None:
     time = np.linspace(0, 1, 11)
-    drawn = figures.moving_arm(time, np.full((11, 1), 500.0), None, SPEC)
+    drawn = moving_arm(time, np.full((11, 1), 500.0), None, SPEC)
     assert "asked for" not in drawn

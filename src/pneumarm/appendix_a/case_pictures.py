@@ -10,19 +10,8 @@ from pneumarm.appendix_a.runs import Case
 from pneumarm.checkup import Checkup
 from pneumarm.checkup.figures import LAGS, detrended
 from pneumarm.report.checkup import spectrum
-from pneumarm.report.style import (
-    DARK,
-    GREY,
-    INK,
-    MIDDLE,
-    PALE,
-    key,
-    legend_below,
-    panels,
-    quantities,
-    scatter,
-    styled,
-)
+from pneumarm.report.colours import DARK, GREY, INK, MIDDLE, PALE
+from pneumarm.report.style import key, legend_below, panels, quantities, scatter, styled
 from pneumarm.statistics import binned
 
 Array = NDArray[np.float64]

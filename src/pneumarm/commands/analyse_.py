@@ -7,7 +7,7 @@ from pneumarm.commands.common import AnyStore, Json
 from pneumarm.console import say, show, table
 from pneumarm.files import require_folder
 from pneumarm.progress import progress
-from pneumarm.report import write_analysis
+from pneumarm.report.run_report import write_analysis
 from pneumarm.simulation import Simulation
 from pneumarm.transitions import Store
 

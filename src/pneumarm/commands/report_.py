@@ -5,7 +5,7 @@ from pathlib import Path
 from pneumarm.commands.common import Json
 from pneumarm.console import show
 from pneumarm.progress import progress
-from pneumarm.report import write_report
+from pneumarm.report.run_report import write_report
 
 
 def report_(folder: Path, /, *, json: Json = False) -> None:

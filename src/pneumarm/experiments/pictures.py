@@ -13,8 +13,9 @@ from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import TrialRows
 from pneumarm.experiments.means import Array, Column, over_arms, samples, table
 from pneumarm.experiments.words import SectionWords
+from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE, PALE
 from pneumarm.report.page import Picture, Section, Table
-from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, PALE, key, legend_below, panels, styled
+from pneumarm.report.style import key, legend_below, panels, styled
 
 _INKS = ((DARK, "-", "o"), (MIDDLE, "--", "s"), (GREY, "-.", "^"), (LIGHT, ":", "D"), (INK, (0, (1, 1)), "v"))
 _LABEL = 66  # letters of the labels of all axes side by side

@@ -77,7 +77,7 @@ class _Figure:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        from pneumarm.report.style import DARK, INK, LIGHT
+        from pneumarm.report.colours import DARK, INK, LIGHT
 
         self._joints = joints
         figure = Figure(figsize=(_INCHES, _INCHES), dpi=_DOTS)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel, part
 from pneumarm.networks.tansig import FASTMATH, tansig
+from pneumarm.vectors import add_sums
 
 Layers = tuple[NDArray[np.float32], ...]
 
@@ -93,35 +94,9 @@ def workspace(sizes: tuple[int, ...], samples: int) -> Layers:
 
 @kernel(fastmath=FASTMATH)
 def weighted_sums(weights, x, out):  # type: ignore[no-untyped-def]
-    """Set ``out`` (outputs, n) to W^T x, ``weights`` (at least inputs, outputs), ``x`` (inputs, n); no biases.
-
-    Two sums over four inputs at a time: what is loaded of ``x`` is used twice.
-    """
-    inputs, n, outputs = np.uint64(x.shape[0]), np.uint64(x.shape[1]), np.uint64(out.shape[0])
-    blocks, pairs = inputs - inputs % np.uint64(4), outputs - outputs % np.uint64(2)
-    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    """Set ``out`` (outputs, n) to W^T x, ``weights`` (at least inputs, outputs), ``x`` (inputs, n); no biases."""
     out[:] = np.float32(0.0)
-    for o in range(np.uint64(0), pairs, two):
-        p = o + one
-        for i in range(np.uint64(0), blocks, np.uint64(4)):
-            j, k, m = i + one, i + two, i + three
-            a, b, c, d = weights[i, o], weights[j, o], weights[k, o], weights[m, o]
-            q, r, s, t = weights[i, p], weights[j, p], weights[k, p], weights[m, p]
-            if a == b == c == d == q == r == s == t == np.float32(0.0):  # an observation that is not read
-                continue
-            for e in range(n):
-                out[o, e] += a * x[i, e] + b * x[j, e] + (c * x[k, e] + d * x[m, e])
-                out[p, e] += q * x[i, e] + r * x[j, e] + (s * x[k, e] + t * x[m, e])
-        for i in range(blocks, inputs):
-            a, q = weights[i, o], weights[i, p]
-            for e in range(n):
-                out[o, e] += a * x[i, e]
-                out[p, e] += q * x[i, e]
-    for o in range(pairs, outputs):
-        for i in range(inputs):
-            a = weights[i, o]
-            for e in range(n):
-                out[o, e] += a * x[i, e]
+    add_sums(weights, x, out)
 
 
 @kernel(fastmath=FASTMATH)

@@ -22,9 +22,10 @@ from pneumarm.checkup.figures import (
     muscle_row,
 )
 from pneumarm.checkup.measure import Checkup
+from pneumarm.report.colours import DARK, GREY, LIGHT, MIDDLE
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.playing import playing
-from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
+from pneumarm.report.style import panels, styled
 
 _LINES = ((DARK, "-"), (MIDDLE, "--"))
 

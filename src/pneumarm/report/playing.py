@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report import figures
+from pneumarm.report.moving_arm import moving_arm, moving_arm_alt
 from pneumarm.report.page import Picture
 
 Array = NDArray[np.float64]
@@ -24,7 +24,5 @@ def playing(
         dashed: what ``wanted`` is.
 
     """
-    wide, narrow = (
-        figures.moving_arm(time, angle, wanted, spec, dashed=dashed, narrow=narrow) for narrow in (False, True)
-    )
-    return Picture(wide, caption, figures.moving_arm_alt(time, angle, wanted, spec, dashed=dashed), narrow)
+    wide, narrow = (moving_arm(time, angle, wanted, spec, dashed=dashed, narrow=narrow) for narrow in (False, True))
+    return Picture(wide, caption, moving_arm_alt(time, angle, wanted, spec, dashed=dashed), narrow)

@@ -1,17 +1,12 @@
 """The report of a run: from the files in its folder to one HTML page."""
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-import msgspec
-
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.versions import HISTORY, read_history
-from pneumarm.errors import UnusableInput
-from pneumarm.files import write_json, write_text
+from pneumarm.files import write_text
 from pneumarm.report.data import (
     CoverageData,
     Demonstration,
@@ -21,6 +16,17 @@ from pneumarm.report.data import (
     Record,
     TrainingData,
     TransferData,
+)
+from pneumarm.report.files import (
+    ANALYSIS,
+    DEMONSTRATIONS,
+    EPISODES,
+    REPORT,
+    RESULTS,
+    SPEC,
+    TEST,
+    read_json,
+    read_spec,
 )
 from pneumarm.report.health import summary_of_health
 from pneumarm.report.page import Section, render
@@ -37,24 +43,17 @@ from pneumarm.report.sections import (
 )
 from pneumarm.task.movements import Movements, movements, read_episodes
 
-REPORT = "report.html"
-ANALYSIS = "analysis.html"
-RESULTS = "results.json"
-EPISODES = "episodes.csv"
-SPEC = "arm.json"
-TEST = "test_episodes.safetensors"
-DEMONSTRATIONS = "demonstration-*.safetensors"
-
 _Record = TypeVar("_Record", bound=Record)
 
 
-def write_report(folder: Path, drawn: Sequence[Section] | None = None) -> Path:
+def write_report(folder: Path, drawn: Mapping[str, Sequence[Section]] | None = None) -> Path:
     """Write ``report.html`` of the run in ``folder`` and return its path.
 
-    ``drawn`` are its sections on what was learned, if they have been drawn already.
+    ``drawn`` are parts of it that have been drawn already, as in :data:`~.sections.PARTS`.
 
-    The folder holds ``results.json`` and ``arm.json`` (:func:`save_spec`); what else there is of the records
-    (:class:`CoverageData`, ...), of ``episodes.csv`` and of demonstrations (:func:`save_demonstration`) enters it.
+    The folder holds ``results.json`` and ``arm.json`` (:func:`~.files.save_spec`); what else there is of the records
+    (:class:`CoverageData`, ...), of ``episodes.csv`` and of demonstrations (:func:`~.files.save_demonstration`)
+    enters it.
 
     Raises:
         UnusableInput: a file is missing or is not what it should be.
@@ -81,19 +80,9 @@ def write_analysis(
     return path
 
 
-def run_page(run: RunData, drawn: Sequence[Section] | None = None) -> str:
-    """Return the HTML page of ``run``; ``drawn`` are its sections on what was learned, if there are such already."""
+def run_page(run: RunData, drawn: Mapping[str, Sequence[Section]] | None = None) -> str:
+    """Return the HTML page of ``run``; ``drawn`` as of :func:`write_report`."""
     return render(f"An arm learns to move: {run.spec.name}", _summary(run), all_sections(run, drawn))
-
-
-def save_spec(folder: Path, spec: ArmSpec) -> None:
-    """Write what the report must know of the arm to ``folder``."""
-    write_json(folder / SPEC, asdict(spec))
-
-
-def save_demonstration(folder: Path, shown: Demonstration, number: int) -> None:
-    """Write a demonstration to ``folder``; the report shows them in the order of their ``number``."""
-    shown.save(folder, DEMONSTRATIONS.replace("*", f"{number:02d}"))
 
 
 def read_run(folder: Path) -> RunData:
@@ -103,7 +92,7 @@ def read_run(folder: Path) -> RunData:
         UnusableInput: a file is missing or is not what it should be.
 
     """
-    results = _read_json(folder / RESULTS)
+    results = read_json(folder / RESULTS)
     return RunData(
         spec=read_spec(folder / SPEC),
         results=results,
@@ -132,30 +121,6 @@ def _read_transfer(path: Path, results: dict[str, Any]) -> TransferData | None:
     found = results.get("transfer", {})
     rate, adaptations = float(found.get("learning_rate", 0.0)), int(found.get("adaptations", 0))
     return TransferData(before, learning, after, rate, adaptations)
-
-
-_KNOWN = {field.name for field in fields(ArmSpec)}  # of an arm
-
-
-def read_spec(path: Path) -> ArmSpec:
-    """Return what :func:`save_spec` wrote to ``path``; raises UnusableInput where it is something else."""
-    stored = _read_json(path)
-    try:
-        if not isinstance(stored, dict) or "angle_range" not in stored or set(stored) - _KNOWN:
-            raise UnusableInput(f"it has {', '.join(stored)}")
-        return msgspec.convert(stored, ArmSpec)
-    except (msgspec.ValidationError, UnusableInput) as error:
-        raise UnusableInput(f"{path}: expected the spec of an arm, {error}") from error
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UnusableInput(f"{path}: expected a JSON file of a run; finish the run first ({error})") from error
-    if not isinstance(value, dict):
-        raise UnusableInput(f"{path}: expected a JSON object, got {type(value).__name__}")
-    return value
 
 
 def _summary(run: RunData) -> list[str]:

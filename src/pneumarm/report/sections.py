@@ -1,7 +1,7 @@
 """The sections of a run's report: which figures, with which words."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,12 +68,9 @@ def learned(run: RunData) -> list[Section]:
     return sections
 
 
-def all_sections(run: RunData, drawn: Sequence[Section] | None = None) -> list[Section]:
-    """Return the sections of ``run`` in the order of the way of the data; ``drawn`` are :func:`learned` ones."""
-    shown = run.moving or one_after_the_other(run.demonstrations)
-    sections = [] if shown is None else [moving(shown, run.results, run.spec)]
-    sections.append(overview(run))
-    sections += learned(run) if drawn is None else drawn
+def moved(run: RunData) -> list[Section]:
+    """Return the sections of ``run`` on how an agent moved the arm and learned from it."""
+    sections = []
     if run.transfer is not None:
         sections.append(transferred(run.transfer, run.test))
         if run.adaptation is not None:
@@ -81,6 +78,21 @@ def all_sections(run: RunData, drawn: Sequence[Section] | None = None) -> list[S
         sections.append(by_displacement(run.transfer, run.test, run.spec))
     if run.demonstrations:
         sections.append(demonstrated(run.demonstrations, run.spec))
+    return sections
+
+
+PARTS: Mapping[str, Callable[[RunData], list[Section]]] = {"learned": learned, "moved": moved}
+"""What can be drawn before a run ends, each by its name, in the order in which it can."""
+
+
+def all_sections(run: RunData, drawn: Mapping[str, Sequence[Section]] | None = None) -> list[Section]:
+    """Return the sections of ``run`` in the order of the way of the data; ``drawn`` are parts that are there."""
+    drawn = drawn or {}
+    shown = run.moving or one_after_the_other(run.demonstrations)
+    sections = [] if shown is None else [moving(shown, run.results, run.spec)]
+    sections.append(overview(run))
+    for name, part in PARTS.items():
+        sections += drawn[name] if name in drawn else part(run)
     if tells_of_health(run.results):
         sections.append(health(run.results, run.marked, run.spec))
     return sections

@@ -13,7 +13,7 @@ from pneumarm.address import Address
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.report.data import Demonstration, MovingData
-from pneumarm.report.run_report import DEMONSTRATIONS, SPEC, read_spec
+from pneumarm.report.files import DEMONSTRATIONS, SPEC, read_spec
 from pneumarm.task.reference import parse_reference
 from pneumarm.transitions.rows import Rows, joined
 from pneumarm.transitions.store import SequenceEntry, Store

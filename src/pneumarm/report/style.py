@@ -21,18 +21,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.report.colours import DARK, INK
 
 WIDTH = 7.4
 """Width of every figure [inch]."""
-INK = "#1a1a1a"
-DARK = "#12476b"
-"""Blue, about 30% light: what the figure is about."""
-MIDDLE = "#d1602b"
-"""Orange, about 53% light: what it is compared with."""
-LIGHT = "#dcb24c"
-"""Sand, about 75% light: a third thing, or areas."""
-GREY = "#8a8a8a"
-PALE = "#d9d9d9"
 DENSITY = "cividis_r"
 """Colour map of counts: light is few, dark is many, in colour and in grey."""
 RASTER_DPI = 170

@@ -1,4 +1,7 @@
-"""Writing a stretch of movement to a file that people show each other: a picture, or one that plays."""
+"""Writing a stretch of movement to a file that people show each other: a picture, or one that plays.
+
+What draws with a library is imported where it is needed: a picture that plays is text.
+"""
 
 import shutil
 import subprocess
@@ -10,8 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_text, written_whole
-from pneumarm.report.figures.film import FRAMES_A_SECOND, frames, still
-from pneumarm.report.figures.moving import moving_arm
+from pneumarm.report.moving_arm import moving_arm
 from pneumarm.report.shown import Shown
 
 _COLORS = 64  # of a GIF: lines on white
@@ -41,6 +43,8 @@ def check_view(path: Path) -> Callable[[Shown, Path], None]:
 
 
 def _png(shown: Shown, path: Path) -> None:
+    from pneumarm.report.figures.film import still
+
     with written_whole(path) as temporary:
         still(shown).savefig(temporary, format="png", dpi=_DPI)
 
@@ -51,6 +55,8 @@ def _svg(shown: Shown, path: Path) -> None:
 
 def _gif(shown: Shown, path: Path) -> None:
     from PIL import Image
+
+    from pneumarm.report.figures.film import FRAMES_A_SECOND, frames
 
     pictures: list[Image.Image] = []
     for frame in frames(shown):  # all with the colours of the first, so that only what moves is stored
@@ -68,12 +74,16 @@ def _gif(shown: Shown, path: Path) -> None:
 
 
 def _mp4(shown: Shown, path: Path) -> None:
+    from pneumarm.report.figures.film import frames
+
     with written_whole(path) as temporary:
         _encoded(frames(shown), temporary)
 
 
 def _encoded(pictures: Iterable[NDArray[np.uint8]], path: Path) -> None:
     """Have ffmpeg write ``pictures`` (height, width, 3) to ``path``, in a form that every browser plays."""
+    from pneumarm.report.figures.film import FRAMES_A_SECOND
+
     command: list[str] = []
     process: subprocess.Popen[bytes] | None = None
     for picture in pictures:

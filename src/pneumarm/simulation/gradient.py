@@ -18,6 +18,7 @@ from pneumarm.kernels import kernel
 from pneumarm.networks.layers import through_layer, weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.kernel import SimulationParameters
+from pneumarm.vectors import add_sums
 
 
 class StepWorkspace(NamedTuple):
@@ -62,24 +63,19 @@ def last_units(simulation, work):  # type: ignore[no-untyped-def]
 def predict_all(simulation, x, work):  # type: ignore[no-untyped-def]
     """Set the hidden units and ``work.change`` to what the networks make of ``x`` (size, n), commands in place."""
     change = work.change
-    weighted_sums(simulation.hidden, x, work.hidden)
+    work.hidden[:] = np.float32(0.0)
+    for begin, end in simulation.read:
+        add_sums(simulation.hidden[begin:end], x[begin:end], work.hidden)
     for u in range(work.hidden.shape[0]):
         tansig(work.hidden[u])
     hidden = last_units(simulation, work)
+    weighted_sums(simulation.output.T, hidden, change)
     for o in range(change.shape[0]):
-        row = change[o]
-        for e in range(row.shape[0]):
-            row[e] = simulation.output_bias[o]
-        for u in range(hidden.shape[0]):
-            weight = simulation.output[o, u]
-            if weight != np.float32(0.0):  # the unit of another network
-                for e in range(row.shape[0]):
-                    row[e] += weight * hidden[u, e]
-    for o in range(simulation.direct.shape[0]):
-        for i in range(x.shape[0]):
-            weight = simulation.direct[o, i]
-            for e in range(x.shape[1]):
-                change[o, e] += weight * x[i, e]
+        for e in range(change.shape[1]):
+            change[o, e] += simulation.output_bias[o]
+    if simulation.direct.shape[0] > 0:
+        for begin, end in simulation.read:
+            add_sums(simulation.direct[:, begin:end].T, x[begin:end], change)
 
 
 @kernel(fastmath=FASTMATH)
@@ -142,29 +138,17 @@ def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
             sooner[place, e] += work.change[o, e]
     hidden = last_units(simulation, work)
     slope = work.slope if simulation.second.shape[0] == 0 else work.second_slope
+    weighted_sums(simulation.output, work.change, slope)
     for u in range(slope.shape[0]):
-        for e in range(n):
-            slope[u, e] = np.float32(0.0)
-        for o in range(work.change.shape[0]):
-            weight = simulation.output[o, u]
-            if weight != np.float32(0.0):
-                for e in range(n):
-                    slope[u, e] += weight * work.change[o, e]
         for e in range(n):
             slope[u, e] *= np.float32(1.0) - hidden[u, e] * hidden[u, e]
     if simulation.second.shape[0] > 0:
         through_layer(simulation.second, slope, work.hidden, work.slope)
         slope = work.slope
     last = command + commanded  # beyond are the goal, the 1 and nothing, which no command changes
-    for i in range(last):
-        row = sooner[i]
-        for u in range(slope.shape[0]):
-            weight = simulation.hidden[i, u]
-            if weight != np.float32(0.0):  # what is not read
-                for e in range(n):
-                    row[e] += weight * slope[u, e]
-    for o in range(simulation.direct.shape[0]):
-        for i in range(last):
-            weight = simulation.direct[o, i]
-            for e in range(n):
-                sooner[i, e] += weight * work.change[o, e]
+    for begin, beyond in simulation.read:
+        end = min(beyond, last)
+        if begin < end:
+            add_sums(simulation.hidden[begin:end].T, slope, sooner[begin:end])
+            if simulation.direct.shape[0] > 0:
+                add_sums(simulation.direct[:, begin:end], work.change, sooner[begin:end])

@@ -44,6 +44,8 @@ class SimulationParameters(NamedTuple):
     """b2, shape (outputs,)."""
     direct: NDArray[np.float32]
     """D, shape (outputs, inputs), or (0, inputs) where no network has such a part."""
+    read: NDArray[np.int64]
+    """Where what the networks read of the inputs begins and ends, shape (stretches, 2)."""
     place: NDArray[np.int64]
     """Place of each output in the observation, shape (outputs,)."""
     lowest: NDArray[np.float32]
@@ -136,6 +138,7 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
         output=_float32(output),
         output_bias=_float32(output_bias),
         direct=_float32(direct),
+        read=_stretches(np.asarray(np.concatenate([hidden.T, direct]).any(axis=0))),
         place=simulation.outputs,
         lowest=_float32(lowest[simulation.outputs]),
         highest=_float32(highest[simulation.outputs]),
@@ -182,6 +185,12 @@ def raw_observations(sigma: ArrayLike, scaling: Scaling) -> NDArray[np.float64]:
 
 def _float32(array: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.ascontiguousarray(array, np.float32)
+
+
+def _stretches(read: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return where each stretch of True begins and ends, shape (stretches, 2)."""
+    change = np.diff(read.astype(np.int8), prepend=0, append=0)
+    return np.stack([np.flatnonzero(change > 0), np.flatnonzero(change < 0)], axis=1)
 
 
 @part

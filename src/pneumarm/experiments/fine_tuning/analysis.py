@@ -12,8 +12,9 @@ from pneumarm.experiments.fine_tuning.levels import FineTuning
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.trainings import CRITERIA
 from pneumarm.learning import TrainSettings
+from pneumarm.report.colours import DARK, GREY, MIDDLE
 from pneumarm.report.page import Picture, Section
-from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
+from pneumarm.report.style import panels, styled
 
 _GAMMAS = (0.95, 0.98, 0.99)  # of returns_figure: the thesis' levels, and the highest here
 

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 
 from pneumarm.experiments.means import from_series
-from pneumarm.report.style import DARK, GREY, LIGHT, MIDDLE, panels, styled
+from pneumarm.report.colours import DARK, GREY, LIGHT, MIDDLE
+from pneumarm.report.style import panels, styled
 
 _STYLES = ((DARK, "-"), (MIDDLE, "--"), (GREY, "-."), (LIGHT, "-"), (DARK, ":"))
 

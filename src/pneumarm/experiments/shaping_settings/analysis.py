@@ -20,8 +20,9 @@ from pneumarm.experiments.trainings import CRITERIA, LEARNING
 from pneumarm.experiments.words import SectionWords
 from pneumarm.learning import TrainSettings
 from pneumarm.learning.online.shaping import initial_deviation, stage
+from pneumarm.report.colours import DARK, GREY, MIDDLE
 from pneumarm.report.page import Picture, Section, Table
-from pneumarm.report.style import DARK, GREY, MIDDLE, panels, styled
+from pneumarm.report.style import panels, styled
 
 _CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episodes", "met")
 _SHOWN = ("reward", "success_rate", "episodes")

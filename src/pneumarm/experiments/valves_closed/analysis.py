@@ -11,8 +11,9 @@ from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array, change, difference, mean, numbers, samples
 from pneumarm.experiments.pictures import Axis, section
 from pneumarm.experiments.valves_closed.inflation import CLOSED, OPEN, ValvesClosed
+from pneumarm.report.colours import DARK, MIDDLE
 from pneumarm.report.page import Picture
-from pneumarm.report.style import DARK, MIDDLE, panels, styled
+from pneumarm.report.style import panels, styled
 
 
 def analysis(experiment: ValvesClosed, rows: TrialRows) -> Analysis:

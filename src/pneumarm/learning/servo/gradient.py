@@ -138,7 +138,16 @@ def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
         write_commands(task.commands, x, tape.underway, net.units[-1], tape.slope[t], x[first : first + commanded])
         step_all(simulation, x, tape.x[t + 1], tape.work)
         tape.hidden[t] = tape.work.hidden
-        tape.free[t] = np.maximum(tape.work.free, np.float32(task.past_the_limit))
+        note_free(task, tape, t)
+
+
+@kernel(fastmath=FASTMATH)
+def note_free(task, tape, t):  # type: ignore[no-untyped-def]
+    """Note what share of the gradient passes at step ``t``."""
+    least, free = np.float32(task.past_the_limit), tape.work.free
+    for o in range(free.shape[0]):
+        for e in range(free.shape[1]):
+            tape.free[t, o, e] = max(free[o, e], least)
 
 
 @kernel(fastmath=FASTMATH)
@@ -295,6 +304,7 @@ __all__ = [
     "learn_once",
     "move_back",
     "move_forward",
+    "note_free",
     "price_of_a_step",
     "prices_of_pressures",
     "tape",

@@ -24,6 +24,7 @@ from pneumarm.learning.servo.gradient import (
     errors_of,
     go_sooner,
     move_forward,
+    note_free,
     price_of_a_step,
     prices_of_pressures,
     tape,
@@ -91,7 +92,7 @@ def play(task, plans, tape):  # type: ignore[no-untyped-def]
                 tape.slope[t, c, e] = leak if stopped else plans.there[c]
         step_all(simulation, x, tape.x[t + 1], tape.work)
         tape.hidden[t] = tape.work.hidden
-        tape.free[t] = np.maximum(tape.work.free, np.float32(task.past_the_limit))
+        note_free(task, tape, t)
 
 
 @kernel(fastmath=FASTMATH)

@@ -16,7 +16,7 @@ from pneumarm.learning.servo.gradient import (
     tape,
 )
 from pneumarm.learning.servo.price import prices_of_errors
-from pneumarm.learning.servo.references import draw_references
+from pneumarm.learning.servo.references import draw_references, write_previews
 from pneumarm.learning.servo.settings import SOFT, STIFF, USUAL_PERIOD, ServoSettings
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
 from pneumarm.networks.layers import adam, initial_weights, split, trainable
@@ -253,7 +253,4 @@ class ServoLearner(Learner[ServoAgent]):
         offset = window.of_joints(scaling.observation_offset)
         reference = ((drawn - offset[:, :1]) / scale[:, :1]).astype(np.float32)
         tape.reference[...] = reference[: steps + 1]
-        slope = np.diff(reference[:steps], axis=0, prepend=reference[:1])
-        line = reference[:steps, None] + ahead[:, None, None] * slope[:, None]
-        known = random.random(n) < wanted.known
-        tape.preview[...] = np.where(known, reference[np.arange(steps)[:, None] + ahead], line)
+        write_previews(reference, ahead, random.random(n) < wanted.known, tape.preview)

@@ -13,7 +13,6 @@ from pneumarm.report.figures.importance import input_importance, input_importanc
 from pneumarm.report.figures.isoplots import isoplot, isoplot_alt
 from pneumarm.report.figures.marked import marked_rows, marked_rows_alt
 from pneumarm.report.figures.movements import movement, movement_alt
-from pneumarm.report.figures.moving import moving_arm, moving_arm_alt
 from pneumarm.report.figures.propagation import error_propagation, error_propagation_alt, expectation
 from pneumarm.report.figures.residues import (
     Classification,
@@ -56,8 +55,6 @@ __all__ = [
     "marked_rows_alt",
     "movement",
     "movement_alt",
-    "moving_arm",
-    "moving_arm_alt",
     "new_share",
     "projections",
     "projections_alt",

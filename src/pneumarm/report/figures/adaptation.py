@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pneumarm.report.style import DARK, GREY, INK, MIDDLE, key, legend_below, nothing, panels, styled
+from pneumarm.report.colours import DARK, GREY, INK, MIDDLE
+from pneumarm.report.style import key, legend_below, nothing, panels, styled
 from pneumarm.statistics import moving_mean
 
 Array = NDArray[np.float64]

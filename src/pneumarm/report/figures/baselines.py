@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pneumarm.report.style import DARK, GREY, INK, LIGHT, MIDDLE, key, legend_below, nothing, panels, styled
+from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
+from pneumarm.report.style import key, legend_below, nothing, panels, styled
 from pneumarm.statistics import Estimate
 
 Array = NDArray[np.float64]

@@ -8,11 +8,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.report.colours import DARK, INK, MIDDLE
 from pneumarm.report.style import (
-    DARK,
     DENSITY,
-    INK,
-    MIDDLE,
     counts_bar,
     counts_norm,
     nothing,

@@ -7,17 +7,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.style import (
-    INK,
-    MIDDLE,
-    key,
-    nothing,
-    of_joint,
-    panels,
-    scatter,
-    styled,
-    whole_ticks,
-)
+from pneumarm.report.colours import INK, MIDDLE
+from pneumarm.report.style import key, nothing, of_joint, panels, scatter, styled, whole_ticks
 from pneumarm.statistics import running_median
 
 Array = NDArray[Any]

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pneumarm.report.style import DARK, INK, LIGHT, nothing, panels, styled, whole_ticks
+from pneumarm.report.colours import DARK, INK, LIGHT
+from pneumarm.report.style import nothing, panels, styled, whole_ticks
 
 Array = NDArray[Any]
 

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.hand import link_ends
+from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE, PALE
 from pneumarm.report.shown import Shown
-from pneumarm.report.style import DARK, INK, LIGHT, MIDDLE, PALE, key, legend_below, of_joint, styled
+from pneumarm.report.style import key, legend_below, of_joint, styled
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pneumarm.report.style import DARK, INK, MIDDLE, panels, styled
+from pneumarm.report.colours import DARK, INK, MIDDLE
+from pneumarm.report.style import panels, styled
 
 Array = NDArray[np.float64]
 

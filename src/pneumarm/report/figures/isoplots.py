@@ -5,10 +5,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.report.colours import INK, MIDDLE
 from pneumarm.report.style import (
     DENSITY,
-    INK,
-    MIDDLE,
     counts_bar,
     counts_norm,
     key,

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pneumarm.report.style import DARK, GREY, INK, panels, styled
+from pneumarm.report.colours import DARK, GREY, INK
+from pneumarm.report.style import panels, styled
 
 _THINNEST = 0.003  # of the width: a shorter stretch is drawn as long as this, so that it can be seen
 _LINE = 34  # characters of a label in a line

@@ -6,7 +6,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.style import DARK, INK, LIGHT, MIDDLE, of_joint, panels, styled
+from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
+from pneumarm.report.style import of_joint, panels, styled
 from pneumarm.report.thesis import GOAL_TOLERANCE
 
 Array = NDArray[np.float64]

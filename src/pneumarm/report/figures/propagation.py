@@ -5,16 +5,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.style import (
-    DARK,
-    MIDDLE,
-    legend_below,
-    nothing,
-    of_joint,
-    panels,
-    quantities,
-    styled,
-)
+from pneumarm.report.colours import DARK, MIDDLE
+from pneumarm.report.style import legend_below, nothing, of_joint, panels, quantities, styled
 
 Array = NDArray[np.float64]
 

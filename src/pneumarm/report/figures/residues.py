@@ -9,17 +9,8 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS, VALVES
-from pneumarm.report.style import (
-    DARK,
-    INK,
-    MIDDLE,
-    legend_below,
-    nothing,
-    of_joint,
-    panels,
-    scatter,
-    styled,
-)
+from pneumarm.report.colours import DARK, INK, MIDDLE
+from pneumarm.report.style import legend_below, nothing, of_joint, panels, scatter, styled
 from pneumarm.statistics import Bins, binned, by_group
 
 Array = NDArray[np.float64]

@@ -8,19 +8,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.style import (
-    DARK,
-    GREY,
-    INK,
-    LIGHT,
-    MIDDLE,
-    key,
-    legend_below,
-    nothing,
-    panels,
-    styled,
-    whole_ticks,
-)
+from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
+from pneumarm.report.style import key, legend_below, nothing, panels, styled, whole_ticks
 
 Array = NDArray[np.float64]
 

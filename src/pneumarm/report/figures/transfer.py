@@ -9,16 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from pneumarm.report.style import (
-    DARK,
-    INK,
-    LIGHT,
-    MIDDLE,
-    legend_below,
-    nothing,
-    panels,
-    styled,
-)
+from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
+from pneumarm.report.style import legend_below, nothing, panels, styled
 from pneumarm.statistics import Moving, moving_mean, moving_rate
 
 Array = NDArray[Any]

@@ -241,7 +241,7 @@ def _follow(typing: Any, table: Any, traces: Any, first: Any, units: Any, factor
     return types.void(table, traces, types.intp, types.intp, types.float32, types.float32), generate
 
 
-_TILES = (LANES, 3, (4, 2, 1)), (LANES, 1, (8, 4, 1)), (1, 1, (4, 1))
+_TILES = (LANES, 3, (4, 1)), (LANES, 1, (8, 1)), (1, 1, (1,))
 """What is added up at once: lanes of a vector, vectors, rows of them; sixteen registers hold it with its factors."""
 
 
@@ -294,8 +294,11 @@ def _steps(builder: Any, begin: Any, end: Any, step: int) -> Iterator[Any]:
         yield at
 
 
+_CALLED = {**PART, "forceinline": False}
+"""What is long is in a kernel once, and called."""
+
 # Translations for kernels.
-overload(add_sums, jit_options=PART)(lambda weights, x, out: _call_add_sums)
+overload(add_sums, jit_options=_CALLED)(lambda weights, x, out: _call_add_sums)
 overload(weighted_sums, jit_options=PART)(lambda x, weights, first, sums: _call_weighted_sums)
 overload(add_products, jit_options=PART)(lambda table, first, x, factors: _call_add_products)
 overload(follow, jit_options=PART)(lambda table, traces, first, units, factor, decay: _call_follow)

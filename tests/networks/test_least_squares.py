@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pneumarm.networks import importance, least_squares, nguyen_widrow
+from pneumarm.networks import importance, least_squares, nested_least_squares, nguyen_widrow
 
 
 def test_a_linear_system_is_found_exactly() -> None:
@@ -23,6 +23,18 @@ def test_it_is_the_minimum_whatever_the_block() -> None:
     for block in (1, 10, 333, 8192):
         found = least_squares(x, y, block)
         np.testing.assert_allclose(np.vstack([found.output_bias, found.direct]), oracle, atol=1e-10)
+
+
+def test_nested_models_are_those_of_their_inputs_alone() -> None:
+    g = np.random.default_rng(2)
+    x, y = g.normal(size=(333, 9)), g.normal(size=(333, 2))
+    x[:, 5] = x[:, 3] + x[:, 4]
+    sizes = [1, 4, 6, 9]
+    for size, found in zip(sizes, nested_least_squares(x, y, sizes, 100), strict=True):
+        alone = least_squares(x[:, :size], y)
+        assert found.direct is not None
+        np.testing.assert_allclose(found.direct, alone.direct, atol=1e-10)
+        np.testing.assert_allclose(found.output_bias, alone.output_bias, atol=1e-10)
 
 
 def test_nearly_equal_inputs_need_no_squared_precision() -> None:

@@ -1,5 +1,6 @@
 """A linear least-squares fit in place of a network, and what its weights say of the inputs (thesis section 3.2.4)."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,16 @@ def least_squares(x: ArrayLike, y: ArrayLike, block: int = 8192) -> Network:
         ValueError: the shapes do not fit together.
 
     """
+    return nested_least_squares(x, y, [np.shape(x)[-1]], block)[0]
+
+
+def nested_least_squares(x: ArrayLike, y: ArrayLike, sizes: Iterable[int], block: int = 8192) -> list[Network]:
+    """Return linear models as of :func:`least_squares`, each of the first so many inputs, by one decomposition.
+
+    Raises:
+        ValueError: the shapes do not fit together.
+
+    """
     x, y = np.asarray(x), np.asarray(y)
     if x.ndim != 2 or y.ndim != 2 or len(x) != len(y) or len(x) == 0:
         raise ValueError(f"expected x (n, inputs) and y (n, outputs), got {x.shape} and {y.shape}")
@@ -31,9 +42,13 @@ def least_squares(x: ArrayLike, y: ArrayLike, block: int = 8192) -> Network:
         part = slice(begin, begin + block)
         rows = np.concatenate([np.ones((len(x[part]), 1)), x[part], y[part]], axis=1, dtype=np.float64)
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, rows]), mode="r"))
-    size = 1 + inputs
-    solution = np.linalg.lstsq(triangle[:size, :size], triangle[:size, size:], rcond=_SMALLEST)[0]
-    weights = np.asarray(solution, np.float64)
+    return [_solved(triangle[: 1 + size, : 1 + size], triangle[: 1 + size, 1 + inputs :]) for size in sizes]
+
+
+def _solved(triangle: NDArray[np.float64], target: NDArray[np.float64]) -> Network:
+    """Return the linear model of which R is a ``triangle``, and Q^T y the ``target``."""
+    weights = np.asarray(np.linalg.lstsq(triangle, target, rcond=_SMALLEST)[0], np.float64)
+    inputs, outputs = len(weights) - 1, target.shape[1]
     return Network(
         hidden_weights=np.zeros((inputs, 0)),
         hidden_bias=np.zeros(0),

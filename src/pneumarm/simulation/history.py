@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, SensorKind
-from pneumarm.networks import least_squares
+from pneumarm.networks import nested_least_squares
 from pneumarm.transitions.choice import held_out, sample, share_held_out
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window, transitions
@@ -45,21 +45,31 @@ def chosen_history(source: Iterable[Rows], spec: ArmSpec, kinds: Iterable[Sensor
     if min(apart.sum(), (~apart).sum()) <= 2 * window.input_size:
         return USUAL
     lengths = range(USUAL, LONGEST + 1)
-    errors = np.array([_error(drawn, window, history, apart) for history in lengths])
+    errors = _errors(drawn, window, lengths, apart)
     if errors.min() > (1 - _WORTH) * errors[0]:
         return USUAL
     return lengths[int(np.argmax(errors <= (1 + _AS_GOOD) * errors.min()))]
 
 
-def _error(data: Transitions, window: Window, history: int, apart: NDArray[np.bool_]) -> float:
-    """Return the error of a linear model of how the angles change, the geometric mean of all joints [counts]."""
+def _errors(data: Transitions, window: Window, lengths: range, apart: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the errors of linear models of how the angles change, for each length of the history [counts].
+
+    They are geometric means of all joints.
+    """
     place = np.arange(0, window.joint_size, len(QUANTITIES))
     change = (data.target - data.observation)[:, place].astype(np.float64)
-    x = data.inputs[:, columns(window, history)].astype(np.float64)
+    read = [columns(window, history) for history in lengths]
+    order = read[0]
+    for more in read[1:]:  # a longer history reads what shorter ones do, and then its own
+        order = np.concatenate([order, np.setdiff1d(more, order)])
+    x = data.inputs[:, order].astype(np.float64)
     spread = x[~apart].std(axis=0)
     x = (x - x[~apart].mean(axis=0)) / np.where(spread > 0, spread, 1.0)
-    error = least_squares(x[~apart], change[~apart])(x[apart]) - change[apart]
-    return float(np.exp(np.log(np.maximum(error.std(axis=0), np.finfo(float).tiny)).mean()))
+    sizes = [len(one) for one in read]
+    models = nested_least_squares(x[~apart], change[~apart], sizes)
+    errors = [(one(x[apart, :size]) - change[apart]).std(axis=0) for one, size in zip(models, sizes, strict=True)]
+    found: NDArray[np.float64] = np.exp(np.log(np.maximum(errors, np.finfo(float).tiny)).mean(axis=1))
+    return found
 
 
 def columns(window: Window, history: int) -> NDArray[np.int64]:

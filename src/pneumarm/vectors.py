@@ -294,7 +294,7 @@ def _steps(builder: Any, begin: Any, end: Any, step: int) -> Iterator[Any]:
         yield at
 
 
-_CALLED = {**PART, "forceinline": False}
+_CALLED: Any = {**PART, "forceinline": False}
 """What is long is in a kernel once, and called."""
 
 # Translations for kernels.

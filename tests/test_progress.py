@@ -123,7 +123,7 @@ def test_only_stages_that_are_done_are_counted(
     small_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An agent that reaches goals does not settle; movements are not planned where nobody asked for that."""
-    monkeypatch.setattr("pneumarm.report.beside.write_report", lambda folder: None)
+    monkeypatch.setattr("pneumarm.report.beside.ReportBeside.write", lambda page: None)
     for planned, last in ((8, 7), (0, 6)):
         folder = tmp_path / str(planned)
         shutil.copytree(small_run, folder)

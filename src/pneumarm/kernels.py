@@ -180,25 +180,6 @@ _codegen: Any = cpu_target.target_context.codegen()
 _codegen._library_class = _OwnCopies
 
 
-def _pass_builder(
-    opt: Any = numba_config.OPT,
-    loop_vectorize: Any = numba_config.LOOP_VECTORIZE,
-    slp_vectorize: Any = numba_config.SLP_VECTORIZE,
-) -> Any:
-    """Return what Numba optimises with, told to make one vector instruction of a loop's turns and not four.
-
-    With four a loop of fewer than 32 turns is no vector instruction at all, and most loops here are over 8 to 96.
-    """
-    options = llvm.create_pipeline_tuning_options()
-    options.speed_level = opt
-    options.loop_vectorization, options.slp_vectorization = loop_vectorize, slp_vectorize
-    options.loop_interleaving = False
-    return llvm.create_pass_builder(_codegen._tm, options)
-
-
-_codegen._pass_builder = _pass_builder
-
-
 def _set_env(name: str, environment: Any) -> None:
     """Tell machine code where its globals in Python are; what is code alone has nowhere to keep it."""
     if _codegen._engine.is_symbol_defined(name):

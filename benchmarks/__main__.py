@@ -14,6 +14,7 @@ LONG = (
     "adaptation",
     "agents",
     "bound",
+    "chosen",
     "faults",
     "few_sensors",
     "held_out",

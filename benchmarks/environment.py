@@ -25,7 +25,8 @@ _MIDDLE = np.array([511.5, 0.0, 90.0, 90.0])
 _SPREAD = np.array([400.0, 5.0, 90.0, 90.0])
 
 
-def _simulation() -> tuple[Simulation, BeginStates]:
+def thesis_simulation() -> tuple[Simulation, BeginStates]:
+    """Return a simulation of the thesis' sizes, and states to begin in."""
     window, random = Window(), np.random.default_rng(0)
 
     def network() -> Network:
@@ -82,7 +83,7 @@ def _vectorised(env: gymnasium.vector.VectorEnv, steps: int) -> float:  # type: 
 def measure() -> Iterator[str]:
     """Yield lines with environment steps a second; the best of three."""
     name = pneumarm.gym.ENVIRONMENT
-    simulation, begin = _simulation()
+    simulation, begin = thesis_simulation()
     given = {"arm": simulation, "transitions": begin}
     env = gymnasium.make(name, **given, disable_env_checker=True)
     _single(env, 100)  # compiles, or loads what was compiled

@@ -2,10 +2,12 @@
 
 Takes about a minute an arm on two cores. Settings of ``pneumarm run`` may be given in PNEUMARM_HELD_OUT, such as
 "--method q-learning --seed 1"; PNEUMARM_HELD_OUT_ARMS names other arms, such as "virtual,virtual:seed=5". Where a run
-plans (agents for reaching do, or --bound-episodes 40), it is told how far below its plans the same movements stay.
+plans (agents for reaching do, or --bound-episodes 40), it is told how far below its plans the same movements stay;
+where its agent settles (the default does), at how many goals. Of few movements there are no intervals.
 """
 
 import json
+import math
 import shlex
 import subprocess
 import sys
@@ -35,6 +37,10 @@ def measure() -> Iterator[str]:
         means = {key: sum(one[key] for one in each) / len(each) for key in ("reward", "success_rate")}
         lowest = min(one["success_rate"] for one in each)
         yield f"{'mean of all':28}{name:12}{means['reward']:8.2f}{means['success_rate']:21.4f} (lowest {lowest:.4f})"
+    if each := [results["settle"] for results in found if results["settle"]]:
+        settled, rest = (float(np.mean([one[key] for one in each])) for key in ("settled", "rest_error_deg"))
+        lowest = min(one["settled"] for one in each)
+        yield f"{'mean of all':28}{'adapted':12}settles at {settled:.4f} (lowest {lowest:.3f}), rests {rest:.2f}° off"
     seconds = [sum(results["wall_seconds"].values()) for results in found]
     yield f"seconds a run: {min(seconds):.0f} to {max(seconds):.0f}"
 
@@ -56,12 +62,18 @@ def figures(results: dict[str, Any], phase: str) -> dict[str, Any]:
 def rows(arm: str, results: dict[str, Any]) -> Iterator[str]:
     for name, phase in (("simulation", "test"), ("arrival", "before"), ("adapted", "after")):
         one = figures(results, phase)
-        low, high = one["intervals"]["reward"]
-        worst, best = one["intervals"]["success_rate"]
-        reward = f"{one['reward']:.2f} ± {(high - low) / 2:.2f}"
-        success = f"{one['success_rate']:.4f} ({worst:.3f}..{best:.3f})"
+        reward, success = f"{one['reward']:.2f}", f"{one['success_rate']:.4f}"
+        if interval := one["intervals"]["reward"]:  # none of few movements
+            reward += f" ± {(interval[1] - interval[0]) / 2:.2f}"
+        if interval := one["intervals"]["success_rate"]:
+            success += f" ({interval[0]:.3f}..{interval[1]:.3f})"
         yield f"{arm:28}{name:12}{reward:>18}{success:>22}{one['actions']:9.2f}{np.sum(one['switches']):9.2f}"
         arm = ""
+    if settled := results["settle"]:
+        yield (
+            f"{'':28}{'adapted':12}settles at {settled['settled']:.3f} of {settled['movements']} goals, half within "
+            f"{settled['median_seconds'] or math.nan:.2f} s, rests {settled['rest_error_deg']:.2f}° off"
+        )
     for name, phase in (("arrival", "before"), ("adapted", "after")):
         if planned := results["bound"].get("distance", {}).get(phase):
             best = max(planned.values(), key=lambda one: float(one["planned"]))

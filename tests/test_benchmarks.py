@@ -27,6 +27,11 @@ from pneumarm.transitions import CollectSettings, Recorded, Store
         ("PNEUMARM_FEW_GOALS", "0", "expected a whole number, 1 or more, got '0'"),
         ("PNEUMARM_FEW_FOLDER", __file__, "expected a folder"),
         ("PNEUMARM_MINUTES_MINUTES", "5,0", "expected numbers above 0 divided by commas, got '5,0'"),
+        (
+            "PNEUMARM_CHOSEN_WAYS",
+            "random,best",
+            "expected some of random, chosen, chosen of a kind, divided by commas, got",
+        ),
     ],
 )
 def test_what_the_environment_says_wrong_is_told_in_a_line(
@@ -39,7 +44,8 @@ def test_what_the_environment_says_wrong_is_told_in_a_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(variable, value)
-    assert main(["minutes" if "MINUTES" in variable else "few_sensors"]) == 2
+    benchmark = {"FEW": "few_sensors"}.get(variable.split("_")[1], variable.split("_")[1].lower())
+    assert main([benchmark]) == 2
     told = capsys.readouterr().err
     assert told.startswith(f"pneumarm: {variable}: {said}")
     assert told.count("\n") == 1

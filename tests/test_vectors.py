@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 from pneumarm.kernels import kernel
 from pneumarm.vectors import LANES, ROWS, add_products, add_sums, follow, weighted_sums
@@ -104,3 +105,9 @@ def test_sums_of_a_sample_do_not_depend_on_those_beside_it() -> None:
         alone[:] = 0
         added_in_kernels(weights, np.ascontiguousarray(x[:, sample : sample + 1]), alone)
         np.testing.assert_array_equal(alone[:, 0], together[:, sample])
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((5, 9)), np.zeros((5, 18), np.float32)[:, ::2]])
+def test_sums_over_many_samples_refuse_other_arrays_where_they_are_compiled(wrong: Any) -> None:
+    with pytest.raises(TypingError):
+        added_in_kernels(np.zeros((5, 4), np.float32), wrong, np.zeros((4, 9), np.float32))

@@ -217,12 +217,12 @@ class Run:
         with ReportBeside(self.folder) as page:
             with self._rehearsal:
                 self._begin()
-                if not (self.folder / REPORT).exists():
-                    page.begin()
                 for name, stage in stages.items():
                     if name in counted:
                         self._stage = f"stage {counted.index(name) + 1} of {last}"
                     if name not in self.results:
+                        if name != "collect":  # nothing more is to run beside an arm while it is recorded
+                            page.begin()
                         for part in _DRAWN.get(name, ()):
                             page.draw(part)
                         with self._noted(name):

@@ -7,7 +7,7 @@ many), their sums in registers over all inputs. Every sum is made in the order o
 not depend on how wide the machine's vectors are.
 
 Each is an ordinary function, which says what it does and runs as plain Python, with a translation for kernels
-(:mod:`pneumarm.kernels`). Arrays are float32 and C-contiguous.
+(:mod:`pneumarm.kernels`). Arrays are float32 and C-contiguous, unless a function says otherwise.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -294,11 +294,17 @@ def _steps(builder: Any, begin: Any, end: Any, step: int) -> Iterator[Any]:
         yield at
 
 
+def _is_float32(*kinds: types.Array) -> bool:
+    return all(kind.dtype == types.float32 for kind in kinds)
+
+
 _CALLED: Any = {**PART, "forceinline": False}
 """What is long is in a kernel once, and called."""
 
 # Translations for kernels.
-overload(add_sums, jit_options=_CALLED)(lambda weights, x, out: _call_add_sums)
+overload(add_sums, jit_options=_CALLED)(
+    lambda weights, x, out: _call_add_sums if _is_float32(weights, x, out) and x.layout == out.layout == "C" else None
+)
 overload(weighted_sums, jit_options=PART)(lambda x, weights, first, sums: _call_weighted_sums)
 overload(add_products, jit_options=PART)(lambda table, first, x, factors: _call_add_products)
 overload(follow, jit_options=PART)(lambda table, traces, first, units, factor, decay: _call_follow)

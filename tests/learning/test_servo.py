@@ -23,7 +23,7 @@ from pneumarm.learning.servo.price import (
     price_of_slack,
     prices_of_errors,
 )
-from pneumarm.learning.servo.references import draw_references
+from pneumarm.learning.servo.references import draw_references, write_previews
 from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.simulation.arm import SimulationArm
@@ -173,6 +173,19 @@ def test_references_stay_in_the_range_of_goals_and_are_no_faster_than_asked():
     is_smooth = np.abs(np.diff(drawn, 2, axis=0)).max(axis=0) < 60
     assert 0.5 < is_smooth.mean() < 1
     assert (np.ptp(drawn, axis=0) == 0).mean() == pytest.approx(0.45, abs=0.1)
+
+
+def test_previews_are_the_reference_where_it_is_known_and_else_go_on_as_it_did():
+    reference = np.random.default_rng(0).random((12, 2, 5), np.float32)
+    ahead, known = np.array([1, 3, 6]), np.array([True, False, True, True, False])
+    preview = np.zeros((6, 3, 2, 5), np.float32)
+    write_previews(reference, ahead, known, preview)
+    for p, steps in enumerate(ahead):
+        np.testing.assert_array_equal(
+            preview[:, p, :, known], reference[steps : steps + 6, :, known].transpose(2, 0, 1)
+        )
+        goes_on = reference[:6] + steps * np.diff(reference[:6], axis=0, prepend=reference[:1])
+        np.testing.assert_allclose(preview[:, p][..., ~known], goes_on[..., ~known], atol=1e-6)
 
 
 def test_training_is_the_same_with_any_number_of_threads():

@@ -1,15 +1,19 @@
 """The report that is begun beside a run: the same page, whatever becomes of the process that begins it."""
 
+import json
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from time import monotonic, sleep
 
 import pytest
 
+from children import python
 from pneumarm.errors import UnusableInput
 from pneumarm.report import beside
-from pneumarm.report.beside import ReportBeside
+from pneumarm.report.beside import WRITE, ReportBeside
+from pneumarm.report.drawn import draw
 from pneumarm.report.run_report import write_report
 from pneumarm.report.sections import PARTS
 
@@ -53,16 +57,20 @@ def test_parts_that_are_not_asked_for_are_drawn_at_the_end(run: Path) -> None:
     assert written(run) == at_once
 
 
-def test_what_the_arm_changes_is_read_when_it_is_written(run: Path) -> None:
+def test_parts_say_what_the_whole_run_says_of_them(run: Path) -> None:
+    """They are drawn before the stages that follow are done; what those add is read when the page is written."""
     results = run / "results.json"
-    text = results.read_text()
-    moved = results.read_text().replace('"transfer"', '"before"')
-    results.write_text(moved)
-    with ReportBeside(run) as page:
-        page.begin()
-        page.draw("learned")
-        results.write_text(text)
-        page.write()
+    whole = json.loads(results.read_text())
+    assert {"transfer", "bound"} <= whole.keys()
+
+    def words() -> Iterator[str]:
+        for part, later in (("learned", {"transfer", "bound"}), ("moved", {"bound"})):
+            results.write_text(json.dumps({name: value for name, value in whole.items() if name not in later}))
+            yield part
+        results.write_text(json.dumps(whole))
+        yield WRITE
+
+    draw(run, words())
     beside_it = written(run)
     write_report(run)
     assert written(run) == beside_it
@@ -111,3 +119,11 @@ def test_nothing_is_written_where_the_run_is_left_before(run: Path) -> None:
         sleep(0.05)
     assert process.returncode is not None
     assert not (run / "report.html").exists()
+
+
+def test_what_a_run_needs_draws_nothing() -> None:
+    """A library that draws takes a second to load, and only the process beside a run needs it."""
+    done = python(
+        "-c", "import sys, pneumarm.commands.run_; print({'matplotlib', 'jinja2', 'PIL'} & sys.modules.keys())"
+    )
+    assert done.stdout.strip() == "set()", done.stderr

@@ -27,7 +27,9 @@ class ReportBeside:
         self._told: list[str] = []
 
     def begin(self) -> None:
-        """Begin the process, which takes a while to load what it draws with."""
+        """Begin the process, which takes a while to load what it draws with; once."""
+        if self._process is not None:
+            return
         command = [sys.executable, "-m", "pneumarm.report.drawn", str(self._folder)]
         errors = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # the run would write it itself
         with suppress(OSError):

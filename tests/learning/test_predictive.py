@@ -137,7 +137,8 @@ def test_what_a_plan_gains_is_asked_without_a_trace():
 
 def test_a_simulation_that_is_planned_in_settles_holds_and_tracks():
     simulation = synthetic_simulation()
-    simulation = replace(simulation, error_std=simulation.error_std / 4)
+    # In pulses: a whole period moves this arm by nearly twice the tolerance, and rest is then a matter of luck.
+    simulation = replace(simulation, error_std=simulation.error_std / 4, commands="pulses")
     servo, spec = PlannedServo(simulation), simulation.spec
     arm, controller = SimulationArm(simulation, seed=2), servo.controller()
     goals = np.array([[450.0], [600.0], [520.0]])

@@ -1,13 +1,12 @@
 """A small run of the whole job, made once and used by the tests of everything that comes after it."""
 
-import fcntl
-import os
 import signal
 from pathlib import Path
 
 import hypothesis
 import pytest
 
+from once import made_once
 from pneumarm.console import peak_memory
 from pneumarm.run import Run
 from small import SMALL
@@ -20,13 +19,7 @@ hypothesis.settings.load_profile("untimed")
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a finished small run, the same for all workers of pytest; tests must not change it."""
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "small_run"
-    with folder.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not (folder / "report.html").exists():
-            Run(folder, SMALL).do()
-    return folder
+    return made_once(tmp_path_factory, "small_run", lambda folder: Run(folder, SMALL).do())
 
 
 def pytest_configure() -> None:

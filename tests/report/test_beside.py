@@ -10,6 +10,7 @@ from time import monotonic, sleep
 import pytest
 
 from children import python
+from once import made_once
 from pneumarm.errors import UnusableInput
 from pneumarm.report import beside
 from pneumarm.report.beside import WRITE, ReportBeside
@@ -29,6 +30,18 @@ def run(small_run: Path, tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def at_once(small_run: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The page of that run, written in one go."""
+
+    def write(folder: Path) -> None:
+        shutil.copytree(small_run, folder, dirs_exist_ok=True)
+        (folder / "report.html").unlink()
+        write_report(folder)
+
+    return (made_once(tmp_path_factory, "written_at_once", write) / "report.html").read_text()
+
+
 def written(folder: Path) -> str:
     """Return the page of the run in ``folder``, without its report there."""
     text = (folder / "report.html").read_text()
@@ -36,9 +49,7 @@ def written(folder: Path) -> str:
     return text
 
 
-def test_the_page_is_the_one_that_is_written_at_once(run: Path) -> None:
-    write_report(run)
-    at_once = written(run)
+def test_the_page_is_the_one_that_is_written_at_once(run: Path, at_once: str) -> None:
     with ReportBeside(run) as page:
         page.begin()
         for part in PARTS:
@@ -47,9 +58,7 @@ def test_the_page_is_the_one_that_is_written_at_once(run: Path) -> None:
     assert written(run) == at_once
 
 
-def test_parts_that_are_not_asked_for_are_drawn_at_the_end(run: Path) -> None:
-    write_report(run)
-    at_once = written(run)
+def test_parts_that_are_not_asked_for_are_drawn_at_the_end(run: Path, at_once: str) -> None:
     with ReportBeside(run) as page:
         page.begin()
         page.draw("learned")
@@ -57,7 +66,7 @@ def test_parts_that_are_not_asked_for_are_drawn_at_the_end(run: Path) -> None:
     assert written(run) == at_once
 
 
-def test_parts_say_what_the_whole_run_says_of_them(run: Path) -> None:
+def test_parts_say_what_the_whole_run_says_of_them(run: Path, at_once: str) -> None:
     """They are drawn before the stages that follow are done; what those add is read when the page is written."""
     results = run / "results.json"
     whole = json.loads(results.read_text())
@@ -71,9 +80,7 @@ def test_parts_say_what_the_whole_run_says_of_them(run: Path) -> None:
         yield WRITE
 
     draw(run, words())
-    beside_it = written(run)
-    write_report(run)
-    assert written(run) == beside_it
+    assert written(run) == at_once
 
 
 @pytest.mark.parametrize("script", ["exit 1", "sleep 60 & wait", "read line; exit 3"])

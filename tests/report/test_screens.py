@@ -18,6 +18,7 @@ from playwright.sync_api import Browser, Page
 from children import python
 from live.browser import PATIENCE, WIDTHS, emptiness, keep, opened_browser, smallest_text, too_wide
 from live.chromium import missing
+from once import made_once
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import Leak
 from pneumarm.checkup import diagnose, measure
@@ -28,6 +29,7 @@ from pneumarm.experiments.preparation import STORE, claim
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.sweep import arm_folder
 from pneumarm.report.checkup import checkup_page
+from pneumarm.report.files import ANALYSIS
 from pneumarm.report.run_report import run_page, write_analysis
 from pneumarm.report.sections import RunData
 from pneumarm.task import Movements
@@ -41,7 +43,15 @@ MOST_EMPTY = 0.5
 """Of a printed page that is not the last."""
 DRAWN = ("report", "report of two joints", "simulation", "check-up", "experiment")
 """Pages that begin with a picture that plays, and have others."""
-PAGES = (*DRAWN, "claims", "site")
+PAGES = {
+    "report": "report.html",
+    "report of two joints": "two.html",
+    "simulation": ANALYSIS,
+    "check-up": "checkup.html",
+    "experiment": f"laboratory/{ALL_GOALS.name}/page.html",
+    "claims": "laboratory/claims.html",
+    "site": "site/index.html",
+}
 
 FIGURES = ("reward", "actions", "switches", "episodes", "success_rate", "gain", "met", "learning success_rate")
 """Of a row of an experiment."""
@@ -50,48 +60,44 @@ FIGURES = ("reward", "actions", "switches", "episodes", "success_rate", "gain", 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return a page of each kind; the site only where what builds it is installed."""
-    folder = tmp_path_factory.mktemp("screens")
+    folder = made_once(tmp_path_factory, "screens", make_pages)
+    return {name: folder / file for name, file in PAGES.items() if (folder / file).exists()}
+
+
+def make_pages(folder: Path) -> None:
+    """Make a page of each kind in ``folder``."""
+
+    def write(name: str, page: str) -> None:
+        (folder / PAGES[name]).write_text(page, encoding="utf-8")
+
     run = builders.run(small=True)
-    (folder / "report.html").write_text(run_page(run), encoding="utf-8")
-    (folder / "two.html").write_text(run_page(two_joints()), encoding="utf-8")
+    write("report", run_page(run))
+    write("report of two joints", run_page(two_joints()))
     arm = open_arm("virtual:seed=3", 3)
     arm.faults = (Leak(joint=1, muscle=2, factor=30),)  # type: ignore[attr-defined]
     checkup = measure(arm)
-    (folder / "checkup.html").write_text(checkup_page(checkup, diagnose(checkup)), encoding="utf-8")
+    write("check-up", checkup_page(checkup, diagnose(checkup)))
+    write_analysis(folder, run.spec, builders.coverage(), builders.quality(), {})
+    make_laboratory(folder / "laboratory")
+    if (done := python("-m", "mkdocs", "build", "--site-dir", folder / "site", cwd=ROOT)).returncode:
+        assert "No module named" in done.stderr, done.stderr
+
+
+def make_laboratory(folder: Path) -> None:
+    """Make the pages of an experiment and of claims."""
     random, rows = np.random.default_rng(0), []
     for trial in ALL_GOALS.trials:
         for repeat in range(1, 5):
-            names = (
-                "reward",
-                "actions",
-                "switches",
-                "episodes",
-                "success_rate",
-                "gain",
-                "met",
-                "learning success_rate",
-            )
-            rows.append(Row("virtual:seed=1", trial, repeat, {name: random.uniform(0.5, 1) for name in names}, 0.0))
+            rows.append(Row("virtual:seed=1", trial, repeat, {name: random.uniform(0.5, 1) for name in FIGURES}, 0.0))
     table = sorted_rows(rows)
-    laboratory = folder / "laboratory"
-    (laboratory / ALL_GOALS.name).mkdir(parents=True)
-    recording = arm_folder(laboratory, table.arms[0])
+    (folder / ALL_GOALS.name).mkdir(parents=True)
+    recording = arm_folder(folder, table.arms[0])
     claim(recording, {"arm": table.arms[0]})
     with open_arm(table.arms[0]) as arm, Store.for_arm(recording / STORE, arm.spec) as store:
         collect(arm, store, 2000)
-    analysis = ALL_GOALS.analyse(table)
-    experiment = write_page(ALL_GOALS, laboratory / ALL_GOALS.name, analysis, table.runs, table.arms)
+    write_page(ALL_GOALS, folder / ALL_GOALS.name, ALL_GOALS.analyse(table), table.runs, table.arms)
     with pytest.raises(SystemExit):
-        main(["claims", "--out", str(laboratory)])
-    reports = {"report": folder / "report.html", "report of two joints": folder / "two.html"}
-    reports["simulation"] = write_analysis(folder, run.spec, builders.coverage(), builders.quality(), {})
-    found = {**reports, "check-up": folder / "checkup.html", "experiment": experiment}
-    found["claims"] = laboratory / "claims.html"
-    if (done := python("-m", "mkdocs", "build", "--site-dir", folder / "site", cwd=ROOT)).returncode == 0:
-        found["site"] = folder / "site" / "index.html"
-    else:
-        assert "No module named" in done.stderr, done.stderr
-    return found
+        main(["claims", "--out", str(folder)])
 
 
 def two_joints() -> RunData:

@@ -17,7 +17,7 @@ from pneumarm.learning.servo import ServoAgent, ServoSettings
 from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.networks.layers import weighted_sums
 
-SIZES = (44, 48, 96), (44, 48, 8), (19, 32, 8)
+SIZES = (44, 48, 64), (44, 48, 8), (19, 32, 8)
 """Inputs, outputs and samples: of a policy while it learns and while it plans, of a simulation while it plans."""
 _REPEATED = 15
 

@@ -15,6 +15,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.report import beside
 from pneumarm.report.beside import WRITE, ReportBeside
 from pneumarm.report.drawn import draw
+from pneumarm.report.files import RESULTS, SPEC
 from pneumarm.report.run_report import write_report
 from pneumarm.report.sections import PARTS
 
@@ -27,6 +28,16 @@ def run(small_run: Path, tmp_path: Path) -> Path:
     folder = tmp_path / "run"
     shutil.copytree(small_run, folder)
     (folder / "report.html").unlink()
+    return folder
+
+
+@pytest.fixture
+def bare(small_run: Path, tmp_path: Path) -> Path:
+    """A finished run of which hardly anything is left to be drawn, which takes a moment."""
+    folder = tmp_path / "bare"
+    folder.mkdir()
+    for name in (RESULTS, SPEC):
+        shutil.copy(small_run / name, folder)
     return folder
 
 
@@ -85,39 +96,39 @@ def test_parts_say_what_the_whole_run_says_of_them(run: Path, at_once: str) -> N
 
 @pytest.mark.parametrize("script", ["exit 1", "sleep 60 & wait", "read line; exit 3"])
 def test_a_process_that_fails_or_hangs_is_done_without(
-    script: str, run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    script: str, bare: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bad = tmp_path / "python"
     bad.write_text(f"#!/bin/sh\n{script}\n")
     bad.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(bad))
     monkeypatch.setattr(beside, "_PATIENCE", 0.5)
-    with ReportBeside(run) as page:
+    with ReportBeside(bare) as page:
         page.begin()
         page.write()
-    assert (run / "report.html").exists()
+    assert (bare / "report.html").exists()
     assert page._process is not None
     assert page._process.returncode != 0
 
 
-def test_one_that_cannot_begin_is_done_without(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_that_cannot_begin_is_done_without(bare: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "missing"))
-    with ReportBeside(run) as page:
+    with ReportBeside(bare) as page:
         page.begin()
         page.write()
-    assert (run / "report.html").exists()
+    assert (bare / "report.html").exists()
 
 
-def test_a_file_that_is_damaged_is_told_of_as_ever(run: Path) -> None:
-    (run / "results.json").write_text("{")
-    with ReportBeside(run) as page:
+def test_a_file_that_is_damaged_is_told_of_as_ever(bare: Path) -> None:
+    (bare / "results.json").write_text("{")
+    with ReportBeside(bare) as page:
         page.begin()
         with pytest.raises(UnusableInput, match="expected a JSON file"):
             page.write()
 
 
-def test_nothing_is_written_where_the_run_is_left_before(run: Path) -> None:
-    with ReportBeside(run) as page:
+def test_nothing_is_written_where_the_run_is_left_before(bare: Path) -> None:
+    with ReportBeside(bare) as page:
         page.begin()
     process = page._process
     assert process is not None
@@ -125,7 +136,7 @@ def test_nothing_is_written_where_the_run_is_left_before(run: Path) -> None:
     while process.poll() is None and monotonic() - began < PATIENCE:
         sleep(0.05)
     assert process.returncode is not None
-    assert not (run / "report.html").exists()
+    assert not (bare / "report.html").exists()
 
 
 def test_what_a_run_needs_draws_nothing() -> None:

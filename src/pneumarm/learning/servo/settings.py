@@ -23,7 +23,7 @@ class ServoSettings(TaskSettings):
     """Agents trained at once from different weights, of which the best is kept; one a core takes no longer."""
     updates: int = 1000
     """How often movements are made and learned from."""
-    arms: int = 96
+    arms: int = 64
     """Simulated arms that move at once."""
     duration: float = 1.7
     """Length of a movement in simulation, through which the gradient goes [s]."""

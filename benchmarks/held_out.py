@@ -40,7 +40,9 @@ def measure() -> Iterator[str]:
     if each := [results["settle"] for results in found if results["settle"]]:
         settled, rest = (float(np.mean([one[key] for one in each])) for key in ("settled", "rest_error_deg"))
         lowest = min(one["settled"] for one in each)
-        yield f"{'mean of all':28}{'adapted':12}settles at {settled:.4f} (lowest {lowest:.3f}), rests {rest:.2f}° off"
+        median = np.mean([one["median_seconds"] or math.nan for one in each])
+        said = f"settles at {settled:.4f} (lowest {lowest:.3f}), half within {median:.2f} s, rests {rest:.2f}° off"
+        yield f"{'mean of all':28}{'adapted':12}{said}"
     seconds = [sum(results["wall_seconds"].values()) for results in found]
     yield f"seconds a run: {min(seconds):.0f} to {max(seconds):.0f}"
 

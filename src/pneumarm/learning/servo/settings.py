@@ -92,7 +92,7 @@ class ServoSettings(TaskSettings):
             or "1 to 8 layers of 1 to 1,024 units",
             "preview": (1 <= len(self.preview) <= 64 and all(0 < ahead <= 10 for ahead in self.preview))
             or "1 to 64 times above 0 and up to 10 s",
-            "tolerance": 0 < self.tolerance < math.inf or "above 0",
+            "tolerance": 0 < self.tolerance < math.inf or "above 0 degrees",
             "precision": 0 < self.precision < math.inf or "above 0",
             "flat": 0 <= self.flat < math.inf or "0 or more",
             "far": 0 <= self.far < math.inf or "0 or more",
@@ -104,7 +104,7 @@ class ServoSettings(TaskSettings):
             "coarse": self.coarse is None or 0 <= self.coarse <= 0.5 or "0 to 0.5 periods",
             "known": 0 <= self.known <= 1 or "0 to 1",
             "reading_noise": 0 <= self.reading_noise < math.inf or "0 or more",
-            "quiet": 0 <= self.quiet <= self.alert or "0 to alert",
+            "quiet": 0 <= self.quiet <= self.alert or "0 or more, and at most alert",
             "alert": 0 <= self.alert < math.inf or "0 or more",
             "planned": 0 <= self.planned <= 10_000 or "0 to 10,000",
             "ways": all(0 <= error < math.inf for error in self.ways) or "0 or more each",

@@ -20,6 +20,7 @@ import numpy as np
 
 from benchmarks import _environment as environment
 from pneumarm.arm.open import names_in
+from pneumarm.errors import PneumarmError, UnusableInput
 
 ARMS = ",".join(f"virtual:seed={seed}" for seed in range(1001, 1011))
 HEADER = f"{'arm':28}{'':12}{'reward':>18}{'success':>22}{'actions':>9}{'switches':>9}"
@@ -51,7 +52,10 @@ def run(arm: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pneumarm.cli", "run", "--arm", arm, "--out", str(Path(folder) / "run")]
         command += ["--json", *shlex.split(environment.text("PNEUMARM_HELD_OUT", ""))]
-        done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        kind = UnusableInput if done.returncode == UnusableInput.exit_code else PneumarmError
+        raise kind(f"the run on {arm} ended with {done.returncode}; what it says of that is above")
     results: dict[str, Any] = json.loads(done.stdout)
     return results
 

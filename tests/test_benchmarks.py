@@ -209,3 +209,13 @@ def test_differences_to_the_longest_are_taken_arm_by_arm() -> None:
     left, right = minutes.curve([short, longest]).axes
     assert [label.get_text() for label in left.get_xticklabels()] == ["5", "110"]
     np.testing.assert_allclose(right.lines[-1].get_ydata(), [1, 1])  # percent failed
+
+
+def test_a_run_that_a_benchmark_makes_and_that_is_refused_is_told_in_lines(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PNEUMARM_HELD_OUT_ARMS", "virtual:seed=x")
+    assert main(["held_out"]) == 2
+    told = capfd.readouterr().err
+    assert "Traceback" not in told
+    assert told.splitlines()[-1].startswith("pneumarm: the run on virtual:seed=x ended with 2")

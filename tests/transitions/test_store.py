@@ -16,7 +16,8 @@ from stand_ins import make_recorded
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.transitions import Recorded, Store
+from pneumarm.transitions import Recorded, Store, lock
+from pneumarm.transitions.lock import WriterLock
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.rows import joined
 
@@ -249,6 +250,25 @@ def test_a_second_writer_is_refused_by_name(path, recorded, python):
             Store.append_to(path)
     assert python(script, path).returncode == 0
     assert not path.with_name(path.name + "-writer").exists()
+
+
+def test_a_lock_whose_file_was_removed_while_it_was_taken_is_no_lock(path, monkeypatch):
+    """The holder before us removes it between our opening and our locking; whoever comes next makes another one."""
+    take, before = lock.lock_descriptor, path.with_name(path.name + "-writer")
+
+    def taken(file, blocking):
+        before.unlink()
+        monkeypatch.setattr(lock, "lock_descriptor", take)
+        return take(file, blocking=blocking)
+
+    monkeypatch.setattr(lock, "lock_descriptor", taken)
+    mine = WriterLock(path)
+    assert before.exists()
+    with pytest.raises(UnusableInput, match="is writing to it"):
+        WriterLock(path)
+    mine.release()
+    WriterLock(path).release()
+    assert not before.exists()
 
 
 def test_a_place_that_is_taken_or_missing_is_refused(path, tmp_path):

@@ -186,7 +186,9 @@ def test_an_exchange_says_its_valves_twice() -> None:
 def test_a_pulse_s_values_are_summed_up() -> None:
     """With its right CRC, a payload that differs from its sum in any bit, or in the order of its bytes, is none."""
     good = wire.layout("PULSE").pack(*summed(7, wire.valves("OUT", "IN"), 300, 400, 0, 0))
-    payloads = [bytes(b ^ (at == place) << bit for at, b in enumerate(good)) for place in range(12) for bit in range(8)]
+    payloads = [
+        bytes(b ^ (at == place) << bit for at, b in enumerate(good)) for place in range(12) for bit in range(8)
+    ]
     payloads += [good[:2] + good[4:6] + good[2:4] + good[6:], good[1::-1] + good[2:], good]
     taken = []
     for payload in payloads:

@@ -82,9 +82,7 @@ class Wired:
         return all(valve == -1 for joint in self.applied for valve in joint)
 
 
-def wired(
-    seed: int = 1, period: float = 1 / 30, version: int = VERSION, cut_off: float | None = None
-) -> Wired:
+def wired(seed: int = 1, period: float = 1 / 30, version: int = VERSION, cut_off: float | None = None) -> Wired:
     muscles = WatchedArm(seed)
     board = EmulatedBoard(muscles, version)
     line = WatchedLine(board, muscles)

@@ -1,7 +1,7 @@
 """Change the program in one place at a time, and see that the tests named for it fail: `make mutants`.
 
-The list is ``mutants.toml`` beside this file. Each mutant replaces a snippet, found exactly once in its file, in a copy
-of the project, and its tests, which pass without the change, have to fail with it. What was found is kept in
+The list is ``mutants.toml`` beside this file. Each mutant replaces a snippet, found exactly once in its file, in a
+copy of the project, and its tests, which pass without the change, have to fail with it. What was found is kept in
 ``.mutants``, with what it was found for: the sources, the tests and the mutant. A second call goes on from there.
 
 Ends with 0 where every mutant is killed, with 1 where one survives, and with 2 where the list itself is wrong. Where
@@ -33,7 +33,9 @@ TOO_LONG = 900
 """Tests of a mutant that run for so long [s] hang; a change that makes them hang is none for this list."""
 NOT_COPIED = (".*", "__pycache__", "runs", "site", "build", "node_modules", "*.egg-info", "*.db*")
 
-Outcome = Literal["killed", "survived", "not run", "wrong"]
+Outcome = Literal["wrong", "survived", "not run", "killed"]
+OUTCOMES: tuple[Outcome, ...] = ("wrong", "survived", "not run", "killed")
+"""The worst first."""
 
 
 class ListError(Exception):
@@ -97,8 +99,7 @@ def _wrong_with(root: Path, mutant: Mutant, tests: str) -> Iterable[str]:
         yield "no tests are named"
     for test in mutant.tests:
         path, _, name = test.partition("::")
-        function = name.partition("[")[0]
-        if not (root / path).is_file() or (f"def {function}(" not in tests and function):
+        if not (root / path).is_file() or f"def {name.partition('[')[0]}(" not in tests:
             yield f"there is no test {test}"
 
 
@@ -191,15 +192,14 @@ class Tree:
         place = self._place
         report = place.with_name(f"{place.name}.xml")
         report.unlink(missing_ok=True)
-        command = [sys.executable, "-m", "pytest", *tests, *options, "-q", "-p", "no:cacheprovider", "--tb=short"]
-        if "xdist" in sys.modules or _is_there("xdist"):
-            command += ["-p", "no:xdist"]
+        quiet = ["-q", "--tb=short", "-p", "no:cacheprovider", "-p", "no:xdist"]
+        command = [sys.executable, "-m", "pytest", *tests, *options, *quiet, f"--junitxml={report}"]
         paths = os.pathsep.join(str(one) for one in (place / "src", place / "tests", place))
         environment = os.environ | {"PYTHONPATH": paths, "PNEUMARM_CACHE": str(kernels)} | more
         began = perf_counter()
         try:
             done = subprocess.run(
-                [*command, f"--junitxml={report}"],
+                command,
                 cwd=place,
                 env=environment,
                 stdin=subprocess.DEVNULL,
@@ -214,12 +214,6 @@ class Tree:
             return Ran(-1, "", [], perf_counter() - began)
         cases = _cases(report) if report.exists() else []
         return Ran(done.returncode, done.stdout, cases, perf_counter() - began)
-
-
-def _is_there(module: str) -> bool:
-    from importlib.util import find_spec
-
-    return find_spec(module) is not None
 
 
 class Case(NamedTuple):
@@ -360,13 +354,9 @@ class Hunt:
                 self._places.append(place)
 
     def _one(self, tree: Tree, mutant: Mutant, before: dict[str, Found], progress: Progress) -> Found:
-        useless = [before[test] for test in mutant.tests if before[test].outcome != "killed"]
-        wrong = [one for one in useless if one.outcome == "wrong"]
-        found = (
-            (wrong or useless)[0]
-            if wrong or len(useless) == len(mutant.tests)
-            else tree.run_with(mutant).with_change()
-        )
+        tests = sorted((before[test] for test in mutant.tests), key=lambda one: OUTCOMES.index(one.outcome))
+        usable = tests[0].outcome != "wrong" and tests[-1].outcome == "killed"
+        found = tree.run_with(mutant).with_change() if usable else tests[0]
         self._results.keep(mutant.name, asdict(mutant), found)
         progress.done(mutant.name, found.outcome, found)
         return found
@@ -374,10 +364,8 @@ class Hunt:
 
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
     """Run the mutants that are asked for; return 0 where all are killed."""
-    parser = argparse.ArgumentParser(description="Change the program in one place at a time; its tests have to fail.")
-    parser.add_argument(
-        "--only", metavar="NAME", action="append", help="a mutant, or all of a package; again for more"
-    )
+    parser = argparse.ArgumentParser(description="Change the program in one place at a time: its tests must fail.")
+    parser.add_argument("--only", metavar="NAME", action="append", help="a mutant, or a package; again for more")
     parser.add_argument("--list", action="store_true", help="say which there are, and run nothing")
     parser.add_argument("--workers", type=int, default=min(os.cpu_count() or 1, 2), help="so many at a time")
     options = parser.parse_args(arguments)
@@ -401,13 +389,11 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
     for mutant in mutants:
         one = found[mutant.name]
         if one.outcome == "survived":
-            tests = ", ".join(mutant.tests)
-            print(
-                f"SURVIVED {mutant.name}: {mutant.file}, {mutant.snippet!r} -> {mutant.replacement!r}; pass: {tests}"
-            )
+            change = f"{mutant.file}, {mutant.snippet!r} -> {mutant.replacement!r}"
+            print(f"SURVIVED {mutant.name}: {change}; pass: {', '.join(mutant.tests)}")
         elif one.outcome != "killed":
             print(f"{one.outcome.upper()} {mutant.name}: {one.words}")
-    said = ", ".join(f"{counts[outcome]} {outcome}" for outcome in ("killed", "survived", "not run", "wrong"))
+    said = ", ".join(f"{counts[outcome]} {outcome}" for outcome in reversed(OUTCOMES))
     print(f"{len(found)} mutants: {said}; {(monotonic() - began) / 60:.1f} min")
     return 2 if counts["wrong"] else 1 if counts["survived"] else 0
 

@@ -189,6 +189,17 @@ def test_pulses_count_as_inflation_too_and_venting_ends_it(smallest_arm):
     assert arm.valves == OPEN
 
 
+@pytest.mark.parametrize(("vented", "free"), [(0.15, 0), (0.25, 1)])
+def test_an_inlet_that_was_open_for_too_long_is_vented_for_a_tenth_of_that(smallest_arm, vented, free):
+    arm = smallest_arm(max_inflation=2.0, max_pressure=1e6)
+    safe = GuardedArm(arm)
+    for valve, seconds in ((1, 2.1), (-1, vented), (1, 0.0)):
+        safe.read()
+        safe.set_valves([[valve, 0]])
+        arm.wait(seconds)
+    assert arm.valves == [[free, 0]]
+
+
 @pytest.mark.parametrize("how", ["wait", "wait_until"])
 def test_long_waits_keep_to_pressure_and_time(smallest_arm, how):
     for limits, opened in (({"max_pressure": 0.5}, 0.5), ({"max_inflation": 2.0, "max_pressure": 1e6}, 2.0)):

@@ -232,6 +232,14 @@ def test_at_an_end_of_the_angle_nothing_pushes_further_out(smallest_arm):
     assert arm.valves == [[1, -1]] * 3
 
 
+def test_a_muscle_that_is_not_there_is_given_nothing(smallest_arm):
+    arm = smallest_arm(joints=2, muscles=1)
+    safe = GuardedArm(arm)
+    for command, applied in (([[1, 1], [-1, -1]], [[1, 0], [-1, 0]]), ([[0.5, 0.5], [1.0, -0.5]], [[1, 0], [1, 0]])):
+        safe.decide(np.array(command))
+        assert arm.valves == applied
+
+
 def test_interventions_are_counted_apart_and_can_be_told():
     first, second = Interventions(pressure=3, late=1), Interventions(pressure=1, vented=2)
     assert (first + second) - second == first

@@ -259,6 +259,14 @@ def test_board_that_restarts(w: Wired, cause: Cause, words: str) -> None:
     assert w.applied == [[1, 1]]
 
 
+def test_closing_vents_at_once_and_disarms(w: Wired) -> None:
+    in_motion(w)
+    known = len(w.muscles.set)
+    w.arm.close()
+    assert w.muscles.set[known][1] == [[-1, -1]]
+    assert not w.board.armed
+
+
 def test_controller_that_hangs(w: Wired) -> None:
     in_motion(w)
     hung = w.line.now()

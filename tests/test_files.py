@@ -158,6 +158,7 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
     with pytest.raises(ZeroDivisionError):
         fail_halfway()
     assert path.read_text() == "before"
+    assert [p.name for p in tmp_path.iterdir()] == ["it.txt"]
     write_text(path, "after ä")
     assert path.read_text(encoding="utf-8") == "after ä"
     assert [p.name for p in tmp_path.iterdir()] == ["it.txt"]

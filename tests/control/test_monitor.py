@@ -283,6 +283,31 @@ def test_an_angle_that_is_swept_onto_a_rail_is_no_broken_wire():
     assert (found.kind, found.since) == ("dead-potentiometer", pytest.approx(2 / 30))
 
 
+def see_angles(monitor, angles, begin=0):
+    """Let ``monitor`` see closed valves, steady pressures and ``angles``, from the period ``begin`` on."""
+    for k, angle in enumerate(angles, begin):
+        monitor.see(Reading(k / 30, np.array([angle], float), np.full((1, 2), 50.0)), np.zeros((1, 2), np.int8))
+
+
+def test_readings_that_jump_to_a_rail_and_back_are_no_broken_wire():
+    monitor = Monitor(VirtualArm().spec)
+    see_angles(monitor, [600, 610, 0, 0, 610, 0, 0, 620, 1023, 1023, 600])
+    assert monitor.findings == []
+
+
+def test_what_was_found_is_there_again_with_its_state():
+    arm = VirtualArm()
+    first, other = Monitor(arm.spec), Monitor(arm.spec)
+    see_angles(first, [600, 610, 0, 0, 0, 0])
+    other.set_state(first.get_state())
+    assert other.findings == first.findings == first.now == other.now
+    for monitor in (first, other):
+        see_angles(monitor, [600, 605, 610], begin=6)
+    (over,) = other.findings
+    assert (over.kind, over.until) == ("dead-potentiometer", pytest.approx(6 / 30))
+    assert other.findings == first.findings
+
+
 def test_hypotheses_are_told_apart_for_any_number_of_joints():
     for joints in (1, 2, 3):
         names, readings = hypotheses(joints)
@@ -301,11 +326,19 @@ def test_what_is_found_has_one_name_also_where_two_hypotheses_share_it():
     off = [h for h, name in enumerate(names) if name[1:] == (DRAINS, 1)]
     torn = names.index(("torn-hose", "it loses its air, as if its hose were torn", 1))
     assert len(off) == 2
-    for now, scores in enumerate([(18.0, 6.0, 0.0), (18.0, 6.0, 15.0), (18.0, 6.0, 26.0), (26.0, 6.0, 18.0)]):
+    scored = [
+        (18.0, 6.0, 0.0),
+        (18.0, 6.0, 15.0),
+        (18.0, 6.0, 21.0),
+        (18.0, 6.0, 26.0),
+        (26.0, 6.0, 23.0),
+        (27.0, 6.0, 18.0),
+    ]
+    for now, scores in enumerate(scored):
         monitor._memory.score[[*off, torn]] = scores
         monitor._decide(float(now))
         (found,) = monitor.findings
-        assert (found.kind, found.until) == ("torn-hose" if now == 2 else "stuck-valve", None)
+        assert (found.kind, found.until) == ("torn-hose" if now in (3, 4) else "stuck-valve", None)
 
 
 def test_marks_are_the_rows_from_since_to_until():

@@ -295,6 +295,17 @@ def test_readings_that_jump_to_a_rail_and_back_are_no_broken_wire():
     assert monitor.findings == []
 
 
+def test_what_spoils_readings_is_told_while_it_lasts_by_a_monitor_that_stops():
+    stops, warns = (Monitor(VirtualArm().spec, mode=mode) for mode in ("stop", "warn"))
+    for monitor in (stops, warns):
+        see_angles(monitor, [600, 610, 0, 0, 0, 0])
+    since, what = stops.spoiled_since()
+    assert (since, warns.spoiled_since()) == (pytest.approx(2 / 30), None)
+    assert what.startswith("dead potentiometer: joint 1")
+    see_angles(stops, [600, 605], begin=6)
+    assert stops.spoiled_since() is None
+
+
 def test_what_was_found_is_there_again_with_its_state():
     arm = VirtualArm()
     first, other = Monitor(arm.spec), Monitor(arm.spec)

@@ -269,24 +269,20 @@ def test_an_arm_that_has_changed_is_not_complained_of_once_it_is_adapted_to(simu
         Monitor(arm.spec).judge_by(simulation)
 
 
-def test_an_angle_that_is_swept_onto_a_rail_is_no_broken_wire():
-    arm = VirtualArm()
-    monitor = Monitor(arm.spec)
-    angles = [600, 800, 1000, 1023, 1023, 1023, 1023, 1023]
-    for k, angle in enumerate(angles):
-        monitor.see(Reading(k / 30, np.array([angle], float), np.full((1, 2), 50.0)), np.zeros((1, 2), np.int8))
-    assert monitor.findings == []
-    monitor = Monitor(arm.spec)
-    for k, angle in enumerate([600, 610, 0, 0, 0]):
-        monitor.see(Reading(k / 30, np.array([angle], float), np.full((1, 2), 50.0)), np.zeros((1, 2), np.int8))
-    (found,) = monitor.findings
-    assert (found.kind, found.since) == ("dead-potentiometer", pytest.approx(2 / 30))
-
-
 def see_angles(monitor, angles, begin=0):
     """Let ``monitor`` see closed valves, steady pressures and ``angles``, from the period ``begin`` on."""
     for k, angle in enumerate(angles, begin):
         monitor.see(Reading(k / 30, np.array([angle], float), np.full((1, 2), 50.0)), np.zeros((1, 2), np.int8))
+
+
+@pytest.mark.parametrize("angles", [[600, 800, 1000], [50, 350, 650]])
+def test_an_angle_that_is_swept_onto_a_rail_is_no_broken_wire(angles):
+    swept, jumped = Monitor(VirtualArm().spec), Monitor(VirtualArm().spec)
+    see_angles(swept, [*angles, 1023, 1023, 1023, 1023, 1023])
+    assert swept.findings == []
+    see_angles(jumped, [600, 610, 0, 0, 0])
+    (found,) = jumped.findings
+    assert (found.kind, found.since) == ("dead-potentiometer", pytest.approx(2 / 30))
 
 
 def test_readings_that_jump_to_a_rail_and_back_are_no_broken_wire():

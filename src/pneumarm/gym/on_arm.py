@@ -62,7 +62,8 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
         """
         chosen = chosen_goal(options, self.arm.spec, self._goals)
         super().reset(seed=seed)
-        drawn = self.np_random.uniform(*self._goals.T)
+        low, high = self._goals.T
+        drawn = self.np_random.uniform(low, high)
         self._goal = goal = drawn if chosen is None else chosen
         reading = self._turns.begin(self.np_random, fresh=seed is not None)
         self._over, self._tally = False, Tally(self._task, self.arm.spec)

@@ -49,7 +49,7 @@ class PlayFigures:
     def __init__(self) -> None:
         self.by_controller: dict[str, Goals] = {}
         self._since: float | None = None  # when the goal was given that is counted; None while none is
-        self._seen: list[tuple[float, NDArray[np.float64]]] = []  # times [s] and errors (joints,) [degrees] since then
+        self._seen: list[tuple[float, NDArray[np.float64]]] = []  # times [s], errors (joints,) [degrees]
         self._curve: tuple[float, int] | None = None  # sum of squares, number
 
     def of(self, controller: str) -> Goals:

@@ -122,8 +122,9 @@ def measure_moving_bound(
 def _settling(errors: list[Array], period: float, last: int, tolerance: float) -> dict[str, float | None]:
     """Return the figures of movements with ``errors`` (steps, joints) in tolerances, one a period."""
     sizes = [np.abs(error).max(axis=1) for error in errors]
-    times = [settled_at(period * np.arange(1, len(one) + 1), one, 1.0, MoveSettings.dwell) for one in errors]
-    settled = [time for time in times if time is not None]
+    times = [period * np.arange(1, len(one) + 1, dtype=np.float64) for one in errors]
+    found = [settled_at(*one, 1.0, MoveSettings.dwell) for one in zip(times, errors, strict=True)]
+    settled = [time for time in found if time is not None]
     return {
         "settled": len(settled) / len(errors),
         "median_seconds": float(np.median(settled)) if settled else None,

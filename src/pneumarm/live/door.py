@@ -31,6 +31,11 @@ class Door:
 
     async def open(self, listening: socket.socket, protocol: Callable[[], asyncio.Protocol]) -> None:
         """Take in what comes to the socket ``listening``, each with a ``protocol`` of its own, until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._close_silent())
+            await self._accept(listening, protocol)
+
+    async def _accept(self, listening: socket.socket, protocol: Callable[[], asyncio.Protocol]) -> None:
         loop = asyncio.get_running_loop()
         while True:
             try:
@@ -48,8 +53,7 @@ class Door:
             if len(self._waiting) > _MOST:
                 self._close_longest_silent()
 
-    async def close_silent(self) -> None:
-        """Close those that are silent for too long, until cancelled."""
+    async def _close_silent(self) -> None:
         while True:
             await asyncio.sleep(_LOOK)
             latest = asyncio.get_running_loop().time() - _SILENT

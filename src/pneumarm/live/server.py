@@ -11,6 +11,7 @@ import socket
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib.resources import files
 from types import FrameType
 from urllib.parse import urlsplit
@@ -89,7 +90,9 @@ class Server:
         )
         self._serving = serving = _Uvicorn(config, self.rig, self._door, self._socket, opened)
         with _closing(self._socket):
-            if not _in_a_loop():
+            try:
+                asyncio.get_running_loop()
+            except RuntimeError:
                 serving.run(sockets=[])
                 return
             with ThreadPoolExecutor(1) as beside:  # a notebook has a loop of its own in this thread
@@ -199,29 +202,21 @@ class _Uvicorn(uvicorn.Server):
     ) -> None:
         super().__init__(config)
         self._rig, self._door, self._listening, self._opened = rig, door, listening, opened
-        self._tasks: list[asyncio.Task[None]] = []
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Begin to serve what comes through the door."""
         await super().startup(sockets)
         self._listening.listen(_QUEUE)
         self._listening.setblocking(False)
-        self._tasks = [
-            asyncio.create_task(self._door.open(self._listening, self._protocol)),
-            asyncio.create_task(self._door.close_silent()),
-        ]
+        kind = self.config.http_protocol_class
+        given = {"config": self.config, "server_state": self.server_state, "app_state": self.lifespan.state}
+        self._task = asyncio.create_task(self._door.open(self._listening, partial(kind, **given)))
         self._opened()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Take in nobody more, and end."""
-        for task in self._tasks:
-            task.cancel()
+        self._task.cancel()
         await super().shutdown(sockets)
-
-    def _protocol(self) -> asyncio.Protocol:
-        return self.config.http_protocol_class(  # type: ignore[call-arg]
-            config=self.config, server_state=self.server_state, app_state=self.lifespan.state
-        )
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Take a signal to end."""
@@ -251,14 +246,6 @@ def _bound(host: str, port: int) -> socket.socket:
             "--host or --port"
         ) from error
     return bound
-
-
-def _in_a_loop() -> bool:
-    """Whether a loop runs in this thread already, beside which none can be run here."""
-    with suppress(RuntimeError):
-        asyncio.get_running_loop()
-        return True
-    return False
 
 
 def _own_address() -> str:

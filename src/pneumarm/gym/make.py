@@ -84,7 +84,7 @@ def point_to_point(
     ## Starting State
     At rest with closed valves: in a simulation one of the recorded resting states; on an arm all muscles are vented
     for 2 s, inflated for up to 1.5 s each, and closed for 1 s (section 5.5). The goal is uniform in the range of
-    goals, or ``reset(options={"goal": [counts]})``.
+    goals, or ``reset(options={"goal": [counts]})`` or ``{"goal_deg": [degrees]}``.
 
     ## Episode End
     Termination: every joint is within 25 counts of its goal and not faster than 1 count/ms (eq. 5.1, 5.2), judged

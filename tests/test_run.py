@@ -133,8 +133,8 @@ def test_nothing_is_left_behind_by_settings_that_cannot_be_used(tmp_path: Path) 
         replace(SMALL, transitions=100)
     with pytest.raises(UnusableInput, match="1 joint"):
         Run(tmp_path / "run", replace(SMALL, joints=2)).do()
-    with pytest.raises(UnusableInput, match="does not exist"):
-        Run(tmp_path / "no" / "run", SMALL)
+    with pytest.raises(UnusableInput, match="expected virtual"):
+        Run(tmp_path / "new" / "run", replace(SMALL, arm="wirtual")).do()
     assert not list(tmp_path.iterdir())
 
 

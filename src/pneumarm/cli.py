@@ -242,9 +242,10 @@ def _run(arguments: list[str]) -> int:
     except KeyboardInterrupt as error:
         complain(_interrupted(arguments, str(error)))
         return getattr(error, "exit_code", 128 + signal.SIGINT)
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 1
+    except (BrokenPipeError, SystemExit) as error:
+        if not isinstance(error, BrokenPipeError) and not isinstance(error.__context__, BrokenPipeError):
+            raise  # of anything but Rich, which makes that of a broken pipe
+        return _with_nobody_to_read()
     except Exception as error:
         if os.environ.get("PNEUMARM_DEBUG"):
             raise
@@ -256,6 +257,15 @@ def _run(arguments: list[str]) -> int:
             complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
         return 1
     return 0
+
+
+def _with_nobody_to_read() -> int:
+    """Have what is still to be printed go nowhere; return what a shell reports of a program that SIGPIPE ended."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(nowhere, stream.fileno())
+    return 128 + getattr(signal, "SIGPIPE", 13)  # Windows has none
 
 
 def _too_many(error: UnusedCliTokensError) -> str:

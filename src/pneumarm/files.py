@@ -67,6 +67,23 @@ def require_folder(path: Path) -> None:
         raise UnusableInput(f"{path}: the folder {path.parent} does not exist; create it first")
 
 
+def require_output(folder: Path) -> None:
+    """Raise UnusableInput where ``folder`` is none and cannot be made, before hours go into its content."""
+    nearest = next((one for one in (folder, *folder.parents) if one.exists()), folder)
+    if not nearest.is_dir():
+        raise UnusableInput(f"{folder}: {nearest} is a file; give a folder")
+    if not os.access(nearest, os.W_OK):
+        raise UnusableInput(f"{folder}: the folder {nearest} may not be written to; give another")
+
+
+def make_folder(folder: Path) -> None:
+    """Make ``folder``, which is itself what is written, with its parents; it may exist already."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _not_written(folder, error) from error
+
+
 @contextmanager
 def folder_written_whole(folder: Path) -> Iterator[Path]:
     """Give a folder to write into, which gets the name ``folder`` when all is in it, and is removed otherwise.
@@ -76,9 +93,9 @@ def folder_written_whole(folder: Path) -> Iterator[Path]:
         PneumarmError: the disk is full or broken.
 
     """
-    require_folder(folder)
     if folder.exists():
         raise UnusableInput(f"{folder}: exists already; give a folder that does not")
+    make_folder(folder.parent)
     temporary = folder.absolute().with_name(f".{folder.name}.part")
     shutil.rmtree(temporary, ignore_errors=True)
     try:

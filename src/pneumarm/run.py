@@ -26,7 +26,7 @@ from pneumarm.control.monitor import Mode
 from pneumarm.control.transfer import monitor_of
 from pneumarm.control.versions import ADAPTED, TRAINED
 from pneumarm.errors import UnusableInput
-from pneumarm.files import require_folder, write_json
+from pneumarm.files import make_folder, require_output, write_json
 from pneumarm.learning import (
     LOOKING_AHEAD,
     LearnSettings,
@@ -175,7 +175,7 @@ class Run:
 
     def _claim(self) -> None:
         folder, wanted = self.folder, self._wanted
-        require_folder(folder)
+        require_output(folder)
         file = folder / SETTINGS
         if file.exists():
             found = _read_json(file)
@@ -188,8 +188,6 @@ class Run:
                 self.results = _read_json(self._results_file)
         elif folder.is_dir() and any(folder.iterdir()):
             raise UnusableInput(f"{folder}: is not empty and holds no run; give another folder")
-        elif folder.exists() and not folder.is_dir():
-            raise UnusableInput(f"{folder}: is a file; give a folder")
 
     @property
     def _results_file(self) -> Path:
@@ -245,7 +243,7 @@ class Run:
             self._rehearse(shape)
         if not (self.folder / SETTINGS).exists():
             open_arm_checked(self.settings).close()
-            self.folder.mkdir(exist_ok=True)
+            make_folder(self.folder)
             write_json(self.folder / SETTINGS, self._wanted)
 
     def numbered(self, title: str) -> str:

@@ -28,7 +28,7 @@ import math
 import weakref
 from contextlib import suppress
 from dataclasses import astuple, dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -150,6 +150,19 @@ class GuardedArm(Arm):
         self.watchdog = Watchdog(self)
         """Looks after a decision while it is out."""
         _open_arms[id(arm)] = arm
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy takes up, with the state of the arm behind; an arm that has none is refused."""
+        if self.get_state() is None:
+            raise UnusableInput(
+                f"{self.spec.name} cannot be copied: only an arm that can be put into a saved state can, such as a "
+                "virtual one or a simulation, and hardware never"
+            )
+        return vars(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        _open_arms[id(self.arm)] = self.arm
 
     @property
     def interventions(self) -> Interventions:

@@ -20,7 +20,7 @@ from pneumarm.control.monitor import Mode, Monitor
 from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import ADAPTED, Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.files import require_folder
+from pneumarm.files import make_folder
 from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.settling import settled_at
@@ -470,12 +470,11 @@ def transfer_into(
     :mod:`~pneumarm.control.versions`. ``monitor`` says what is done about faults that are found meanwhile.
 
     Raises:
-        UnusableInput: the folder's parent is missing, or it holds another transfer.
+        UnusableInput: the folder cannot be written, or it holds another transfer.
 
     """
     check_fit(agent, arm)
-    require_folder(folder)
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     with Store.for_arm(folder / "transitions.db", arm.spec) as store:
         moved = transfer(
             agent,

@@ -4,7 +4,6 @@ A sequence grows in the store while the arm moves, so that a process that is kil
 thread of its own writes: no control period waits for the disk.
 """
 
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -45,10 +44,10 @@ class Recorder:
 
         def add(step: Step) -> None:
             nonlocal written, due
-            growing.new.append(step)
-            if written.done() and (now := monotonic()) >= due:
+            growing.waiting.append(step)
+            if monotonic() >= due and written.done():
                 written.result()  # raises what went wrong
-                written, due = self._writer.submit(growing.store), now + EVERY
+                written, due = self._writer.submit(growing.store), monotonic() + EVERY
 
         try:
             yield add
@@ -74,76 +73,57 @@ def recorder(
     if address is None:
         yield None
         return
-    with ThreadPoolExecutor(1, "recorder") as writer:  # which alone uses the store
-        opening = writer.submit(_opened, address, spec)
+    with ThreadPoolExecutor(1, "recorder") as writer:  # its thread alone uses the database
+        store = writer.submit(Store.for_arm, address, spec).result()
         try:
-            yield Recorder(opening.result(), writer, info or {})
+            store.check_arm(spec)
+            writer.submit(store.begin_run, "move", {}).result()
+            yield Recorder(store, writer, info or {})
         finally:
-            if opening.exception() is None:
-                writer.submit(opening.result().close).result()
-
-
-def _opened(address: StoreAddress, spec: ArmSpec) -> Store:
-    store = Store.for_arm(address, spec)
-    try:
-        store.check_arm(spec)
-        store.begin_run("move", {})
-    except BaseException:
-        store.close()
-        raise
-    return store
+            writer.submit(store.close).result()
 
 
 class _Growing:
     """A movement that is stored while it grows; where it gets too long, it goes on as another sequence."""
 
     def __init__(self, store: Store, kind: str, info: Mapping[str, Any]) -> None:
-        self.new: deque[Step] = deque()
-        """Steps that the writing thread has not taken yet."""
+        self.waiting: list[Step] = []
+        """Steps that are not stored yet, after the last one that is; the arm's thread adds, the writing one takes."""
         self._store, self._kind, self._info = store, kind, dict(info)
-        self._waiting: list[Step] = []  # what is not stored yet, after the last row that is
         self._number: int | None = None  # of the sequence; None while none of its rows is stored
-        self._before = self._step = 0  # its rows before the first in _waiting, and the step of that
+        self._before = self._step = 0  # its rows before the first that waits, and the step of that
 
     def store(self, *, ends: bool = False) -> None:
         """Store what is new; unless the movement ``ends``, a row that may be alone in the next sequence waits."""
-        while self.new:
-            self._waiting.append(self.new.popleft())
-        while self._before + len(self._waiting) > LONGEST_PART + 1:
+        while self._before + len(self.waiting) > LONGEST_PART + 1:
             self._write(LONGEST_PART - self._before)
-            del self._waiting[0]
+            del self.waiting[0]
             self._number, self._before, self._step = None, 0, 0
-        rows = len(self._waiting)
+        rows = len(self.waiting)
         self._write(rows if ends else min(rows, LONGEST_PART - self._before))
 
     def end(self, why: BaseException | None = None) -> None:
         """Store the rest, and mark the last row where the movement broke off, with ``why``."""
         try:
             self.store(ends=True)
-        except Exception as error:
-            why = why or error
-            raise
         finally:
             if why is not None and self._number is not None:
                 self._store.mark(self._number, [broken_at(self._step, why)])
 
     def _write(self, rows: int) -> None:
         """Store the first ``rows`` of those that wait; where one of them cannot be stored, those before it."""
-        try:
-            self._write_together(rows)
-        except UnusableInput:
-            for _ in range(rows - 1):
-                self._write_together(2)
-            raise
-
-    def _write_together(self, rows: int) -> None:
         if rows < 2:  # nothing is new, or nothing to learn from
             return
-        part = Recorded.from_steps(self._waiting[:rows], self._store.spec, kind=self._kind, info=self._info)
-        if self._number is None:
-            self._number = self._store.append(part)
-            self._info.setdefault("began", float(part.time[0]))  # by which what follows in other parts is placed
-        else:
-            self._store.extend(self._number, part)
-        del self._waiting[: rows - 1]
+        try:
+            part = Recorded.from_steps(self.waiting[:rows], self._store.spec, kind=self._kind, info=self._info)
+            if self._number is None:
+                self._number = self._store.append(part)
+                self._info.setdefault("began", float(part.time[0]))  # by which what follows in other parts is placed
+            else:
+                self._store.extend(self._number, part)
+        except UnusableInput:
+            for _ in range(rows - 1 if rows > 2 else 0):
+                self._write(2)
+            raise
+        del self.waiting[: rows - 1]
         self._before, self._step = self._before + rows - 1, self._step + int(part.step[-1])

@@ -351,36 +351,29 @@ class Store:
                 database.insert("state", ("name", "value"), [(name, value)])
         return number
 
-    def extend(self, number: int, recorded: Recorded) -> None:
-        """Add to sequence ``number``, none of whose rows is marked; what was added is durable then.
+    def extend(self, number: int, more: Recorded) -> None:
+        """Add to sequence ``number``, in which nothing is marked; it is durable then.
 
-        ``recorded`` begins with the last row that is stored, with its command now; of the rest of it, rows count.
+        ``more`` begins with the last row that is stored, now with its command. Who adds sees to it that
+        the sequence does not get longer than one may be.
 
         Raises:
-            UnusableInput: the sequence does not end in that row, or would be too long; nothing was written.
+            UnusableInput: the sequence does not end in that row, or what follows is impossible; nothing was written.
             PneumarmError: as for :meth:`append`.
 
         """
-        values = row_values(recorded, self.spec, self.further, self.valves)
-        ending = (
-            'SELECT step, time, (SELECT "rows" FROM sequences WHERE number = :number) FROM "rows" '
-            "WHERE sequence = :number ORDER BY step DESC LIMIT 1"
-        )
+        values = row_values(more, self.spec, self.further, self.valves)
+        query = 'SELECT step, time FROM "rows" WHERE sequence = :number ORDER BY step DESC LIMIT 1'
         with self.writing() as database:
-            found = list(database.execute(ending, {"number": number}))
-            if not found or found[0][1] != recorded.time[0]:
+            step, time = next(iter(database.execute(query, {"number": number})), (0, None))
+            if time != more.time[0]:
                 raise UnusableInput(f"{self.address}: sequence {number} does not end where this goes on")
-            last, _, rows = found[0]
-            if (rows := rows + len(recorded) - 1) > LONGEST_SEQUENCE:
-                raise UnusableInput(f"a sequence may have {LONGEST_SEQUENCE} rows, this would have {rows}; cut it")
-            database.execute(
-                'DELETE FROM "rows" WHERE sequence = :number AND step = :last', {"number": number, "last": last}
-            )
-            self.insert_rows(np.full(len(recorded), number), recorded.step + last, values)
-            database.execute(
-                'UPDATE sequences SET "rows" = :rows, transitions = transitions + :added WHERE number = :number',
-                {"number": number, "rows": rows, "added": recorded.transitions},
-            )
+            last = {"number": number, "step": step}
+            database.execute('DELETE FROM "rows" WHERE sequence = :number AND step = :step', last)
+            self.insert_rows(np.full(len(more), number), more.step + step, values)
+            added = {"number": number, "more": len(more) - 1, "transitions": more.transitions}
+            query = 'UPDATE sequences SET "rows" = "rows" + :more, transitions = transitions + :transitions '
+            database.execute(query + "WHERE number = :number", added)
 
     def mark(self, number: int, marks: Iterable[Mark]) -> None:
         """Mark steps of sequence ``number``, so that nothing is learned from them; marks are never taken back.

@@ -136,29 +136,6 @@ def test_an_hour_is_stored_to_the_last_row(tmp_path: Path) -> None:
         assert store.transitions == rows - store.sequences
 
 
-def test_a_sequence_that_grew_is_the_one_that_was_stored_at_once(tmp_path: Path) -> None:
-    whole = followed(Counting(), None, 30).recorded
-    parts = []
-    for part in (slice(0, 10), slice(9, 11), slice(10, 30)):
-        command = whole.command[part].copy()
-        command[-1] = np.nan
-        values = {name: getattr(whole, name)[part] for name in ("time", "angle", "pressure")}
-        parts.append(replace(whole, **values, command=command, step=whole.step[part] - whole.step[part][0]))
-    with Store.create(tmp_path / "s.db", Counting().spec) as store:
-        number = store.append(parts[0])
-        for part in parts[1:]:
-            store.extend(number, part)
-        for wrong in (number, number + 1):
-            with pytest.raises(UnusableInput, match="does not end where this goes on"):
-                store.extend(wrong, parts[1])
-        store.append(whole)
-        store.check()
-        grown, at_once = (joined(store.blocks(sequences=lambda n, k=k: n == k)) for k in (1, 2))
-        assert len({(one.rows, one.transitions) for one in store.catalogue()}) == 1
-    for name in ("step", "time", "angle", "pressure", "command"):
-        np.testing.assert_array_equal(getattr(grown, name), getattr(at_once, name), err_msg=name)
-
-
 class Inline(Executor):
     """Does at once, in the calling thread, what is submitted."""
 

@@ -88,6 +88,18 @@ def reasons(path: Path) -> dict[int, tuple[int, str]]:
         return {number: (marks[-1].first, marks[-1].reason) for number, marks in store.marks().items()}
 
 
+class Inline(Executor):
+    """Does at once, in the calling thread, what is submitted."""
+
+    def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> "Future[Any]":
+        done: Future[Any] = Future()
+        try:
+            done.set_result(do(*arguments, **named))
+        except Exception as error:
+            done.set_exception(error)
+        return done
+
+
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have every step stored as soon as the writer gets to it."""
@@ -100,6 +112,7 @@ def test_parts_hold_the_same_rows_and_no_transition_across_their_joint(
     turns: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "LONGEST_PART", 50)
+    monkeypatch.setattr(module, "ThreadPoolExecutor", lambda *_: Inline())  # each row in a transaction of its own
     path = tmp_path / "parts.db"
     arm = Counting()
     with recorder(path, arm.spec) as record:
@@ -134,15 +147,6 @@ def test_an_hour_is_stored_to_the_last_row(tmp_path: Path) -> None:
             total += len(block)
         assert total == rows
         assert store.transitions == rows - store.sequences
-
-
-class Inline(Executor):
-    """Does at once, in the calling thread, what is submitted."""
-
-    def submit(self, do: Callable[..., Any], /, *arguments: Any, **named: Any) -> "Future[Any]":
-        done: Future[Any] = Future()
-        done.set_result(do(*arguments, **named))
-        return done
 
 
 def test_never_more_than_a_second_of_a_movement_is_not_durable(
@@ -270,9 +274,9 @@ def test_what_was_asked_for_is_shown_in_parts_too(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(module, "LONGEST_PART", 50)
     arm = Counting()
     arm.spec = replace(arm.spec, angle_range=(0.0, 1000.0))
-    with recorder(tmp_path / "s.db", arm.spec, {"reference": "sine:0.2Hz,10deg"}) as record:
+    with recorder(tmp_path / "s.db", arm.spec, {"reference": "sine:0.13Hz,10deg"}) as record:
         followed(arm, record, 95)
     wanted = read_shown(tmp_path / "s.db").wanted
     assert wanted is not None
     time = 0.1 * np.arange(95)
-    np.testing.assert_allclose(wanted[:, 0], 500 + 100 * np.sin(2 * np.pi * 0.2 * time), atol=1e-6)
+    np.testing.assert_allclose(wanted[:, 0], 500 + 100 * np.sin(2 * np.pi * 0.13 * time), atol=1e-6)

@@ -35,7 +35,8 @@ from pneumarm.transitions.watch import warm_up as warm_up_watch
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
 _TOGETHER = 10
-"""Movements that are stored in one transaction: at most these are made again after an interruption."""
+"""Movements that are stored in one transaction, at most those that are made again after an interruption; of an arm
+that cannot make them again every one is stored at once."""
 
 
 @dataclass(frozen=True)
@@ -281,7 +282,8 @@ class Transfer:
             self._ways = getattr(controller, "ways", ())
             self._note(phase, movement)
             self._count(phase)
-            if len(self._waiting) == _TOGETHER or number == movements - 1:
+            together = _TOGETHER if self._arm.get_state() is not None else 1
+            if len(self._waiting) >= together or number == movements - 1:
                 self._keep()
             self._judge_arm(float(movement.recorded.time[-1]))
             progress(len(self._done), total)

@@ -351,6 +351,30 @@ class Store:
                 database.insert("state", ("name", "value"), [(name, value)])
         return number
 
+    def extend(self, number: int, more: Recorded) -> None:
+        """Add to sequence ``number``, in which nothing is marked; it is durable then.
+
+        ``more`` begins with the last row that is stored, now with its command. Who adds sees to it that
+        the sequence does not get longer than one may be.
+
+        Raises:
+            UnusableInput: the sequence does not end in that row, or what follows is impossible; nothing was written.
+            PneumarmError: as for :meth:`append`.
+
+        """
+        values = row_values(more, self.spec, self.further, self.valves)
+        query = 'SELECT step, time FROM "rows" WHERE sequence = :number ORDER BY step DESC LIMIT 1'
+        with self.writing() as database:
+            step, time = next(iter(database.execute(query, {"number": number})), (0, None))
+            if time != more.time[0]:
+                raise UnusableInput(f"{self.address}: sequence {number} does not end where this goes on")
+            last = {"number": number, "step": step}
+            database.execute('DELETE FROM "rows" WHERE sequence = :number AND step = :step', last)
+            self.insert_rows(np.full(len(more), number), more.step + step, values)
+            added = {"number": number, "more": len(more) - 1, "transitions": more.transitions}
+            query = 'UPDATE sequences SET "rows" = "rows" + :more, transitions = transitions + :transitions '
+            database.execute(query + "WHERE number = :number", added)
+
     def mark(self, number: int, marks: Iterable[Mark]) -> None:
         """Mark steps of sequence ``number``, so that nothing is learned from them; marks are never taken back.
 

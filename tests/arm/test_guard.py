@@ -3,7 +3,7 @@ import pytest
 
 from children import python
 from pneumarm.arm import GuardedArm, Reading
-from pneumarm.arm.guard import HELD, MOST_REPLACED, Interventions
+from pneumarm.arm.guard import HELD, REPLACED, Interventions
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
 
@@ -110,6 +110,7 @@ def test_closing_closes_the_arm_behind(smallest_arm):
 
 
 OPEN = [[1, -1]]
+HELD_TURNS, MOST_REPLACED = round(30 * HELD), round(30 * REPLACED)
 
 
 class Hostile:
@@ -128,8 +129,8 @@ def test_a_decision_that_is_nonsense_is_held_then_vented_then_stopped(smallest_a
     safe.decide(OPEN)
     for count in range(1, MOST_REPLACED + 1):
         safe.decide(nonsense)
-        assert arm.valves == (OPEN if count <= HELD else [[-1, -1]])
-    assert safe.interventions == Interventions(nonsense=MOST_REPLACED, vented=MOST_REPLACED - HELD)
+        assert arm.valves == (OPEN if count <= HELD_TURNS else [[-1, -1]])
+    assert safe.interventions == Interventions(nonsense=MOST_REPLACED, vented=MOST_REPLACED - HELD_TURNS)
     assert safe.interventions.total == MOST_REPLACED
     with pytest.raises(ControllerFailure, match="smallest: stopped and vented"):
         safe.decide(nonsense)
@@ -140,11 +141,11 @@ def test_one_good_decision_makes_the_guard_patient_again(smallest_arm):
     arm = smallest_arm()
     safe = GuardedArm(arm)
     for _ in range(MOST_REPLACED):
-        for _ in range(HELD):
+        for _ in range(HELD_TURNS):
             safe.decide(None)
         safe.decide(OPEN)
     assert arm.valves == OPEN
-    assert safe.interventions == Interventions(nonsense=HELD * MOST_REPLACED)
+    assert safe.interventions == Interventions(nonsense=HELD_TURNS * MOST_REPLACED)
 
 
 def test_what_is_held_keeps_to_the_limits(smallest_arm):

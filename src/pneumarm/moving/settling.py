@@ -32,6 +32,8 @@ def settled_at(times: NDArray[np.float64], off: NDArray[np.float64], tolerance: 
     outside = np.zeros(len(times), bool)
     for joint in off.T:
         noise = scatter(joint[times > times[-1] - 1])
+        if not noise < math.inf:
+            return None  # numbers too large to say anything of
         if noise <= _SCATTERED * tolerance:
             outside |= np.abs(joint) > tolerance
         else:

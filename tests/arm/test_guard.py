@@ -137,6 +137,31 @@ def test_a_decision_that_is_nonsense_is_held_then_vented_then_stopped(smallest_a
     assert arm.valves == safe.applied.tolist() == [[-1, -1]]
 
 
+@pytest.mark.parametrize(("rate", "held", "most"), [(200, 20, 200), (30, 3, 30), (5, 1, 5), (0.5, 1, 1)])
+def test_decisions_are_held_and_replaced_for_times_not_for_periods(smallest_arm, rate, held, most):
+    arm = smallest_arm(period=1 / rate)
+    safe = GuardedArm(arm)
+    safe.decide(OPEN)
+    vented = []
+    for _ in range(most):
+        safe.decide(None)
+        vented.append(arm.valves == [[-1, -1]])
+    assert vented == [False] * held + [True] * (most - held)
+    with pytest.raises(ControllerFailure):
+        safe.decide(None)
+
+
+@pytest.mark.parametrize(("rate", "late"), [(200, 0.09), (30, 0.09), (200, 0.11), (30, 0.11)])
+def test_the_watchdog_holds_for_the_same_time_at_any_rate(smallest_arm, rate, late):
+    arm = smallest_arm(period=1 / rate)
+    safe = GuardedArm(arm)
+    reading = safe.read()
+    safe.decide(OPEN)
+    arm.wait(late)
+    assert safe.stand_in(reading)
+    assert (arm.valves == [[-1, -1]]) == (late > HELD)
+
+
 def test_one_good_decision_makes_the_guard_patient_again(smallest_arm):
     arm = smallest_arm()
     safe = GuardedArm(arm)

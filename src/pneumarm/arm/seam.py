@@ -385,16 +385,17 @@ class Arm(ABC):
 
 
 _FAR = 10.0
-"""By so many times its ``angle_range`` an angle may lie outside of it: potentiometers do a little, encoders that count
-on by some turns; what lies farther away no sensor says."""
+"""An angle may lie outside of ``angle_range`` by so many times its width: potentiometers do by a little, encoders
+that count on by some turns."""
 
 
 def checked(reading: Reading, spec: ArmSpec) -> Reading:
     """Return ``reading`` with float64 arrays of the right shapes; as it is where it has them already.
 
     Raises:
-        ArmFailure: a value is missing, not finite or of the wrong shape; also of the further sensors of ``spec``;
-            or an angle lies far outside ``angle_range``. An arm without pressure sensors may leave out the pressures, one with one muscle a joint those of others.
+        ArmFailure: a value is missing, not finite or of the wrong shape, also of the further sensors of ``spec``, or
+            an angle lies far outside ``angle_range``. An arm without pressure sensors may leave out the pressures,
+            one with one muscle a joint those of others.
 
     """
     try:

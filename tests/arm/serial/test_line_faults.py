@@ -53,9 +53,7 @@ def vented_after(w: Wired, begun: float) -> float:
 
 @pytest.mark.parametrize("phase", [0.0, 0.3, 0.9])
 @pytest.mark.parametrize("fault", ["unplugged", "cut"])
-def test_line_that_goes_in_an_episode(
-    w: Wired, fault: str, phase: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_line_that_goes_in_an_episode(w: Wired, fault: str, phase: float, monkeypatch: pytest.MonkeyPatch) -> None:
     in_motion(w)
     fed = w.line.now()
     w.arm.wait(phase * PERIOD)

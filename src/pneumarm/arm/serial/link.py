@@ -12,8 +12,8 @@ from pneumarm.errors import ArmFailure
 DEAD_MAN = DEAD_MAN_MS / 1e3
 """Time after which a board that hears nothing vents the arm by itself [s]."""
 GIVE_UP = 0.9 * DEAD_MAN
-"""Silence after which a link is lost [s]: just within the dead-man, which counts from the request before. A board, its
-line or this computer may be busy elsewhere for less; that is noticed after a control period, and counted."""
+"""Silence after which a link is lost [s]: just within the dead-man, which counts from the request before. Boards,
+lines and computers are busy elsewhere for less; that is noticed after a control period, and counted."""
 FEWEST = 3
 """... but never after fewer attempts: a host that was stopped itself has not listened."""
 _log = logging.getLogger("pneumarm")

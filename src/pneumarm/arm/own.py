@@ -132,7 +132,7 @@ class OwnArm(PassedOn):
             raise ArmFailure(
                 f"{self.spec.name}: {self._named}.{method} {'returned nothing usable' if returned else 'failed'}: "
                 f"{told[:_LONGEST]} ({last_line(error, self._kind.__module__) or begins}); correct its code or check "
-                "its hardware"
+                "its hardware, and run the same command again"
             ) from error
 
     def _clock_failed(self, what: str) -> ArmFailure:

@@ -5,6 +5,7 @@ import inspect
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
@@ -237,6 +238,8 @@ def _run(arguments: list[str]) -> int:
         complain(f"{error} See {' '.join(['pneumarm', *(error.command_chain or ())])} --help.")
         return 2
     except PneumarmError as error:
+        if os.environ.get("PNEUMARM_DEBUG"):
+            traceback.print_exc()
         complain(error)
         return error.exit_code
     except KeyboardInterrupt as error:

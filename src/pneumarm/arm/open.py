@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pneumarm.arm.own import last_line, owned
 from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.arm.slower import SlowerArm, usual_turns
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -251,9 +252,13 @@ def _from_python(place: str, every: str | None) -> Arm:
     """Return the arm of a user's own, controlled at ``every`` so many of its periods, the usual ones if not given."""
     if every is not None and not every.isdecimal():
         raise UnusableInput(f"arm python:{place}: expected every=1 or more of its periods, not {every!r}")
-    arm = _made_by(place)
+    arm = owned(_made_by(place))
     turns = int(every) if every is not None else usual_turns(arm.spec.period)
-    return arm if turns == 1 else SlowerArm(arm, turns)
+    try:
+        return arm if turns == 1 else SlowerArm(arm, turns)
+    except UnusableInput:
+        arm.close()
+        raise
 
 
 def _made_by(place: str) -> Arm:
@@ -267,14 +272,15 @@ def _made_by(place: str) -> Arm:
         raise UnusableInput(
             f"arm python:{place}: expected a module and a callable in it that returns an Arm; {error}"
         ) from error
-    except Exception as error:  # whatever stands in it
-        raise UnusableInput(f"arm python:{place}: {module_name} cannot be imported ({_told(error)})") from error
+    except (Exception, SystemExit) as error:  # whatever stands in it
+        told = _told(error, module_name)
+        raise UnusableInput(f"arm python:{place}: {module_name} cannot be imported ({told})") from error
     try:
         arm = made_by()
     except PneumarmError:
         raise
-    except Exception as error:  # whatever its maker's code or its hardware raises
-        raise ArmFailure(f"arm python:{place}: cannot be opened ({_told(error)})") from error
+    except (Exception, SystemExit) as error:  # whatever its maker's code or its hardware raises
+        raise ArmFailure(f"arm python:{place}: cannot be opened ({_told(error, module_name)})") from error
     if not isinstance(arm, Arm):
         raise UnusableInput(
             f"arm python:{place}: the callable must return a pneumarm.arm.Arm, it returned {type(arm).__name__}"
@@ -282,5 +288,5 @@ def _made_by(place: str) -> Arm:
     return arm
 
 
-def _told(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+def _told(error: BaseException, module: str) -> str:
+    return "; ".join(filter(None, [f"{type(error).__name__}: {error}", last_line(error, module)]))

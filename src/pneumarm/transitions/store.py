@@ -30,6 +30,7 @@ from pneumarm.transitions.database import (
     Database,
     damaged,
     further_columns,
+    kept_json,
     pages,
     row_columns,
 )
@@ -174,7 +175,8 @@ class Store:
         for number, of_run, kind, at_rest, rows, transitions, info in pages(
             self.database, "sequences", SEQUENCE[1:], where=where, values={"run": run} if where else {}
         ):
-            yield SequenceEntry(number, of_run, kind, bool(at_rest), rows, transitions, json.loads(info))
+            about = kept_json(info, self.address, f"what sequence {number} is")
+            yield SequenceEntry(number, of_run, kind, bool(at_rest), rows, transitions, about)
 
     @property
     def keeps_marks(self) -> bool:
@@ -189,7 +191,10 @@ class Store:
     def runs(self) -> dict[int, dict[str, Any]]:
         """Return for each run its purpose, settings, arm, version of pneumarm and time of its beginning."""
         found = pages(self.database, "runs", ("purpose", "metadata"))
-        return {number: {"purpose": purpose, **json.loads(metadata)} for number, purpose, metadata in found}
+        return {
+            number: {"purpose": purpose, **kept_json(metadata, self.address, f"what run {number} is")}
+            for number, purpose, metadata in found
+        }
 
     def state(self, name: str = "arm") -> bytes | None:
         """Return the state last kept under ``name``, or None."""
@@ -445,7 +450,8 @@ class Store:
         ((count, first, last, shortest, longest),) = self.database.execute(
             'SELECT count(*), min(number), max(number), min("rows"), max("rows") FROM sequences'
         )
-        if count and not (first == 1 and last == count and shortest >= 2 and longest <= LONGEST_SEQUENCE):
+        numbers = isinstance(shortest, int) and isinstance(longest, int)  # of SQLite they may be anything
+        if count and not (numbers and first == 1 and last == count and shortest >= 2 and longest <= LONGEST_SEQUENCE):
             raise damaged(self.address, "its sequences are not numbered from 1 or are of impossible lengths")
 
     def _one(self, query: str) -> Any:

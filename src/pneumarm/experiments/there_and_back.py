@@ -160,8 +160,8 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
     simulation = Simulation.load(folder / SIMULATION)
     with Store.open(folder / STORE) as store:
         begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec)
-    found = read_json(folder / _FIGURES, "figures of a recording")
-    return Prepared(arm, recipe, folder, simulation, begin, found)
+    figures = read_json(folder / _FIGURES, "figures of a recording")
+    return Prepared(arm, recipe, folder, simulation, begin, figures)
 
 
 def place(folder: Path, wanted: object) -> Path:

@@ -71,13 +71,13 @@ class EnoughData(ThereAndBack):
                 fitted.simulation.save(file)
                 figures = {"transitions": transitions, "minutes": took, "new": found.share, **judged}
                 write_json(kept, {"sequences": sequences, "figures": figures})
-            found = read_json(kept, "figures of a part of a recording")
+            known = read_json(kept, "figures of a part of a recording")
             simulation = Simulation.load(file)
             with Store.open(whole / STORE) as store:
-                first = [entry.number for entry in store.catalogue()][: found["sequences"]]
+                first = [entry.number for entry in store.catalogue()][: known["sequences"]]
                 part = store.blocks(kinds=KINDS, sequences=partial(np.isin, test_elements=first))
                 begin = begin_states(part, simulation.window, simulation.scaling, simulation.spec)
-            made.append(Prepared(arm, recipe, whole, simulation, begin, found["figures"]))
+            made.append(Prepared(arm, recipe, whole, simulation, begin, known["figures"]))
         return made
 
     def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:

@@ -2,7 +2,6 @@
 
 import os
 import shlex
-import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
@@ -210,33 +209,6 @@ def test_weights_beyond_what_can_be_computed_with_are_refused(tmp_path: Path) ->
     write_arrays(tmp_path / "agent", "pneumarm servo", {}, {"x": np.array([1e307])})
     with pytest.raises(UnusableInput, match="too large"):
         load_agent(tmp_path / "agent")
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        "UPDATE sequences SET rows = 'many'",
-        "UPDATE sequences SET info = '{'",
-        "UPDATE sequences SET info = '[1]'",
-        "UPDATE sequences SET info = x'ff'",
-        "UPDATE runs SET metadata = 'null'",
-        "UPDATE runs SET metadata = '{\"a\": ' || '" + "[" * 30_000 + "'",
-    ],
-)
-def test_a_damaged_catalogue_is_said(small_run: Path, tmp_path: Path, change: str) -> None:
-    path = tmp_path / "damaged.db"
-    with sqlite3.connect(small_run / "transitions.db") as whole, sqlite3.connect(path) as copy:
-        whole.backup(copy)
-        copy.execute("PRAGMA journal_mode = DELETE")
-        copy.execute(change)
-
-    def read() -> None:
-        with Store.open(path) as store:
-            list(store.catalogue())
-            store.runs()
-
-    with pytest.raises(UnusableInput, match="damaged"):
-        read()
 
 
 @pytest.mark.parametrize("content", ["", "null", "[]", "5", "{", "[" * 50_000, "NaN", '{"a": ' + "9" * 10_000 + "}"])

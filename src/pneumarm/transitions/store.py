@@ -24,7 +24,7 @@ from pneumarm.address import Address, ServerAddress, StoreAddress, address_of
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.extras import extra
-from pneumarm.transitions.blocks import Blocks, Predicate
+from pneumarm.transitions.blocks import STEPS, Blocks, Predicate
 from pneumarm.transitions.database import (
     LONGEST_SEQUENCE,
     Database,
@@ -45,7 +45,6 @@ BLOCK = 200_000
 
 SEQUENCE = ("number", "run", "kind", "at_rest", '"rows"', "transitions", "info")
 """Columns of the table of sequences."""
-_STEPS = 1 << 32  # more than any step of a sequence
 _ALL = (1, 1 << 62)  # the first and the last number of any sequence
 
 
@@ -235,7 +234,7 @@ class Store:
         with database.translated():
             found = list(
                 database.execute(
-                    f'SELECT marks.reason, count(DISTINCT "rows".sequence * {_STEPS} + "rows".step) FROM marks '
+                    f'SELECT marks.reason, count(DISTINCT "rows".sequence * {STEPS} + "rows".step) FROM marks '
                     "JOIN sequences ON sequences.number = marks.sequence AND sequences.run = :run "
                     'JOIN "rows" ON "rows".sequence = marks.sequence '
                     'AND "rows".step BETWEEN marks.first AND marks.last '

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
@@ -15,7 +16,7 @@ from cyclopts import App, CycloptsError, Group, Parameter, UnusedCliTokensError
 from pneumarm import __version__
 from pneumarm.commands.config_file import take_config, take_option
 from pneumarm.commands.help_pages import HELP, HELP_ALL, LOG, AllOptions, FewOptions
-from pneumarm.console import complain
+from pneumarm.console import complain, open_closed_streams
 from pneumarm.errors import PneumarmError
 from pneumarm.leaving import leave_by_exceptions
 from pneumarm.progress import LEVELS, checked_level, print_lines
@@ -164,6 +165,8 @@ RESUMED = ("run", "collect", "transfer", "experiment")
 
 _NO_BUG = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 """Of errors of the operating system: disks that are full, read-only or broken, and what is not allowed."""
+_NO_NAME = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR)
+"""... and names that no file, or no folder, can have or has."""
 
 app = App(
     name="pneumarm",
@@ -221,6 +224,9 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _run(arguments: list[str]) -> int:
     try:
+        open_closed_streams()
+        if not sys.warnoptions and "PNEUMARM_DEBUG" not in os.environ:
+            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's, which are not for whoever calls a command
         leave_by_exceptions()
         arguments, level = take_option(arguments, LOG, "one of " + ", ".join(LEVELS))
         print_lines(checked_level(level))
@@ -252,8 +258,10 @@ def _run(arguments: list[str]) -> int:
     except Exception as error:
         if os.environ.get("PNEUMARM_DEBUG"):
             raise
-        if isinstance(error, OSError) and error.errno in _NO_BUG:
-            complain(f"{f'{error.filename}: ' if error.filename else ''}{error.strerror}")
+        if isinstance(error, OSError) and error.errno in (*_NO_BUG, *_NO_NAME):
+            complain(f"{error.filename or 'standard output'}: {error.strerror}")
+            if error.errno in _NO_NAME:
+                return 2
             with suppress(OSError):
                 sys.stdout.close()  # or Python would try once more to write what is left
         else:

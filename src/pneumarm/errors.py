@@ -3,11 +3,21 @@
 Every message says what was expected, what came, and what to do; the command line prints it as one line.
 """
 
+_LONGEST = 1000  # characters of a message: what a file holds may be repeated in it, and can be of any length
+
 
 class PneumarmError(Exception):
     """Base of all errors raised on purpose; ``exit_code`` is what the command line exits with."""
 
     exit_code = 1
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(shortened(str(message)))
+
+
+def shortened(message: str) -> str:
+    """Return ``message`` without its middle if it is long: its beginning names the file, its end what to do."""
+    return message if len(message) <= _LONGEST else f"{message[: _LONGEST - 305]} ... {message[-300:]}"
 
 
 class UnusableInput(PneumarmError):  # noqa: N818 - reads as a sentence where it is raised

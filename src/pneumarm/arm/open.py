@@ -28,6 +28,7 @@ _OPTIONS = (
     r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|pulses|muscles|faults|every|spec)=|"
     r"wide(?:,|$)"
 )
+_LONGEST_NUMBER = 40  # digits, of a seed as well
 _OPTION = re.compile(rf"[:,](?={_OPTIONS})")
 """Stands before an option; files may have commas in their names."""
 
@@ -204,7 +205,7 @@ def _parameters(name: str, options: Mapping[str, str]) -> "ArmParameters":
 
     drawn, preset, joints = options.get("seed"), options.get("preset"), options.get("joints", "1")
     wide = "wide" in options
-    if not all(number.isdecimal() for number in (drawn or "0", joints)) or (wide and drawn is None):
+    if not all(map(_is_whole, (drawn or "0", joints))) or (wide and drawn is None):
         raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
     if (preset is not None and {"seed", "joints", "wide"} & options.keys()) or (wide and "joints" in options):
         raise UnusableInput(f"arm {name!r}: these options do not go together; expected {_FORMS}")
@@ -224,6 +225,10 @@ def _parameters(name: str, options: Mapping[str, str]) -> "ArmParameters":
         return replace(parameters, coupling=float(options["coupling"]))
     except ValueError as error:
         raise UnusableInput(f"arm {name!r}: expected a coupling of 0 to 1") from error
+
+
+def _is_whole(text: str) -> bool:
+    return text.isdecimal() and len(text) <= _LONGEST_NUMBER
 
 
 def _period(name: str, options: Mapping[str, str], usual: float) -> float:
@@ -250,7 +255,7 @@ def _on(name: str, options: Mapping[str, str], option: str, usual: bool) -> bool
 
 def _from_python(place: str, every: str | None) -> Arm:
     """Return the arm of a user's own, controlled at ``every`` so many of its periods, the usual ones if not given."""
-    if every is not None and not every.isdecimal():
+    if every is not None and not _is_whole(every):
         raise UnusableInput(f"arm python:{place}: expected every=1 or more of its periods, not {every!r}")
     arm = owned(_made_by(place))
     turns = int(every) if every is not None else usual_turns(arm.spec.period)

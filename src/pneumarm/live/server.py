@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from importlib.resources import files
 from types import FrameType
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
@@ -66,7 +66,8 @@ class Server:
         """Where the page is."""
         host = _own_address() if self._host in ("0.0.0.0", "::") else self._host
         host = f"[{host}]" if ":" in host else host
-        return f"http://{host}:{self._port}/" + (f"?token={self.token}" if self.token else "")
+        token = f"?token={quote(self.token, '', errors='surrogateescape')}" if self.token else ""
+        return f"http://{host}:{self._port}/{token}"
 
     def run(self, opened: Callable[[], None] = lambda: None) -> None:
         """Serve until the program, or :meth:`end`, asks for the end; ``opened`` is called once it can be reached."""
@@ -113,11 +114,15 @@ class Server:
         """Whether who asks knows the token, or comes from this machine where there is none."""
         host = connection.headers.get("host", "")
         origin = connection.headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        try:
+            local = urlsplit(f"//{host}").hostname in _LOCAL
+            foreign = origin is not None and urlsplit(origin).netloc != host
+        except ValueError:  # no address of a host
             return False
-        if self.token is None:
-            return urlsplit(f"//{host}").hostname in _LOCAL
-        return hmac.compare_digest(connection.query_params.get("token", ""), self.token)
+        if foreign or self.token is None:
+            return local and not foreign
+        given = connection.query_params.get("token", "")
+        return hmac.compare_digest(*(one.encode(errors="surrogateescape") for one in (given, self.token)))
 
     async def _page(self, request: Request) -> Response:
         self._door.hear(request.client)

@@ -1,15 +1,13 @@
 """The files in a run's folder that its report is made of, by their names, beside the records."""
 
-import json
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
-from pneumarm.files import write_json
+from pneumarm.files import read_json, write_json
 from pneumarm.report.data import Demonstration
 
 REPORT = "report.html"
@@ -36,21 +34,10 @@ _KNOWN = {field.name for field in fields(ArmSpec)}  # of an arm
 
 def read_spec(path: Path) -> ArmSpec:
     """Return what :func:`save_spec` wrote to ``path``; raises UnusableInput where it is something else."""
-    stored = read_json(path)
+    stored = read_json(path, "the spec of an arm")
     try:
-        if not isinstance(stored, dict) or "angle_range" not in stored or set(stored) - _KNOWN:
+        if "angle_range" not in stored or set(stored) - _KNOWN:
             raise UnusableInput(f"it has {', '.join(stored)}")
         return msgspec.convert(stored, ArmSpec)
     except (msgspec.ValidationError, UnusableInput) as error:
         raise UnusableInput(f"{path}: expected the spec of an arm, {error}") from error
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return the object in the file ``path``; raises UnusableInput where there is none."""
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UnusableInput(f"{path}: expected a JSON file of a run; finish the run first ({error})") from error
-    if not isinstance(value, dict):
-        raise UnusableInput(f"{path}: expected a JSON object, got {type(value).__name__}")
-    return value

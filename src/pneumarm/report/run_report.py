@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.versions import HISTORY, read_history
-from pneumarm.files import write_text
+from pneumarm.files import read_json, write_text
 from pneumarm.report.data import (
     CoverageData,
     Demonstration,
@@ -25,7 +25,6 @@ from pneumarm.report.files import (
     RESULTS,
     SPEC,
     TEST,
-    read_json,
     read_spec,
 )
 from pneumarm.report.health import summary_of_health
@@ -92,7 +91,7 @@ def read_run(folder: Path) -> RunData:
         UnusableInput: a file is missing or is not what it should be.
 
     """
-    results = read_json(folder / RESULTS)
+    results = read_json(folder / RESULTS, "the results of a finished run")
     return RunData(
         spec=read_spec(folder / SPEC),
         results=results,

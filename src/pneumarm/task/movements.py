@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.files import read_arrays, write_arrays, write_text
+from pneumarm.files import read_arrays, read_rows, write_arrays, write_text
 from pneumarm.statistics import summarise
 from pneumarm.transitions.rows import Recorded
 
@@ -246,24 +246,15 @@ def read_episodes(path: Path) -> dict[str, Movements]:
         UnusableInput: no such file, missing columns, or a cell that is no number.
 
     """
+    table = read_rows(path, "the episodes of a transfer as CSV")
+    header = next(table, [])
+    if missing := set(COLUMNS) - set(header):
+        raise UnusableInput(f"{path}: expected the columns {', '.join(COLUMNS)}; {sorted(missing)} are missing")
+    phases: dict[str, list[dict[str, Any]]] = {}
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            missing = set(COLUMNS) - set(reader.fieldnames or ())
-            if missing:
-                raise UnusableInput(
-                    f"{path}: expected the columns {', '.join(COLUMNS)}; {sorted(missing)} are missing"
-                )
-            phases: dict[str, list[dict[str, Any]]] = {}
-            for row in reader:
-                phases.setdefault(row["phase"], []).append({name: _numbers(row[name]) for name in COLUMNS[1:]})
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UnusableInput(
-            f"{path}: expected the episodes of a transfer as CSV, it cannot be read ({error})"
-        ) from error
-    except (ValueError, TypeError, AttributeError) as error:
-        raise UnusableInput(f"{path}: a cell is not what its column says ({error})") from error
-    try:
+        for cells in table:
+            row = dict(zip(header, cells, strict=True))
+            phases.setdefault(row["phase"], []).append({name: _numbers(row[name]) for name in COLUMNS[1:]})
         return {phase: of_rows(rows) for phase, rows in phases.items()}
     except (ValueError, TypeError) as error:
         raise UnusableInput(f"{path}: a cell is not what its column says ({error})") from error

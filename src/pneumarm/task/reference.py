@@ -3,7 +3,6 @@
 Degrees in them are counted from the middle of the range of the arm's angle sensor.
 """
 
-import csv
 import math
 import re
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.arm import ArmSpec
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
+from pneumarm.files import read_rows
 
 FORMS = (
     "sine:0.5Hz,20deg, ramp:30deg/s,20deg, minimum-jerk:1s,20deg, steps:FILE.csv, or FILE.csv of time [s] and "
@@ -125,16 +125,14 @@ def _quantity(text: str, part: str, units: tuple[str, ...]) -> float:
 
 def _from_file(path: Path, spec: ArmSpec, *, jumps: bool) -> Reference:
     """Return what the file says: held until its next row where it ``jumps``, else with a cubic between."""
-    expected = f"{path}: expected rows of rising times [s] and the degrees of {spec.joints} joint(s)"
+    expected = f"rows of rising times [s] and the degrees of {spec.joints} joint(s)"
+    rows = list(read_rows(path, expected))
+    expected = f"{path}: expected {expected}"
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.reader(file) if row]
         if rows and not _NUMBER.fullmatch(rows[0][0].strip()):
             del rows[0]  # a header
         values = np.array([[float(cell) for cell in row] for row in rows], np.float64)
-    except OSError as error:
-        raise UnusableInput(f"{expected}; it cannot be read ({error.strerror})") from error
-    except (ValueError, csv.Error) as error:
+    except ValueError as error:
         raise UnusableInput(f"{expected}; {error}") from error
     if values.ndim != 2 or values.shape[1] != 1 + spec.joints:
         raise UnusableInput(f"{expected}; found an array of shape {values.shape}")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
-from pneumarm.files import as_toml, require_folder, require_output, write_text, written_whole
+from pneumarm.files import as_toml, read_beginning, require_folder, require_output, write_text, written_whole
 from pneumarm.transitions.lerobot import export_lerobot
 from pneumarm.transitions.minari import export_minari
 from pneumarm.transitions.recording import mapping_beside
@@ -79,9 +79,8 @@ def export_recording(store: Store, path: Path) -> Exported:
 
 def _is_ours(file: Path) -> bool:
     try:
-        with open(file, encoding="utf-8") as opened:
-            return opened.readline().rstrip() == _HEAD
-    except (OSError, UnicodeDecodeError):
+        return read_beginning(file, "a mapping", len(_HEAD)) == _HEAD.encode()
+    except UnusableInput:
         return False
 
 

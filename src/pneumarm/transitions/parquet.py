@@ -6,13 +6,13 @@ by the names that the dataset gives them.
 
 import csv
 import io
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
+from pneumarm.files import read_json, require_regular_file
 from pneumarm.transitions.lerobot import INFO
 
 _ROWS = 4096
@@ -33,6 +33,8 @@ def lines_of(path: Path) -> Iterator[str]:
     """
     arrow, parquet = (extra(name, "parquet", f"{path}: Parquet") for name in ("pyarrow", "pyarrow.parquet"))
     try:
+        if not path.is_dir():
+            require_regular_file(path, "Parquet or a dataset of LeRobot")
         names = _names(path)
         header: list[str] | None = None
         for file in sorted(path.glob("data/*/*.parquet")) if path.is_dir() else [path]:
@@ -43,7 +45,7 @@ def lines_of(path: Path) -> Iterator[str]:
                         header = list(columns)
                         yield from _written([header])
                     yield from _written(zip(*(columns[name] for name in header), strict=True))
-    except (OSError, ValueError, KeyError, TypeError, arrow.ArrowException) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, arrow.ArrowException) as error:
         raise UnusableInput(f"{path}: expected Parquet or a dataset of LeRobot; {error}") from error
 
 
@@ -51,7 +53,7 @@ def _names(path: Path) -> Mapping[str, list[str]]:
     """Return the names of the numbers in columns of vectors."""
     if not path.is_dir():
         return {}
-    features = json.loads((path / INFO).read_text(encoding="utf-8"))["features"]
+    features = read_json(path / INFO, "what a dataset of LeRobot is")["features"]
     return {name: list(one["names"]) for name, one in features.items() if isinstance(one.get("names"), list)}
 
 

@@ -30,7 +30,6 @@ estimated from the commands of each sequence, at whose begin all muscles count a
 import csv
 import math
 import sys
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -44,14 +43,12 @@ from pneumarm.address import StoreAddress
 from pneumarm.arm.fill import filled
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
+from pneumarm.files import read_toml
 from pneumarm.transitions.lerobot import MAPPING
 from pneumarm.transitions.parquet import is_parquet, lines_of
 from pneumarm.transitions.rows import Recorded, steps_of
 from pneumarm.transitions.store import Store
 
-# A key of n dotted parts takes tomllib n**2 memory, hence both of these.
-_LONGEST_MAPPING = 16 << 10  # bytes
-_LONGEST_MAPPING_LINE = 1000  # characters
 _LONGEST_LINE = 64 << 10  # characters
 _LONGEST_SEQUENCE = 10_000  # rows; a longer one is stored in parts, which costs a window's length of each
 
@@ -197,15 +194,9 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
         UnusableInput: no such file, no TOML, or keys that are unknown, missing or of the wrong kind.
 
     """
+    table = read_toml(path, "a mapping file (TOML)")
     try:
-        if not path.is_file():
-            raise UnusableInput(f"{path}: no such file; expected a mapping file (TOML)")
-        if path.stat().st_size > _LONGEST_MAPPING:
-            raise UnusableInput(f"{path}: not a mapping file: it has more than {_LONGEST_MAPPING} bytes")
-        text = path.read_text(encoding="utf-8")
-        if max(map(len, text.splitlines()), default=0) > _LONGEST_MAPPING_LINE:
-            raise UnusableInput(f"{path}: a line has {_LONGEST_MAPPING_LINE} characters at most")
-        mapping = msgspec.convert(tomllib.loads(text), Mapping)
+        mapping = msgspec.convert(table, Mapping)
         allowed = {field.name for field in fields(ArmSpec)} - {"joints", "velocity_sensor", "sensors"}
         if unknown := mapping.arm.keys() - allowed:
             raise UnusableInput(f"[arm] has no {', '.join(sorted(unknown))}; it has {', '.join(sorted(allowed))}")
@@ -217,11 +208,8 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
         _check_pressures(mapping, spec)
         velocity, sensors = _measures_velocity(mapping.joint), _sensors(mapping.joint)
         return mapping, replace(spec, velocity_sensor=velocity, sensors=sensors)
-    except OSError as error:
-        raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, RecursionError, UnusableInput) as error:  # TOML, UTF-8 and msgspec's errors are ValueErrors
-        message = str(error) if isinstance(error, UnusableInput | ValueError) else "too deeply nested"
-        raise UnusableInput(message if message.startswith(str(path)) else f"{path}: {message}") from error
+    except (msgspec.ValidationError, UnusableInput) as error:
+        raise UnusableInput(f"{path}: {error}") from error
 
 
 def _check_pressures(mapping: Mapping, spec: ArmSpec) -> None:

@@ -24,12 +24,13 @@ from pneumarm.address import Address, ServerAddress, StoreAddress, address_of
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.extras import extra
-from pneumarm.transitions.blocks import Blocks, Predicate
+from pneumarm.transitions.blocks import STEPS, Blocks, Predicate
 from pneumarm.transitions.database import (
     LONGEST_SEQUENCE,
     Database,
     damaged,
     further_columns,
+    kept_json,
     pages,
     row_columns,
 )
@@ -44,7 +45,6 @@ BLOCK = 200_000
 
 SEQUENCE = ("number", "run", "kind", "at_rest", '"rows"', "transitions", "info")
 """Columns of the table of sequences."""
-_STEPS = 1 << 32  # more than any step of a sequence
 _ALL = (1, 1 << 62)  # the first and the last number of any sequence
 
 
@@ -174,7 +174,8 @@ class Store:
         for number, of_run, kind, at_rest, rows, transitions, info in pages(
             self.database, "sequences", SEQUENCE[1:], where=where, values={"run": run} if where else {}
         ):
-            yield SequenceEntry(number, of_run, kind, bool(at_rest), rows, transitions, json.loads(info))
+            about = kept_json(info, self.address, f"what sequence {number} is")
+            yield SequenceEntry(number, of_run, kind, bool(at_rest), rows, transitions, about)
 
     @property
     def keeps_marks(self) -> bool:
@@ -189,7 +190,10 @@ class Store:
     def runs(self) -> dict[int, dict[str, Any]]:
         """Return for each run its purpose, settings, arm, version of pneumarm and time of its beginning."""
         found = pages(self.database, "runs", ("purpose", "metadata"))
-        return {number: {"purpose": purpose, **json.loads(metadata)} for number, purpose, metadata in found}
+        return {
+            number: {"purpose": purpose, **kept_json(metadata, self.address, f"what run {number} is")}
+            for number, purpose, metadata in found
+        }
 
     def state(self, name: str = "arm") -> bytes | None:
         """Return the state last kept under ``name``, or None."""
@@ -230,7 +234,7 @@ class Store:
         with database.translated():
             found = list(
                 database.execute(
-                    f'SELECT marks.reason, count(DISTINCT "rows".sequence * {_STEPS} + "rows".step) FROM marks '
+                    f'SELECT marks.reason, count(DISTINCT "rows".sequence * {STEPS} + "rows".step) FROM marks '
                     "JOIN sequences ON sequences.number = marks.sequence AND sequences.run = :run "
                     'JOIN "rows" ON "rows".sequence = marks.sequence '
                     'AND "rows".step BETWEEN marks.first AND marks.last '
@@ -469,7 +473,8 @@ class Store:
         ((count, first, last, shortest, longest),) = self.database.execute(
             'SELECT count(*), min(number), max(number), min("rows"), max("rows") FROM sequences'
         )
-        if count and not (first == 1 and last == count and shortest >= 2 and longest <= LONGEST_SEQUENCE):
+        numbers = isinstance(shortest, int) and isinstance(longest, int)  # of SQLite they may be anything
+        if count and not (numbers and first == 1 and last == count and shortest >= 2 and longest <= LONGEST_SEQUENCE):
             raise damaged(self.address, "its sequences are not numbered from 1 or are of impossible lengths")
 
     def _one(self, query: str) -> Any:

@@ -74,7 +74,7 @@ def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = No
     remedy = Resynchronisation(states[:: max(1, len(states) // 10_000)], RESYNCHRONISE)
     remedied = propagation(simulation, apart, steps, resynchronisation=remedy)
     window = simulation.window
-    figures = {
+    figures: dict[str, Any] = {
         "held_out": _errors(errors, window.further),
         "propagation": {
             "steps": steps,

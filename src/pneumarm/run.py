@@ -317,7 +317,7 @@ class Run:
                 analysis = analyse(store, fitted.simulation, fitted.filtered)
         fitted.simulation.save(self.simulation)
         analysis.save(self.folder)
-        for line in fitted.remarks:
+        for line in fitted.result.remarks:
             self._tell(line)
         return {"filter": analysis.figures["filter"], "simulation": fitted.results() | analysis.figures}
 

@@ -30,7 +30,7 @@ def fit_(
         fitted = fit_store(store, settings, progress=report)
     fitted.simulation.save(out)
     result = fitted.results()
-    for line in fitted.remarks:
+    for line in fitted.result.remarks:
         say(line)
     further, relative = fitted.simulation.window.further, result["relative_error"]
     header = ("one-step error on held-out sequences", "std", "in", "relative")

@@ -200,7 +200,7 @@ def enough_data(store: Store) -> Enough | None:
 
 
 def _error(result: FitResult) -> float:
-    """Return the geometric mean of the relative one-step errors of all that is measured and predicted; NaN of none."""
+    """Return the geometric mean of the relative one-step errors of what is measured and predicted; NaN of none."""
     simulation = result.simulation
     errors: NDArray[np.float64] = result.held_out.relative[simulation.outputs[simulation.measured]]
     known = errors[np.isfinite(errors)]  # not of a sensor that reads one constant

@@ -199,6 +199,8 @@ class FitResult(NamedTuple):
     """Transitions that were fitted."""
     seconds: float
     """Duration of the fits alone, without the errors."""
+    used: Sequence[str] = ()
+    """What to tell a person where not all of a store was used."""
 
     @property
     def std(self) -> dict[str, Any]:
@@ -212,8 +214,8 @@ class FitResult(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """What to tell a person of the errors."""
-        return remarks(self.held_out, self.simulation)
+        """What to tell a person of the fit."""
+        return [*self.used, *remarks(self.held_out, self.simulation)]
 
 
 def by_quantity(values: NDArray[np.float64], further: Sequence[str] = ()) -> dict[str, Any]:
@@ -230,7 +232,7 @@ def by_quantity(values: NDArray[np.float64], further: Sequence[str] = ()) -> dic
 
 
 def remarks(errors: Statistics, simulation: Simulation) -> list[str]:
-    """Return what to tell a person of one-step errors: of which quantity nothing can be said, and which are useless."""
+    """Return what to tell a person of one-step errors: of what nothing can be said, and what is useless."""
     window = simulation.window
     names = [name.removesuffix("[k]").replace("_", " ") for name in window.input_names()[: window.observation_size]]
     there = np.ones(len(names), np.bool_)
@@ -239,8 +241,8 @@ def remarks(errors: Statistics, simulation: Simulation) -> list[str]:
     lines = []
     if still:
         lines.append(
-            f"nothing can be said of the error of {', '.join(still)}: it never changes in what was held out to measure "
-            "errors on; record more in which it does"
+            f"nothing can be said of the error of {', '.join(still)}: it never changes in what was held out of the "
+            "fit; record more in which it does"
         )
     return lines + [
         f"the one-step error of {name} is {error:.2g} times its change: worse than saying that nothing changes; look "
@@ -560,8 +562,6 @@ class StoreFit(NamedTuple):
     result: FitResult
     filtered: Filtered
     """The filtered set, its coverage, and the parts that were not fitted, to be streamed again."""
-    used: Sequence[str] = ()
-    """What to tell a person where not all of the store was used."""
 
     @property
     def simulation(self) -> Simulation:
@@ -584,12 +584,7 @@ class StoreFit(NamedTuple):
             "rows": result.rows,
             "epochs": [len(curve) - 1 for curve in result.curves],
             "seconds": result.seconds,
-        } | ({"remarks": self.remarks} if self.remarks else {})
-
-    @property
-    def remarks(self) -> list[str]:
-        """What to tell a person of the fit."""
-        return [*self.used, *self.result.remarks]
+        } | ({"remarks": result.remarks} if result.remarks else {})
 
 
 def fit_store(
@@ -632,7 +627,7 @@ def fit_store(
     )
     goals = seen_goals(store.blocks, result.simulation.goal_range)
     simulation = replace(result.simulation.with_goals(goals), stretch=stretch)
-    return StoreFit(result._replace(simulation=simulation), filtered, store.used)
+    return StoreFit(result._replace(simulation=simulation, used=store.used), filtered)
 
 
 def fitted_on(

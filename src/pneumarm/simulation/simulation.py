@@ -217,15 +217,7 @@ class Simulation:
         """Return what a file has to hold: settings for its header, and arrays."""
         direct = [network.direct is not None for network in self.networks]
         header = _Header(
-            self.spec,
-            self.window,
-            self.velocity,
-            self.commands,
-            self.held_out,
-            self.seed,
-            direct,
-            self.spread,
-            self.stretch,
+            self.spec, self.window, self.velocity, self.commands, self.held_out, self.seed, direct, self.spread
         )
         names = (*_ARRAYS, *(_FURTHER if self.window.further else ()), *(_LIMITS if len(self.goal_ways) else ()))
         arrays: dict[str, NDArray[np.float64]] = {name: getattr(self, name) for name in names}
@@ -233,9 +225,9 @@ class Simulation:
         for number, network in enumerate(self.networks):
             layers = {name: getattr(network, name) for name in (*_LAYERS, "direct", *_SECOND)}
             arrays |= {f"network_{number}_{name}": array for name, array in layers.items() if array is not None}
-        settings = asdict(header)
+        settings = {**asdict(header), "stretch": self.stretch}
         if not self.stretch:
-            del settings["stretch"]  # so that older versions read it
+            del settings["stretch"]  # older versions read what has none
         return settings, arrays
 
     @classmethod
@@ -317,10 +309,8 @@ def _check(simulation: Simulation) -> None:
     if window.joints != simulation.spec.joints or window.joints < 1 or window.history < 1:
         raise ValueError(f"its {window} does not fit to an arm with {simulation.spec.joints} joint(s)")
     if not (0 <= simulation.held_out < 1 and simulation.seed >= 0 and simulation.stretch >= 0):
-        raise ValueError(
-            f"its share held out is {simulation.held_out}, in stretches of {simulation.stretch} rows, its seed "
-            f"{simulation.seed}"
-        )
+        apart = simulation.held_out, simulation.stretch
+        raise ValueError(f"its share and stretch held out are {apart}, its seed {simulation.seed}")
     window.require(simulation.spec.further, "its arm")
     if window.velocity == "measured" and simulation.velocity != "network":
         raise ValueError("a measured velocity needs a network of its own")

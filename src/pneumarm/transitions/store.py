@@ -36,6 +36,7 @@ from pneumarm.transitions.database import (
     pages,
     row_columns,
 )
+from pneumarm.transitions.doubtful import with_doubtful_marked
 from pneumarm.transitions.possible import row_values
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.rows import Mark, Recorded, Rows, joinable, unmarked
@@ -384,6 +385,8 @@ class Store:
     def append(self, recorded: Recorded, state: Mapping[str, bytes] | None = None) -> int:
         """Write a sequence, and states to go on from after it, and return its number: it is durable then.
 
+        Rows that no sound sensor gives are marked (:mod:`pneumarm.transitions.doubtful`).
+
         Raises:
             UnusableInput: shapes or numbers are impossible; nothing was written.
             PneumarmError: the disk is full, read-only or broken; nothing of this sequence was written.
@@ -451,6 +454,7 @@ class Store:
 
     def _insert(self, number: int, one: Recorded) -> None:
         values = row_values(one, self.spec, self.further, self.valves)
+        one = with_doubtful_marked(one, self.spec, self.valves)
         known = (number, self._run, one.kind, int(one.at_rest), len(one), one.transitions, _as_json(one.info))
         self.database.insert("sequences", SEQUENCE, [known])
         self._insert_marks(number, one.marks)

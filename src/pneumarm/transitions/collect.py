@@ -408,8 +408,8 @@ class _Collection:
         self._doubtful = 0 if joinable(recorded.step, doubtful) else self._doubtful + 1
         if self._doubtful >= MOST_SPOILED and doubtful:
             raise ArmFailure(
-                f"{self._arm.spec.name}: {doubtful[0].reason}, in {self._doubtful} sequences in a row; they are stored "
-                "and marked, nothing can be learned of them. See to the sensor and run the same command again"
+                f"{self._arm.spec.name}: {doubtful[0].reason}, in {self._doubtful} sequences in a row; they are "
+                "stored and marked, nothing can be learned of them. See to the sensor and run the same command again"
             )
         if whole:
             self.done += recorded.transitions

@@ -13,8 +13,10 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.transitions.rows import Mark, Recorded
 
 _PRESSURES = -0.2, 2.0
-"""Of ``max_pressure``, what a closed muscle reads at least and at most: sensors drift about 0, and a joint that moves
-compresses closed muscles, by a tenth or two."""
+"""Of ``max_pressure``, beyond which single readings of a closed muscle are none: sensors drift about 0, and a joint
+that moves compresses closed muscles, by a tenth or two."""
+_LEAP = 0.8
+"""Of the range of the angle; in a period virtual arms move by a sixth of it at most."""
 _ACTED = 0.1
 """Of the times in which a muscle is filled and emptied: after so much of both no sound pressure is still the same. On
 virtual arms equal readings span less than half as much."""
@@ -36,8 +38,7 @@ def _doubtful(one: Recorded, spec: ArmSpec, valves: bool) -> Iterator[Mark]:
         acts = [_acts(one, j, m, spec, valves) for m in muscles]
         name = "the angle" + (f" of joint {j + 1}" if spec.joints > 1 else "")
         low, high = spec.angle_range
-        # More than half of the range in a period is nearer the other way round.
-        leaps = (np.abs(np.diff(angle)) > (high - low) / 2) & (np.diff(one.step) == 1)
+        leaps = (np.abs(np.diff(angle)) > _LEAP * (high - low)) & (np.diff(one.step) == 1)
         outside = (angle < low) | (angle > high) | np.append(leaps, False) | np.insert(leaps, 0, False)
         yield from _marks(one, outside, f"{name} {_OUTSIDE}, or leaps across it")
         difference = one.pressure[:, j, 0] - one.pressure[:, j, 1] if spec.muscles > 1 else None
@@ -46,9 +47,11 @@ def _doubtful(one: Recorded, spec: ArmSpec, valves: bool) -> Iterator[Mark]:
             pressure = one.pressure[:, j, m]
             name = f"pressure {m + 1}" + (f" of joint {j + 1}" if spec.joints > 1 else "")
             low, high = (share * spec.max_pressure_counts for share in _PRESSURES)
-            # A sensor towards the valve reads the supply while the inlet is open.
-            closed = np.insert(one.command[:-1, j, m] <= 0, 0, False) if valves else np.ones(len(one), np.bool_)
-            outside = (pressure < low) | ((pressure > high) & closed)
+            # A sensor towards the valve reads the supply while the inlet is open; what lasts may be a wrong limit.
+            opened = np.insert(one.command[:-1, j, m] > 0, 0, True) if valves else np.zeros(len(one), np.bool_)
+            outside = (pressure < low) | ((pressure > high) & ~opened)
+            around = np.convolve(outside, [1, 0, 1])[1:-1] > 0
+            outside &= ~around
             yield from _marks(one, outside, f"{name} {_OUTSIDE}")
             yield from _marks(one, _constant(pressure, [acts[m]]), f"{name} {_ONE}")
 
@@ -56,11 +59,11 @@ def _doubtful(one: Recorded, spec: ArmSpec, valves: bool) -> Iterator[Mark]:
 def _acts(one: Recorded, joint: int, muscle: int, spec: ArmSpec, valves: bool) -> _Floats:
     """Return for how many times a muscle has been filled and emptied up to each row, shape (n, 2).
 
-    Continuous commands count as inlets above the middle of what was commanded, and as outlets below it.
+    Continuous commands, of whatever unit, count a little: as inlets above the middle of all, as outlets below it.
     """
     command = np.nan_to_num(one.command[:, joint, muscle])
     if not valves:
-        command = np.sign(command - (command[:-1].max() + command[:-1].min()) / 2)
+        command = _ACTED * np.sign(command - (command[:-1].max() + command[:-1].min()) / 2)
     passed = np.diff(one.time, append=one.time[-1])
     each = np.stack([np.maximum(command, 0), np.maximum(-command, 0)], axis=1) * passed[:, None] / spec.fill_times
     return np.cumsum(np.insert(each[:-1], 0, 0.0, axis=0), axis=0)

@@ -38,8 +38,10 @@ def _doubtful(one: Recorded, spec: ArmSpec, valves: bool) -> Iterator[Mark]:
         acts = [_acts(one, j, m, spec, valves) for m in muscles]
         name = "the angle" + (f" of joint {j + 1}" if spec.joints > 1 else "")
         low, high = spec.angle_range
+        outside = (angle < low) | (angle > high)
         leaps = (np.abs(np.diff(angle)) > _LEAP * (high - low)) & (np.diff(one.step) == 1)
-        outside = (angle < low) | (angle > high) | np.append(leaps, False) | np.insert(leaps, 0, False)
+        leaps &= ~(outside[1:] | outside[:-1])
+        outside |= np.append(leaps, False) | np.insert(leaps, 0, False)
         yield from _marks(one, outside, f"{name} {_OUTSIDE}, or leaps across it")
         difference = one.pressure[:, j, 0] - one.pressure[:, j, 1] if spec.muscles > 1 else None
         yield from _marks(one, _constant(angle, acts, difference), f"{name} {_ONE}")

@@ -315,6 +315,8 @@ class Run:
                 analysis = analyse(store, fitted.simulation, fitted.filtered)
         fitted.simulation.save(self.simulation)
         analysis.save(self.folder)
+        for line in fitted.result.remarks:
+            self._tell(line)
         return {"filter": analysis.figures["filter"], "simulation": fitted.results() | analysis.figures}
 
     def _train(self) -> dict[str, Any]:

@@ -33,6 +33,8 @@ def analyse_(db: AnyStore, sim: Path, /, *, out: Path, json: Json = False) -> No
     with progress("drawing"):
         page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality, analysis.figures)
     say(f"page: {page}")
+    for line in analysis.figures.get("remarks", ()):
+        say(line)
     errors = analysis.figures["held_out"]
     rows = [(_WORDS[name], *figures.values()) for name, figures in errors.items()]
     header = ("one-step error, held out", *(name.replace("_", " ") for name in errors["std"]))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pneumarm.commands.common import AnyStore, Json
 from pneumarm.console import show, table
-from pneumarm.transitions import import_recording
+from pneumarm.transitions import Store, import_recording
 
 
 def import_(recording: Path, db: AnyStore, /, *, mapping: Path | None = None, json: Json = False) -> None:
@@ -23,6 +23,9 @@ def import_(recording: Path, db: AnyStore, /, *, mapping: Path | None = None, js
     """
     imported = asdict(import_recording(recording, mapping, db))
     rows = [(_WORDS.get(name, name), f"{count:,}") for name, count in imported.items()]
+    with Store.open(db) as store:
+        imported["marked"] = store.marked_rows()
+    rows += [(f"rows marked: {reason}", f"{count:,}") for reason, count in imported["marked"].items()]
     show(imported, json, lambda: [table(("imported", ""), rows)])
 
 

@@ -7,12 +7,14 @@ A sequence is written in one transaction and is durable when :meth:`Store.append
 number read at the same time. What databases differ in is behind :class:`~pneumarm.transitions.database.Database`.
 """
 
+import copy
 import json
 import math
 import time as wall_clock
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
+from itertools import chain
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
@@ -25,6 +27,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.extras import extra
 from pneumarm.transitions.blocks import STEPS, Blocks, Predicate
+from pneumarm.transitions.choice import hashed_uniform
 from pneumarm.transitions.database import (
     LONGEST_SEQUENCE,
     Database,
@@ -34,6 +37,7 @@ from pneumarm.transitions.database import (
     pages,
     row_columns,
 )
+from pneumarm.transitions.doubtful import with_doubtful_marked
 from pneumarm.transitions.possible import row_values
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.rows import Mark, Recorded, Rows, joinable, unmarked
@@ -42,6 +46,9 @@ from pneumarm.transitions.schema import SqliteFile
 BLOCK = 200_000
 """Rows of a block, about; with one joint a block takes 20 MB."""
 
+MOST_USED = 400_000
+"""Transitions that a simulation is fitted to and judged by at most: twice as many as the thesis collects."""
+_DRAWN = 11  # seed of the draw of these, not that of what is held out
 
 SEQUENCE = ("number", "run", "kind", "at_rest", '"rows"', "transitions", "info")
 """Columns of the table of sequences."""
@@ -60,6 +67,15 @@ class SequenceEntry(NamedTuple):
     info: dict[str, Any]
 
 
+class _Part(NamedTuple):
+    """What was drawn from a store."""
+
+    sequences: frozenset[int]
+    transitions: int
+    of: int
+    """Transitions of the whole store."""
+
+
 class Store:
     """A store, opened; a context manager. Iterating over it gives :class:`Rows`, block by block, again and again.
 
@@ -72,6 +88,7 @@ class Store:
         """Where it is; shown without a password."""
         self.database = database
         self._run: int | None = None
+        self._part: _Part | None = None
         self.spec: ArmSpec
         """The arm that the rows are of."""
         self.valves: bool
@@ -161,7 +178,32 @@ class Store:
     @property
     def transitions(self) -> int:
         """Number of transitions: rows with a command and the row of the next step, none of them marked."""
+        if self._part is not None:
+            return self._part.transitions
         return int(self._one("SELECT coalesce(sum(transitions), 0) FROM sequences"))
+
+    def drawn(self, most: int = MOST_USED) -> "Store":
+        """Return the store for reading as if it held ``most`` transitions: whole sequences, drawn evenly by lot.
+
+        One that holds no more is returned as it is. The same sequences are drawn again and again.
+        """
+        total = self.transitions
+        if self._part is not None or total <= most:
+            return self
+        pairs = chain.from_iterable(pages(self.database, "sequences", ("transitions",)))
+        number, transitions = np.fromiter(pairs, np.int64).reshape(-1, 2).T
+        order = np.argsort(hashed_uniform(_DRAWN, number))
+        order = order[np.cumsum(transitions[order]) <= most]
+        part = copy.copy(self)
+        part._part = _Part(frozenset(number[order].tolist()), int(transitions[order].sum()), total)
+        return part
+
+    @property
+    def used(self) -> list[str]:
+        """What to tell a person of how much is used of a store that was :meth:`drawn` from."""
+        if self._part is None:
+            return []
+        return [f"used {self._part.transitions:,} of {self._part.of:,} transitions, evenly drawn"]
 
     @property
     def sequences(self) -> int:
@@ -174,6 +216,8 @@ class Store:
         for number, of_run, kind, at_rest, rows, transitions, info in pages(
             self.database, "sequences", SEQUENCE[1:], where=where, values={"run": run} if where else {}
         ):
+            if self._part is not None and number not in self._part.sequences:
+                continue
             about = kept_json(info, self.address, f"what sequence {number} is")
             yield SequenceEntry(number, of_run, kind, bool(at_rest), rows, transitions, about)
 
@@ -217,7 +261,15 @@ class Store:
         ``sequences`` and ``kinds`` choose what is read. Marked rows are left out, which leaves a gap in the steps
         that no transition spans, unless ``marked`` asks for them. The result can be iterated over again and again.
         """
-        return Blocks(self, rows, sequences, kinds, marked)
+        if (part := self._part) is None:
+            return Blocks(self, rows, sequences, kinds, marked)
+        drawn = np.array(sorted(part.sequences), np.int64)
+
+        def among_drawn(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+            wanted: NDArray[np.bool_] = np.isin(numbers, drawn)
+            return wanted if sequences is None else wanted & sequences(numbers)
+
+        return Blocks(self, rows, among_drawn, kinds, marked)
 
     def marks(self, number: int | None = None) -> dict[int, list[Mark]]:
         """Return the marks of every sequence that has some, or of sequence ``number``, in the order of marking."""
@@ -226,20 +278,21 @@ class Store:
             found.setdefault(sequence, []).append(mark)
         return found
 
-    def marked_rows(self, run: int) -> dict[str, int]:
-        """Return how many rows of ``run`` are marked, by reason; a row with several marks counts for each reason."""
+    def marked_rows(self, run: int | None = None) -> dict[str, int]:
+        """Return how many rows of ``run``, or of all, are marked, by reason; one marked twice counts for both."""
         database = self.database
         if not self.keeps_marks:
             return {}
+        of_run = "" if run is None else "AND sequences.run = :run "
         with database.translated():
             found = list(
                 database.execute(
                     f'SELECT marks.reason, count(DISTINCT "rows".sequence * {STEPS} + "rows".step) FROM marks '
-                    "JOIN sequences ON sequences.number = marks.sequence AND sequences.run = :run "
+                    f"JOIN sequences ON sequences.number = marks.sequence {of_run}"
                     'JOIN "rows" ON "rows".sequence = marks.sequence '
                     'AND "rows".step BETWEEN marks.first AND marks.last '
                     "GROUP BY marks.reason ORDER BY min(marks.rowid)",
-                    {"run": run},
+                    {} if run is None else {"run": run},
                 )
             )
         return {str(reason): int(rows) for reason, rows in found}
@@ -336,6 +389,8 @@ class Store:
     def append(self, recorded: Recorded, state: Mapping[str, bytes] | None = None) -> int:
         """Write a sequence, and states to go on from after it, and return its number: it is durable then.
 
+        Rows that no sound sensor gives are marked (:mod:`pneumarm.transitions.doubtful`).
+
         Raises:
             UnusableInput: shapes or numbers are impossible; nothing was written.
             PneumarmError: the disk is full, read-only or broken; nothing of this sequence was written.
@@ -427,6 +482,7 @@ class Store:
 
     def _insert(self, number: int, one: Recorded) -> None:
         values = row_values(one, self.spec, self.further, self.valves)
+        one = with_doubtful_marked(one, self.spec, self.valves)
         known = (number, self._run, one.kind, int(one.at_rest), len(one), one.transitions, _as_json(one.info))
         self.database.insert("sequences", SEQUENCE, [known])
         self._insert_marks(number, one.marks)

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 INSTALLED := $(VENV)/.installed
 
-.PHONY: setup run test lint bench held-out baselines soak walk site clean
+.PHONY: setup run test lint bench held-out baselines soak mutants walk site clean
 
 setup: $(READY)
 
@@ -44,6 +44,9 @@ baselines: setup  ## the table of baselines on the held-out arms, into runs/base
 soak: setup  ## fault injection that takes minutes: kills, power cuts, full disks
 	$(BIN)/python -m pytest -m soak -s
 
+mutants: setup  ## changes the program in one place at a time: tests must fail; ONLY=name for one, or a package; minutes, a second call goes on
+	$(BIN)/python tests/mutate.py $(if $(ONLY),--only '$(ONLY)')
+
 walk: setup  ## a new user's walk: the wheel in a fresh environment, every command of the README; takes minutes
 	$(BIN)/python -m pytest -m walk -s
 
@@ -52,4 +55,4 @@ site: setup  ## the documentation as pages to be read in a browser, into site/
 	$(BIN)/python -m mkdocs build
 
 clean:
-	rm -rf $(VENV) runs site .pytest_cache .ruff_cache .mypy_cache
+	rm -rf $(VENV) runs site .mutants .pytest_cache .ruff_cache .mypy_cache

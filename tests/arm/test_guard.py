@@ -215,6 +215,17 @@ def test_pulses_count_as_inflation_too_and_venting_ends_it(smallest_arm):
     assert arm.valves == OPEN
 
 
+@pytest.mark.parametrize(("vented", "free"), [(0.15, 0), (0.25, 1)])
+def test_an_inlet_that_was_open_for_too_long_is_vented_for_a_tenth_of_that(smallest_arm, vented, free):
+    arm = smallest_arm(max_inflation=2.0, max_pressure=1e6)
+    safe = GuardedArm(arm)
+    for valve, seconds in ((1, 2.1), (-1, vented), (1, 0.0)):
+        safe.read()
+        safe.set_valves([[valve, 0]])
+        arm.wait(seconds)
+    assert arm.valves == [[free, 0]]
+
+
 @pytest.mark.parametrize("how", ["wait", "wait_until"])
 def test_long_waits_keep_to_pressure_and_time(smallest_arm, how):
     for limits, opened in (({"max_pressure": 0.5}, 0.5), ({"max_inflation": 2.0, "max_pressure": 1e6}, 2.0)):
@@ -245,6 +256,14 @@ def test_at_an_end_of_the_angle_nothing_pushes_further_out(smallest_arm):
     safe.read()
     safe.set_valves([[1, -1]] * 3)
     assert arm.valves == [[1, -1]] * 3
+
+
+def test_a_muscle_that_is_not_there_is_given_nothing(smallest_arm):
+    arm = smallest_arm(joints=2, muscles=1)
+    safe = GuardedArm(arm)
+    for command, applied in (([[1, 1], [-1, -1]], [[1, 0], [-1, 0]]), ([[0.5, 0.5], [1.0, -0.5]], [[1, 0], [1, 0]])):
+        safe.decide(np.array(command))
+        assert arm.valves == applied
 
 
 def test_interventions_are_counted_apart_and_can_be_told():

@@ -43,12 +43,22 @@ def test_a_constant_reference_gets_integral_action() -> None:
     assert errors[-1] < 0.1
 
 
-def test_errors_of_a_joint_on_its_way_teach_nothing() -> None:
+@pytest.mark.parametrize("error", [300.0, -300.0, 25.5, -25.5])
+def test_errors_of_a_joint_on_its_way_teach_nothing(error: float) -> None:
     correction = Correction(1, 25.0)
     features = features_of(np.array([[500.0], [510.0], [520.0]]), MIDDLE)
     for _ in range(50):
-        correction.learn(np.array([300.0]), features[0])
+        correction.learn(np.array([error]), features[0])
     assert correction.of(features)[0, 0] == 0
+
+
+@pytest.mark.parametrize("error", [24.5, -24.5])
+def test_no_correction_is_larger_than_twice_the_largest_error_that_teaches(error: float) -> None:
+    correction = Correction(1, 25.0)
+    features = features_of(np.array([[500.0], [510.0], [520.0]]), MIDDLE)
+    for _ in range(300):
+        correction.learn(np.array([error]), features[0])
+    assert correction.of(features)[0, 0] == np.copysign(50.0, error)
 
 
 def test_what_was_learned_is_forgotten_where_it_may_be_what_is_wrong() -> None:

@@ -149,6 +149,12 @@ def test_a_stop_vents_and_stays_until_it_is_released(played: Played) -> None:
     assert "release" in played.screen.state["notice"]
 
 
+def test_only_a_release_ends_a_stop(played: Played) -> None:
+    played.run((0.1, Goal([15.0])), (1.0, Stop()), (2.0, Relax()), (3.0, Goal([15.0])), until=4.0)
+    assert [mode for _, mode, _ in played.modes] == ["moving", "stopped", "stopped", "stopped"]
+    assert played.virtual.pressure.max() < 5e3
+
+
 def test_a_stop_outlasts_a_board_that_has_vented_by_itself(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pneumarm.live.session.behind", lambda *_: played.virtual)  # which has no board
 
@@ -178,6 +184,19 @@ def test_an_arm_whose_page_is_silent_holds_then_is_vented(played: Played) -> Non
     assert "not heard" in why
     assert "vented" in after
     assert played.virtual.pressure.max() < 5e3
+
+
+def test_an_arm_on_its_way_stops_where_it_is_when_its_page_falls_silent(played: Played) -> None:
+    played.run(
+        (0.1, Goal([20.0])),
+        (4.0, Goal([-20.0])),
+        (4.2, played.be_silent(HOLD_AFTER)),
+        until=6.5,
+    )
+    begin = played.arm.times[0]
+    stopped = played.arm.at(begin + 4.25)
+    assert played.arm.at(begin + 6.4) == pytest.approx(stopped, abs=8)
+    assert stopped > -5
 
 
 def test_a_fault_is_switched_on_found_and_switched_off(played: Played) -> None:

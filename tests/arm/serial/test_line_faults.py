@@ -242,6 +242,61 @@ def test_host_that_stalls(w: Wired, stall: float) -> None:
     assert w.applied == [[1, 1]]
 
 
+@pytest.fixture
+def cut_off() -> Iterator[Wired]:
+    """Return an arm whose board has cut off muscle 1, which its host does not know yet, and is empty again."""
+    with (w := wired(cut_off=0.1)).arm:
+        w.arm.set_valves(np.array([[1, 0]], np.int8))
+        begun = w.line.now()
+        while w.applied != [[-1, 0]]:
+            assert w.line.now() - begun < 0.24, "its muscle does not fill"
+            w.wire.sleep_until(w.line.now() + 0.001)
+        w.wire.sleep_until(begun + 2.0)
+        assert not w.board.armed  # the dead-man has vented it besides
+        yield w
+
+
+def test_a_latch_that_nobody_has_seen_is_not_ended_by_making_ready(cut_off: Wired) -> None:
+    """Only a silence of this host may be; a muscle over its limit is for a person to look at."""
+    w, known = cut_off, len(cut_off.muscles.set)
+    for _ in range(2):
+        with pytest.raises(ArmFailure, match="cut off muscle 1 of joint 1"):
+            w.arm.make_ready()
+    assert len(w.muscles.set) == known  # nothing moved
+    w.arm.rearm()
+    w.arm.make_ready()
+    w.arm.set_valves(all_valves(w.arm, 0))
+    assert w.applied == [[0, 0]]
+
+
+def test_a_latch_is_told_of_though_the_valves_are_as_they_were_asked_for() -> None:
+    with (w := wired(cut_off=0.1)).arm:
+        w.arm.set_valves(np.array([[1, 0]], np.int8))
+        begun = w.line.now()
+        while w.applied != [[-1, 0]]:
+            assert w.line.now() - begun < 0.24, "its muscle does not fill"
+            w.wire.sleep_until(w.line.now() + 0.001)
+        with pytest.raises(ArmFailure, match="cut off muscle 1 of joint 1"):
+            w.arm.set_valves(all_valves(w.arm, -1))
+
+
+@pytest.mark.parametrize("done", [[[1, 0]], [[1, 1]], [[-1, -1]], [[0, -1]]])
+@pytest.mark.parametrize("as_pulses", [False, True])
+def test_valves_that_are_not_as_they_were_asked_for_are_a_failure(
+    w: Wired, done: list[list[int]], as_pulses: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Such as a board sets whose program is not the one that it should be."""
+    monkeypatch.setattr(w.board, "_applied", lambda: np.array(done, np.int8))
+    if not as_pulses:
+        with pytest.raises(ArmFailure, match="were asked for"):
+            w.arm.set_valves(np.array([[1, -1]], np.int8))
+    elif done == [[0, -1]]:
+        assert w.arm.set_pulses(np.array([[0.5, -1.0]]))  # the pulse is over by now
+    else:
+        with pytest.raises(ArmFailure, match="were asked for"):
+            w.arm.set_pulses(np.array([[0.5, -1.0]]))
+
+
 @pytest.mark.parametrize(
     ("cause", "words"),
     [(Cause.EXTERNAL, "reset pin"), (Cause.BROWN_OUT, "supply too low"), (Cause.POWER_ON, "power on")],
@@ -262,6 +317,14 @@ def test_board_that_restarts(w: Wired, cause: Cause, words: str) -> None:
     assert w.arm.reset_causes() == [words]
     w.arm.set_valves(all_valves(w.arm, 1))
     assert w.applied == [[1, 1]]
+
+
+def test_closing_vents_at_once_and_disarms(w: Wired) -> None:
+    in_motion(w)
+    known = len(w.muscles.set)
+    w.arm.close()
+    assert w.muscles.set[known][1] == [[-1, -1]]
+    assert not w.board.armed
 
 
 def test_controller_that_hangs(w: Wired) -> None:

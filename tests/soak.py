@@ -3,7 +3,7 @@
 import os
 from time import monotonic
 
-_PAUSE = 5.0
+_PAUSE = 15.0
 """Time between two lines of progress [s]."""
 
 withstood: list[str] = []
@@ -11,7 +11,7 @@ withstood: list[str] = []
 
 
 def amount(name: str, full: int) -> int:
-    """Return how much of an attack is done: ``full``, unless the environment says otherwise, as in ``SOAK_KILLS=3``."""
+    """Return how much of an attack is done: ``full``, or what the environment says, as in ``SOAK_KILLS=3``."""
     text = os.environ.get(f"SOAK_{name}", str(full))
     if not text.isdecimal() or int(text) < 1:
         raise ValueError(f"SOAK_{name}: expected a number from 1 up, got {text!r}")
@@ -22,7 +22,7 @@ class Attack:
     """Tells how far an attack is."""
 
     def __init__(self, title: str, total: int) -> None:
-        self.title, self.total, self.done = title, total, 0
+        self.title, self.total, self.done, self.failed = title, total, 0, 0
         self._begun = self._told = monotonic()
 
     def advance(self, count: int = 1) -> None:
@@ -42,4 +42,3 @@ class Attack:
         line = f"{self.title}: {self.done:,} in {self.seconds:.0f} s; {result}"
         withstood.append(line)
         print(line, flush=True)
-

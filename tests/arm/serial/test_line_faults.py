@@ -163,7 +163,8 @@ def exchange_on_bad_lines(attack: Attack, seed: int) -> dict[str, int]:
                 check_valves()
                 w.arm.wait_until(reading.time + PERIOD)
             except ArmFailure as error:
-                assert re.search("has not answered|heard nothing for a quarter of a second", str(error))
+                if not re.search("has not answered|heard nothing", str(error)):
+                    raise
                 given_up += 1
                 w.wire.sleep_until(w.line.now() + 0.3)
                 check_valves()
@@ -177,7 +178,7 @@ def exchange_on_bad_lines(attack: Attack, seed: int) -> dict[str, int]:
 
 def test_exchanges_on_bad_lines() -> None:
     tally = exchange_on_bad_lines(Attack("exchanges", 1_500), seed=1)
-    assert min(tally.values()) > 0
+    assert min(tally["stale"], tally["corrupt"]) > 50
 
 
 @pytest.mark.soak

@@ -16,14 +16,15 @@ import sys
 import threading
 import traceback
 from contextlib import suppress
+from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
 import pneumarm.commands
 from pneumarm.cli import main
 
-ADDRESSES = 6 << 30
-"""Address space of a command [bytes]: what needs more fails, and takes nothing from the rest of the machine."""
+MORE = 2 << 30
+"""Address space that a command gets besides this process' [bytes]: what needs more fails; others go on."""
 LONGEST_FILE = 1 << 30
 """What a command may write into one file [bytes]."""
 _LOOK = 0.005
@@ -51,7 +52,8 @@ def become(order: dict[str, Any]) -> None:
         (("input", os.O_RDONLY), ("output", writing), ("errors", writing | os.O_APPEND))
     ):
         os.dup2(os.open(order[name], flags, 0o600), place)
-    resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
+    most = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + MORE
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LONGEST_FILE, LONGEST_FILE))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     sys.stdin, sys.stdout, sys.stderr = os.fdopen(0), os.fdopen(1, "w"), os.fdopen(2, "w", buffering=1)

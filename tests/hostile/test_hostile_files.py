@@ -36,22 +36,30 @@ def attack(sound: Path) -> Iterator[Attack]:
     found.summarise(f"{found.done - found.failed:,} kept the rule")
 
 
+def none_broken(found: list[str]) -> None:
+    """Fail, with the lines of :meth:`Commands.failures`, where there are some."""
+    if found:
+        pytest.fail(f"{len(found)} broke the rule:\n" + "\n".join(found), pytrace=False)
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize(("kind", "damage"), GROUPS)
 def test_hostile_files(kind: str, damage: str, on_files: Commands, sound: Path, attack: Attack) -> None:
     found = []
     for case in chosen(sound)[kind, damage]:
-        found += on_files.failures(case)
+        for failure in on_files.failures(case):
+            print(f"BROKEN {failure}", flush=True)
+            found.append(failure)
         attack.advance()
     attack.failed += len(found)
-    assert not found, f"{len(found)} broke the rule:\n" + "\n".join(found)
+    none_broken(found)
 
 
 def test_a_sample_of_hostile_files(on_files: Commands, sound: Path) -> None:
     rng = random.Random(2)
     cases = [case for make in GROUPS.values() for case in make(sound) if case.arguments[0] not in DRAWING]
     found = [failure for case in rng.sample(cases, SAMPLE) for failure in on_files.failures(case)]
-    assert not found, f"{len(found)} broke the rule:\n" + "\n".join(found)
+    none_broken(found)
 
 
 GOOD = Outcome(code=2, seconds=1.0, cpu=1.0, memory=200.0, output="", errors="pneumarm: a.db: this is no store\n")

@@ -1,7 +1,9 @@
 """What must hold when the line, the host or the controller fails: faults injected, consequences measured."""
 
+import re
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from pneumarm.arm.serial.arm import BOOT
 from pneumarm.arm.serial.protocol import VERSION, Cause, Request
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.transitions import CollectBegin, CollectSettings, Recorded, Store, collect
+from soak import Attack, amount
 
 PERIOD = 1 / 30
 
@@ -130,6 +133,67 @@ def test_bad_line(w: Wired, faults: str, share: float) -> None:
     joined = np.diff(recorded.step) == 1
     assert (np.abs(np.diff(recorded.time)[joined] / PERIOD - 1) < 0.5).all()
     assert recorded.transitions == joined.sum()
+
+
+_LINE = 500
+"""Exchanges until the line gets other faults."""
+
+
+def exchange_on_bad_lines(attack: Attack, seed: int) -> dict[str, int]:
+    """Exchange random valves for readings on lines with all faults at once; return how often what came of it.
+
+    No valves are ever set but those asked for, or all exhausts open; what is acknowledged is so; nothing stale acts;
+    readings are of the past and have times that rise. A line that is given up leaves the arm vented, and once the arm
+    is armed again it goes on.
+    """
+    rng, w, given_up = np.random.default_rng(seed), wired(seed), 0
+    vented = all_valves(w.arm, -1).tolist()
+    asked, told, known = vented, -np.inf, len(w.muscles.set)
+
+    def check_valves() -> None:
+        nonlocal known
+        assert all(one in (asked, vented) for _, one in w.muscles.set[known:])
+        known = len(w.muscles.set)
+
+    with w.arm:
+        while attack.done < attack.total:
+            if attack.done % _LINE == 0:
+                shares = rng.uniform(0, rng.choice((0.05, 0.2, 0.4)), 5)
+                w.line.faults = LineFaults(*shares, lateness=rng.uniform(0.002, 0.1), seed=attack.done)
+            attack.advance()
+            try:
+                reading = w.arm.read()
+                check_valves()
+                assert told < reading.time <= w.line.now()
+                told, asked = reading.time, rng.integers(-1, 2, (1, 2)).astype(np.int8).tolist()
+                w.arm.set_valves(np.array(asked, np.int8))
+                assert w.applied == asked
+                check_valves()
+                w.arm.wait_until(reading.time + PERIOD)
+            except ArmFailure as error:
+                if not re.search("has not answered|heard nothing", str(error)):
+                    raise
+                given_up += 1
+                w.wire.sleep_until(w.line.now() + 0.3)
+                check_valves()
+                assert w.is_vented
+                w.line.faults = replace(w.line.faults, dropped=0.0, corrupted=0.0)
+                w.arm.rearm()
+                known = len(w.muscles.set)
+    assert w.wire.stale_applied == 0
+    return {"stale": w.wire.stale, "corrupt": w.arm.link.counts.corrupt, "given up": given_up}
+
+
+def test_exchanges_on_bad_lines() -> None:
+    tally = exchange_on_bad_lines(Attack("exchanges", 1_500), seed=1)
+    assert min(tally["stale"], tally["corrupt"]) > 50
+
+
+@pytest.mark.soak
+def test_many_exchanges_on_bad_lines() -> None:
+    attack = Attack("exchanges on bad lines", amount("EXCHANGES", 100_000))
+    tally = exchange_on_bad_lines(attack, seed=2)
+    attack.summarise(", ".join(f"{what} {count:,}" for what, count in tally.items()))
 
 
 def test_times_of_readings_are_true_on_a_bad_line(w: Wired) -> None:

@@ -7,7 +7,7 @@ by the names that the dataset gives them; numbers without a name of their own ar
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
@@ -15,15 +15,8 @@ from pneumarm.transitions.lerobot import INFO
 
 _ROWS = 4096
 """Rows read at once."""
-
-
-class Name(NamedTuple):
-    """What a column is called."""
-
-    full: str
-    """With the feature that it is of, such as ``action.elbow.pos``; no two columns should share it."""
-    short: str
-    """Without."""
+Name = tuple[str, str]
+"""What a column is called: with the feature that it is of, such as ``action.elbow.pos``, and without."""
 
 
 def is_parquet(path: Path) -> bool:
@@ -46,7 +39,7 @@ def files_of(path: Path) -> list[Path]:
     return files
 
 
-def batches_of(path: Path) -> Iterator[tuple[list[Name], Iterator[list[str]]]]:
+def batches_of(path: Path) -> Iterator[tuple[list[Name], list[tuple[str, ...]]]]:
     """Give the names of the columns and some rows at a time, in bounded memory.
 
     Raises:
@@ -60,19 +53,11 @@ def batches_of(path: Path) -> Iterator[tuple[list[Name], Iterator[list[str]]]]:
         for file in files:
             with parquet.ParquetFile(file) as opened:
                 for batch in opened.iter_batches(_ROWS):
-                    columns = dict(_flat(batch, names, arrow.types))
-                    yield [name for _, name in columns], map(list, zip(*columns.values(), strict=True))
-    except (
-        OSError,
-        ValueError,
-        LookupError,
-        TypeError,
-        AttributeError,
-        RecursionError,
-        arrow.ArrowException,
-    ) as error:
-        reason = str(error).partition("\n")[0][:300]
-        raise UnusableInput(f"{path}: expected Parquet or a dataset of LeRobot; {reason}") from error
+                    columns = list(_flat(batch, names))
+                    yield [name for name, _ in columns], list(zip(*(texts for _, texts in columns), strict=True))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, arrow.ArrowException) as why:
+        reason = str(why).partition("\n")[0][:300]
+        raise UnusableInput(f"{path}: expected Parquet or a dataset of LeRobot; {reason}") from why
 
 
 def _names(path: Path) -> Mapping[str, list[str]]:
@@ -86,24 +71,19 @@ def _names(path: Path) -> Mapping[str, list[str]]:
     return {name: list(map(str, one)) for name, one in lists.items() if isinstance(one, list)}
 
 
-def _flat(batch: Any, names: Mapping[str, list[str]], types: Any) -> Iterator[tuple[tuple[int, Name], list[str]]]:
-    """Give each column of numbers or text, by its place and name, as text; what is missing is empty."""
-    place = 0
+def _flat(batch: Any, names: Mapping[str, list[str]]) -> Iterator[tuple[Name, list[str]]]:
+    """Give each column, of vectors each of their numbers, with its name and as text; what is missing is empty."""
     for feature, column in zip(batch.schema.names, batch.columns, strict=True):
         values = column.to_pylist()
-        if any(is_kind(column.type) for is_kind in (types.is_list, types.is_large_list, types.is_fixed_size_list)):
-            size = max((len(one) for one in values if one is not None), default=0)
-            inner = names.get(feature, [])
-            for i in range(size):
-                named = inner[i] if len(inner) == size and inner.count(inner[i]) == 1 else str(i)
-                full = f"{feature}.{named}"
-                short = full if named == str(i) else named
-                yield (place, Name(full, short)), [_text(None if one is None else one[i]) for one in values]
-                place += 1
-        else:
-            yield (place, Name(feature, feature)), list(map(_text, values))
-            place += 1
-
-
-def _text(value: Any) -> str:
-    return "" if value is None else str(value)
+        size = next((len(one) for one in values if isinstance(one, list)), None)
+        if size is None:
+            yield (feature, feature), ["" if value is None else str(value) for value in values]
+            continue
+        if any(one is not None and len(one) != size for one in values):
+            raise ValueError(f"the vectors of {feature} differ in length")
+        inner = names.get(feature, [])
+        inner = inner if len(inner) == size else [""] * size
+        for i, named in enumerate(inner):
+            own = named and inner.count(named) == 1
+            texts = ["" if one is None or one[i] is None else str(one[i]) for one in values]
+            yield (f"{feature}.{named if own else i}", named if own else f"{feature}.{i}"), texts

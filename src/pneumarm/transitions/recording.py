@@ -35,7 +35,7 @@ import hashlib
 import math
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -103,13 +103,6 @@ class PressureColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     range: tuple[float, float] | None = None
 
 
-class CommandColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
-    """The column of a muscle's command."""
-
-    column: str
-    range: tuple[float, float] | None = None
-
-
 class VelocityColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The column of a joint's velocity that a sensor of its own measured."""
 
@@ -118,8 +111,8 @@ class VelocityColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     range: tuple[float, float] | None = None
 
 
-class FurtherColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
-    """The column of an accelerometer [m/s2] or a thermometer [Celsius]."""
+class OtherColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
+    """The column of a muscle's command, of an accelerometer [m/s2] or of a thermometer [Celsius]."""
 
     column: str
     range: tuple[float, float] | None = None
@@ -129,14 +122,14 @@ class JointColumns(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The columns of one joint; those of further sensors where it has them."""
 
     angle: AngleColumn
-    command_1: CommandColumn
-    command_2: CommandColumn
+    command_1: OtherColumn
+    command_2: OtherColumn
     pressure_1: PressureColumn | None = None
     pressure_2: PressureColumn | None = None
     velocity: VelocityColumn | None = None
-    acceleration: FurtherColumn | None = None
-    temperature_1: FurtherColumn | None = None
-    temperature_2: FurtherColumn | None = None
+    acceleration: OtherColumn | None = None
+    temperature_1: OtherColumn | None = None
+    temperature_2: OtherColumn | None = None
 
 
 class Mapping(_MappingTable, frozen=True, forbid_unknown_fields=True):
@@ -217,7 +210,7 @@ def import_recording(recording: Path | str, mapping: Path | str | None, store: S
         if not transitions:
             raise UnusableInput(f"{recording}: no two rows are one period of {spec.period:g} s apart; is it right?")
         return ImportResult(
-            transitions, sequences, reader.rows, reader.single, reader.restarts, dict(sorted(reader.skipped.items()))
+            transitions, sequences, reader.rows, reader.single, reader.restarts, dict(+reader.skipped)
         )
 
 
@@ -386,7 +379,7 @@ class _Unusable(Exception):  # noqa: N818 - never seen outside
 class _Read(NamedTuple):
     """A row that was understood."""
 
-    row: Row
+    fields: Sequence[str]
     sequence: str
     time: float
     values: list[float]
@@ -397,33 +390,28 @@ class _Part:
 
     def __init__(self, sequence: str | None) -> None:
         self.sequence = sequence
-        self.times: list[float] = []
-        self.values: list[list[float]] = []
-        self.cut: list[bool] = []
-        self.last: list[str] = []
-        """Fields of the last row."""
-        self.passed = 0
-        """Rows of the recording since it began, those left out too."""
-        self.broken = False
-        """Whether a row was left out since the last."""
+        self.rows: list[tuple[float, bool, list[float]]] = []  # time, whether one was left out before it, values
+        self.last: Sequence[str] = ()  # fields of the last row
+        self.passed = 0  # rows since it began, those left out too
+        self.broken = False  # whether one was left out since the last
 
     def add(self, read: _Read) -> None:
         """Add a row, which does not follow on the one before where one was left out between them."""
-        self.cut.append(self.broken and bool(self.times))
-        self.times.append(read.time)
-        self.values.append(read.values)
-        self.last, self.broken = read.row.fields, False
+        self.rows.append((read.time, self.broken and bool(self.rows), read.values))
+        self.last, self.broken = read.fields, False
 
 
 class _Reader:
-    """Iterates over the sequences of a recording: time (n,), whether there is a cut before a row (n,), and values.
+    """Iterates over the sequences of a recording, once.
 
-    Values (n, columns) are in sensor units.
+    Gives times (n,) [s], whether a row is cut off from the one before (n,), and values (n, columns) in sensor units.
     """
 
     def __init__(self, path: Path, mapping: Mapping, columns: list[_Column], period: float) -> None:
         self._path, self._sequence, self._columns, self._period = path, mapping.sequence, columns, period
         self._time = TimeColumn(mapping.time) if isinstance(mapping.time, str) else mapping.time
+        time = None if self._time is None else self._time.column
+        self._names = [self._sequence, time, *(column.name for column in columns)]
         self._used = self.single = self.restarts = 0
         self.skipped = Counter[str]()
         self._wrong = ""  # what is wrong with the first row that was left out
@@ -437,8 +425,7 @@ class _Reader:
         return self._used + self.skipped.total()
 
     def __iter__(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]]:
-        table = self._open()
-        part, early = _Part(None), list[_Read]()  # of the latter at most one: the next row says what it was
+        table, part, early = read_table(self._path, self._names), _Part(None), None
         for row in table.rows:
             try:
                 read = self._read(row, table, part)
@@ -448,86 +435,58 @@ class _Reader:
                     part.broken, part.passed = True, part.passed + 1
                 continue
             if read.sequence != part.sequence:
-                self._leave(early, part)
                 yield from self._whole(part)
                 part = _Part(read.sequence)
             part.passed += 1
-            if part.times and read.time - part.times[-1] < self._period / 2:
-                if not early or not 0.5 <= (read.time - early[0].time) / self._period < 1.5:
-                    self._leave(early, part)
-                    early.append(read)
+            if part.rows and read.time - part.rows[-1][0] < self._period / 2:
+                if early is None or not 0.5 <= (read.time - early.time) / self._period < 1.5:
+                    early, before = read, part.rows[-1][0]
+                    what = f"{read.time:g} s is less than half a period of {self._period:g} s after {before:g} s"
+                    what = f"column {self._names[1]!r}: {what}; is the period right, does a new sequence begin?"
+                    self._skip(row, _NOT_RISING, what)
+                    part.broken |= read.fields != part.last  # a copy of the row before cuts nothing
                     continue
-                yield from self._whole(part)  # the row goes on from the early one: the clock began anew
+                yield from self._whole(part)  # it goes on from the row left out before: the clock began anew there
+                part = _Part(read.sequence)
+                part.add(early)
+                self.skipped[_NOT_RISING] -= 1
                 self.restarts += 1
-                broken, part = part.broken, _Part(read.sequence)
-                part.add(early.pop())
-                part.broken = broken
-            self._leave(early, part)
             part.add(read)
-            if len(part.times) == _LONGEST_SEQUENCE:
+            early = None
+            if len(part.rows) == _LONGEST_SEQUENCE:
                 yield from self._whole(part)
                 part = _Part(part.sequence)
-        self._leave(early, part)
         yield from self._whole(part)
 
     def check(self) -> None:
-        """Check what was read, all of it.
-
-        Raises:
-            UnusableInput: the time does not go on by the period, or too many rows could not be used.
-
-        """
-        self._check_period()
-        bad, rows = self.skipped.total() - self.skipped[_TORN], self.rows
-        if bad > _MOST_SKIPPED * rows:
-            reasons = ", ".join(f"{reason}: {count}" for reason, count in self.skipped.most_common())
+        """Raise UnusableInput where the time does not go on by the period, or too many rows could not be used."""
+        steps = np.array(sorted(self._steps.items())).reshape(-1, 2)
+        passed = np.cumsum(steps[:, 1])
+        median = float(steps[np.searchsorted(passed, passed[-1] / 2), 0]) if len(steps) else self._period
+        if self._time is not None and abs(median / self._period - 1) > _TOLERANCE:
+            wrong = f"the median step of the time is {median:g} s, the mapping's period says {self._period:g} s"
+            raw = median / _SECONDS[self._time.unit] / self._period
+            likely = next((unit for unit, seconds in _SECONDS.items() if 0.5 < raw * seconds < 2), self._time.unit)
+            advice = f"set period = {median:g}, or the unit of the time" if median else "its stamps are too coarse"
+            if _SECONDS[likely] != _SECONDS[self._time.unit]:
+                told = as_toml({"column": self._time.column, "unit": likely})
+                advice = f"the time column seems to be in {likely}: set time = {told}"
+            raise UnusableInput(f"{self._path}: {wrong}; {advice}")
+        bad = self.skipped.total() - self.skipped[_TORN]
+        if bad > _MOST_SKIPPED * self.rows:
+            reasons = ", ".join(f"{reason}: {count}" for reason, count in self.skipped.most_common() if count)
             raise UnusableInput(
-                f"{self._path}: {self._wrong}; {bad} of {rows} rows cannot be used ({reasons}), "
-                f"{_MOST_SKIPPED:.0%} may be"
+                f"{self._path}: {self._wrong}; {bad} of {self.rows} rows cannot be used ({reasons}), at most "
+                f"{_MOST_SKIPPED:.0%} may"
             )
 
-    def _check_period(self) -> None:
-        if self._time is None or not self._steps:
-            return
-        sizes = sorted(self._steps)
-        median = sizes[
-            int(np.searchsorted(np.cumsum([self._steps[size] for size in sizes]), self._steps.total() / 2))
-        ]
-        if abs(median / self._period - 1) <= _TOLERANCE:
-            return
-        raw = median / _SECONDS[self._time.unit]
-        likely = [unit for unit, seconds in _SECONDS.items() if 0.5 < raw * seconds / self._period < 2]
-        advice = f"set period = {median:g}, or the unit of the time"
-        if likely and likely[0] != self._time.unit:
-            named = f"time = {{ column = {as_toml(self._time.column)}, unit = {as_toml(likely[0])} }}"
-            advice = f"the time column seems to be in {likely[0]}: set {named}"
-        raise UnusableInput(
-            f"{self._path}: the recording's median step is {median:g} s, the mapping's period says "
-            f"{self._period:g} s; {advice}"
-        )
-
-    def _open(self) -> Table:
-        time = None if self._time is None else self._time.column
-        names = [self._sequence, time, *(column.name for column in self._columns)]
-        table = read_table(self._path, [name for name in names if name is not None])
-        places = iter(table.places)
-        return table._replace(places=[-1 if name is None else next(places) for name in names])
-
     def _whole(self, part: _Part) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]]:
-        self._used += len(part.times)
-        if len(part.times) >= 2:
-            yield np.array(part.times), np.array(part.cut), np.array(part.values)
+        self._used += len(part.rows)
+        if len(part.rows) >= 2:
+            times, cut, values = zip(*part.rows, strict=True)
+            yield np.array(times), np.array(cut), np.array(values)
         else:
-            self.single += len(part.times)
-
-    def _leave(self, early: list[_Read], part: _Part) -> None:
-        """Leave out the row whose time was too ``early``, if there is one; a copy of the one before cuts nothing."""
-        for one in early:
-            part.broken |= one.row.fields != part.last
-            what = f"{one.time:g} s is less than half a period of {self._period:g} s after {part.times[-1]:g} s"
-            what += "; is the period right, does a new sequence begin?"
-            self._skip(one.row, _NOT_RISING, f"column {self._time and self._time.column!r}: {what}")
-        early.clear()
+            self.single += len(part.rows)
 
     def _skip(self, row: Row, reason: str, what: str) -> None:
         self.skipped[_TORN if row.torn and reason != _NOT_RISING else reason] += row.lines
@@ -537,7 +496,7 @@ class _Reader:
         """Return the ``row`` of a ``table``, the next one of ``part`` or of a new sequence; or raise _Unusable."""
         fields_, width = row.fields, table.width
         if len(fields_) != width and (len(fields_) < width or any(map(str.strip, fields_[width:]))):
-            what = f"expected {width} fields, got {len(fields_)} separated by {table.separators}"
+            what = f"expected {width} fields, got {len(fields_)} separated by {table.separator!r}"
             raise _Unusable("wrong number of fields", what)
         of_sequence, of_time, *places = table.places
         sequence = "" if self._sequence is None else fields_[of_sequence].strip()
@@ -554,7 +513,7 @@ class _Reader:
         values = [
             self._value(fields_[place], column, table) for place, column in zip(places, self._columns, strict=True)
         ]
-        return _Read(row, sequence, time, values)
+        return _Read(fields_, sequence, time, values)
 
     def _value(self, text: str, column: _Column, table: Table) -> float:
         """Return what a field holds, in sensor units; or raise _Unusable."""

@@ -92,6 +92,9 @@ DIALECTS = {
     "comments": "# bench\n#\n" + SOUND.replace("\n0.2000", "\n# a pause, here\n0.2000"),
     "a header in a comment": "# measured on Monday\n# " + SOUND,
     "a title": "Recorder 3.1\nrate;50 Hz\n\n" + written(cells(), ";"),
+    "a remark that is not in UTF-8": b"# at 20 \xb0C\n" + SOUND.encode(),
+    "a name that is not in UTF-8": written([[*row, "1"] for row in cells()], names=[*NAMES, "w"]).encode("cp1252")
+    .replace(b"w", b"\xb0"),
     "blank lines": "\n" + SOUND.replace("\n", "\n\n") + "\n \n",
     "no end of the last line": SOUND[:-1],
     "a column without a name": "," + SOUND.replace("\n", "\n7,")[:-2],
@@ -145,6 +148,7 @@ def lost(*rows: int) -> list[int]:
         (spoilt(30, "q", "inf"), "not a number", lost(30)),
         (spoilt(30, "p1", "77"), "out of range", lost(30)),
         (spoilt(30, "a1", "0.5"), "out of range", lost(30)),
+        (spoilt(30, "q", "3").encode().replace(b",3,", b",\xff,"), "not a number", lost(30)),
         (spoilt(30, "t", ""), "value missing", lost(30)),
         (spoilt(30, "t", "0.58"), "time not after that of the row before", lost(30)),
         (spoilt(30, "t", "0.03"), "time not after that of the row before", lost(30)),
@@ -160,7 +164,7 @@ def lost(*rows: int) -> list[int]:
     ],
 )  # fmt: skip
 def test_a_row_that_cannot_be_used_is_left_out_and_nothing_spans_it(
-    imported: Imported, text: str, reason: str, kept: list[int]
+    imported: Imported, text: str | bytes, reason: str, kept: list[int]
 ) -> None:
     result, rows = imported(text)
     assert result.skipped == {reason: 1}
@@ -174,6 +178,11 @@ def test_a_row_left_out_takes_its_time_where_there_is_no_column_of_it(imported: 
     _, rows = imported(spoilt(30, "p1", ""), MAPPING.replace('time = "t"\n', ""))
     np.testing.assert_allclose(rows.time[28:32], [0.56, 0.58, 0.62, 0.64])
     assert np.diff(rows.step)[28:32].tolist() == [1, 3, 1, 1]
+
+
+def test_a_torn_last_line_counts_for_nothing_however_short_the_recording(imported: Imported) -> None:
+    result, _ = imported(written(cells()[:10])[:-9])
+    assert (result.transitions, result.rows, result.skipped) == (8, 10, {"torn last line": 1})
 
 
 def test_where_the_clock_begins_anew_a_sequence_does(imported: Imported) -> None:
@@ -347,7 +356,7 @@ def test_names_that_are_ambiguous_are_refused_with_those_that_are_not(tmp_path: 
     assert not (tmp_path / "s.db").exists()
 
 
-def parquet_of(file: Path, **text: list[str | None]) -> Path:
+def parquet_of(file: Path, **text: Sequence[str | None]) -> Path:
     arrow, parquet = (pytest.importorskip(name) for name in ("pyarrow", "pyarrow.parquet"))
     columns = {name: [float(row[k]) for row in cells()] for k, name in enumerate(NAMES)}
     parquet.write_table(arrow.table(columns | text), file)
@@ -373,14 +382,16 @@ def test_a_sequence_of_text_in_parquet_may_hold_any_character(tmp_path: Path) ->
 # ---- further files, and what is no file
 
 
-def test_a_second_file_is_added_to_the_store_of_the_same_arm(tmp_path: Path) -> None:
+def test_a_second_file_is_added_to_the_store_of_the_same_arm(tmp_path: Path, address: Path | str) -> None:
     (tmp_path / "m.toml").write_text(MAPPING)
     (tmp_path / "a.csv").write_text(SOUND)
     (tmp_path / "b.csv").write_text(written(cells()[:40]))
-    first = import_recording(tmp_path / "a.csv", tmp_path / "m.toml", tmp_path / "s.db")
-    second = import_recording(tmp_path / "b.csv", tmp_path / "m.toml", tmp_path / "s.db")
+    first = import_recording(tmp_path / "a.csv", tmp_path / "m.toml", address)
+    second = import_recording(tmp_path / "b.csv", tmp_path / "m.toml", address)
     assert (first.transitions, second.transitions, second.sequences, second.rows) == (ROWS - 1, 39, 1, 40)
-    with Store.open(tmp_path / "s.db") as store:
+    with pytest.raises(UnusableInput, match=r"has been imported into .* already, as its run 2"):
+        import_recording(tmp_path / "b.csv", tmp_path / "m.toml", address)
+    with Store.open(address) as store:
         store.check()
         assert (store.sequences, store.transitions) == (2, ROWS - 1 + 39)
         assert [run["settings"]["recording"] for run in store.runs().values()] == ["a.csv", "b.csv"]

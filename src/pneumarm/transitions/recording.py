@@ -520,7 +520,7 @@ class _Reader:
         value = self._number(text, column.name, table)
         if not column.low <= value <= column.high or (column.whole and value != round(value)):
             kind = "-1, 0 or 1" if column.whole else f"{column.low:g} to {column.high:g}"
-            what = f"column {column.name!r}: expected {kind}, got {text[:40]}; is the unit right?"
+            what = f"column {column.name!r}: expected {kind}, got {text.strip()[:40]}; is the unit right?"
             raise _Unusable("out of range", what)
         return column.factor * value + column.offset
 

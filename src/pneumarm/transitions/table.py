@@ -87,6 +87,8 @@ def _csv(path: Path, wanted: Sequence[str | None]) -> Table:
                     best, nearest = (len(places), len(names)), f"line {begin}: {wrong}"
         except csv.Error:
             continue
+    if any("\ufffd" in line for line in head):
+        nearest += "; expected CSV in UTF-8, this is something else"
     raise UnusableInput(f"{path}: {nearest}")
 
 
@@ -95,7 +97,7 @@ def _reader(lines: Iterable[str], separator: str) -> Any:
 
 
 def _places(names: list[Name], wanted: Sequence[str | None]) -> tuple[list[int], str]:
-    """Return where the columns ``wanted`` are, by whole names or else by short ones, and what is wrong with others."""
+    """Return where the columns ``wanted`` are, by whole names or else short ones, and what is wrong with others."""
     whole, short = defaultdict[str, list[int]](list), defaultdict[str, list[int]](list)
     for place, name in enumerate(names):
         whole[name[0].strip()].append(place)
@@ -106,16 +108,17 @@ def _places(names: list[Name], wanted: Sequence[str | None]) -> tuple[list[int],
     if not wrong:
         return places, ""
     first = [place for one in wrong for place in found[one]]  # what is ambiguous comes with all that it may be
-    offered = ", ".join(names[place][0] for place in dict.fromkeys([*first, *range(len(names))]))
+    shown = (names[place][0][:100] for place in dict.fromkeys([*first, *range(len(names))]))
+    offered = "".join(one if one.isprintable() else "?" for one in ", ".join(shown)[:600])
     return (
         places,
-        f"the mapping needs the column(s) {', '.join(wrong)} once each; the file has {offered[:600] or 'none'}",
+        f"the mapping needs the column(s) {', '.join(wrong)} once each; the file has {offered or 'none'}",
     )
 
 
 def _lines(path: Path) -> Iterator[str]:
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
+        with open(path, encoding="utf-8-sig", errors="replace", newline="") as file:
             for number in count(1):
                 line = file.readline(_LONGEST_LINE + 1)
                 if len(line) > _LONGEST_LINE:
@@ -126,8 +129,6 @@ def _lines(path: Path) -> Iterator[str]:
                 yield line
     except OSError as error:
         raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise UnusableInput(f"{path}: expected CSV in UTF-8, this is something else ({error})") from error
 
 
 def _rows(path: Path, lines: Iterator[str], separator: str, begin: int) -> Iterator[Row]:

@@ -400,7 +400,7 @@ def test_hostile_recordings_are_refused_in_little_memory(tmp_path, limited):
         "line": columns + '"' + "1\n" * 1_000_000,
         "expected 5 fields": columns + "1," * 30_000 + "\n",
         "UTF-8": b"\xff\xfe\x00" * 1000,
-        "expected a finite number": columns + "1,1,1,0,0\n" * 20_000 + "1,1,1,0,x\n",
+        "expected a finite number": columns + "1,1,1,0,0\n" * 20_000 + "1,1,1,0,x\n" * 2_000,
     }
     recordings = [tmp_path / f"{n}.csv" for n in range(len(hostile))]
     for path, text in zip(recordings, hostile.values(), strict=True):

@@ -89,6 +89,7 @@ class Store:
         self.database = database
         self._run: int | None = None
         self._part: _Part | None = None
+        self._is_writing = False
         self.spec: ArmSpec
         """The arm that the rows are of."""
         self.valves: bool
@@ -127,6 +128,22 @@ class Store:
         place = address_of(address)
         with _kind(place).made_whole(place, spec, valves) as database:
             yield cls(database)
+
+    @classmethod
+    @contextmanager
+    def added_whole(cls, address: StoreAddress, spec: ArmSpec, valves: bool = True) -> "Iterator[Store]":
+        """Give the store at ``address``, made where there is none, to be added to: all that is written, or nothing.
+
+        Raises:
+            UnusableInput: it is of another arm; else as for :meth:`create` and :meth:`append_to`.
+
+        """
+        place = address_of(address)
+        is_there = _kind(place).is_there(place)
+        with cls.append_to(place) if is_there else cls.made_whole(place, spec, valves) as store:
+            store.check_arm(spec, valves)
+            with store.writing():
+                yield store
 
     @classmethod
     def append_to(cls, address: StoreAddress) -> "Store":
@@ -339,10 +356,11 @@ class Store:
 
     # ---- writing
 
-    def check_arm(self, spec: ArmSpec) -> None:
+    def check_arm(self, spec: ArmSpec, valves: bool = True) -> None:
         """Raise UnusableInput where what an arm of ``spec`` does cannot be added: the store is of another one."""
-        if not self.valves:
-            raise UnusableInput(f"{self.address}: holds continuous commands; collect into a store of its own")
+        if self.valves != valves:
+            held, given = ("valves or pulses", "continuous commands")[:: 1 if self.valves else -1]
+            raise UnusableInput(f"{self.address}: holds {held}, not {given}; give another store")
         # Nothing that is stored depends on the links: they may be measured, or measured again, while an arm is used.
         mine, kept = asdict(replace(spec, links=())), asdict(replace(self.spec, links=()))
         different = [f"{name} was {kept[name]!r}, is {mine[name]!r}" for name in kept if mine[name] != kept[name]]
@@ -498,11 +516,21 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[Database]:
-        """Give the database within a transaction: durable when this ends well, rolled back when it does not."""
+        """Give the database within a transaction: durable when this ends well, rolled back when it does not.
+
+        Within another one it is part of that.
+        """
         if not self.database.writer:
             raise PneumarmError(f"{self.address}: was opened for reading; open it with Store.append_to to write")
-        with self.database.transaction():
+        if self._is_writing:
             yield self.database
+            return
+        self._is_writing = True
+        try:
+            with self.database.transaction():
+                yield self.database
+        finally:
+            self._is_writing = False
 
     # ---- checks
 

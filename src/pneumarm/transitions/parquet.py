@@ -33,9 +33,7 @@ def files_of(path: Path) -> list[Path]:
     """
     files = sorted(path.glob("data/*/*.parquet")) if (path / INFO).is_file() else [path]
     for file in files:
-        if not file.is_file():  # to open a pipe would wait for ever
-            there = "this is not a file" if file.exists() else "there is no such file"
-            raise UnusableInput(f"{file}: expected a recording (CSV, Parquet, or a dataset of LeRobot), {there}")
+        require_regular_file(file, "a recording (CSV, Parquet, or a dataset of LeRobot)")
     return files
 
 
@@ -49,8 +47,6 @@ def batches_of(path: Path) -> Iterator[tuple[list[Name], list[tuple[str, ...]]]]
     arrow, parquet = (extra(name, "parquet", f"{path}: Parquet") for name in ("pyarrow", "pyarrow.parquet"))
     files = files_of(path)
     try:
-        if not path.is_dir():
-            require_regular_file(path, "Parquet or a dataset of LeRobot")
         names = _names(path)
         for file in files:
             with parquet.ParquetFile(file) as opened:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pneumarm.errors import UnusableInput
-from pneumarm.files import require_regular_file
 from pneumarm.transitions.parquet import Name, batches_of, files_of, is_parquet
 
 _LONGEST_LINE = 64 << 10  # characters
@@ -118,7 +117,6 @@ def _places(names: list[Name], wanted: Sequence[str | None]) -> tuple[list[int],
 
 
 def _lines(path: Path) -> Iterator[str]:
-    require_regular_file(path, "a recording as CSV")
     try:
         with open(path, encoding="utf-8-sig", errors="replace", newline="") as file:
             for number in count(1):

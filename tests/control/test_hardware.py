@@ -184,7 +184,7 @@ from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import Monitor, TransferSettings, open_agent, open_controller, transfer
 from pneumarm.transitions import CollectSettings, Store, collect
 
-class Enough(BaseException):
+class Enough(KeyboardInterrupt):
     pass
 
 class Counting(VirtualArm):

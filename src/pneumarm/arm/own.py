@@ -81,8 +81,8 @@ class OwnArm(PassedOn):
 
     def read(self) -> Reading:
         """Return what the sensors say."""
-        reading: Reading = self._call("read", check=lambda given: checked(given, self.spec))
-        wrong = self._clock.wrong(reading.time, self.real_time)
+        reading: Reading = self._call("read", check=lambda given: checked(given, self.spec) and given)
+        wrong = self._clock.wrong(float(reading.time), self.real_time)
         if wrong is not None:
             raise self._clock_failed(wrong)
         return reading

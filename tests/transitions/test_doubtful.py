@@ -1,5 +1,6 @@
 """Rows that no sound sensor gives are marked, imported or recorded; no row of a sound arm is."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from pneumarm.arm import ArmSpec, Reading
 from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.cli import main
 from pneumarm.errors import ArmFailure
 from pneumarm.transitions import Store, collect, import_recording
 
@@ -153,3 +155,19 @@ def test_no_row_of_a_sound_arm_is_marked(tmp_path, seed):
     with Store.create(tmp_path / "store.db", arm.spec) as store:
         assert collect(arm, store, 2000).marked == {}
         assert store.marks() == {}
+
+
+def test_marks_are_told_by_the_commands(recorded, tmp_path, capsys):
+    path = tmp_path / "store.db"
+    with Store.create(path, SPEC) as store:
+        store.append_all(spoiled(sound(recorded), "pressure", slice(None), 77.0) for _ in range(3))
+        store.append_all([sound(recorded)] * 2)
+    said = "600 rows marked: pressure 1 reads one constant while valves act"
+    with pytest.raises(SystemExit, match="0"):
+        main(["coverage", str(path), "--json"])
+    shown = capsys.readouterr()
+    assert said in shown.err
+    assert json.loads(shown.out)["marked"] == {"pressure 1 reads one constant while valves act": 600}
+    with pytest.raises(SystemExit, match="2"):
+        main(["fit", str(path), "--out", str(tmp_path / "sim")])
+    assert "600 rows are marked: pressure 1" in capsys.readouterr().err

@@ -18,11 +18,10 @@ def coverage_(db: AnyStore, /, *, json: Json = False) -> None:
         The store.
     """
     with Store.open(db) as store, progress("comparing simulations of a half and of all"):
-        used = store.drawn()
+        used, marked = store.drawn(), store.marked_rows()
+        for line in (*used.used, *(f"{count:,} rows marked: {reason}" for reason, count in marked.items())):
+            say(line)
         found, judged = new_cells(used, Window(store.joints)), enough_data(used)
-        marked = store.marked_rows()
-    for line in used.used:
-        say(line)
     result = {
         **found.whole.summary(),
         "new_cells": found.count,
@@ -41,7 +40,6 @@ def coverage_(db: AnyStore, /, *, json: Json = False) -> None:
         ("of them full", f"{whole.full:,}"),
         ("new in the second half", f"{found.count:,}, {found.share:.0%} of those seen"),
         ("chance that the next one is new", f"{whole.unseen:.0%}"),
-        *((f"rows marked: {reason}", f"{count:,}") for reason, count in marked.items()),
     ]
     verdict = str(result["verdict"])
     show(result, json, lambda: [verdict[0].upper() + verdict[1:], table(("", ""), rows)])

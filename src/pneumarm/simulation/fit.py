@@ -603,8 +603,9 @@ def fit_store(
     """
     settings, store = settings or FitSettings(), store.drawn()
     if store.transitions < FEWEST_TRANSITIONS:
+        marked = "".join(f"; {count:,} rows are marked: {reason}" for reason, count in store.marked_rows().items())
         raise UnusableInput(
-            f"{store.transitions} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}"
+            f"{store.transitions} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}{marked}"
         )
     window = Window.of(store.spec, 1, settings.sensors)
     window.require(store.further, str(store.address))

@@ -544,7 +544,7 @@ PLACES: dict[str, tuple[tuple[str, ...], frozenset[str]]] = {
     "move": (("move", "FILE", "--arm", ARM, "10deg"), frozenset({"agent", "run"})),
     "transfer": (
         ("transfer", "FILE", "--arm", ARM, "--episodes", "5", "--test-episodes", "5", "--out", "new"),
-        frozenset({"agent", "run"}),
+        frozenset({"agent", "run", "simulation"}),  # a simulation that is planned in is an agent
     ),
     "test in": (("test", "arm.agent", "FILE", "arm.db", "--episodes", "10"), frozenset({"simulation"})),
     "test with": (("test", "arm.agent", "arm.sim", "FILE", "--episodes", "10"), frozenset({"store"})),

@@ -285,3 +285,10 @@ def test_nothing_is_written_through_a_link_where_a_temporary_file_may_be(tmp_pat
         assert temporary.parent.stat().st_mode & 0o077 == 0  # nobody else can put anything there
         temporary.write_text("{}")
     assert (victim.read_text(), path.read_text()) == ("precious", "{}")
+
+
+@pytest.mark.parametrize("reader", ["table", "trajectory"])
+def test_a_cell_without_end_is_no_table(tmp_path: Path, capsys: pytest.CaptureFixture[str], reader: str) -> None:
+    file = tmp_path / "table.csv"
+    file.write_text("trial,run 1\n1," + "2" * 1_000_000)
+    assert Outcome(capsys, *READERS[reader](file)).is_refused("table.csv: expected")

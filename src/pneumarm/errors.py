@@ -3,6 +3,9 @@
 Every message says what was expected, what came, and what to do; the command line prints it as one line.
 """
 
+import re
+
+_LONG_WORD = re.compile(r"(?<!\S)(\S{150})\S{100,}(\S{50})")
 _LONGEST = 1000  # characters of a message: what a file holds may be repeated in it, and can be of any length
 
 
@@ -16,7 +19,8 @@ class PneumarmError(Exception):
 
 
 def shortened(message: str) -> str:
-    """Return ``message`` without its middle if it is long: its beginning names the file, its end what to do."""
+    """Return ``message`` without what is in the middle of its long words, and of itself if it is long."""
+    message = _LONG_WORD.sub(r"\1...\2", message)
     return message if len(message) <= _LONGEST else f"{message[: _LONGEST - 305]} ... {message[-300:]}"
 
 

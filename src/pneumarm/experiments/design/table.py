@@ -37,7 +37,10 @@ def parse_table(text: str, source: str, columns: str | None = None) -> ResultTab
         UnusableInput: it is no such table.
 
     """
-    lines = [line for line in csv.reader(text.splitlines()) if any(cell.strip() for cell in line)]
+    try:
+        lines = [line for line in csv.reader(text.splitlines()) if any(cell.strip() for cell in line)]
+    except csv.Error as error:
+        raise UnusableInput(f"{source}: {_EXPECTED}; {error}") from error
     if len(lines) < 2 or len(lines[0]) < 2:
         first = f", the first {','.join(lines[0])!r}" if lines else ""
         raise UnusableInput(f"{source}: {_EXPECTED}, separated by commas; it has {len(lines)} lines{first}")

@@ -1,9 +1,15 @@
 """Corrections of a moving reference: what is missed again and again is learned, what is missed by far is not."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from pneumarm.arm import ArmSpec
+from pneumarm.arm.reference import Reference
 from pneumarm.learning.servo.correction import Correction, features_of
+from pneumarm.learning.servo.following import Following
 
 MIDDLE = np.array([500.0])
 PERIOD = 1 / 30
@@ -70,3 +76,20 @@ def test_what_was_learned_is_forgotten_where_it_may_be_what_is_wrong() -> None:
     for _ in range(30):
         correction.learn(np.array([300.0]), features[0])
     assert correction.of(features)[0, 0] < 5
+
+
+def test_what_the_policy_misses_is_no_longer_corrected_where_plans_take_its_place() -> None:
+    spec, tolerance = ArmSpec(), ArmSpec.counts_per_degree
+    settings, goals = SimpleNamespace(tolerance=1.0), np.array([[300, 700]])
+    agent: Any = SimpleNamespace(spec=spec, goal_range=goals, settings=settings)
+    plans: Any = SimpleNamespace(gains=lambda *_: 0.0)
+    following = Following(Reference(lambda time: np.array([500 + 100 * np.sin(3 * time)])), agent, tolerance)
+    moves, unused = np.array([True]), np.zeros(1, np.float32)
+    for k in range(30):
+        path = following.path(k * spec.period, 3)
+        corrections = following.corrections(path, moves, path[1] - tolerance)
+        planned = following.is_planned(plans, moves, np.array([3 * tolerance]), unused, unused)
+        assert planned == (k == 29)  # a second of errors that are larger than those hoped of plans
+    assert corrections.min() > tolerance / 2
+    path = following.path(30 * spec.period, 3)
+    assert following.corrections(path, moves, path[1]).tolist() == [[0.0]] * 4

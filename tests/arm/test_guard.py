@@ -222,7 +222,7 @@ def test_an_inlet_that_was_open_for_too_long_is_vented_for_a_tenth_of_that(small
     for valve, seconds in ((1, 2.1), (-1, vented), (1, 0.0)):
         safe.read()
         safe.set_valves([[valve, 0]])
-        arm.wait(seconds)
+        safe.wait(seconds)
     assert arm.valves == [[free, 0]]
 
 

@@ -10,7 +10,7 @@ from pneumarm.arm import ArmSpec, Reading
 from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.cli import main
-from pneumarm.errors import ArmFailure
+from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.transitions import Store, collect, import_recording
 
 N = 200
@@ -110,14 +110,14 @@ def test_a_joint_held_against_its_end_stop_is_not_marked(recorded, tmp_path):
     assert marked(replace(spoiled(one, "angle", slice(None), 900.0), pressure=pressure), tmp_path) == {}
 
 
-@pytest.mark.parametrize("commands", ["valves", "continuous"])
-def test_imported_rows_are_marked(tmp_path, commands):
+def imported(tmp_path, commands, constant):
+    """Import 400 rows, the first ``constant`` of which have one pressure, and one an angle out of range."""
     random, k = np.random.default_rng(0), np.arange(400)
     table = np.stack(
         [
             0.02 * k,
             500 + 300 * np.sin(k / 9),
-            np.full(400, 66),
+            np.where(k < constant, 66, 100 + 60 * np.sin(k / 7)),
             80 + 50 * np.sin(k / 9),
             *random.integers(-1, 2, (2, 400)),
         ]
@@ -125,9 +125,23 @@ def test_imported_rows_are_marked(tmp_path, commands):
     table[30, 1] = 1200
     np.savetxt(tmp_path / "r.csv", table, "%.6g", ",", header="t,q,p1,p2,a1,a2", comments="")
     (tmp_path / "m.toml").write_text(MAPPING.format(commands=commands), encoding="utf-8")
-    assert import_recording(tmp_path / "r.csv", tmp_path / "m.toml", tmp_path / "s.db").transitions == 0
+    return import_recording(tmp_path / "r.csv", tmp_path / "m.toml", tmp_path / "s.db").transitions
+
+
+CONSTANT = "pressure 1 reads one constant while valves act"
+
+
+@pytest.mark.parametrize("commands", ["valves", "continuous"])
+def test_imported_rows_are_marked(tmp_path, commands):
+    assert 0 < imported(tmp_path, commands, 300) < 100
     with Store.open(tmp_path / "s.db") as store:
-        assert store.marked_rows() == {OUTSIDE: 1, "pressure 1 reads one constant while valves act": 400}
+        assert store.marked_rows() == {OUTSIDE: 1, CONSTANT: 300}
+
+
+def test_a_recording_that_is_all_marked_is_refused_with_what_is_wrong(tmp_path):
+    with pytest.raises(UnusableInput, match=f"no transition to learn from: .*400 x {CONSTANT}"):
+        imported(tmp_path, "valves", 400)
+    assert not (tmp_path / "s.db").exists()
 
 
 class Frozen(PassedOn):

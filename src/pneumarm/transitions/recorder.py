@@ -14,6 +14,7 @@ from pneumarm.address import StoreAddress
 from pneumarm.arm.cycle import Step
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
+from pneumarm.transitions.doubtful import with_doubtful_marked
 from pneumarm.transitions.rows import Recorded, broken_at
 from pneumarm.transitions.store import Store
 
@@ -91,6 +92,7 @@ class _Growing:
         """Steps that are not stored yet, after the last one that is; the arm's thread adds, the writing one takes."""
         self._store, self._kind, self._info = store, kind, dict(info)
         self._number: int | None = None  # of the sequence; None while none of its rows is stored
+        self._stored: list[Step] = []  # what it holds
         self._before = self._step = 0  # its rows before the first that waits, and the step of that
 
     def store(self, *, ends: bool = False) -> None:
@@ -98,7 +100,8 @@ class _Growing:
         while self._before + len(self.waiting) > LONGEST_PART + 1:
             self._write(LONGEST_PART - self._before)
             del self.waiting[0]
-            self._number, self._before, self._step = None, 0, 0
+            self._mark_doubtful()
+            self._number, self._stored, self._before, self._step = None, [], 0, 0
         rows = len(self.waiting)
         self._write(rows if ends else min(rows, LONGEST_PART - self._before))
 
@@ -107,6 +110,7 @@ class _Growing:
         try:
             self.store(ends=True)
         finally:
+            self._mark_doubtful()
             if why is not None and self._number is not None:
                 self._store.mark(self._number, [broken_at(self._step, why)])
 
@@ -117,7 +121,7 @@ class _Growing:
         try:
             part = Recorded.from_steps(self.waiting[:rows], self._store.spec, kind=self._kind, info=self._info)
             if self._number is None:
-                self._number = self._store.append(part)
+                self._number = self._store.append(part, grows=True)
                 self._info.setdefault("began", float(part.time[0]))  # by which what follows in other parts is placed
             else:
                 self._store.extend(self._number, part)
@@ -125,5 +129,14 @@ class _Growing:
             for _ in range(rows - 1 if rows > 2 else 0):
                 self._write(2)
             raise
+        self._stored[-1:] = self.waiting[:rows]
         del self.waiting[: rows - 1]
         self._before, self._step = self._before + rows - 1, self._step + int(part.step[-1])
+
+    def _mark_doubtful(self) -> None:
+        """Mark the rows that no sound sensor gives, now that the sequence is complete."""
+        if self._number is not None:
+            whole = Recorded.from_steps(self._stored, self._store.spec)
+            marks = with_doubtful_marked(whole, self._store.spec, valves=True).marks
+            if marks:
+                self._store.mark(self._number, marks)

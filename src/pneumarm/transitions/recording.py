@@ -191,20 +191,22 @@ def import_recording(recording: Path | str, mapping: Path | str | None, store: S
     reader = _Reader(recording, chosen, _columns(chosen, spec), spec.period)
     settings = {"recording": recording.name, "mapping": mapping.name, "fingerprint": _fingerprint(recording, chosen)}
     with Store.added_whole(store, spec, chosen.commands != "continuous") as kept:
-        for number, run in kept.runs().items():
-            if run["settings"].get("fingerprint") == settings["fingerprint"]:
+        for number, known in kept.runs().items():
+            if known["settings"].get("fingerprint") == settings["fingerprint"]:
                 raise UnusableInput(
                     f"{recording}: has been imported into {kept.address} already, as its run {number}"
                 )
         before = kept.transitions, kept.sequences
-        kept.begin_run("import", settings)
+        run = kept.begin_run("import", settings)
         kept.append_all(_sequences(reader, spec))
         transitions, sequences = kept.transitions - before[0], kept.sequences - before[1]
         reader.check()
         if not sequences:
             raise UnusableInput(f"{recording}: holds no sequence of two rows or more")
         if not transitions:
-            raise UnusableInput(f"{recording}: no two rows are one period of {spec.period:g} s apart; is it right?")
+            marked = ", ".join(f"{count:,} x {reason}" for reason, count in kept.marked_rows(run).items())
+            why = marked or f"no two rows are one period of {spec.period:g} s apart; is it right?"
+            raise UnusableInput(f"{recording}: holds no transition to learn from: {why}")
         return ImportResult(
             transitions, sequences, reader.rows, reader.single, reader.restarts, dict(+reader.skipped)
         )

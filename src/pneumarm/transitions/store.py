@@ -404,25 +404,28 @@ class Store:
             return number
         return self.begin_run(purpose, settings)
 
-    def append(self, recorded: Recorded, state: Mapping[str, bytes] | None = None) -> int:
+    def append(self, recorded: Recorded, state: Mapping[str, bytes] | None = None, *, grows: bool = False) -> int:
         """Write a sequence, and states to go on from after it, and return its number: it is durable then.
 
-        Rows that no sound sensor gives are marked (:mod:`pneumarm.transitions.doubtful`).
+        Rows that no sound sensor gives are marked (:mod:`pneumarm.transitions.doubtful`), unless the sequence
+        ``grows`` (:meth:`extend`): whoever adds to it marks them when it is complete.
 
         Raises:
             UnusableInput: shapes or numbers are impossible; nothing was written.
             PneumarmError: the disk is full, read-only or broken; nothing of this sequence was written.
 
         """
-        return self.append_all([recorded], state)
+        return self.append_all([recorded], state, grows=grows)
 
-    def append_all(self, recorded: Iterable[Recorded], state: Mapping[str, bytes] | None = None) -> int:
+    def append_all(
+        self, recorded: Iterable[Recorded], state: Mapping[str, bytes] | None = None, *, grows: bool = False
+    ) -> int:
         """Write sequences in one transaction, all or none, and return the number of the last one."""
         with self.writing() as database:
             number = int(self._one("SELECT coalesce(max(number), 0) FROM sequences"))
             for one in recorded:
                 number += 1
-                self._insert(number, one)
+                self._insert(number, one, grows)
             for name, value in (state or {}).items():
                 database.execute("DELETE FROM state WHERE name = :name", {"name": name})
                 database.insert("state", ("name", "value"), [(name, value)])
@@ -498,9 +501,10 @@ class Store:
         if lines:
             self.database.insert("marks", ("sequence", "first", "last", "reason"), lines)
 
-    def _insert(self, number: int, one: Recorded) -> None:
+    def _insert(self, number: int, one: Recorded, grows: bool) -> None:
         values = row_values(one, self.spec, self.further, self.valves)
-        one = with_doubtful_marked(one, self.spec, self.valves)
+        if not grows:
+            one = with_doubtful_marked(one, self.spec, self.valves)
         known = (number, self._run, one.kind, int(one.at_rest), len(one), one.transitions, _as_json(one.info))
         self.database.insert("sequences", SEQUENCE, [known])
         self._insert_marks(number, one.marks)

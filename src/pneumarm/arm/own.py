@@ -177,9 +177,10 @@ def _is_ours(arm: Arm) -> bool:
 
 
 def last_line(error: BaseException, module: str) -> str | None:
-    """Return the last line of ``module`` in the traceback of ``error``, None where there is none."""
+    """Return the last line of ``module`` in the traceback of ``error``, else the first that is not pneumarm's."""
     found = None
     for frame, line in traceback.walk_tb(error.__traceback__):
-        if frame.f_globals.get("__name__") == module:
+        name = str(frame.f_globals.get("__name__"))
+        if name == module or (found is None and not name.startswith("pneumarm.")):
             found = f"{frame.f_code.co_filename}:{line}, in {frame.f_code.co_name}"
     return found

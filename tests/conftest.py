@@ -6,11 +6,11 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+import soak
 from once import made_once
 from pneumarm.console import peak_memory
 from pneumarm.run import Run
 from small import SMALL
-from soak import withstood
 
 # An example may wait for a compiler, and for another worker that compiles; no test depends on how fast it is.
 hypothesis.settings.register_profile("untimed", deadline=None)
@@ -39,6 +39,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    for line in withstood:
-        terminalreporter.write_line(f"withstood: {line}")
+    for line in soak.summary:
+        terminalreporter.write_line(f"soak: {line}")
     terminalreporter.write_line(f"at most {peak_memory():.0f} MB of memory")

@@ -6,8 +6,8 @@ from time import monotonic
 _PAUSE = 15.0
 """Time between two lines of progress [s]."""
 
-withstood: list[str] = []
-"""A line for each attack of this session that was withstood; pytest shows them at its end."""
+summary: list[str] = []
+"""A line for each attack of this session; pytest shows them at its end."""
 
 
 def amount(name: str, full: int) -> int:
@@ -40,5 +40,5 @@ class Attack:
     def summarise(self, result: str) -> None:
         """Say what came of the attack, now and at the end of the session."""
         line = f"{self.title}: {self.done:,} in {self.seconds:.0f} s; {result}"
-        withstood.append(line)
+        summary.append(line)
         print(line, flush=True)

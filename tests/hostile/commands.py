@@ -23,8 +23,8 @@ MEMORY = 600.0
 """What a command may hold [MB]."""
 LONGEST_LINE = 500
 """Characters of a line on standard error."""
-_LATER = 4.0
-"""Times that a command may take when it is killed as one that hangs."""
+_LATER = 2.0
+"""Times what a command may take: after that it is killed as one that hangs."""
 REFUSED, DONE_OR_REFUSED, ANY = (2,), (0, 2), (0, 1, 2)
 """Exit codes: of what cannot be used; of what may be; of what may also move an arm in vain."""
 ARM = "virtual:seed=7"
@@ -112,7 +112,7 @@ class Commands:
         files = {name: str(self._place / name) for name in ("input", "output", "errors")}
         Path(files["input"]).write_bytes(case.input)
         allowed = DRAWING_SECONDS if case.arguments[0] in DRAWING else SECONDS
-        answer = self.ask(case.arguments, **files, patience=allowed * (1 + load()) + _LATER * allowed)
+        answer = self.ask(case.arguments, **files, patience=_LATER * allowed * (1 + load()))
         said = (Path(files[name]).read_bytes()[:1_000_000].decode(errors="replace") for name in ("output", "errors"))
         return Outcome(**answer, **dict(zip(("output", "errors"), said, strict=True)))
 

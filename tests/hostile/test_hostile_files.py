@@ -1,6 +1,7 @@
 """Damaged, swapped and hostile files and words against every command that reads them: each keeps the rule."""
 
 import random
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -11,6 +12,8 @@ import pytest
 from soak import Attack, amount
 from tests.hostile.attacks import GROUPS
 from tests.hostile.commands import DRAWING, REFUSED, Case, Commands, Outcome, violations
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="commands are forked, and limited as Linux does it")
 
 FEWEST = 1_657
 """Cases that there are at least."""
@@ -33,7 +36,7 @@ def chosen(sound: Path) -> dict[tuple[str, str], list[Case]]:
 def attack(sound: Path) -> Iterator[Attack]:
     found = Attack("commands on hostile files", sum(map(len, chosen(sound).values())))
     yield found
-    found.summarise(f"{found.done - found.failed:,} kept the rule")
+    found.summarise(f"{found.failed:,} broke the rule")
 
 
 def none_broken(found: list[str]) -> None:

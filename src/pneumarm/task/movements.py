@@ -112,11 +112,10 @@ class Movements(NamedTuple):
         """
         _, arrays = read_arrays(path, _KIND)
         angles = arrays.get("goal", np.empty(0)).shape
-        shapes = {name: angles if name in _BY_JOINT else angles[:1] for name in cls._fields}
-        found = {name: column.shape for name, column in arrays.items()}
-        if (found.get("switches") or ())[1:] == (1,):
-            shapes["switches"] = (*angles[:1], 1)
-        if len(angles) != 2 or found != shapes:
+        shapes = {name: {angles} if name in _BY_JOINT else {angles[:1]} for name in cls._fields}
+        shapes["switches"] |= {(*angles[:1], 1)}
+        fits = arrays.keys() == shapes.keys() and all(arrays[name].shape in shapes[name] for name in shapes)
+        if len(angles) != 2 or not fits:
             raise UnusableInput(
                 f"{path}: expected movements with the columns {', '.join(cls._fields)}; make it again"
             )

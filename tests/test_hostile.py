@@ -18,6 +18,7 @@ from pneumarm.experiments.row_file import read_rows
 from pneumarm.files import write_arrays, write_json, written_whole
 from pneumarm.learning import METHODS, load_agent
 from pneumarm.run import settings_in
+from pneumarm.task.movements import Movements
 from pneumarm.transitions import Store
 from test_cli import Outcome
 
@@ -224,6 +225,14 @@ def test_json_of_a_run_that_is_none_is_said(
     assert Outcome(capsys, *command, tmp_path).is_refused(file, "expected")
 
 
+@pytest.mark.parametrize("content", ['{"collect": 5}', '{"simulation": []}', '{"collect": null}'])
+def test_results_that_are_no_tables_are_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str
+) -> None:
+    (tmp_path / "results.json").write_text(content)
+    assert Outcome(capsys, "report", tmp_path).is_refused("results.json", "expected tables")
+
+
 @pytest.mark.parametrize("columns", ["0", "-3", "3", "many", "9" * 5000])
 def test_terminals_that_say_nonsense_get_tables_all_the_same(columns: str) -> None:
     environment = {**os.environ, "COLUMNS": columns}
@@ -247,7 +256,7 @@ def test_streams_that_the_caller_has_closed_are_no_bug(tmp_path: Path, closed: s
 
 
 def test_numbers_of_any_length_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    for arm in ("virtual:seed=" + "9" * 5000, "virtual:joints=" + "1" * 5000):
+    for arm in ("virtual:seed=" + "9" * 5000, "virtual:joints=" + "1" * 5000, "emulated:" * 500 + "virtual"):
         done = Outcome(capsys, "arm", "sensors", arm)
         assert done.is_refused("expected")
         assert len(done.err) < 1500
@@ -292,3 +301,14 @@ def test_a_cell_without_end_is_no_table(tmp_path: Path, capsys: pytest.CaptureFi
     file = tmp_path / "table.csv"
     file.write_text("trial,run 1\n1," + "2" * 1_000_000)
     assert Outcome(capsys, *READERS[reader](file)).is_refused("table.csv: expected")
+
+
+@pytest.mark.parametrize("name", Movements._fields)
+def test_movements_of_other_shapes_are_refused_before_they_are_computed_with(tmp_path: Path, name: str) -> None:
+    by_joint = ("goal", "angle_begin", "angle_end", "velocity_end", "switches")
+    known = {one: np.zeros((5, 2) if one in by_joint else 5) for one in Movements._fields}
+    write_arrays(tmp_path / "it", "pneumarm movements", {}, known)
+    Movements.load(tmp_path / "it")
+    write_arrays(tmp_path / "it", "pneumarm movements", {}, known | {name: np.zeros((5, 5, 2))})
+    with pytest.raises(UnusableInput, match="expected movements"):
+        Movements.load(tmp_path / "it")

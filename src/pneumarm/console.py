@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -26,7 +27,7 @@ _LOOK = 0.1  # s between two looks of a person
 
 _NARROWEST = 20  # columns in which tables and helps can be laid out; terminals that cannot tell say 0
 _columns = os.environ.get("COLUMNS", "")
-if not _columns.isdecimal() or int(_columns[:9]) < _NARROWEST:
+if not re.fullmatch("[0-9]{2,6}", _columns) or int(_columns) < _NARROWEST:
     os.environ.pop("COLUMNS", None)
 _errors = Console(stderr=True, highlight=False)
 

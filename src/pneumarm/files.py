@@ -10,13 +10,12 @@ import io
 import json
 import os
 import re
-import shutil
 import stat
-import tempfile
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
 import msgspec
@@ -52,15 +51,14 @@ def written_whole(path: Path) -> Iterator[Path]:
 
     """
     require_folder(path)
-    own = None
     try:
-        own = _own_folder(path)
-        temporary = own / path.name
-        yield temporary
-        os.chmod(temporary, 0o666 & ~_UMASK)  # some writers make files that only their owner may read
-        with open(temporary, "rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
+        with _own_folder(path) as own:
+            temporary = Path(own) / path.name
+            yield temporary
+            os.chmod(temporary, 0o666 & ~_UMASK)  # some writers make files that only their owner may read
+            with open(temporary, "rb+") as file:
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
         if os.name == "posix":  # elsewhere folders cannot be opened
             folder = os.open(path.parent, os.O_RDONLY)
             try:
@@ -69,13 +67,11 @@ def written_whole(path: Path) -> Iterator[Path]:
                 os.close(folder)
     except OSError as error:
         raise _not_written(path, error) from error
-    finally:
-        if own is not None:
-            shutil.rmtree(own, ignore_errors=True)
 
 
-def _own_folder(path: Path) -> Path:
-    return Path(tempfile.mkdtemp(prefix=f".{path.name[:100]}.", suffix=".part", dir=path.absolute().parent))
+def _own_folder(path: Path) -> TemporaryDirectory[str]:
+    where = path.absolute().parent
+    return TemporaryDirectory(".part", f".{path.name[:100]}.", where, ignore_cleanup_errors=True)
 
 
 def _not_written(path: Path, error: OSError) -> PneumarmError:
@@ -130,16 +126,9 @@ def folder_written_whole(folder: Path) -> Iterator[Path]:
     if folder.exists():
         raise UnusableInput(f"{folder}: exists already; give a folder that does not")
     make_folder(folder.parent)
-    own = None
-    try:
-        own = _own_folder(folder)
-        yield own / folder.name
-        (own / folder.name).rename(folder)
-    except OSError as error:
-        raise _not_written(folder, error) from error
-    finally:
-        if own is not None:
-            shutil.rmtree(own, ignore_errors=True)
+    with writing(folder), _own_folder(folder) as own:
+        yield Path(own) / folder.name
+        (Path(own) / folder.name).rename(folder)
 
 
 def refuse_link(path: Path) -> None:
@@ -180,12 +169,7 @@ def read_bytes(path: Path | str, expected: str, most: int = LARGEST_TEXT) -> byt
 
 
 def read_beginning(path: Path | str, expected: str, length: int) -> bytes:
-    """Return the first ``length`` bytes of the file ``path``, all where it has fewer.
-
-    Raises:
-        UnusableInput: there is none, it is no regular file, or it cannot be read.
-
-    """
+    """Return the first ``length`` bytes of the file ``path``, or all; raises UnusableInput as :func:`read_bytes`."""
     require_regular_file(path, expected)
     try:
         with open(path, "rb") as file:

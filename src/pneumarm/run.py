@@ -46,7 +46,7 @@ from pneumarm.progress import Report, compiling
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
 from pneumarm.rehearsal import Piece, Rehearsal
 from pneumarm.report.beside import ReportBeside
-from pneumarm.report.files import REPORT, TEST, save_demonstration, save_spec
+from pneumarm.report.files import REPORT, TEST, read_results, save_demonstration, save_spec
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
 from pneumarm.settings import Valid
@@ -185,7 +185,7 @@ class Run:
                     "give the same ones or another folder"
                 )
             if self._results_file.exists():
-                self.results = read_json(self._results_file, "the results of a run")
+                self.results = read_results(folder)
         elif folder.is_dir() and any(folder.iterdir()):
             raise UnusableInput(f"{folder}: is not empty and holds no run; give another folder")
 

@@ -116,7 +116,7 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
         )
     if place == "virtual":
         return _virtual(name, options, seed, spec)
-    if kind == "emulated" and rest:
+    if kind == "emulated" and rest and not rest.startswith(kind):  # a board has an arm behind it, not another board
         from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
 
         inner = _open(rest, options, seed, spec)

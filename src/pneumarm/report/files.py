@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -17,6 +18,17 @@ EPISODES = "episodes.csv"
 SPEC = "arm.json"
 TEST = "test_episodes.safetensors"
 DEMONSTRATIONS = "demonstration-*.safetensors"
+
+
+_TABLES = ("collect", "filter", "simulation", "training", "test", "transfer", "wall_seconds", "compile_seconds")
+
+
+def read_results(folder: Path) -> dict[str, Any]:
+    """Return the results of the run in ``folder``; raises UnusableInput where they are something else."""
+    results = read_json(folder / RESULTS, "the results of a finished run")
+    if wrong := [name for name in _TABLES if not isinstance(results.get(name, {}), dict)]:
+        raise UnusableInput(f"{folder / RESULTS}: expected tables of figures; {', '.join(wrong)} is none")
+    return results
 
 
 def save_spec(folder: Path, spec: ArmSpec) -> None:

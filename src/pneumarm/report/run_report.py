@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.versions import HISTORY, read_history
-from pneumarm.files import read_json, write_text
+from pneumarm.files import write_text
 from pneumarm.report.data import (
     CoverageData,
     Demonstration,
@@ -22,9 +22,9 @@ from pneumarm.report.files import (
     DEMONSTRATIONS,
     EPISODES,
     REPORT,
-    RESULTS,
     SPEC,
     TEST,
+    read_results,
     read_spec,
 )
 from pneumarm.report.health import summary_of_health
@@ -91,7 +91,7 @@ def read_run(folder: Path) -> RunData:
         UnusableInput: a file is missing or is not what it should be.
 
     """
-    results = read_json(folder / RESULTS, "the results of a finished run")
+    results = read_results(folder)
     return RunData(
         spec=read_spec(folder / SPEC),
         results=results,

@@ -22,6 +22,7 @@ TEST, NOISE = 3, 4
 LONGEST_PAUSE = 120.0
 """Movements that are farther apart on the arm's clock [s] were interrupted: none takes so long to begin."""
 _KIND = "pneumarm movements"
+_BY_JOINT = ("goal", "angle_begin", "angle_end", "velocity_end", "switches")
 _DECIMALS = {"time_start": 4, "time_end": 4, "velocity_end": 4}  # in a file for people
 
 
@@ -110,7 +111,11 @@ class Movements(NamedTuple):
 
         """
         _, arrays = read_arrays(path, _KIND)
-        if arrays.keys() != set(cls._fields) or len({len(column) for column in arrays.values()}) != 1:
+        angles = arrays.get("goal", np.empty(0)).shape
+        shapes = {name: {angles} if name in _BY_JOINT else {angles[:1]} for name in cls._fields}
+        shapes["switches"] |= {(*angles[:1], 1)}
+        fits = arrays.keys() == shapes.keys() and all(arrays[name].shape in shapes[name] for name in shapes)
+        if len(angles) != 2 or not fits:
             raise UnusableInput(
                 f"{path}: expected movements with the columns {', '.join(cls._fields)}; make it again"
             )

@@ -323,7 +323,7 @@ class Store:
             found = list(
                 database.execute(
                     "SELECT sequence, first, last, reason FROM marks WHERE sequence BETWEEN :first AND :last "
-                    "ORDER BY sequence, rowid",
+                    "GROUP BY sequence, first, last, reason ORDER BY sequence, min(rowid)",
                     {"first": first, "last": last},
                 )
             )

@@ -13,10 +13,10 @@ from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import Monitor
-from pneumarm.errors import ArmFailure
+from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.live.choices import Choice, opened
 from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
-from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop
+from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop, Take
 from pneumarm.live.rig import Rig
 from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
@@ -102,6 +102,18 @@ def test_the_arm_is_seen_before_its_monitor_is_compiled(pid: Path, monkeypatch: 
     with rig:
         wait_until("it is ready", lambda: rig.screen.state["mode"] == "relaxed")
     assert seen == ["opening"]
+
+
+def test_only_the_page_that_controls_the_arm_moves_it_and_any_page_stops_it(pid: Path) -> None:
+    rig = Rig(RunSettings(arm="virtual:seed=3"), [str(pid)], None)  # nothing moves yet
+    writer, watcher = rig.desk.enter(), rig.desk.enter()
+    rig.order(writer, Take())
+    rig.order(writer, Goal([10.0]))
+    for order in (Goal([10.0]), Hold(), Relax(), Release(), Draw([0.0, 1.0], [[0.0], [0.0]])):
+        with pytest.raises(UnusableInput, match="another page controls the arm"):
+            rig.order(watcher, order)
+    rig.order(watcher, Stop())
+    assert rig.desk.writer == writer
 
 
 def test_of_an_arm_with_one_muscle_nothing_else_is_shown() -> None:

@@ -41,7 +41,7 @@ baselines: setup  ## the table of baselines on the held-out arms, into runs/base
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,stable-baselines]'
 	$(BIN)/python -m benchmarks baselines
 
-soak: setup  ## fault injection that takes minutes: kills, power cuts, full disks
+soak: setup  ## attacks, in about an hour: kills, power cuts, hostile files, bad lines, damaged frames; see CONTRIBUTING.md
 	$(BIN)/python -m pytest -m soak -s
 
 mutants: setup  ## changes the program in one place at a time: tests must fail; ONLY=name for one, or a package; minutes, a second call goes on

@@ -318,3 +318,34 @@ def test_the_same_bits_come_whether_code_was_compiled_or_loaded(script, tmp_path
     loaded = results("one")
     assert len(compiled.split()[0]) == 64
     assert compiled == loaded == again
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs owners of files")
+@pytest.mark.parametrize("made", ["open to all", "a link", "of somebody else"])
+def test_a_cache_that_others_can_write_to_is_not_used(tmp_path, monkeypatch, made):
+    import pneumarm.kernels
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    place = tmp_path / f"pneumarm-{os.getuid()}"
+    if made == "open to all":
+        place.mkdir()
+        place.chmod(0o777)
+    elif made == "a link":
+        (tmp_path / "theirs").mkdir()
+        place.symlink_to(tmp_path / "theirs")
+    else:
+        monkeypatch.setattr("os.getuid", lambda: os.stat(tmp_path).st_uid + 1)
+        (tmp_path / f"pneumarm-{os.getuid()}").mkdir()
+    own = pneumarm.kernels._own_folder()
+    assert own.parent == tmp_path
+    assert own.name not in (place.name, f"pneumarm-{os.getuid()}")
+    assert own.stat().st_mode & 0o077 == 0
+
+
+def test_a_cache_among_temporary_files_is_found_again(tmp_path, monkeypatch):
+    import pneumarm.kernels
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    own = pneumarm.kernels._own_folder()
+    assert own == pneumarm.kernels._own_folder()
+    assert os.name == "nt" or own.stat().st_mode & 0o077 == 0

@@ -18,6 +18,7 @@ compiled for half as long again. LLVM optimises at its first level, which makes 
 (``python -m benchmarks`` with ``NUMBA_OPT=3`` shows it) in four fifths of the time.
 """
 
+import atexit
 import gc
 import getpass
 import hashlib
@@ -25,8 +26,10 @@ import itertools
 import os
 import secrets
 import shutil
+import stat
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -77,12 +80,26 @@ def _cache_root() -> Path:
     return platformdirs.user_cache_path("pneumarm", appauthor=False)
 
 
+def _own_folder() -> Path:
+    """Return a folder among the temporary files that nobody else can write to: what lies in a cache is executed."""
+    whose = os.getuid() if hasattr(os, "getuid") else getpass.getuser()
+    folder = Path(tempfile.gettempdir()) / f"pneumarm-{whose}"
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    known = folder.lstat()
+    if stat.S_ISDIR(known.st_mode) and (os.name == "nt" or (known.st_uid == whose and not known.st_mode & 0o022)):
+        return folder
+    folder = Path(tempfile.mkdtemp(prefix="pneumarm-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
 def _cache_folder() -> Path:
     name = sources_hash(Path(__file__).parent)
-    whose = os.getuid() if hasattr(os, "getuid") else getpass.getuser()
-    for root in (_cache_root(), Path(tempfile.gettempdir()) / f"pneumarm-{whose}"):
-        folder = root / name
+    for choose in (_cache_root, _own_folder):
         try:
+            root = choose()
+            folder = root / name
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:
             continue

@@ -111,7 +111,7 @@ class Rehearsal:
             self._start(coming[0], piece)
 
     def _start(self, part: str, piece: Piece) -> None:
-        command = [sys.executable, "-m", "pneumarm.rehearsal", part]
+        command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", part]
         errors = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # it is no part of the run
         with self._starting, suppress(OSError):
             if self._ended:

@@ -3,7 +3,7 @@ import pytest
 
 from children import python
 from pneumarm.arm import GuardedArm, Reading
-from pneumarm.arm.guard import HELD, MOST_REPLACED, Interventions
+from pneumarm.arm.guard import HELD, REPLACED, Interventions
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
 
@@ -110,6 +110,7 @@ def test_closing_closes_the_arm_behind(smallest_arm):
 
 
 OPEN = [[1, -1]]
+HELD_TURNS, MOST_REPLACED = round(30 * HELD), round(30 * REPLACED)
 
 
 class Hostile:
@@ -128,23 +129,48 @@ def test_a_decision_that_is_nonsense_is_held_then_vented_then_stopped(smallest_a
     safe.decide(OPEN)
     for count in range(1, MOST_REPLACED + 1):
         safe.decide(nonsense)
-        assert arm.valves == (OPEN if count <= HELD else [[-1, -1]])
-    assert safe.interventions == Interventions(nonsense=MOST_REPLACED, vented=MOST_REPLACED - HELD)
+        assert arm.valves == (OPEN if count <= HELD_TURNS else [[-1, -1]])
+    assert safe.interventions == Interventions(nonsense=MOST_REPLACED, vented=MOST_REPLACED - HELD_TURNS)
     assert safe.interventions.total == MOST_REPLACED
     with pytest.raises(ControllerFailure, match="smallest: stopped and vented"):
         safe.decide(nonsense)
     assert arm.valves == safe.applied.tolist() == [[-1, -1]]
 
 
+@pytest.mark.parametrize(("rate", "held", "most"), [(200, 20, 200), (30, 3, 30), (5, 1, 5), (0.5, 1, 1)])
+def test_decisions_are_held_and_replaced_for_times_not_for_periods(smallest_arm, rate, held, most):
+    arm = smallest_arm(period=1 / rate)
+    safe = GuardedArm(arm)
+    safe.decide(OPEN)
+    vented = []
+    for _ in range(most):
+        safe.decide(None)
+        vented.append(arm.valves == [[-1, -1]])
+    assert vented == [False] * held + [True] * (most - held)
+    with pytest.raises(ControllerFailure):
+        safe.decide(None)
+
+
+@pytest.mark.parametrize(("rate", "late"), [(200, 0.09), (30, 0.09), (200, 0.11), (30, 0.11)])
+def test_the_watchdog_holds_for_the_same_time_at_any_rate(smallest_arm, rate, late):
+    arm = smallest_arm(period=1 / rate)
+    safe = GuardedArm(arm)
+    reading = safe.read()
+    safe.decide(OPEN)
+    arm.wait(late)
+    assert safe.stand_in(reading)
+    assert (arm.valves == [[-1, -1]]) == (late > HELD)
+
+
 def test_one_good_decision_makes_the_guard_patient_again(smallest_arm):
     arm = smallest_arm()
     safe = GuardedArm(arm)
     for _ in range(MOST_REPLACED):
-        for _ in range(HELD):
+        for _ in range(HELD_TURNS):
             safe.decide(None)
         safe.decide(OPEN)
     assert arm.valves == OPEN
-    assert safe.interventions == Interventions(nonsense=HELD * MOST_REPLACED)
+    assert safe.interventions == Interventions(nonsense=HELD_TURNS * MOST_REPLACED)
 
 
 def test_what_is_held_keeps_to_the_limits(smallest_arm):
@@ -196,7 +222,7 @@ def test_an_inlet_that_was_open_for_too_long_is_vented_for_a_tenth_of_that(small
     for valve, seconds in ((1, 2.1), (-1, vented), (1, 0.0)):
         safe.read()
         safe.set_valves([[valve, 0]])
-        arm.wait(seconds)
+        safe.wait(seconds)
     assert arm.valves == [[free, 0]]
 
 

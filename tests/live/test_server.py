@@ -138,3 +138,14 @@ def test_a_port_that_is_taken_is_said(server: Server) -> None:
     port = int(server.url.rstrip("/").rpartition(":")[2])
     with pytest.raises(UnusableInput, match="another --host or --port"):
         Server(server.rig, "127.0.0.1", port, None)
+
+
+def test_hosts_and_tokens_of_any_letters_are_answered(pid: Path) -> None:
+    with served(Rig(RunSettings(arm=ARM), [str(pid)], None)) as server:
+        address = server.url
+        assert status(address) == 200
+        assert [status(address, Host=host) for host in ("[", "[::1", "[]:80", "\xe4")] == [403] * 4
+        assert status(address, Origin="http://[") == 403
+        server.token = "schlüssel &?"
+        assert status(server.url) == 200
+        assert [status(f"{address}?token={token}") for token in ("schl", "%C3%BC", "%FF")] == [403] * 3

@@ -147,6 +147,34 @@ def test_many_are_appended_all_or_none(address, recorded):
         assert store._one("SELECT count(*) FROM sequences") == 0
 
 
+def test_a_sequence_that_grew_is_the_one_that_was_appended_at_once(address, recorded):
+    step = np.append(np.arange(20), np.arange(22, 32))  # two periods were lost
+    whole = recorded(3, n=30, step=step, time=step / 30)
+
+    def part(begin, end):
+        command = whole.command[begin:end].copy()
+        command[-1] = np.nan
+        values = {name: getattr(whole, name)[begin:end] for name in ("time", "angle", "pressure")}
+        return replace(whole, **values, command=command, step=step[begin:end] - step[begin])
+
+    with Store.create(address, ArmSpec()) as store:
+        store.append(whole)
+        number = store.append(part(0, 10))
+        for begin, end in ((9, 11), (10, 25), (24, 30)):
+            store.extend(number, part(begin, end))
+        for wrong in (number, number + 1):
+            with pytest.raises(UnusableInput, match=f"sequence {wrong} does not end where this goes on"):
+                store.extend(wrong, part(9, 11))
+        with pytest.raises(UnusableInput, match="commands must be"):
+            store.extend(number, replace(recorded(4, n=2), time=np.array([31, 32]) / 30, command=np.zeros((2, 1, 2))))
+        store.check()
+        first, second = (entry._replace(number=0) for entry in store.catalogue())
+        assert first == second
+        at_once, grown = (joined(store.blocks(sequences=lambda n, k=k: n == k)) for k in (1, 2))
+    for name in ("step", "time", "angle", "pressure", "command"):
+        np.testing.assert_array_equal(getattr(grown, name), getattr(at_once, name), err_msg=name)
+
+
 def test_state_is_written_with_the_sequence_or_not_at_all(address, recorded):
     with Store.create(address, ArmSpec()) as store:
         assert store.state() is None

@@ -102,8 +102,8 @@ def _tile(rows: int, vectors: int, lanes: int = LANES, anew: bool = False) -> An
     """Return, for kernels, a sum over inputs in ``rows`` times ``vectors`` of so many ``lanes``, held in registers.
 
     ``add(count, weights, w, w_input, w_row, x, e, x_input, out, o, o_row)`` adds to ``out``, for each row and each
-    of the ``vectors * lanes`` columns, the sum over ``count`` inputs of weights times ``x``; where it begins ``anew``,
-    it puts the sum there. After each array come the place of the first number in its memory and the steps from input
+    of the ``vectors * lanes`` columns, the sum over ``count`` inputs of weights times ``x``; ``anew``, it puts the sum
+    there. After each array come the place of the first number in its memory and the steps from input
     to input, and from row to row.
     """
 
@@ -152,20 +152,8 @@ def _tile(rows: int, vectors: int, lanes: int = LANES, anew: bool = False) -> An
                 builder.store(phi, at, align=4)
             return context.get_dummy_value()
 
-        arrays = types.void(
-            types.intp,
-            weights,
-            types.intp,
-            types.intp,
-            types.intp,
-            x,
-            types.intp,
-            types.intp,
-            out,
-            types.intp,
-            types.intp,
-        )
-        return arrays, generate
+        steps = types.intp, types.intp
+        return types.void(types.intp, weights, *steps, types.intp, x, *steps, out, *steps), generate
 
     return add
 

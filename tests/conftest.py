@@ -6,6 +6,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+import soak
 from once import made_once
 from pneumarm.console import peak_memory
 from pneumarm.run import Run
@@ -38,4 +39,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    for line in soak.summary:
+        terminalreporter.write_line(f"soak: {line}")
     terminalreporter.write_line(f"at most {peak_memory():.0f} MB of memory")

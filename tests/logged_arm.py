@@ -7,6 +7,7 @@ import os
 import sys
 
 import pneumarm.arm.guard
+import pneumarm.arm.own
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 
 
@@ -19,6 +20,8 @@ class Logged(VirtualArm):
 
     def set_valves(self, valves):
         caller = sys._getframe(1)
+        while caller.f_globals["__name__"] == pneumarm.arm.own.__name__:
+            caller = caller.f_back  # what passes calls on to an arm of somebody's own
         own = caller.f_code in (VirtualArm.close.__code__, VirtualArm.rest.__code__)
         by = "itself" if own else "guard" if caller.f_globals["__name__"] == pneumarm.arm.guard.__name__ else "others"
         self._log.write(f"set {by} {valves.ravel().tolist()}\n")

@@ -1,15 +1,21 @@
 import json
+import os
 import re
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from children import python
+from children import LIMIT, python
 from pneumarm.cli import COMMANDS, PANELS, main
+from pneumarm.errors import PneumarmError
 from pneumarm.learning.imported import ImportedPolicy
+from pneumarm.run import Run
 from pneumarm.simulation import Simulation
+from pneumarm.transitions import Store
 from readme import blocks, commands
 
 
@@ -89,14 +95,79 @@ def test_a_missing_parent_folder_is_refused_before_any_work(
     capsys: pytest.CaptureFixture[str], store: Path, sim: Path, agent: Path, missing: Path
 ) -> None:
     for arguments in (
-        ("run", "--out", missing),
         ("collect", "virtual", missing),
         ("fit", store, "--out", missing),
-        ("analyse", store, sim, "--out", missing),
         ("train", sim, store, "--out", missing),
-        ("transfer", agent, "--arm", "virtual", "--out", missing),
+        ("export", store, "--out", missing.with_suffix(".csv")),
     ):
         assert Outcome(capsys, *arguments).is_refused(str(missing.parent), "does not exist"), arguments
+
+
+def test_a_folder_that_is_itself_written_is_made_with_its_parents(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    store: Path,
+    sim: Path,
+    agent: Path,
+    tmp_path: Path,
+) -> None:
+    def begun(run: Run) -> None:
+        raise PneumarmError("far enough")
+
+    monkeypatch.setattr(Run, "_collect", begun)
+    table = tmp_path / "table.csv"
+    table.write_text("trial,run 1,run 2\n" + "".join(f"{trial},{trial},{trial + 1}\n" for trial in range(1, 17)))
+    (tmp_path / "file").touch()
+    written = (
+        ("run", "--arm", "virtual:seed=3"),
+        ("analyse", store, sim),
+        ("transfer", agent, "--arm", "virtual:seed=3", "--episodes", 1, "--test-episodes", 1),
+        ("arm", "check", "virtual:seed=3"),
+        ("taguchi", "analyse", table),
+    )
+    for arguments in written:
+        under_a_file = Outcome(capsys, *arguments, "--out", tmp_path / "file" / "new" / "out")
+        assert under_a_file.code == 2, (arguments, under_a_file.err)
+        assert "file/new/out" in under_a_file.err.replace("\\", "/"), arguments
+        deep = tmp_path / arguments[0] / "deep" / "out"
+        made = Outcome(capsys, *arguments, "--out", deep)
+        assert "far enough" in made.err if arguments[0] == "run" else made.code == 0, (arguments, made.err)
+        assert any(deep.iterdir()), arguments
+
+
+PIPED = """
+import sys
+from pneumarm.cli import main
+from pneumarm.arm.virtual import VirtualArm
+closed, close = [], VirtualArm.close
+VirtualArm.close = lambda arm: (closed.append(1), close(arm))
+try:
+    main(sys.argv[2:])
+finally:
+    open(sys.argv[1], "w").write(str(len(closed)))
+"""
+"""The command line, which notes how many arms it has closed."""
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_nobody_who_reads_is_no_error(form: list[str], agent: Path, tmp_path: Path) -> None:
+    """As other programs end whose output goes into ``head``: quietly, with the number of SIGPIPE."""
+    notes, db = tmp_path / "closed", tmp_path / "arm.db"
+    for arguments, arms in (
+        (["move", agent, "--arm", "virtual:seed=3", "5deg", "--hold", 0.5, *form], 1),
+        (["collect", "virtual:seed=3", db, "--transitions", 1000, *form], 1),
+        (["--help"], 0),
+    ):
+        nobody, written = os.pipe()
+        os.close(nobody)
+        command = [sys.executable, "-c", PIPED, notes, *arguments]
+        done = subprocess.run([*map(str, command)], stdout=written, stderr=subprocess.PIPE, text=True, timeout=LIMIT)
+        os.close(written)
+        assert done.returncode == 141, (arguments, done.stderr)
+        assert not re.search("Error|Traceback|Exception", done.stderr), arguments
+        assert int(notes.read_text()) >= arms
+    with Store.open(db) as store:
+        assert store.transitions >= 1000
 
 
 def test_files_of_another_kind_are_refused(

@@ -158,9 +158,28 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
     with pytest.raises(ZeroDivisionError):
         fail_halfway()
     assert path.read_text() == "before"
+    assert [p.name for p in tmp_path.iterdir()] == ["it.txt"]
     write_text(path, "after ä")
     assert path.read_text(encoding="utf-8") == "after ä"
     assert [p.name for p in tmp_path.iterdir()] == ["it.txt"]
+
+
+def test_a_file_is_durable_before_it_is_in_place_and_its_place_is_before_that_is_told(tmp_path, monkeypatch):
+    done = []
+    sync, replace = os.fsync, os.replace
+
+    def synced(file):
+        done.append("folder" if os.path.samestat(os.fstat(file), os.stat(tmp_path)) else "file")
+        sync(file)
+
+    def replaced(before, after):
+        done.append("in place")
+        replace(before, after)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(os, "replace", replaced)
+    write_text(tmp_path / "it.txt", "it")
+    assert done == ["file", "in place", "folder"]
 
 
 def test_json_comes_back(tmp_path):

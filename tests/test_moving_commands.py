@@ -2,18 +2,26 @@
 
 import io
 import json
+import os
 import shutil
+import signal
+import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
+from subprocess import Popen
 
 import numpy as np
 import pytest
 
-from pneumarm.api import load_controller, move
+from children import LIMIT, child, end, wait_until
+from pneumarm.api import load_controller, move, track
 from pneumarm.arm import ArmSpec, open_arm
 from pneumarm.arm.hand import hand
 from pneumarm.cli import main
 from pneumarm.commands.common import move_command
 from pneumarm.control.versions import agent_file
+from pneumarm.transitions import Store
+from pneumarm.transitions.rows import Mark, Rows, joined
 
 ARM = ("--arm", "virtual:seed=3")
 
@@ -208,3 +216,77 @@ def test_what_was_done_is_recorded_and_can_be_shown(
     )
     assert code == 2
     assert "another arm" in err
+
+
+def rows_of(path: Path) -> Rows:
+    with Store.open(path) as store:
+        store.check()
+        return joined(store.blocks(marked=True))
+
+
+def rows_in(path: Path) -> int:
+    """Return how many rows are in a store, none before there is one."""
+    if not path.exists():
+        return 0
+    with Store.open(path) as store:
+        return sum(one.rows for one in store.catalogue())
+
+
+RECORDED = {"track": ("--reference", "sine:0.5Hz,8deg", "--seconds"), "move": ("8deg", "--tries", "1", "--hold")}
+
+
+def recording(command: str, controller: Path, seconds: int, store: Path) -> AbstractContextManager[Popen[str]]:
+    """Start a movement of so many ``seconds`` on an arm that does the same each time."""
+    asked = (command, controller, "--arm", "python:logged_arm:logged", *RECORDED[command], seconds, "--record", store)
+    here = {"cwd": Path(__file__).parent, "env": os.environ | {"PNEUMARM_TEST_LOG": f"{store}.log"}}
+    return child(sys.executable, "-m", "pneumarm.cli", *asked, **here)
+
+
+@pytest.fixture(scope="module", params=RECORDED)
+def whole(request: pytest.FixtureRequest, controller: Path) -> tuple[str, Rows]:
+    """Return a command, and the rows of 3 s of its movement that it recorded to the end."""
+    store = controller.with_name(f"{request.param}.db")
+    with recording(request.param, controller, 3, store) as process:
+        process.communicate(timeout=LIMIT)
+    return request.param, rows_of(store)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+def test_what_was_recorded_is_kept_whatever_ends_the_command(
+    number: signal.Signals, whole: tuple[str, Rows], controller: Path, tmp_path: Path
+) -> None:
+    (command, rows), path, killed = whole, tmp_path / "kept.db", number == signal.SIGKILL
+    with recording(command, controller, 3600, path) as process:
+        wait_until("rows on disk", lambda: rows_in(path) > 0, process)
+        before = rows_in(path)
+        _, told = end(process, number)
+    assert process.returncode == (-number if killed else 128 + number)
+    assert told == ("" if killed else f"pneumarm: interrupted ({number.name}); the arm is closed\n")
+    kept = rows_of(path)
+    assert len(kept) >= before
+    n = min(len(kept), len(rows))
+    for name in ("step", "time", "angle", "pressure"):
+        np.testing.assert_array_equal(getattr(kept, name)[:n], getattr(rows, name)[:n], err_msg=name)
+    np.testing.assert_array_equal(kept.command[: n - 1], rows.command[: n - 1])
+    with Store.open(path) as store:
+        marks = [mark for of_sequence in store.marks().values() for mark in of_sequence]
+    last = int(kept.step[-1])
+    assert marks == ([] if killed else [Mark(last, last, f"broke off here: {number.name}")])
+
+
+def test_the_functions_record_as_the_commands_do(
+    controller: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    by_function, by_command = tmp_path / "function.db", tmp_path / "command.db"
+    sine, name = "sine:1Hz,5deg", "virtual:seed=3"
+    followed = track(controller, name, sine, 1.0, record=by_function)
+    (moved,) = move(controller, name, goals_deg=[5], record=str(by_function))
+    called(capsys, "track", controller, *ARM, "--reference", sine, "--seconds", 1, "--record", by_command)
+    called(capsys, "move", controller, *ARM, "5deg", "--record", by_command)
+    mine, other = rows_of(by_function), rows_of(by_command)
+    np.testing.assert_array_equal(mine.time[: len(followed.recorded)], followed.recorded.time)
+    np.testing.assert_array_equal(mine.angle[-len(moved.recorded) :], moved.recorded.angle)
+    for values in ("sequence", "step", "time", "angle", "pressure", "command"):
+        np.testing.assert_array_equal(getattr(mine, values), getattr(other, values), err_msg=values)
+    with Store.open(by_function) as store, Store.open(by_command) as again:
+        assert list(store.catalogue()) == list(again.catalogue())

@@ -1,6 +1,11 @@
 """What only POSIX has is imported where it is needed alone: everything can be imported without it."""
 
 import pkgutil
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+from packaging.requirements import Requirement
 
 import pneumarm
 from children import python
@@ -38,3 +43,15 @@ def test_every_module_is_imported_without_what_only_posix_has() -> None:
     done = python("-c", PROGRAM.format(blocked=POSIX_ONLY, modules=modules))
     assert done.returncode == 2, done.stderr
     assert "emulated on Linux and macOS only" in done.stderr
+
+
+def test_the_compiler_is_one_that_is_known_to_work() -> None:
+    """Kernels reach into Numba: versions outside of this range fail at the first of them, or nobody has tried."""
+    with open(Path(__file__).parents[1] / "pyproject.toml", "rb") as file:
+        wanted = tomllib.load(file)["project"]["dependencies"]
+    (numba,) = (one for one in map(Requirement, wanted) if one.name == "numba")
+    assert numba.specifier.contains(version("numba"))
+    for fails in ("0.61.2", "0.62.1", "0.69.0", "1.0"):
+        assert not numba.specifier.contains(fails), fails
+    for runs in ("0.63.0", "0.63.1", "0.65.1", "0.67.0", "0.68.1"):
+        assert numba.specifier.contains(runs), runs

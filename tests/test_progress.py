@@ -236,4 +236,4 @@ def test_an_answer_that_cannot_be_written_is_no_bug() -> None:
     ):
         _, errors = process.communicate(timeout=LIMIT)
     assert process.returncode == 1
-    assert errors.startswith("pneumarm: No space left on device"), errors
+    assert errors.startswith("pneumarm: standard output: No space left on device"), errors

@@ -1,19 +1,24 @@
 import csv
 import json
+import random
 import signal
+import sqlite3
+import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from children import child, end, python, wait_until
+from children import LIMIT, child, end, python, wait_until
 from pneumarm.errors import UnusableInput
 from pneumarm.run import Run, RunSettings
 from pneumarm.transitions import Store
 from small import SMALL
+from soak import Attack, amount
 
 TIMES = (
     "peak_memory_mb", "rehearsal_memory_mb", "seconds", "wall_seconds", "compile_seconds",
@@ -133,8 +138,8 @@ def test_nothing_is_left_behind_by_settings_that_cannot_be_used(tmp_path: Path) 
         replace(SMALL, transitions=100)
     with pytest.raises(UnusableInput, match="1 joint"):
         Run(tmp_path / "run", replace(SMALL, joints=2)).do()
-    with pytest.raises(UnusableInput, match="does not exist"):
-        Run(tmp_path / "no" / "run", SMALL)
+    with pytest.raises(UnusableInput, match="expected virtual"):
+        Run(tmp_path / "new" / "run", replace(SMALL, arm="wirtual")).do()
     assert not list(tmp_path.iterdir())
 
 
@@ -171,6 +176,59 @@ def test_a_run_killed_in_every_stage_ends_as_if_nothing_had_happened(small_run: 
     assert (folder / "episodes.csv").read_text() == (small_run / "episodes.csv").read_text()
     for name in ("agent.safetensors", "adapted.safetensors", "simulation.safetensors"):
         assert (folder / name).read_bytes() == (small_run / name).read_bytes()
+
+
+WHOLE = (
+    "run", "--arm", "virtual:seed=7", "--seed", "5", "--transitions", "6000", "--bound-episodes", "0",
+    "--test-episodes", "300", "--fit.epochs", "10", "--servo.updates", "150",
+    "--transfer.episodes", "12", "--transfer.test-episodes", "6",
+)  # fmt: skip
+"""A run of all stages that takes some seconds."""
+
+
+def left_behind(folder: Path) -> dict[str, Any]:
+    """Return all that a run left, by file, but for what tells how long something took."""
+    timed = ("report.html", "results.json", "training.checkpoint", "transitions.db")
+    files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
+    found: dict[str, Any] = {str(one.relative_to(folder)): one.read_bytes() for one in files if one.name not in timed}
+    assert {path.name for path in files} >= set(timed)
+    found["results.json"] = without_times(results_of(folder))
+    with closing(sqlite3.connect(folder / "transitions.db")) as store:
+        for table in ("store", "sequences", "rows", "state", "marks"):
+            found[f"transitions.db {table}"] = store.execute(f"SELECT * FROM {table}").fetchall()
+    return found
+
+
+def is_killed(folder: Path, after: float) -> bool:
+    """Take up the run in ``folder``, kill it ``after`` seconds; return False where it had done everything before."""
+    with child(sys.executable, "-c", "from pneumarm.cli import main; main()", *WHOLE, "--out", folder) as process:
+        try:
+            _, errors = process.communicate(timeout=after)
+        except subprocess.TimeoutExpired:
+            end(process, signal.SIGKILL)
+            return True
+    assert process.returncode == 0, errors
+    return False
+
+
+@pytest.mark.soak
+def test_runs_killed_at_any_moment_leave_the_same_bits(tmp_path: Path) -> None:
+    rng = random.Random(6)
+    attack = Attack("kills of a run at random moments", amount("KILLS", 30))
+    assert not is_killed(tmp_path / "compiled", LIMIT)
+    begun = time.monotonic()
+    assert not is_killed(tmp_path / "whole", LIMIT)
+    took = time.monotonic() - begun
+    expected, runs = left_behind(tmp_path / "whole"), 0
+    while attack.done < attack.total:
+        folder = tmp_path / str(runs)
+        while attack.done < attack.total and is_killed(folder, rng.uniform(0, took)):
+            attack.advance()
+        assert attack.done < attack.total or not is_killed(folder, LIMIT)
+        found = left_behind(folder)
+        assert [name for name in found.keys() | expected.keys() if found.get(name) != expected.get(name)] == []
+        runs += 1
+    attack.summarise(f"{runs} runs went on after them and left the bits of one that was not killed")
 
 
 def test_movements_are_planned_for_agents_that_reach_or_where_it_is_asked_for() -> None:

@@ -73,3 +73,10 @@ def test_scatter_is_that_of_the_noise_and_not_of_the_motion() -> None:
     noisy = off + 0.5 * np.random.default_rng(0).standard_normal(len(off))
     assert scatter(noisy[late]) == pytest.approx(0.5, rel=0.3)
     assert scatter(np.zeros(3)) == 0.0
+
+
+@pytest.mark.parametrize("far", [1e150, 6e302, -6e302])
+def test_numbers_that_no_sensor_says_are_not_settled(far):
+    times = np.arange(90) / 30
+    off = far * (1 + 1e-3 * np.random.default_rng(0).normal(size=(90, 1)))
+    assert settled_at(times, off, 1.0, 0.5) is None

@@ -12,6 +12,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.networks import importance, least_squares
 from pneumarm.report.data import CoverageData, QualityData
 from pneumarm.simulation import Simulation, by_quantity, refiltered
+from pneumarm.simulation.fit import remarks
 from pneumarm.simulation.quality import Resynchronisation, Statistics, propagation, statistics, validity
 from pneumarm.transitions import Filtered, Store, Transitions, transitions
 from pneumarm.transitions.choice import joined, picked
@@ -37,7 +38,8 @@ class SimulationAnalysis:
     coverage: CoverageData
     quality: QualityData
     figures: dict[str, Any]
-    """Numbers by name: one-step errors, error propagation, invalid predictions, coverage."""
+    """Numbers by name: one-step errors, error propagation, invalid predictions, coverage; remarks where there are
+    any."""
 
     def save(self, folder: Path) -> None:
         """Write the records that the report is drawn from to ``folder``."""
@@ -61,6 +63,7 @@ def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = No
         raise UnusableInput(
             f"{store.address}: holds {_commands(store.valves)}, the simulation is of {_commands(simulation.valves)}"
         )
+    store = store.drawn()
     filtered = filtered or refiltered(store, simulation)
     apart = _in_order(filtered)
     errors = statistics(simulation, apart)
@@ -71,7 +74,7 @@ def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = No
     remedy = Resynchronisation(states[:: max(1, len(states) // 10_000)], RESYNCHRONISE)
     remedied = propagation(simulation, apart, steps, resynchronisation=remedy)
     window = simulation.window
-    figures = {
+    figures: dict[str, Any] = {
         "held_out": _errors(errors, window.further),
         "propagation": {
             "steps": steps,
@@ -82,6 +85,8 @@ def analyse(store: Store, simulation: Simulation, filtered: Filtered | None = No
         "invalid": {"simulated": float(valid.simulated[-1]), "recorded": float(valid.recorded[-1])},
         "filter": filtered.coverage.summary(),
     }
+    if said := [*store.used, *remarks(errors, simulation)]:
+        figures["remarks"] = said
     return SimulationAnalysis(
         coverage=_coverage(store, filtered),
         quality=_quality(simulation, filtered, apart, window.of_joints(spread.measured)),

@@ -192,6 +192,7 @@ def move(
     goals_xy: "Sequence[ArrayLike] | None" = None,
     seed: int = 0,
     settings: "MoveSettings | None" = None,
+    record: "StoreAddress | None" = None,
 ) -> "list[Moved]":
     """Move ``arm`` to one goal after the other, hold each, and return what came of each.
 
@@ -203,14 +204,17 @@ def move(
         goals_xy: where the hand is to be [m], in place of either: ``[(0.2, -0.3)]``, see :mod:`pneumarm.arm.hand`.
         seed: of a virtual arm's noise.
         settings: how long each is held, how often it is tried, how near is there.
+        record: store to add every try to as it happens, made if there is none; what was recorded is kept however
+            this ends.
 
     Raises:
-        UnusableInput: the controller is for another arm, or the arm has not been seen to reach a goal.
+        UnusableInput: the controller or the store is for another arm, or the arm has not been seen to reach a goal.
 
     """
     from pneumarm.errors import UnusableInput
     from pneumarm.moving import MoveSettings, move
     from pneumarm.task.goals import Goal, goal_at, goal_in_counts, goal_of
+    from pneumarm.transitions.recorder import recorder
 
     if sum(given is not None for given in (goals, goals_deg, goals_xy)) != 1:
         raise UnusableInput(
@@ -233,23 +237,32 @@ def move(
         for given in (goals, goals_deg, goals_xy):
             for one in () if given is None else given:
                 wanted.append(meant(one, wanted[-1] if wanted else None))
-        return list(move(opened, mover, wanted, how))
+        with recorder(record, spec) as keep:
+            return list(move(opened, mover, wanted, how, record=keep))
 
 
 def track(
-    controller: "Made", arm: "Arm | str", reference: "Reference | str", seconds: float | None = None, *, seed: int = 0
+    controller: "Made",
+    arm: "Arm | str",
+    reference: "Reference | str",
+    seconds: float | None = None,
+    *,
+    seed: int = 0,
+    record: "StoreAddress | None" = None,
 ) -> "Tracked":
     """Have ``arm`` follow ``reference`` for so many ``seconds``, by default 20 or as long as its file is.
 
     ``reference`` is a name such as ``sine:0.5Hz,20deg`` or one of your own:
-    ``Reference(lambda time: counts)``, see :class:`pneumarm.arm.reference.Reference`.
+    ``Reference(lambda time: counts)``, see :class:`pneumarm.arm.reference.Reference`. What is done is added to the
+    store ``record``, if given, as it happens, and kept however this ends.
 
     Raises:
-        UnusableInput: the controller is for another arm, or the arm has not been seen to reach so far.
+        UnusableInput: the controller or the store is for another arm, or the arm has not been seen to reach so far.
 
     """
     from pneumarm.moving import SECONDS, check_seconds, track
     from pneumarm.task.reference import check_reachable, parse_reference
+    from pneumarm.transitions.recorder import recorder
 
     with _opened(arm, seed) as opened:
         mover, spec, known = _tracking(controller, opened)
@@ -257,7 +270,9 @@ def track(
         lasting = seconds if seconds is not None else wanted.duration or SECONDS
         check_seconds(lasting)
         check_reachable(wanted, lasting, known.range, spec)
-        return track(opened, mover, wanted, lasting)
+        info = {"reference": reference} if isinstance(reference, str) else {}
+        with recorder(record, spec, info) as keep:
+            return track(opened, mover, wanted, lasting, record=keep)
 
 
 def tune(

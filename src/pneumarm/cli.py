@@ -5,8 +5,11 @@ import inspect
 import os
 import signal
 import sys
+import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
 from typing import Any
 
 from cyclopts import App, CycloptsError, Group, Parameter, UnusedCliTokensError
@@ -14,7 +17,7 @@ from cyclopts import App, CycloptsError, Group, Parameter, UnusedCliTokensError
 from pneumarm import __version__
 from pneumarm.commands.config_file import take_config, take_option
 from pneumarm.commands.help_pages import HELP, HELP_ALL, LOG, AllOptions, FewOptions
-from pneumarm.console import complain
+from pneumarm.console import complain, open_closed_streams
 from pneumarm.errors import PneumarmError
 from pneumarm.leaving import leave_by_exceptions
 from pneumarm.progress import LEVELS, checked_level, print_lines
@@ -163,6 +166,8 @@ RESUMED = ("run", "collect", "transfer", "experiment")
 
 _NO_BUG = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 """Of errors of the operating system: disks that are full, read-only or broken, and what is not allowed."""
+_NO_NAME = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR)
+"""... and names that no file, or no folder, can have or has."""
 
 app = App(
     name="pneumarm",
@@ -220,6 +225,9 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _run(arguments: list[str]) -> int:
     try:
+        open_closed_streams()
+        if not sys.warnoptions and "PNEUMARM_DEBUG" not in os.environ:
+            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's, which are not for whoever calls a command
         leave_by_exceptions()
         arguments, level = take_option(arguments, LOG, "one of " + ", ".join(LEVELS))
         print_lines(checked_level(level))
@@ -237,25 +245,49 @@ def _run(arguments: list[str]) -> int:
         complain(f"{error} See {' '.join(['pneumarm', *(error.command_chain or ())])} --help.")
         return 2
     except PneumarmError as error:
+        if os.environ.get("PNEUMARM_DEBUG"):
+            traceback.print_exc()
         complain(error)
         return error.exit_code
     except KeyboardInterrupt as error:
         complain(_interrupted(arguments, str(error)))
         return getattr(error, "exit_code", 128 + signal.SIGINT)
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 1
+    except (BrokenPipeError, SystemExit) as error:
+        if not isinstance(error, BrokenPipeError) and not isinstance(error.__context__, BrokenPipeError):
+            raise  # of anything but Rich, which makes that of a broken pipe
+        return _with_nobody_to_read()
     except Exception as error:
         if os.environ.get("PNEUMARM_DEBUG"):
             raise
-        if isinstance(error, OSError) and error.errno in _NO_BUG:
-            complain(f"{f'{error.filename}: ' if error.filename else ''}{error.strerror}")
+        if isinstance(error, OSError) and error.errno in (*_NO_BUG, *_NO_NAME):
+            complain(f"{error.filename or 'standard output'}: {error.strerror}")
+            if error.errno in _NO_NAME:
+                return 2
             with suppress(OSError):
                 sys.stdout.close()  # or Python would try once more to write what is left
         else:
-            complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
+            complain(f"{type(error).__name__}: {error} ({_cause(error)})")
         return 1
     return 0
+
+
+def _with_nobody_to_read() -> int:
+    """Have what is still to be printed go nowhere; return what a shell reports of a program that SIGPIPE ended."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(nowhere, stream.fileno())
+    return 128 + getattr(signal, "SIGPIPE", 13)  # Windows has none
+
+
+def _cause(error: Exception) -> str:
+    """Return what made an ``error`` that nobody expected, and what to do."""
+    passed = {Path(frame.filename).parts[-3:] for frame in traceback.extract_tb(error.__traceback__)}
+    if ("numba", "core", "caching.py") in passed:
+        from pneumarm.kernels import CACHE_FOLDER
+
+        return f"compiled code on the disk is damaged: delete the folder {CACHE_FOLDER} and try again"
+    return "a bug in pneumarm: PNEUMARM_DEBUG=1 shows where"
 
 
 def _too_many(error: UnusedCliTokensError) -> str:

@@ -2,6 +2,8 @@
 
 import json
 import math
+import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -13,6 +15,7 @@ from rich.status import Status
 from rich.table import Table
 
 from pneumarm.address import masked
+from pneumarm.errors import shortened
 
 if TYPE_CHECKING:  # the command line answers before these are imported
     import numpy as np
@@ -22,6 +25,10 @@ if TYPE_CHECKING:  # the command line answers before these are imported
 
 _LOOK = 0.1  # s between two looks of a person
 
+_NARROWEST = 20  # columns in which tables and helps can be laid out; terminals that cannot tell say 0
+_columns = os.environ.get("COLUMNS", "")
+if not re.fullmatch("[0-9]{2,6}", _columns) or int(_columns) < _NARROWEST:
+    os.environ.pop("COLUMNS", None)
 _errors = Console(stderr=True, highlight=False)
 
 
@@ -53,8 +60,24 @@ def say(text: str) -> None:
 
 
 def complain(error: BaseException | str) -> None:
-    """Print an error as one line on stderr, without the passwords of addresses that were given."""
-    print(f"pneumarm: {masked(' '.join(str(error).split()))}", file=sys.stderr)
+    """Print an error as one line on stderr, without the passwords of addresses that were given.
+
+    Nothing in it is too long for a screen or moves the cursor there, whatever it repeats of what was given.
+    """
+    line = shortened(masked(" ".join(str(error).split())))
+    shown = (one if one.isprintable() else one.encode("unicode_escape").decode() for one in line)
+    print(f"pneumarm: {''.join(shown)}", file=sys.stderr)
+
+
+def open_closed_streams() -> None:
+    """Open what of stdin, stdout and stderr the caller has closed, so that no file of ours gets their numbers."""
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # which takes the lowest number that is free
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, mode, closefd=False))  # noqa: SIM115 - as long as the program runs
 
 
 def show(result: Mapping[str, Any], as_json: bool, table: Callable[[], Sequence[Table | str]]) -> None:

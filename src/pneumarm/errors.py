@@ -3,11 +3,25 @@
 Every message says what was expected, what came, and what to do; the command line prints it as one line.
 """
 
+import re
+
+_LONG_WORD = re.compile(r"(?<!\S)(\S{150})\S{100,}(\S{50})")
+_LONGEST = 1000  # characters of a message: what a file holds may be repeated in it, and can be of any length
+
 
 class PneumarmError(Exception):
     """Base of all errors raised on purpose; ``exit_code`` is what the command line exits with."""
 
     exit_code = 1
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(shortened(str(message)))
+
+
+def shortened(message: str) -> str:
+    """Return ``message`` without what is in the middle of its long words, and of itself if it is long."""
+    message = _LONG_WORD.sub(r"\1...\2", message)
+    return message if len(message) <= _LONGEST else f"{message[: _LONGEST - 305]} ... {message[-300:]}"
 
 
 class UnusableInput(PneumarmError):  # noqa: N818 - reads as a sentence where it is raised

@@ -8,7 +8,7 @@ the same folder goes on after the last of them.
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -26,7 +26,7 @@ from pneumarm.control.monitor import Mode
 from pneumarm.control.transfer import monitor_of
 from pneumarm.control.versions import ADAPTED, TRAINED
 from pneumarm.errors import UnusableInput
-from pneumarm.files import require_folder, write_json
+from pneumarm.files import make_folder, read_json, refuse_code, require_output, write_json
 from pneumarm.learning import (
     LOOKING_AHEAD,
     LearnSettings,
@@ -46,7 +46,7 @@ from pneumarm.progress import Report, compiling
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
 from pneumarm.rehearsal import Piece, Rehearsal
 from pneumarm.report.beside import ReportBeside
-from pneumarm.report.files import REPORT, TEST, save_demonstration, save_spec
+from pneumarm.report.files import REPORT, TEST, read_results, save_demonstration, save_spec
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
 from pneumarm.settings import Valid
@@ -175,21 +175,19 @@ class Run:
 
     def _claim(self) -> None:
         folder, wanted = self.folder, self._wanted
-        require_folder(folder)
+        require_output(folder)
         file = folder / SETTINGS
         if file.exists():
-            found = _read_json(file)
+            found = read_json(file, "the settings of a run")
             if found != wanted:
                 raise UnusableInput(
                     f"{folder}: holds a run with other settings ({_differences(found, wanted)}); "
                     "give the same ones or another folder"
                 )
             if self._results_file.exists():
-                self.results = _read_json(self._results_file)
+                self.results = read_results(folder)
         elif folder.is_dir() and any(folder.iterdir()):
             raise UnusableInput(f"{folder}: is not empty and holds no run; give another folder")
-        elif folder.exists() and not folder.is_dir():
-            raise UnusableInput(f"{folder}: is a file; give a folder")
 
     @property
     def _results_file(self) -> Path:
@@ -245,7 +243,7 @@ class Run:
             self._rehearse(shape)
         if not (self.folder / SETTINGS).exists():
             open_arm_checked(self.settings).close()
-            self.folder.mkdir(exist_ok=True)
+            make_folder(self.folder)
             write_json(self.folder / SETTINGS, self._wanted)
 
     def numbered(self, title: str) -> str:
@@ -317,6 +315,8 @@ class Run:
                 analysis = analyse(store, fitted.simulation, fitted.filtered)
         fitted.simulation.save(self.simulation)
         analysis.save(self.folder)
+        for line in fitted.result.remarks:
+            self._tell(line)
         return {"filter": analysis.figures["filter"], "simulation": fitted.results() | analysis.figures}
 
     def _train(self) -> dict[str, Any]:
@@ -424,27 +424,28 @@ def open_arm_checked(settings: RunSettings) -> Arm:
     return arm
 
 
-def settings_in(folder: Path) -> RunSettings | None:
+def settings_in(folder: Path, named: Collection[str | None] = ()) -> RunSettings | None:
     """Return the settings of the run in ``folder``; None where it holds none.
 
+    An arm or a method that is somebody's code is taken from it only if it is among those that the user ``named``:
+    opening a folder runs nothing that is named in it.
+
     Raises:
-        UnusableInput: they are damaged, or of another version.
+        UnusableInput: they are damaged, of another version, or name code that the user has not named.
 
     """
     file = folder / SETTINGS
     if not file.exists():
         return None
+    found = read_json(file, "the settings of a run")
+    for option, code in (("arm", "python:"), ("method", ":")):
+        name = found.get(option)
+        if isinstance(name, str) and code in name and name not in named:
+            refuse_code(file, option, name)
     try:
-        return msgspec.convert(_read_json(file), RunSettings)
-    except msgspec.ValidationError as error:
+        return msgspec.convert(found, RunSettings)
+    except (msgspec.ValidationError, UnusableInput) as error:
         raise UnusableInput(f"{file}: holds no settings of a run that can be used ({error})") from error
-
-
-def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise UnusableInput(f"{path}: cannot be read ({error}); remove the folder or give another") from error
 
 
 def _differences(found: Any, wanted: Any, place: str = "") -> str:

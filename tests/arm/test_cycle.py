@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pneumarm.arm import BeginState, ControlCycle, GuardedArm
-from pneumarm.arm.guard import HELD, MOST_REPLACED, Interventions
+from pneumarm.arm.guard import HELD, REPLACED, Interventions
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import ControllerFailure, UnusableInput
 
@@ -99,7 +99,8 @@ def test_an_error_in_deciding_is_held_then_vented_then_told(smallest_arm):
     applied = []
     with pytest.raises(ControllerFailure, match=r"31 decisions in a row .*RuntimeError: no idea"):
         applied.extend(step.valves.tolist() for step in ControlCycle(GuardedArm(arm)).run(decide))
-    assert applied == [[[1, -1]]] * (1 + HELD) + [[[-1, -1]]] * (MOST_REPLACED - HELD)
+    held, most = round(30 * HELD), round(30 * REPLACED)
+    assert applied == [[[1, -1]]] * (1 + held) + [[[-1, -1]]] * (most - held)
     assert arm.valves == [[0, 0]]
 
 
@@ -135,7 +136,7 @@ def real_time(smallest):
 def test_late_decisions_are_held_then_vented_and_the_arm_goes_on_when_they_are_in_time(smallest_arm):
     arm = real_time(smallest_arm)
     # In periods: in time, a little late, in time, lost in thought, in time.
-    thoughts = [0.0, 1.5, 0.0, HELD + 2.0, 0.0]
+    thoughts = [0.0, 1.5, 0.0, HELD / 0.05 + 2.0, 0.0]
     remaining = list(thoughts)
     decisions = [OPEN, -OPEN, -OPEN, OPEN, OPEN]
 

@@ -3,7 +3,7 @@ import pytest
 
 from children import python
 from pneumarm.arm import GuardedArm, Reading
-from pneumarm.arm.guard import HELD, MOST_REPLACED, Interventions
+from pneumarm.arm.guard import HELD, REPLACED, Interventions
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError
 
@@ -110,6 +110,7 @@ def test_closing_closes_the_arm_behind(smallest_arm):
 
 
 OPEN = [[1, -1]]
+HELD_TURNS, MOST_REPLACED = round(30 * HELD), round(30 * REPLACED)
 
 
 class Hostile:
@@ -128,23 +129,48 @@ def test_a_decision_that_is_nonsense_is_held_then_vented_then_stopped(smallest_a
     safe.decide(OPEN)
     for count in range(1, MOST_REPLACED + 1):
         safe.decide(nonsense)
-        assert arm.valves == (OPEN if count <= HELD else [[-1, -1]])
-    assert safe.interventions == Interventions(nonsense=MOST_REPLACED, vented=MOST_REPLACED - HELD)
+        assert arm.valves == (OPEN if count <= HELD_TURNS else [[-1, -1]])
+    assert safe.interventions == Interventions(nonsense=MOST_REPLACED, vented=MOST_REPLACED - HELD_TURNS)
     assert safe.interventions.total == MOST_REPLACED
     with pytest.raises(ControllerFailure, match="smallest: stopped and vented"):
         safe.decide(nonsense)
     assert arm.valves == safe.applied.tolist() == [[-1, -1]]
 
 
+@pytest.mark.parametrize(("rate", "held", "most"), [(200, 20, 200), (30, 3, 30), (5, 1, 5), (0.5, 1, 1)])
+def test_decisions_are_held_and_replaced_for_times_not_for_periods(smallest_arm, rate, held, most):
+    arm = smallest_arm(period=1 / rate)
+    safe = GuardedArm(arm)
+    safe.decide(OPEN)
+    vented = []
+    for _ in range(most):
+        safe.decide(None)
+        vented.append(arm.valves == [[-1, -1]])
+    assert vented == [False] * held + [True] * (most - held)
+    with pytest.raises(ControllerFailure):
+        safe.decide(None)
+
+
+@pytest.mark.parametrize(("rate", "late"), [(200, 0.09), (30, 0.09), (200, 0.11), (30, 0.11)])
+def test_the_watchdog_holds_for_the_same_time_at_any_rate(smallest_arm, rate, late):
+    arm = smallest_arm(period=1 / rate)
+    safe = GuardedArm(arm)
+    reading = safe.read()
+    safe.decide(OPEN)
+    arm.wait(late)
+    assert safe.stand_in(reading)
+    assert (arm.valves == [[-1, -1]]) == (late > HELD)
+
+
 def test_one_good_decision_makes_the_guard_patient_again(smallest_arm):
     arm = smallest_arm()
     safe = GuardedArm(arm)
     for _ in range(MOST_REPLACED):
-        for _ in range(HELD):
+        for _ in range(HELD_TURNS):
             safe.decide(None)
         safe.decide(OPEN)
     assert arm.valves == OPEN
-    assert safe.interventions == Interventions(nonsense=HELD * MOST_REPLACED)
+    assert safe.interventions == Interventions(nonsense=HELD_TURNS * MOST_REPLACED)
 
 
 def test_what_is_held_keeps_to_the_limits(smallest_arm):
@@ -189,6 +215,17 @@ def test_pulses_count_as_inflation_too_and_venting_ends_it(smallest_arm):
     assert arm.valves == OPEN
 
 
+@pytest.mark.parametrize(("vented", "free"), [(0.15, 0), (0.25, 1)])
+def test_an_inlet_that_was_open_for_too_long_is_vented_for_a_tenth_of_that(smallest_arm, vented, free):
+    arm = smallest_arm(max_inflation=2.0, max_pressure=1e6)
+    safe = GuardedArm(arm)
+    for valve, seconds in ((1, 2.1), (-1, vented), (1, 0.0)):
+        safe.read()
+        safe.set_valves([[valve, 0]])
+        safe.wait(seconds)
+    assert arm.valves == [[free, 0]]
+
+
 @pytest.mark.parametrize("how", ["wait", "wait_until"])
 def test_long_waits_keep_to_pressure_and_time(smallest_arm, how):
     for limits, opened in (({"max_pressure": 0.5}, 0.5), ({"max_inflation": 2.0, "max_pressure": 1e6}, 2.0)):
@@ -219,6 +256,14 @@ def test_at_an_end_of_the_angle_nothing_pushes_further_out(smallest_arm):
     safe.read()
     safe.set_valves([[1, -1]] * 3)
     assert arm.valves == [[1, -1]] * 3
+
+
+def test_a_muscle_that_is_not_there_is_given_nothing(smallest_arm):
+    arm = smallest_arm(joints=2, muscles=1)
+    safe = GuardedArm(arm)
+    for command, applied in (([[1, 1], [-1, -1]], [[1, 0], [-1, 0]]), ([[0.5, 0.5], [1.0, -0.5]], [[1, 0], [1, 0]])):
+        safe.decide(np.array(command))
+        assert arm.valves == applied
 
 
 def test_interventions_are_counted_apart_and_can_be_told():

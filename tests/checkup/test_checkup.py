@@ -31,7 +31,7 @@ from pneumarm.checkup.figures import LAGS, autocorrelation, dropped, irregularit
 from pneumarm.checkup.measure import JointTest, MuscleTest, Trace
 from pneumarm.cli import main
 from pneumarm.commands import asking
-from pneumarm.errors import UnusableInput
+from pneumarm.errors import ArmFailure, UnusableInput
 
 
 @pytest.mark.parametrize("seed", [2, 6, 10, 14])
@@ -179,7 +179,7 @@ def test_a_board_is_fed_however_long_its_answers_are_timed():
 def test_a_broken_check_up_closes_the_valves():
     arm = FaultyArm(1)
     arm.read = fails_after(arm.read, 700)
-    with pytest.raises(OSError, match="cable"):
+    with pytest.raises(ArmFailure, match=r"read failed: OSError: cable \(.*test_checkup.py:\d+, in reading\)"):
         measure(arm)
     assert arm.applied.tolist() == [[0, 0]]
 

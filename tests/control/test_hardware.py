@@ -123,14 +123,17 @@ def policy(small_run: Path) -> AnyAgent:
 
 
 def test_finished_movements_are_kept_when_the_link_is_lost_in_a_transfer(agent: Agent, tmp_path: Path) -> None:
-    folder, arm = tmp_path / "moved", emulated()
+    folder, arm, stored = tmp_path / "moved", emulated(), []
 
     def pull_out(done: float, total: float) -> None:
+        with Store.open(folder / "transitions.db") as store:
+            stored.append(store.sequences)
         if done == 5:
             arm._line.left = 97  # type: ignore[attr-defined]  # in the next movement
 
     with pytest.raises(ArmFailure, match="line to the board is gone"):
         transfer_into(folder, agent, arm, SHORT, seed=1, progress=pull_out)
+    assert stored == [1, 2, 3, 4, 5]  # each as soon as it is made: a process that is killed then loses none
     with Store.open(folder / "transitions.db") as store:
         kinds = [entry.kind for entry in store.catalogue()]
         assert kinds == ["episode"] * 5 + ["broken episode"]
@@ -181,7 +184,7 @@ from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import Monitor, TransferSettings, open_agent, open_controller, transfer
 from pneumarm.transitions import CollectSettings, Store, collect
 
-class Enough(BaseException):
+class Enough(KeyboardInterrupt):
     pass
 
 class Counting(VirtualArm):

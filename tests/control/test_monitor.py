@@ -269,18 +269,50 @@ def test_an_arm_that_has_changed_is_not_complained_of_once_it_is_adapted_to(simu
         Monitor(arm.spec).judge_by(simulation)
 
 
-def test_an_angle_that_is_swept_onto_a_rail_is_no_broken_wire():
-    arm = VirtualArm()
-    monitor = Monitor(arm.spec)
-    angles = [600, 800, 1000, 1023, 1023, 1023, 1023, 1023]
-    for k, angle in enumerate(angles):
+def see_angles(monitor, angles, begin=0):
+    """Let ``monitor`` see closed valves, steady pressures and ``angles``, from the period ``begin`` on."""
+    for k, angle in enumerate(angles, begin):
         monitor.see(Reading(k / 30, np.array([angle], float), np.full((1, 2), 50.0)), np.zeros((1, 2), np.int8))
-    assert monitor.findings == []
-    monitor = Monitor(arm.spec)
-    for k, angle in enumerate([600, 610, 0, 0, 0]):
-        monitor.see(Reading(k / 30, np.array([angle], float), np.full((1, 2), 50.0)), np.zeros((1, 2), np.int8))
-    (found,) = monitor.findings
+
+
+@pytest.mark.parametrize("angles", [[600, 800, 1000], [50, 350, 650]])
+def test_an_angle_that_is_swept_onto_a_rail_is_no_broken_wire(angles):
+    swept, jumped = Monitor(VirtualArm().spec), Monitor(VirtualArm().spec)
+    see_angles(swept, [*angles, 1023, 1023, 1023, 1023, 1023])
+    assert swept.findings == []
+    see_angles(jumped, [600, 610, 0, 0, 0])
+    (found,) = jumped.findings
     assert (found.kind, found.since) == ("dead-potentiometer", pytest.approx(2 / 30))
+
+
+def test_readings_that_jump_to_a_rail_and_back_are_no_broken_wire():
+    monitor = Monitor(VirtualArm().spec)
+    see_angles(monitor, [600, 610, 0, 0, 610, 0, 0, 620, 1023, 1023, 600])
+    assert monitor.findings == []
+
+
+def test_what_spoils_readings_is_told_while_it_lasts_by_a_monitor_that_stops():
+    stops, warns = (Monitor(VirtualArm().spec, mode=mode) for mode in ("stop", "warn"))
+    for monitor in (stops, warns):
+        see_angles(monitor, [600, 610, 0, 0, 0, 0])
+    since, what = stops.spoiled_since()
+    assert (since, warns.spoiled_since()) == (pytest.approx(2 / 30), None)
+    assert what.startswith("dead potentiometer: joint 1")
+    see_angles(stops, [600, 605], begin=6)
+    assert stops.spoiled_since() is None
+
+
+def test_what_was_found_is_there_again_with_its_state():
+    arm = VirtualArm()
+    first, other = Monitor(arm.spec), Monitor(arm.spec)
+    see_angles(first, [600, 610, 0, 0, 0, 0])
+    other.set_state(first.get_state())
+    assert other.findings == first.findings == first.now == other.now
+    for monitor in (first, other):
+        see_angles(monitor, [600, 605, 610], begin=6)
+    (over,) = other.findings
+    assert (over.kind, over.until) == ("dead-potentiometer", pytest.approx(6 / 30))
+    assert other.findings == first.findings
 
 
 def test_hypotheses_are_told_apart_for_any_number_of_joints():
@@ -301,11 +333,19 @@ def test_what_is_found_has_one_name_also_where_two_hypotheses_share_it():
     off = [h for h, name in enumerate(names) if name[1:] == (DRAINS, 1)]
     torn = names.index(("torn-hose", "it loses its air, as if its hose were torn", 1))
     assert len(off) == 2
-    for now, scores in enumerate([(18.0, 6.0, 0.0), (18.0, 6.0, 15.0), (18.0, 6.0, 26.0), (26.0, 6.0, 18.0)]):
+    scored = [
+        (18.0, 6.0, 0.0),
+        (18.0, 6.0, 15.0),
+        (18.0, 6.0, 21.0),
+        (18.0, 6.0, 26.0),
+        (26.0, 6.0, 23.0),
+        (27.0, 6.0, 18.0),
+    ]
+    for now, scores in enumerate(scored):
         monitor._memory.score[[*off, torn]] = scores
         monitor._decide(float(now))
         (found,) = monitor.findings
-        assert (found.kind, found.until) == ("torn-hose" if now == 2 else "stuck-valve", None)
+        assert (found.kind, found.until) == ("torn-hose" if now in (3, 4) else "stuck-valve", None)
 
 
 def test_marks_are_the_rows_from_since_to_until():

@@ -68,8 +68,10 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
         sweep(Toy(), tmp_path, settings=LaboratorySettings(test_episodes=5))
     with pytest.raises(UnusableInput, match="at least 1 run"):
         sweep(Toy(), tmp_path, runs=0)
-    with pytest.raises(UnusableInput, match="does not exist; create it first"):
-        sweep(Toy(), tmp_path / "missing" / "laboratory")
+    (tmp_path / "file").touch()
+    with pytest.raises(UnusableInput, match="cannot be written"):
+        sweep(Toy(), tmp_path / "file" / "laboratory")
+    assert sweep(Toy(), tmp_path / "new" / "laboratory").rows
 
 
 def test_settings_that_decided_no_row_are_none(tmp_path: Path) -> None:

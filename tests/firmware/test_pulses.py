@@ -108,7 +108,8 @@ def test_another_command_ends_what_is_left(ready: Host) -> None:
     ready.pulse(("IN", ms(5)), ("IN", ms(5)))
     ready.exchange("IN", "CLOSED", "OUT", wait=0.02)
     assert ready.chip.valve_pins == wire.pins_of(wire.valves("IN", "CLOSED", "OUT"))
-    ready.pulse(("IN", ms(5)), number=ready.number)  # it was forgotten, and is a new one
+    # It was forgotten, and is a new one.
+    assert ready.pulse(("IN", ms(5)), number=ready.number).valves == wire.valves("IN")
     ready.pulse(("IN", HOLD), wait=0.02)
     assert ready.chip.valve_pins == wire.pins_of(wire.valves("IN"))
     ready.pulse(("IN", ms(10)))

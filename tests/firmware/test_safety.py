@@ -19,6 +19,8 @@ PRESSURES = [1, 2, 4, 5]
 """Analog channels of the muscles' pressures."""
 ADCSRA, ADEN, ADSC = 0x7A, 1 << 7, 1 << 6
 """The converter's control register, and its bits for enabled and converting."""
+TIMSK1 = 0x6F
+"""The register that lets the tick interrupt."""
 
 
 @pytest.fixture
@@ -201,6 +203,17 @@ def test_after_a_hang_the_cause_is_told_and_nothing_moves(ready: Host) -> None:
     assert ready.chip.valve_pins == 0
     ready.ready()
     assert ready.exchange("IN").name == "READING"
+
+
+def test_a_program_whose_tick_has_stopped_is_reset_with_all_outputs_off(ready: Host) -> None:
+    """It answers as ever, but the dead-man hangs on the tick."""
+    ready.exchange("IN", "IN")
+    resets = len(ready.chip.resets)
+    ready.chip.poke(TIMSK1, 0)
+    for _ in range(30):
+        ready.exchange("IN", "IN", wait=0.005)
+    assert len(ready.chip.resets) == resets + 1
+    assert ready.chip.valve_pins == 0
 
 
 def test_idle_program_is_not_reset() -> None:

@@ -1,5 +1,6 @@
 """The environment in which a reference is followed: its contract, its rewards, its pictures."""
 
+import copy
 import math
 import warnings
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from pneumarm.arm.cycle import BeginState
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import UnusableInput
 from pneumarm.gym import ENVIRONMENT, FOLLOW, ArmFollow, FollowSettings, follow
+from pneumarm.gym.drawing import Drawing
 from pneumarm.gym.spaces import nominal_scaling, nominal_view
 
 QUICK = BeginState(deflate=0.2, inflate=0.3, settle=0.2)
@@ -122,6 +124,17 @@ def test_mistakes_are_told(env: ArmFollow) -> None:
         env.reset(options={"goal_deg": 80})
     with pytest.raises(UnusableInput, match="expected sine"):
         env.reset(options={"reference": "sinus"})
+    for options, words in (
+        ({"goal_deg": "12"}, "1 finite angle.s., as numbers, got '12'"),
+        ({"goal_deg": [1, 2]}, "1 finite angle"),
+        ({"goal_deg": None}, "expected one goal"),
+        ({"reference": 5}, "expected a Reference"),
+        ({"reference": "sine:1Hz,15deg", "goal_deg": 3}, "one of goal_deg and reference"),
+        ({"goal": 500}, "goal_deg or reference"),
+        ("goal_deg", "goal_deg or reference"),
+    ):
+        with pytest.raises(UnusableInput, match=words):
+            env.reset(options=options)  # type: ignore[arg-type]
     for arguments, words in (
         ({"seconds": 0}, "seconds cannot be 0; expected above 0"),
         ({"preview": (20.0,)}, r"preview cannot be \(20.0,\)"),
@@ -130,6 +143,26 @@ def test_mistakes_are_told(env: ArmFollow) -> None:
     ):
         with pytest.raises(UnusableInput, match=words):
             follow("virtual:seed=2", **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("reference", [None, "sine:1Hz,15deg"])
+def test_a_copy_carries_the_state_and_goes_its_own_way(reference: str | None) -> None:
+    env = Drawing(on_arm(reference), lambda seen: (seen[:1] * 0, seen[:1]), VirtualArm().spec)
+    env.reset(seed=2)
+    env.render()
+    random = np.random.default_rng(0)
+    before, *after = random.uniform(-1, 1, (6, 2)).astype(np.float32)
+    env.step(before)
+    twin, third = copy.deepcopy(env), copy.deepcopy(env)
+    found = [twin.step(action)[:2] for action in after]
+    third.step(-after[0])
+    np.testing.assert_array_equal(twin.render().shape, (400, 400, 3))
+    for action, (observation, reward) in zip(after, found, strict=True):
+        seen, paid, *_ = env.step(action)
+        np.testing.assert_array_equal(seen, observation)
+        assert paid == reward
+    for one in (env, twin, third):
+        one.close()
 
 
 def test_pictures_show_where_the_arm_is_and_is_wanted() -> None:

@@ -1,6 +1,11 @@
 """The Gymnasium environments: their contract, their rewards, and that all forms of them are the same task."""
 
+import copy
+import math
+import pickle
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -17,6 +22,7 @@ from pneumarm.arm import ControlCycle, Reading, guarded
 from pneumarm.arm.cycle import BeginState
 from pneumarm.arm.valves import to_valves
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.arm.virtual.faults import SensorNoise
 from pneumarm.control import move
 from pneumarm.errors import UnusableInput
 from pneumarm.gym import ENVIRONMENT, ArmPointToPoint, PointToPointVector
@@ -316,3 +322,114 @@ def test_wrong_actions_are_refused() -> None:
 def test_registering_twice_is_harmless() -> None:
     pneumarm.gym.register()
     assert ENVIRONMENT in gymnasium.registry
+
+
+def test_a_cut_off_by_gymnasiums_name_holds_too() -> None:
+    for given_, steps in (({"max_episode_steps": 3}, 3), ({"max_episode_steps": 30, "cutoff": 4}, 4)):
+        many = vector(2, **given_)
+        many.reset(seed=1)
+        ended = [bool(many.step([0, 0])[3][1]) for _ in range(steps)]
+        assert ended == [False] * (steps - 1) + [True]
+    with pytest.raises(UnusableInput, match="cutoff"):
+        vector(2, max_episode_steps=0)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"goal": "12"},
+        {"goal": None},
+        {"goal": [[1.0], [2.0, 3.0]]},
+        {"goal": {"angle": 500}},
+        {"goal": math.nan},
+        {"goal": True},
+        {"goal": 500, "goal_deg": 0},
+        {"goal_deg": "12"},
+        {"goal_deg": 80},
+        {"gaol": 500},
+        "goal",
+        [500],
+    ],
+)
+def test_options_that_choose_no_goal_are_refused(options: Any) -> None:
+    for env in (make().unwrapped, on_arm()):
+        with pytest.raises(UnusableInput, match="goal"):
+            env.reset(options=options)
+        env.close()
+
+
+@pytest.mark.parametrize("goal", [500, 500.0, np.float32(500), [500], (500.0,), np.array(500), np.array([[500]])])
+def test_a_goal_is_any_number(goal: Any) -> None:
+    for env in (make().unwrapped, on_arm()):
+        degrees = SIMULATIONS[1].spec.degrees(goal)
+        for options in ({"goal": goal}, {"goal_deg": degrees}):
+            assert env.reset(options=options)[1]["goal"] == pytest.approx([500.0])
+        env.close()
+
+
+def test_options_of_the_vector_are_a_mask_or_refused() -> None:
+    many = vector(2)
+    first, _ = many.reset(seed=1)
+    again, _ = many.reset(seed=7, options={"reset_mask": [False, True]})
+    assert ((again == first).all(axis=1) == [True, False]).all()
+    for options in ({"reset_mask": [True]}, {"reset_mask": "both"}, {"reset_mask": [0, 1]}, {"goal": 500}, "all"):
+        with pytest.raises(UnusableInput, match="reset_mask"):
+            many.reset(options=options)  # type: ignore[arg-type]
+
+
+def pickled(env: Any) -> Any:
+    return pickle.loads(pickle.dumps(env))
+
+
+def step_of(env: Any, action: Any) -> list[Any]:
+    """Return what a step gives, but for what it says besides."""
+    return list(env.step(action)[:4])
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickled])
+@pytest.mark.parametrize("kind", ["simulation", "two joints", "virtual", "without pressures", "faults", "vector"])
+def test_a_copy_carries_the_state_and_goes_its_own_way(kind: str, copied: Callable[[Any], Any]) -> None:
+    hard = Reward(angle_tolerance=1e-6)  # so that no movement ends meanwhile
+    made: dict[str, Callable[[], Any]] = {
+        "simulation": lambda: make(reward=hard),
+        "two joints": lambda: make(2, reward=hard),
+        "virtual": lambda: on_arm(3),
+        "without pressures": lambda: gymnasium.make(ENVIRONMENT, arm="virtual:seed=2,pressure_sensors=off"),
+        "faults": lambda: ArmPointToPoint(
+            VirtualArm(draw_parameters(2), seed=2, faults=[SensorNoise(angle=3.0)]),
+            nominal_view(VirtualArm(draw_parameters(2)).spec),
+            begin=QUICK,
+        ),
+        "vector": lambda: vector(600, threads=2, cutoff=9),
+    }
+    env = made[kind]()
+    copied(env).reset(seed=5)  # before anything was done
+    env.reset(seed=1)
+    env.action_space.seed(1)
+    before = [env.action_space.sample() for _ in range(3)]
+    after = [env.action_space.sample() for _ in range(8)]
+    for action in before:
+        env.step(action)
+    twin, third = copied(env), copied(env)
+    found = [step_of(twin, action) for action in after]
+    for number in range(2 if kind == "vector" else 1):  # other actions there change nothing here
+        third.step(after[number + 1])
+    for action, expected in zip(after, found, strict=True):
+        for one, other in zip(step_of(env, action), expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(env.reset()[0], twin.reset()[0])
+    for one in (env, twin, third):
+        one.close()
+
+
+def test_copies_share_the_simulation_and_its_begin_states() -> None:
+    env = make().unwrapped
+    assert copy.deepcopy(env).simulation is env.simulation
+
+
+def test_an_environment_on_hardware_is_not_copied() -> None:
+    env = gymnasium.make(ENVIRONMENT, arm="emulated:virtual:seed=2")
+    for copied in (copy.deepcopy, pickled):
+        with pytest.raises(UnusableInput, match="emulated:virtual:seed=2 cannot be copied"):
+            copied(env)
+    env.close()

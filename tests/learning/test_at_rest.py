@@ -105,6 +105,14 @@ def test_of_two_ways_the_second_is_taken_where_it_is_seen_to_be_nearer():
     assert all(seconds(ways, 4.0, 0.5, 5.0)[-1] for ways in late)
 
 
+def test_what_was_before_does_not_count_in_a_try():
+    ways = TwoWays(PERIOD, 0.7)
+    for turn in range(30):
+        ways.see(5.0 if turn < 15 else 0.5)
+    assert not ways.is_tried
+    assert ways.known[0] == pytest.approx(0.3 * 0.5)
+
+
 def test_where_single_pulses_leave_a_joint_off_its_policy_acts_in_every_period(
     agent: ServoAgent, monkeypatch: pytest.MonkeyPatch
 ):

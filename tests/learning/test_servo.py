@@ -134,6 +134,7 @@ def test_a_valve_that_stays_open_is_cheaper_than_one_that_pulses():
         (0.45, 1 / 3, 1 / 3, 1 / 3),
         (0.75, 1 / 3, 1 / 3, 2 / 3),
         (0.9, 1 / 3, 1 / 3, 1.0),
+        (1.0, 0.35, 0.35, 1.0),
     ],
 )
 def test_pulses_are_none_or_as_long_as_the_valve_needs(size: float, shortest: float, step: float, pulse: float):

@@ -14,12 +14,22 @@ from pneumarm.cli import main
 
 HERE = Path(__file__).parent
 START = "import sys; sys.path.insert(0, ''); from pneumarm.cli import main; main()"
+IN_A_LOOP = """
+import asyncio, sys
+sys.path.insert(0, '')
+from pneumarm.cli import main
+async def cell():
+    main()
+asyncio.run(cell())
+"""
+"""As in a notebook, whose cells are run by a loop."""
 
 
-def test_it_ends_with_the_arm_vented(pid: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("start", [START, IN_A_LOOP])
+def test_it_ends_with_the_arm_vented(start: str, pid: Path, tmp_path: Path) -> None:
     notes = tmp_path / "notes"
     live = ["live", pid, "--arm", "python:noted_arm:noted", "--port", 0, "--no-browser", "--json"]
-    with child(sys.executable, "-c", START, *live, cwd=HERE, env=os.environ | {NOTES: str(notes)}) as process:
+    with child(sys.executable, "-c", start, *live, cwd=HERE, env=os.environ | {NOTES: str(notes)}) as process:
         assert process.stderr is not None
         while "open http://127.0.0.1:" not in (line := process.stderr.readline()):
             assert line, "it ended before"

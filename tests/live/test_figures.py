@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from pneumarm.live.figures import PlayFigures
+from pneumarm.live.figures import HELD, PlayFigures
+from pneumarm.moving.movement import MoveSettings
+from pneumarm.moving.settling import settled_at
 
 
 def see(figures: PlayFigures, errors: list[float], begin: float = 0.0) -> None:
@@ -36,11 +38,30 @@ def test_one_that_is_not_settled_at_counts_too_and_a_near_one_does_not() -> None
     }
 
 
+def test_settled_is_what_it_is_for_a_move() -> None:
+    """Readings that scatter at the goal are no reason to have left it; to pass it at the end is not to settle."""
+    noise = np.random.default_rng(0).normal(0, 0.5, 60)
+    coming = 20 * np.maximum(1 - np.arange(60) / 12, 0.0)
+    passing = np.where(np.arange(60) < 55, 4.0, 0.3)
+    found = []
+    for errors in (coming + noise, passing):
+        figures, times = PlayFigures(), np.arange(60) / 28
+        figures.new_goal(0.0, np.array([20.0]))
+        for time, error in zip(times, errors, strict=True):
+            figures.see("pid", time, np.array([error]))
+        found.append(figures.of("pid").results())
+        seen = times <= HELD + 1 / 28
+        settled = settled_at(times[seen], errors[seen, None], MoveSettings.tolerance, MoveSettings.dwell)
+        assert found[-1]["time"] == settled
+    assert [one["settled"] for one in found] == [1, 0]
+    assert found[0]["time"] == pytest.approx(12 / 28, abs=0.1)
+
+
 def test_a_goal_that_is_dragged_counts_from_its_last_place() -> None:
     figures = PlayFigures()
     for step in range(5):
-        figures.new_goal(float(step), np.array([20.0]))
-        figures.see("pid", float(step), np.array([20.0]))
+        figures.new_goal(float(step), np.array([0.0, 20.0]))
+        figures.see("pid", float(step), np.array([0.0, 20.0]))
     see(figures, [20.0, *[0.5] * 25], begin=4.0)
     assert figures.of("pid").results()["goals"] == 1
     assert figures.of("pid").results()["time"] == pytest.approx(0.1)

@@ -10,14 +10,14 @@ from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
 import pytest
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import ClientConnection, connect
 
 from children import wait_until
 from live.serving import ARM, served
 from pneumarm.errors import UnusableInput
 from pneumarm.live.rig import Rig
-from pneumarm.live.server import Server
+from pneumarm.live.server import MOST_PAGES, Server
 from pneumarm.run import RunSettings
 
 
@@ -92,7 +92,7 @@ def test_nonsense_is_refused_and_harms_nobody(server: Server) -> None:
             assert told(page, "refused")
         page.send("x" * (1 << 20))
         with pytest.raises(ConnectionClosed):
-            told(page, "end")
+            told(page, "refused")  # nobody has read so much
     with joined(server) as page:
         assert told(page, "frame")["pressure"]
 
@@ -110,7 +110,8 @@ def test_with_a_token_nobody_comes_without_it(pid: Path) -> None:
     with served(Rig(RunSettings(arm=ARM), [str(pid)], None), "secret") as server:
         assert server.url.endswith("/?token=secret")
         assert status(server.url) == 200
-        assert status(server.url.replace("secret", "guess")) == 403
+        for guess in ("guess", "", "s", "secre", "secrets", "Secret", "secret%00"):
+            assert status(server.url.replace("secret", guess)) == 403
         assert status(server.url.partition("?")[0]) == 403
         with joined(server) as page, pytest.raises(ConnectionClosed):
             page.recv(timeout=60)
@@ -118,7 +119,33 @@ def test_with_a_token_nobody_comes_without_it(pid: Path) -> None:
             assert told(page, "frame")
 
 
+def test_only_so_many_pages_are_open_at_a_time(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert MOST_PAGES == 50
+    monkeypatch.setattr("pneumarm.live.server.MOST_PAGES", 3)
+    with ExitStack() as stack:
+        pages = [stack.enter_context(joined(server)) for _ in range(3)]
+        for page in pages:
+            told(page, "state", lambda state: state["pages"] == 3)
+        with pytest.raises((ConnectionClosed, InvalidHandshake)), joined(server) as one_more:
+            one_more.recv(timeout=60)
+        pages[0].close()
+        told(pages[1], "state", lambda state: state["pages"] == 2)
+        with joined(server) as page:
+            assert told(page, "frame")
+
+
 def test_a_port_that_is_taken_is_said(server: Server) -> None:
     port = int(server.url.rstrip("/").rpartition(":")[2])
     with pytest.raises(UnusableInput, match="another --host or --port"):
         Server(server.rig, "127.0.0.1", port, None)
+
+
+def test_hosts_and_tokens_of_any_letters_are_answered(pid: Path) -> None:
+    with served(Rig(RunSettings(arm=ARM), [str(pid)], None)) as server:
+        address = server.url
+        assert status(address) == 200
+        assert [status(address, Host=host) for host in ("[", "[::1", "[]:80", "\xe4")] == [403] * 4
+        assert status(address, Origin="http://[") == 403
+        server.token = "schlüssel &?"
+        assert status(server.url) == 200
+        assert [status(f"{address}?token={token}") for token in ("schl", "%C3%BC", "%FF")] == [403] * 3

@@ -13,10 +13,10 @@ from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import Monitor
-from pneumarm.errors import ArmFailure
+from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.live.choices import Choice, opened
 from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
-from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop
+from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop, Take
 from pneumarm.live.rig import Rig
 from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
@@ -104,6 +104,18 @@ def test_the_arm_is_seen_before_its_monitor_is_compiled(pid: Path, monkeypatch: 
     assert seen == ["opening"]
 
 
+def test_only_the_page_that_controls_the_arm_moves_it_and_any_page_stops_it(pid: Path) -> None:
+    rig = Rig(RunSettings(arm="virtual:seed=3"), [str(pid)], None)  # nothing moves yet
+    writer, watcher = rig.desk.enter(), rig.desk.enter()
+    rig.order(writer, Take())
+    rig.order(writer, Goal([10.0]))
+    for order in (Goal([10.0]), Hold(), Relax(), Release(), Draw([0.0, 1.0], [[0.0], [0.0]])):
+        with pytest.raises(UnusableInput, match="another page controls the arm"):
+            rig.order(watcher, order)
+    rig.order(watcher, Stop())
+    assert rig.desk.writer == writer
+
+
 def test_of_an_arm_with_one_muscle_nothing_else_is_shown() -> None:
     with open_arm("virtual:seed=3,muscles=1") as arm:
         screen = Screen()
@@ -149,6 +161,12 @@ def test_a_stop_vents_and_stays_until_it_is_released(played: Played) -> None:
     assert "release" in played.screen.state["notice"]
 
 
+def test_only_a_release_ends_a_stop(played: Played) -> None:
+    played.run((0.1, Goal([15.0])), (1.0, Stop()), (2.0, Relax()), (3.0, Goal([15.0])), until=4.0)
+    assert [mode for _, mode, _ in played.modes] == ["moving", "stopped", "stopped", "stopped"]
+    assert played.virtual.pressure.max() < 5e3
+
+
 def test_a_stop_outlasts_a_board_that_has_vented_by_itself(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pneumarm.live.session.behind", lambda *_: played.virtual)  # which has no board
 
@@ -178,6 +196,19 @@ def test_an_arm_whose_page_is_silent_holds_then_is_vented(played: Played) -> Non
     assert "not heard" in why
     assert "vented" in after
     assert played.virtual.pressure.max() < 5e3
+
+
+def test_an_arm_on_its_way_stops_where_it_is_when_its_page_falls_silent(played: Played) -> None:
+    played.run(
+        (0.1, Goal([20.0])),
+        (4.0, Goal([-20.0])),
+        (4.2, played.be_silent(HOLD_AFTER)),
+        until=6.5,
+    )
+    begin = played.arm.times[0]
+    stopped = played.arm.at(begin + 4.25)
+    assert played.arm.at(begin + 6.4) == pytest.approx(stopped, abs=8)
+    assert stopped > -5
 
 
 def test_a_fault_is_switched_on_found_and_switched_off(played: Played) -> None:

@@ -13,8 +13,10 @@ from pneumarm.cli import main
 from pneumarm.learning.servo import ServoAgent, ServoSettings
 from pneumarm.learning.servo.agent import servo_sizes
 from pneumarm.learning.servo.price import PriceParameters
+from pneumarm.moving.movement import MoveSettings
+from pneumarm.moving.settling import settled_at
 from pneumarm.networks.layers import initial_weights
-from pneumarm.planning.moving_bound import WAYS, MovingBoundSettings, measure_moving_bound
+from pneumarm.planning.moving_bound import WAYS, MovingBoundSettings, _settling, measure_moving_bound
 from pneumarm.planning.refine import Wanted, refined
 
 STEPS = 20
@@ -48,6 +50,20 @@ def test_a_movement_gets_better_and_the_arm_moves_as_planned() -> None:
     assert np.abs(planned[-5:] - goal).max() < 25
     assert (np.abs(plan) <= 1).all()
     assert not ((np.abs(plan) > 0) & (np.abs(plan) < 0.09)).any(), "the valve can be no faster"
+
+
+def test_the_bound_takes_for_settled_what_a_move_does() -> None:
+    """Readings that scatter at the goal are no reason to have left it; to pass it at the end is not to settle."""
+    period = 1 / 30
+    noise = np.random.default_rng(1).normal(0, 0.5, (60, 1))
+    coming = 20 * np.maximum(1 - np.arange(60) / 12, 0.0)[:, None]
+    passing = np.where(np.arange(60) < 55, 4.0, 0.3)[:, None]
+    found = _settling([coming + noise, passing], period, 30, 1.0)
+    assert found["settled"] == 0.5
+    assert found["median_seconds"] == settled_at(
+        period * np.arange(1, 61), coming + noise, MoveSettings.tolerance, MoveSettings.dwell
+    )
+    assert found["median_seconds"] == pytest.approx(12 * period, abs=0.1)
 
 
 def test_five_ways_have_figures_and_a_better_plan_is_not_worse(agent: ServoAgent) -> None:

@@ -283,8 +283,8 @@ def test_run_whose_arm_did_nothing_can_be_reported():
 @pytest.mark.parametrize(
     ("file", "content", "told"),
     [
-        ("results.json", "not json", "expected a JSON file"),
-        ("results.json", "[1]", "expected a JSON object, got list"),
+        ("results.json", "not json", "expected the results of a finished run"),
+        ("results.json", "[1]", "a JSON object; got list"),
         ("arm.json", "{}", "expected the spec of an arm"),
         ("arm.json", '{"angle_range": [0, 1023], "wings": 2}', "expected the spec of an arm"),
         ("episodes.csv", "phase,goal\n", "'actions'"),

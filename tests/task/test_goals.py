@@ -96,6 +96,15 @@ def test_links_are_one_length_a_joint(links: tuple[float, ...]) -> None:
         ArmSpec(joints=2, links=links)
 
 
+def test_goals_lie_where_the_arm_was_seen() -> None:
+    spec, known = ArmSpec(), np.array([[300.0, 700.0]])
+    for goal in (300.0, 700.0):
+        assert goal_in_counts([goal], None, spec, known).tolist() == [goal]
+    for goal in (299.0, 701.0, 1e6):
+        with pytest.raises(UnusableInput, match="goals of joint 1 lie from"):
+            goal_in_counts([goal], None, spec, known)
+
+
 def test_joints_that_were_not_seen_to_hold_angles_together_are_not_asked_to() -> None:
     way = np.array([[1.0, 1.0]])
     goals = Goals(RANGE[:2], way, np.array([[723.0, 1323.0]]))

@@ -16,13 +16,13 @@ REWARD = Reward(goal=40.0, action=-2.0, switch=-3.0)
 
 @pytest.mark.parametrize("joints", [1, 3])
 def test_an_arm_and_a_compiled_loop_count_alike(joints: int) -> None:
-    random, task = np.random.default_rng(joints), TaskSettings(REWARD, cutoff=7)
+    random, task, cut_off = np.random.default_rng(joints), TaskSettings(REWARD, cutoff=7), 0
     for e in range(40):
         tally, record, last = Tally(task, ArmSpec(joints=joints)), movements(1, joints), np.full(joints, -1)
         goal = random.uniform(400, 600, joints)
         while not tally.over:
             actions = random.integers(3, 5, joints)
-            angle = goal + random.uniform(-26, 26, joints) / (1 + e % 2)
+            angle = goal + random.uniform(-26, 26, joints) * (0.5, 1, 9)[e % 3]  # the last are cut off
             velocity = random.uniform(-1.2, 1.2, joints)
             gained = tally.count(to_valves(actions), angle, velocity, goal)
             parts = REWARD.parameters
@@ -35,7 +35,10 @@ def test_an_arm_and_a_compiled_loop_count_alike(joints: int) -> None:
             assert (tally.actions, tally.reward, tally.reached) == (record.actions[0], record.reward[0], reached)
             assert tally.paid == paid(parts, reached, switched.sum())
             last = actions
+        cut_off += not tally.reached
+        assert tally.actions <= 7
         assert tally.switches.tolist() == record.switches[0].tolist()
+    assert 0 < cut_off < 40
 
 
 def test_what_is_no_number_has_not_reached_a_goal() -> None:

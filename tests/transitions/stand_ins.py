@@ -74,7 +74,7 @@ def make_recorded(number=0, n=21, joints=1, valves=True, **given):
     return Recorded(
         **{
             "time": np.arange(n) / 30,
-            "angle": random.integers(0, 1024, (n, joints)).astype(float),
+            "angle": random.integers(256, 768, (n, joints)).astype(float),  # more in a period is no arm
             "pressure": random.integers(0, 170, shape).astype(float),
             "command": command,
             "step": np.arange(n),

@@ -238,7 +238,7 @@ def test_an_arm_that_fails_keeps_what_was_acknowledged_and_is_closed(tmp_path):
     arm = FirstOrderArm(fail_after=500)
     with Store.create(tmp_path / "s.db", arm.spec) as store:
         with pytest.raises(
-            ArmFailure, match=r"OSError: no answer from the board\); the 4 sequences before"
+            ArmFailure, match=r"FirstOrderArm\.\w+ failed: OSError: no answer from the board"
         ) as failure:
             collect(arm, store, 2000, settings=SHORT)
         assert failure.value.exit_code == 1

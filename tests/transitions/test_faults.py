@@ -301,6 +301,29 @@ def test_altered_stores_are_refused(whole, statements, message):
         store.check()
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE sequences SET rows = 'many'",
+        "UPDATE sequences SET info = '{'",
+        "UPDATE sequences SET info = '[1]'",
+        "UPDATE sequences SET info = x'ff'",
+        "INSERT INTO runs VALUES (7, 'collect', 'null')",
+        "INSERT INTO runs VALUES (7, 'collect', '" + "[" * 30_000 + "')",
+    ],
+)
+def test_a_catalogue_of_something_else_is_said(whole, change):
+    path = altered(whole, change)
+
+    def read():
+        with Store.open(path) as store:
+            list(store.catalogue())
+            store.runs()
+
+    with pytest.raises(UnusableInput, match="damaged"):
+        read()
+
+
 def test_things_that_are_no_files_are_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "fifo.db")
     (tmp_path / "folder.db").mkdir()
@@ -377,7 +400,7 @@ def test_hostile_recordings_are_refused_in_little_memory(tmp_path, limited):
         "line": columns + '"' + "1\n" * 1_000_000,
         "expected 5 fields": columns + "1," * 30_000 + "\n",
         "UTF-8": b"\xff\xfe\x00" * 1000,
-        "expected a finite number": columns + "1,1,1,0,0\n" * 20_000 + "1,1,1,0,x\n",
+        "expected a finite number": columns + "1,1,1,0,0\n" * 20_000 + "1,1,1,0,x\n" * 2_000,
     }
     recordings = [tmp_path / f"{n}.csv" for n in range(len(hostile))]
     for path, text in zip(recordings, hostile.values(), strict=True):

@@ -185,8 +185,8 @@ def test_mistakes_in_the_mapping_are_told(imported, tmp_path, old, new, message)
 
 def test_places_that_are_taken_or_missing_are_told(imported, tmp_path):
     imported(lines(*GOOD))
-    with pytest.raises(UnusableInput, match="exists already"):
-        imported(lines(*GOOD))
+    with pytest.raises(UnusableInput, match="expected a store"):
+        import_recording(tmp_path / "r.csv", tmp_path / "m.toml", tmp_path / "m.toml")
     with pytest.raises(UnusableInput, match="does not exist; create it first"):
         import_recording(tmp_path / "r.csv", tmp_path / "m.toml", tmp_path / "none" / "s.db")
     with pytest.raises(UnusableInput, match="no such file"):

@@ -14,11 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from stand_ins import make_recorded
 
-from pneumarm.arm import ArmSpec
-from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.transitions import Recorded, Store
+from pneumarm.arm import ArmSpec, Reading, Step
+from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
+from pneumarm.transitions import Mark, Recorded, Store, lock
+from pneumarm.transitions.lock import WriterLock
 from pneumarm.transitions.quantiles import Quantiles
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import broken_off, joined
 
 
 @pytest.fixture
@@ -146,6 +147,34 @@ def test_many_are_appended_all_or_none(address, recorded):
         assert store._one("SELECT count(*) FROM sequences") == 0
 
 
+def test_a_sequence_that_grew_is_the_one_that_was_appended_at_once(address, recorded):
+    step = np.append(np.arange(20), np.arange(22, 32))  # two periods were lost
+    whole = recorded(3, n=30, step=step, time=step / 30)
+
+    def part(begin, end):
+        command = whole.command[begin:end].copy()
+        command[-1] = np.nan
+        values = {name: getattr(whole, name)[begin:end] for name in ("time", "angle", "pressure")}
+        return replace(whole, **values, command=command, step=step[begin:end] - step[begin])
+
+    with Store.create(address, ArmSpec()) as store:
+        store.append(whole)
+        number = store.append(part(0, 10))
+        for begin, end in ((9, 11), (10, 25), (24, 30)):
+            store.extend(number, part(begin, end))
+        for wrong in (number, number + 1):
+            with pytest.raises(UnusableInput, match=f"sequence {wrong} does not end where this goes on"):
+                store.extend(wrong, part(9, 11))
+        with pytest.raises(UnusableInput, match="commands must be"):
+            store.extend(number, replace(recorded(4, n=2), time=np.array([31, 32]) / 30, command=np.zeros((2, 1, 2))))
+        store.check()
+        first, second = (entry._replace(number=0) for entry in store.catalogue())
+        assert first == second
+        at_once, grown = (joined(store.blocks(sequences=lambda n, k=k: n == k)) for k in (1, 2))
+    for name in ("step", "time", "angle", "pressure", "command"):
+        np.testing.assert_array_equal(getattr(grown, name), getattr(at_once, name), err_msg=name)
+
+
 def test_state_is_written_with_the_sequence_or_not_at_all(address, recorded):
     with Store.create(address, ArmSpec()) as store:
         assert store.state() is None
@@ -251,6 +280,25 @@ def test_a_second_writer_is_refused_by_name(path, recorded, python):
     assert not path.with_name(path.name + "-writer").exists()
 
 
+def test_a_lock_whose_file_was_removed_while_it_was_taken_is_no_lock(path, monkeypatch):
+    """The holder before us removes it between our opening and our locking; whoever comes next makes another one."""
+    take, before = lock.lock_descriptor, path.with_name(path.name + "-writer")
+
+    def taken(file, blocking):
+        before.unlink()
+        monkeypatch.setattr(lock, "lock_descriptor", take)
+        return take(file, blocking=blocking)
+
+    monkeypatch.setattr(lock, "lock_descriptor", taken)
+    mine = WriterLock(path)
+    assert before.exists()
+    with pytest.raises(UnusableInput, match="is writing to it"):
+        WriterLock(path)
+    mine.release()
+    WriterLock(path).release()
+    assert not before.exists()
+
+
 def test_a_place_that_is_taken_or_missing_is_refused(path, tmp_path):
     Store.create(path, ArmSpec()).close()
     with pytest.raises(UnusableInput, match="exists already"):
@@ -285,9 +333,24 @@ def test_names_that_mean_something_in_a_uri_are_just_names(tmp_path, recorded):
             store.database.connection.execute("DELETE FROM rows")
 
 
-def test_from_steps_takes_the_valves_as_applied_and_counts_periods(recorded):
-    from pneumarm.arm import Reading, Step
+def test_what_broke_off_is_kept_with_its_last_row_marked():
+    spec = ArmSpec(period=0.1)
+    steps = [Step(Reading(k / 10, np.array([500.0]), np.zeros((1, 2))), np.zeros((1, 2), np.int8)) for k in range(4)]
+    kept = broken_off(steps, spec, ArmFailure("the plug fell out"), kind="k")
+    assert kept.step.tolist() == [0, 1, 2, 3]
+    assert kept.marks == (Mark(3, 3, "broke off here: the plug fell out"),)
+    assert kept.transitions == 2
+    assert broken_off(steps[:1], spec, ArmFailure("at once"), kind="k") is None
 
+
+def test_a_store_is_of_one_arm(path):
+    with Store.create(path, ArmSpec()) as store:
+        store.check_arm(ArmSpec())
+        with pytest.raises(UnusableInput, match=r"made for another arm \(period was .*; max_pressure was"):
+            store.check_arm(ArmSpec(period=0.05, max_pressure=0.9))
+
+
+def test_from_steps_takes_the_valves_as_applied_and_counts_periods(recorded):
     spec = ArmSpec(joints=2, period=0.1)
     times = [0.0, 0.101, 0.2, 0.4, 0.49]  # one period is lost after the third
     readings = [Reading(t, np.array([t, 2 * t]), np.full((2, 2), t)) for t in times]

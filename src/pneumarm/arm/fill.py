@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.passed_on import PassedOn
-from pneumarm.arm.seam import Arm, ArmSpec, Reading
+from pneumarm.arm.seam import Arm, ArmSpec, Reading, checked
 from pneumarm.errors import UnusableInput
 
 _ATMOSPHERE = 1.01325  # bar
@@ -116,8 +116,8 @@ class EstimatedArm(PassedOn):
 
     def read(self) -> Reading:
         """Return what the sensors say, with the estimated pressures."""
-        reading = self.arm.read()
-        self._fill.pass_until(float(reading.time))
+        reading = checked(self.arm.read(), self.spec)
+        self._fill.pass_until(reading.time)
         return replace(reading, pressure=self._fill.pressure)
 
     def set_valves(self, valves: NDArray[np.int8]) -> None:

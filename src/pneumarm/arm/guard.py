@@ -28,22 +28,26 @@ import math
 import weakref
 from contextlib import suppress
 from dataclasses import astuple, dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.fill import EstimatedArm
+from pneumarm.arm.own import OwnArm, owned
+from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Arm, Reading, checked
 from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import Watchdog
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError, UnusableInput
 
 _SETTINGS = frozenset((-1, 0, 1))
-HELD = 3
-"""Control periods in a row without a decision in which the valves are held, 0.1 s at 30 Hz; then they are vented."""
-MOST_REPLACED = 30
-"""Decisions in a row that are replaced; the one after stops the controller."""
+HELD = 0.1
+"""Time without a decision for which the valves are held [s], one control period at least; then they are vented."""
+REPLACED = 1.0
+"""Decisions in a row that make up this time [s], one at least, are replaced; the one after stops the controller."""
+_ROUNDED = 1e-9
+"""Periods add up to a time but for so much [s]."""
 VENTING = 10.0
 """How many times faster a muscle recovers from inflation by venting than by resting."""
 
@@ -56,7 +60,7 @@ _open_arms: "weakref.WeakValueDictionary[int, Arm]" = weakref.WeakValueDictionar
 def _close_open_arms() -> None:
     """Close what nobody closed before the interpreter ends."""
     for arm in list(_open_arms.values()):
-        with suppress(Exception):  # the other arms are to be closed too
+        with suppress(Exception, SystemExit):  # the other arms are to be closed too
             arm.close()
 
 
@@ -121,6 +125,8 @@ class GuardedArm(Arm):
             UnusableInput: it measures no pressures, and nobody has said that its supply is safe.
 
         """
+        self._opened = arm
+        arm = owned(arm)
         if not arm.spec.pressure_sensors:
             if not arm.spec.safe_supply:
                 arm.close()
@@ -145,11 +151,27 @@ class GuardedArm(Arm):
         self._inflation = _Inflation(arm.spec.max_inflation, self.applied.size)
         self._inflating = False
         self._replaced = 0  # decisions in a row
-        self._undecided = 0.0  # control periods in a row without a decision of the controller
+        self._undecided = 0.0  # time without a decision of the controller [s]
+        self._held = max(HELD, self.spec.period) + _ROUNDED
+        self._most_replaced = max(round(REPLACED / self.spec.period), 1)
+        self._waits_itself = _waits_itself(arm)
         self._time = -math.inf  # of the last reading
         self.watchdog = Watchdog(self)
         """Looks after a decision while it is out."""
-        _open_arms[id(arm)] = arm
+        _open_arms[id(self._opened)] = self._opened
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy takes up, with the state of the arm behind; an arm that has none is refused."""
+        if self.get_state() is None:
+            raise UnusableInput(
+                f"{self.spec.name} cannot be copied: only an arm that can be put into a saved state can, such as a "
+                "virtual one or a simulation, and hardware never"
+            )
+        return vars(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        _open_arms[id(self.arm)] = self.arm
 
     @property
     def interventions(self) -> Interventions:
@@ -167,6 +189,8 @@ class GuardedArm(Arm):
         if reading.time < self._time:
             before, self._time = self._time, -math.inf  # the next reading is the first on the new clock
             self._inflation = _Inflation(self.spec.max_inflation, self.applied.size)
+            with suppress(PneumarmError, OSError):  # the first failure is the one to tell of
+                self._set(np.zeros_like(self._valves))
             raise ArmFailure(
                 f"{self.spec.name}: its clock went back from {before:.2f} to {reading.time:.2f} s while in use, as "
                 "when a board restarts; check its power and run the same command again"
@@ -229,13 +253,13 @@ class GuardedArm(Arm):
         counts = self._interventions
         setattr(counts, reason, getattr(counts, reason) + 1)
         self._replaced += 1
-        self._undecided += periods
-        if self._undecided <= HELD:
+        self._undecided += periods * self.spec.period
+        if self._undecided <= self._held:
             self._set(self._within_limits(self.applied.copy()))
             return
         counts.vented += 1
         self._set(np.full_like(self._valves, -1))  # no limit forbids to vent
-        if self._replaced > MOST_REPLACED:
+        if self._replaced > self._most_replaced:
             raise ControllerFailure(
                 f"{self.spec.name}: stopped and vented, because {self._replaced} decisions in a row could not be "
                 f"used ({reason}: {what}); mend the controller and run the same command again"
@@ -261,10 +285,10 @@ class GuardedArm(Arm):
             Whether that is needed: the clock of an arm may stand still while we compute.
 
         """
-        late = (self.watch().time - reading.time) / self.spec.period
-        if late < 1 / 2:
+        late = self.watch().time - reading.time
+        if late < self.spec.period / 2:
             return False
-        if self._undecided + late > HELD:
+        if self._undecided + late > self._held:
             self._set(np.full_like(self._valves, -1))  # over and over: so hardware knows that we are there
         return True
 
@@ -407,9 +431,14 @@ class GuardedArm(Arm):
 
     def wait_until(self, time: float) -> None:
         """Let time pass until the arm's clock shows ``time`` [s], looking at the limits as :meth:`wait` does."""
-        while time - self._time > 2 * self.spec.period and self._inflating:
+        left = time - (self._time if self._waits_itself else self.read().time)
+        while left > 2 * self.spec.period and self._inflating:
             self._pass(self.spec.period)
-            self.watch()
+            left = time - self.watch().time
+        if not self._waits_itself:
+            if left > 0:
+                self._pass(left)
+            return
         if self._closing:
             self.end_pulses(time)
         self.arm.wait_until(time)
@@ -445,12 +474,19 @@ class GuardedArm(Arm):
     def close(self) -> None:
         """Close the arm behind."""
         self.arm.close()
-        _open_arms.pop(id(self.arm), None)
+        _open_arms.pop(id(self._opened), None)
 
 
 def guarded(arm: Arm) -> GuardedArm:
     """Return ``arm`` behind a guard; an arm that has one already is returned as it is."""
     return arm if isinstance(arm, GuardedArm) else GuardedArm(arm)
+
+
+def _waits_itself(arm: Arm) -> bool:
+    """Return whether ``arm`` brings a ``wait_until`` of its own."""
+    while isinstance(arm, PassedOn) and type(arm).wait_until in (PassedOn.wait_until, OwnArm.wait_until):
+        arm = arm.arm
+    return type(arm).wait_until is not Arm.wait_until
 
 
 def _close(command: Command, which: NDArray[np.bool_]) -> int:

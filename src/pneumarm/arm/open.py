@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pneumarm.arm.own import last_line, owned
 from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.arm.slower import SlowerArm, usual_turns
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -27,6 +28,7 @@ _OPTIONS = (
     r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|pulses|muscles|faults|every|spec)=|"
     r"wide(?:,|$)"
 )
+_LONGEST_NUMBER = 40  # digits, of a seed as well
 _OPTION = re.compile(rf"[:,](?={_OPTIONS})")
 """Stands before an option; files may have commas in their names."""
 
@@ -114,7 +116,7 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
         )
     if place == "virtual":
         return _virtual(name, options, seed, spec)
-    if kind == "emulated" and rest:
+    if kind == "emulated" and rest and not rest.startswith(kind):  # a board has an arm behind it, not another board
         from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
 
         inner = _open(rest, options, seed, spec)
@@ -203,7 +205,7 @@ def _parameters(name: str, options: Mapping[str, str]) -> "ArmParameters":
 
     drawn, preset, joints = options.get("seed"), options.get("preset"), options.get("joints", "1")
     wide = "wide" in options
-    if not all(number.isdecimal() for number in (drawn or "0", joints)) or (wide and drawn is None):
+    if not all(map(_is_whole, (drawn or "0", joints))) or (wide and drawn is None):
         raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
     if (preset is not None and {"seed", "joints", "wide"} & options.keys()) or (wide and "joints" in options):
         raise UnusableInput(f"arm {name!r}: these options do not go together; expected {_FORMS}")
@@ -223,6 +225,10 @@ def _parameters(name: str, options: Mapping[str, str]) -> "ArmParameters":
         return replace(parameters, coupling=float(options["coupling"]))
     except ValueError as error:
         raise UnusableInput(f"arm {name!r}: expected a coupling of 0 to 1") from error
+
+
+def _is_whole(text: str) -> bool:
+    return text.isdecimal() and len(text) <= _LONGEST_NUMBER
 
 
 def _period(name: str, options: Mapping[str, str], usual: float) -> float:
@@ -249,11 +255,15 @@ def _on(name: str, options: Mapping[str, str], option: str, usual: bool) -> bool
 
 def _from_python(place: str, every: str | None) -> Arm:
     """Return the arm of a user's own, controlled at ``every`` so many of its periods, the usual ones if not given."""
-    if every is not None and not every.isdecimal():
+    if every is not None and not _is_whole(every):
         raise UnusableInput(f"arm python:{place}: expected every=1 or more of its periods, not {every!r}")
-    arm = _made_by(place)
+    arm = owned(_made_by(place))
     turns = int(every) if every is not None else usual_turns(arm.spec.period)
-    return arm if turns == 1 else SlowerArm(arm, turns)
+    try:
+        return arm if turns == 1 else SlowerArm(arm, turns)
+    except UnusableInput:
+        arm.close()
+        raise
 
 
 def _made_by(place: str) -> Arm:
@@ -267,14 +277,15 @@ def _made_by(place: str) -> Arm:
         raise UnusableInput(
             f"arm python:{place}: expected a module and a callable in it that returns an Arm; {error}"
         ) from error
-    except Exception as error:  # whatever stands in it
-        raise UnusableInput(f"arm python:{place}: {module_name} cannot be imported ({_told(error)})") from error
+    except (Exception, SystemExit) as error:  # whatever stands in it
+        told = _told(error, module_name)
+        raise UnusableInput(f"arm python:{place}: {module_name} cannot be imported ({told})") from error
     try:
         arm = made_by()
     except PneumarmError:
         raise
-    except Exception as error:  # whatever its maker's code or its hardware raises
-        raise ArmFailure(f"arm python:{place}: cannot be opened ({_told(error)})") from error
+    except (Exception, SystemExit) as error:  # whatever its maker's code or its hardware raises
+        raise ArmFailure(f"arm python:{place}: cannot be opened ({_told(error, module_name)})") from error
     if not isinstance(arm, Arm):
         raise UnusableInput(
             f"arm python:{place}: the callable must return a pneumarm.arm.Arm, it returned {type(arm).__name__}"
@@ -282,5 +293,5 @@ def _made_by(place: str) -> Arm:
     return arm
 
 
-def _told(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+def _told(error: BaseException, module: str) -> str:
+    return "; ".join(filter(None, [f"{type(error).__name__}: {error}", last_line(error, module)]))

@@ -10,7 +10,7 @@ class PassedOn(Arm):
     """``arm``, with its spec; what is not overridden is its own."""
 
     def __init__(self, arm: Arm) -> None:
-        self.arm, self.spec = arm, arm.spec
+        self.arm, self.spec, self.real_time = arm, arm.spec, arm.real_time
 
     def read(self) -> Reading:
         """Return what the sensors say."""

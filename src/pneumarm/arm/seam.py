@@ -15,7 +15,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.settings import Settings, Valid
 
 SensorKind = Literal["velocity", "acceleration", "temperature"]
@@ -295,6 +295,9 @@ class Arm(ABC):
     """
 
     spec: ArmSpec
+    real_time: bool = False
+    """Whether its seconds are those of the computer, as of hardware. A wait that takes far longer by the computer's
+    clock is then a failure of the arm; one that is simulated may be slower or faster, and leaves it False."""
 
     @abstractmethod
     def read(self) -> Reading:
@@ -337,7 +340,11 @@ class Arm(ABC):
         return f"<{type(self).__name__} {self.spec.name!r}>"
 
     def wait_until(self, time: float) -> None:
-        """Let time pass until the arm's clock shows ``time`` [s]; return at once if it is past."""
+        """Let time pass until the arm's clock shows ``time`` [s]; return at once if it is past.
+
+        The guard reads and waits by itself where an arm leaves this as it is, and looks at the limits between. An arm
+        that brings its own has to wait by a clock that never goes back: the guard cannot see until it returns.
+        """
         remaining = time - self.read().time
         if remaining > 0:
             self.wait(remaining)
@@ -369,15 +376,26 @@ class Arm(ABC):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except PneumarmError as failure:
+            if not isinstance(error, PneumarmError):
+                raise
+            raise ArmFailure(f"{error}; and it could not be closed: {failure}") from error
+
+
+_FAR = 10.0
+"""An angle may lie outside of ``angle_range`` by so many times its width: potentiometers do by a little, encoders
+that count on by some turns."""
 
 
 def checked(reading: Reading, spec: ArmSpec) -> Reading:
     """Return ``reading`` with float64 arrays of the right shapes; as it is where it has them already.
 
     Raises:
-        ArmFailure: a value is missing, not finite or of the wrong shape; also of the further sensors of ``spec``.
-            An arm without pressure sensors may leave out the pressures, one with one muscle a joint those of others.
+        ArmFailure: a value is missing, not finite or of the wrong shape, also of the further sensors of ``spec``, or
+            an angle lies far outside ``angle_range``. An arm without pressure sensors may leave out the pressures,
+            one with one muscle a joint those of others.
 
     """
     try:
@@ -391,8 +409,15 @@ def checked(reading: Reading, spec: ArmSpec) -> Reading:
             f"pressures, got {reading!r} ({error})"
         ) from error
     # For a handful of numbers Python is several times faster than np.isfinite, and this runs in every period.
-    if not all(map(math.isfinite, [time, *angle.tolist(), *pressure.ravel().tolist()])):
+    angles = angle.tolist()
+    if not all(map(math.isfinite, [time, *angles, *pressure.ravel().tolist()])):
         raise ArmFailure(f"{spec.name}: a reading must hold finite numbers, got {reading!r}")
+    low, high = spec.angle_range
+    if not low - _FAR * (high - low) <= min(angles) <= max(angles) <= high + _FAR * (high - low):
+        raise ArmFailure(
+            f"{spec.name}: expected angles of {low:g} to {high:g} counts (angle_range), or a little outside, got "
+            f"{angles}; check the sensor, its wires, and angle_range"
+        )
     if spec.further:
         measured(reading, spec.further, spec.name)
     if angle is reading.angle and pressure is reading.pressure and type(reading.time) is float:

@@ -27,7 +27,6 @@ are worth; this is an LM35 on the second muscle, 10 mV a degree on a converter o
 """
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import pairwise
@@ -40,7 +39,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
-from pneumarm.files import as_toml, write_text
+from pneumarm.files import as_toml, read_toml, write_text
 
 _LARGEST = 1 << 18
 """Largest file that is read [bytes]: a thousand times what it needs."""
@@ -170,13 +169,9 @@ def load_arm_file(path: Path | str) -> ArmFile:
         UnusableInput: it cannot be read, or holds anything that is not known or not possible.
 
     """
-    path = Path(path)
+    expected = "what is known of an arm, as pneumarm arm calibrate writes it"
+    found = read_toml(path, expected, _LARGEST)
     try:
-        with path.open("rb") as file:
-            text = file.read(_LARGEST + 1)
-        if len(text) > _LARGEST:
-            raise UnusableInput(f"larger than {_LARGEST:,} bytes")
-        found = tomllib.loads(text.decode())
         _refuse_unknown(found, ArmFile, "")
         for part, kind in (("spec", ArmSpec), ("correction", Correction), ("sound", SoundState)):
             if isinstance(found.get(part), dict):
@@ -184,12 +179,8 @@ def load_arm_file(path: Path | str) -> ArmFile:
         for sensor in _tables(found.get("spec"), "sensors"):
             _refuse_unknown(sensor, Sensor, "[spec] sensors: ")
         return msgspec.convert(found, ArmFile)
-    except OSError as error:
-        raise UnusableInput(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, RecursionError, msgspec.MsgspecError, UnusableInput) as error:
-        raise UnusableInput(
-            f"{path}: expected what is known of an arm, as pneumarm arm calibrate writes it; {error}"
-        ) from error
+    except (msgspec.MsgspecError, UnusableInput) as error:
+        raise UnusableInput(f"{path}: expected {expected}; {error}") from error
 
 
 def save_arm_file(known: ArmFile, path: Path | str) -> None:

@@ -52,6 +52,10 @@ class Watchdog:
         self._interrupted: float | None = None  # when the decider was [s]
         self._failure: Exception | None = None  # of the arm, while it was seen to
 
+    def __reduce__(self) -> tuple[type["Watchdog"], tuple["GuardedArm"]]:
+        """Have the copy of an arm looked after anew: of its controller nobody is asked for a decision yet."""
+        return Watchdog, (self._arm,)
+
     def begin(self, reading: Reading, patience: float = PATIENCE) -> None:
         """Look after the decision on ``reading``; the calling thread is interrupted after ``patience`` [s]."""
         with self._lock:

@@ -17,7 +17,7 @@ from pneumarm.classical.following import CommonGains, Following, Law
 from pneumarm.classical.pulse_width import PulseWidth, PulseWidthGains
 from pneumarm.classical.sliding import Sliding, SlidingGains
 from pneumarm.errors import UnusableInput
-from pneumarm.files import write_json
+from pneumarm.files import read_beginning, read_json, write_json
 
 _FORMAT = "pneumarm tuned controller 1"
 _LARGEST = 1 << 20
@@ -113,9 +113,8 @@ class Tuned:
 def is_tuned(path: Path) -> bool:
     """Return whether ``path`` looks like the file of a tuned controller: those of agents are not JSON."""
     try:
-        with open(path, "rb") as file:
-            return file.read(1) == b"{"
-    except OSError:
+        return read_beginning(path, "a controller", 1) == b"{"
+    except UnusableInput:
         return False
 
 
@@ -126,14 +125,11 @@ def load_tuned(path: Path) -> Tuned:
         UnusableInput: it is none, or it is damaged.
 
     """
-    expected = f"{path}: expected a controller from `pneumarm tune`"
+    expected = "a controller from `pneumarm tune`"
+    values = read_json(path, expected, _LARGEST)
+    if values.get("format") != _FORMAT:
+        raise UnusableInput(f"{path}: expected {expected}, this is something else")
     try:
-        with open(path, "rb") as file:
-            values = msgspec.json.decode(file.read(_LARGEST))
-        if not isinstance(values, dict) or values.get("format") != _FORMAT:
-            raise UnusableInput(f"{expected}, this is something else")
         return Tuned.of(values)
-    except OSError as error:
-        raise UnusableInput(f"{expected}, but it cannot be read ({error.strerror})") from error
-    except (msgspec.MsgspecError, KeyError, ValueError, RecursionError) as error:
-        raise UnusableInput(f"{expected}, it is damaged ({error})") from error
+    except (msgspec.MsgspecError, KeyError, ValueError) as error:
+        raise UnusableInput(f"{path}: expected {expected}, it is damaged ({error})") from error

@@ -5,7 +5,7 @@ from pathlib import Path
 from pneumarm.analysis import analyse
 from pneumarm.commands.common import AnyStore, Json
 from pneumarm.console import say, show, table
-from pneumarm.files import require_folder
+from pneumarm.files import make_folder, require_output
 from pneumarm.progress import progress
 from pneumarm.report.run_report import write_analysis
 from pneumarm.simulation import Simulation
@@ -24,15 +24,17 @@ def analyse_(db: AnyStore, sim: Path, /, *, out: Path, json: Json = False) -> No
     out
         Folder for the page and its figures; created if it does not exist.
     """
-    require_folder(out)
+    require_output(out)
     simulation = Simulation.load(sim)
     with Store.open(db) as store, progress("measuring errors"):
         analysis = analyse(store, simulation)
-    out.mkdir(exist_ok=True)
+    make_folder(out)
     analysis.save(out)
     with progress("drawing"):
         page = write_analysis(out, simulation.spec, analysis.coverage, analysis.quality, analysis.figures)
     say(f"page: {page}")
+    for line in analysis.figures.get("remarks", ()):
+        say(line)
     errors = analysis.figures["held_out"]
     rows = [(_WORDS[name], *figures.values()) for name, figures in errors.items()]
     header = ("one-step error, held out", *(name.replace("_", " ") for name in errors["std"]))

@@ -28,7 +28,7 @@ from pneumarm.commands.asking import asked_for, missing_of
 from pneumarm.commands.common import Json, Measuring, Settings
 from pneumarm.console import say, show, table
 from pneumarm.errors import ArmUnsound, UnusableInput
-from pneumarm.files import require_folder, write_text
+from pneumarm.files import make_folder, require_folder, require_output, write_text
 from pneumarm.progress import progress
 from pneumarm.transitions.window import QUANTITIES
 
@@ -65,7 +65,7 @@ def check_(
         Of a virtual arm's noise.
     """
     if out is not None:
-        require_folder(out)
+        require_output(out)
     with open_arm(arm, seed) as opened:
         checkup = _measured(opened, settings)
     sound = None
@@ -79,7 +79,7 @@ def check_(
     if out is not None:
         from pneumarm.report.checkup import checkup_page
 
-        out.mkdir(exist_ok=True)
+        make_folder(out)
         write_text(out / "checkup.html", checkup_page(checkup, findings, sound))
         say(f"page: {out / 'checkup.html'}")
     places = [(j, m) for j in range(len(figures)) for m in range(2)]

@@ -14,9 +14,7 @@ What is given on the command line goes before what is in the file.
 """
 
 import textwrap
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from cyclopts import App
@@ -38,11 +36,9 @@ def take_config(arguments: Sequence[str], app: App) -> tuple[list[str], Dict | N
     left, file = take_option(arguments, CONFIG, "a file")
     if file is None:
         return left, None
-    try:
-        found = tomllib.loads(Path(file).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise UnusableInput(f"{file}: expected a TOML file with options; {reason}") from error
+    from pneumarm.files import read_toml
+
+    found = read_toml(file, "a TOML file with options")
     command, _, _ = app.parse_commands(left)
     table: Any = found
     for name in command:

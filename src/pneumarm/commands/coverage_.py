@@ -1,7 +1,7 @@
 """``pneumarm coverage``."""
 
 from pneumarm.commands.common import AnyStore, Json
-from pneumarm.console import show, table
+from pneumarm.console import say, show, table
 from pneumarm.progress import progress
 from pneumarm.simulation.enough import TOO_LITTLE, enough_data
 from pneumarm.transitions import Store, Window, new_cells
@@ -18,7 +18,10 @@ def coverage_(db: AnyStore, /, *, json: Json = False) -> None:
         The store.
     """
     with Store.open(db) as store, progress("comparing simulations of a half and of all"):
-        found, judged = new_cells(store, Window(store.joints)), enough_data(store)
+        used, marked = store.drawn(), store.marked_rows()
+        for line in (*used.used, *(f"{count:,} rows marked: {reason}" for reason, count in marked.items())):
+            say(line)
+        found, judged = new_cells(used, Window(store.joints)), enough_data(used)
     result = {
         **found.whole.summary(),
         "new_cells": found.count,
@@ -26,6 +29,8 @@ def coverage_(db: AnyStore, /, *, json: Json = False) -> None:
         "gain": None if judged is None else judged.gain,
         "enough": judged is not None and judged.enough,
         "verdict": TOO_LITTLE if judged is None else judged.verdict,
+        **({"remarks": used.used} if used.used else {}),
+        **({"marked": marked} if marked else {}),
     }
     whole = found.whole
     rows = [

@@ -8,7 +8,7 @@ from pneumarm.commands.common import AnyStore, Json, OwnMethod
 from pneumarm.console import show, table
 from pneumarm.control import open_agent
 from pneumarm.errors import UnusableInput
-from pneumarm.files import require_folder, write_bytes, write_text
+from pneumarm.files import write_bytes, write_text
 from pneumarm.learning.as_onnx import as_onnx
 from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.agent import ServoAgent
@@ -33,7 +33,6 @@ def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Jso
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
-    require_folder(out)
     result: dict[str, Any]
     if out.suffix in FORMATS:
         with Store.open(file) as store:

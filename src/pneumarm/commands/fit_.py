@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pneumarm.arm.seam import unit_of
 from pneumarm.commands.common import AnyStore, Json, Settings
-from pneumarm.console import show, table
+from pneumarm.console import say, show, table
 from pneumarm.files import require_folder
 from pneumarm.progress import progress
 from pneumarm.simulation import FitSettings, fit_store
@@ -30,15 +30,12 @@ def fit_(
         fitted = fit_store(store, settings, progress=report)
     fitted.simulation.save(out)
     result = fitted.results()
+    for line in fitted.result.remarks:
+        say(line)
     further, relative = fitted.simulation.window.further, result["relative_error"]
     header = ("one-step error on held-out sequences", "std", "in", "relative")
-    rows = [(name, _short(std), _unit(name, further), _short(relative[name])) for name, std in result["std"].items()]
+    rows = [(name, std, _unit(name, further), relative[name]) for name, std in result["std"].items()]
     show(result, json, lambda: [table(header, rows)])
-
-
-def _short(value: float | list[float]) -> str:
-    """Return a number, or those of several joints."""
-    return ", ".join(f"{one:.4g}" for one in (value if isinstance(value, list) else [value]))
 
 
 def _unit(name: str, further: Sequence[str]) -> str:

@@ -62,7 +62,7 @@ def live_(
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
     folder, named = _sorted(controllers)
-    known = settings_in(folder) if folder is not None else None
+    known = settings_in(folder, (arm, method)) if folder is not None and arm is None else None
     settings = RunSettings(
         arm=arm or (known.arm if known is not None else "virtual"),
         seed=seed,
@@ -71,8 +71,8 @@ def live_(
         bound_episodes=0,
         transfer=TRANSFER,
     )
-    if token is None and host not in _LOCAL:
-        token = secrets.token_urlsafe(12)
+    if not token:
+        token = None if host in _LOCAL else secrets.token_urlsafe(12)
     with progress(f"opening {settings.arm}"):
         rig = Rig(settings, named, folder, method)
     server = Server(rig, host, port, token)

@@ -7,11 +7,11 @@ from cyclopts import Parameter
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import AnyStore, Json, OwnMethod, Settings
 from pneumarm.commands.goals import read_goals
-from pneumarm.commands.recorder import recorder
 from pneumarm.console import live, say, show, table
 from pneumarm.control.named import open_tracking
 from pneumarm.errors import MovementFailed, UnusableInput
 from pneumarm.moving import Moved, MoveSettings, move
+from pneumarm.transitions.recorder import recorder
 
 
 def move_(
@@ -46,7 +46,8 @@ def move_(
     seed
         Of a virtual arm's noise.
     record
-        Store to add what was read and done to, for ``pneumarm view`` or to learn from; made if there is none.
+        Store to add what is read and done to as it happens, for ``pneumarm view`` or to learn from; made if there is
+        none. However it ends, what was recorded is kept.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
@@ -57,9 +58,8 @@ def move_(
         unusable: UnusableInput | None = None
         with live(spec) as seen, recorder(record, spec) as keep:
             try:
-                for one in move(opened, mover, wanted, settings, seen=seen):
+                for one in move(opened, mover, wanted, settings, seen=seen, record=keep):
                     made.append(one)
-                    keep(one.recorded, {"goal": one.goal.tolist()})
                     say(_told(one))
             except UnusableInput as error:
                 unusable = error

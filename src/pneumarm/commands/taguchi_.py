@@ -12,7 +12,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_table
 from pneumarm.experiments.design.assignment import load_design, thesis_design, unnamed
 from pneumarm.experiments.design.table import read_table
-from pneumarm.files import require_folder, write_text
+from pneumarm.files import make_folder, write_text
 
 
 def analyse_(
@@ -82,8 +82,7 @@ def _write(analysis: TableAnalysis, out: Path, quantity: str, results: Path) -> 
     from pneumarm.experiments.design.table_sections import table_sections
     from pneumarm.report.page import render
 
-    require_folder(out)
-    out.mkdir(exist_ok=True)
+    make_folder(out)
     summary = [f"{results.name}: {len(analysis.results)} trials of {analysis.results.shape[1]} runs."]
     write_text(out / "page.html", render("Analysis of an experiment", summary, table_sections(analysis, quantity)))
     say(f"page: {out / 'page.html'}")

@@ -2,11 +2,11 @@
 
 from pneumarm.arm import open_arm
 from pneumarm.commands.common import AnyStore, Json, OwnMethod
-from pneumarm.commands.recorder import recorder
 from pneumarm.console import live, show
 from pneumarm.control.named import open_tracking
 from pneumarm.moving import SECONDS, Tracked, check_seconds, track
 from pneumarm.task.reference import check_reachable, parse_reference
+from pneumarm.transitions.recorder import recorder
 
 
 def track_(
@@ -41,7 +41,8 @@ def track_(
     seed
         Of a virtual arm's noise.
     record
-        Store to add what was read and done to, for ``pneumarm view`` or to learn from; made if there is none.
+        Store to add what is read and done to as it happens, for ``pneumarm view`` or to learn from; made if there is
+        none. However it ends, what was recorded is kept.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
@@ -51,9 +52,8 @@ def track_(
         lasting = seconds if seconds is not None else wanted.duration or SECONDS
         check_seconds(lasting)
         check_reachable(wanted, lasting, goals.range, spec)
-        with live(spec) as seen, recorder(record, spec) as keep:
-            followed = track(opened, mover, wanted, lasting, seen=seen)
-            keep(followed.recorded, {"reference": reference})
+        with live(spec) as seen, recorder(record, spec, {"reference": reference}) as keep:
+            followed = track(opened, mover, wanted, lasting, seen=seen, record=keep)
     show(followed.results(), json, lambda: [_told(followed, reference)])
 
 

@@ -75,6 +75,8 @@ def complaints(results: Mapping[str, Any], doing: str) -> list[str]:
         lines.append(f"guard while {doing}: {total.interventions}")
     if total.missed_deadlines:
         lines.append(f"late while {doing}: {total.missed_deadlines:,} control periods")
+    if total.link.get("silences"):
+        lines.append(f"late board while {doing}: {total.link['silences']:,} {LINK['silences']}")
     return lines
 
 

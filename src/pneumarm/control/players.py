@@ -1,6 +1,5 @@
 """Who collects: controllers by their name on the command line."""
 
-import csv
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +11,7 @@ from pneumarm.control.agent import controller_of, warm_up
 from pneumarm.control.open_agent import open_agent
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
+from pneumarm.files import read_rows
 from pneumarm.transitions import Keyboard, Trajectory
 
 
@@ -48,12 +48,10 @@ def read_trajectory(path: Path, joints: int) -> Trajectory:
         UnusableInput: the file cannot be read or holds something else.
 
     """
-    expected = (
-        f"{path}: expected {2 * joints} columns of valves -1, 0 or 1, or pulses in between, a row a control period"
-    )
+    expected = f"{2 * joints} columns of valves -1, 0 or 1, or pulses in between, a row a control period"
+    cells = read_rows(path, expected)
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [[float(cell) for cell in row] for row in csv.reader(file) if row]
+        rows = [[float(cell) for cell in row] for row in cells]
         return Trajectory(np.array(rows).reshape(len(rows), joints, 2))
-    except (OSError, ValueError, csv.Error, UnusableInput) as error:
-        raise UnusableInput(f"{expected}; {error}") from error
+    except ValueError as error:
+        raise UnusableInput(f"{path}: expected {expected}; {error}") from error

@@ -20,7 +20,7 @@ from pneumarm.control.monitor import Mode, Monitor
 from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import ADAPTED, Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.files import require_folder
+from pneumarm.files import make_folder
 from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.settling import settled_at
@@ -35,7 +35,8 @@ from pneumarm.transitions.watch import warm_up as warm_up_watch
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
 _TOGETHER = 10
-"""Movements that are stored in one transaction: at most these are made again after an interruption."""
+"""Movements that are stored in one transaction, at most those that are made again after an interruption; of an arm
+that cannot make them again every one is stored at once."""
 
 
 @dataclass(frozen=True)
@@ -281,7 +282,8 @@ class Transfer:
             self._ways = getattr(controller, "ways", ())
             self._note(phase, movement)
             self._count(phase)
-            if len(self._waiting) == _TOGETHER or number == movements - 1:
+            together = _TOGETHER if self._arm.get_state() is not None else 1
+            if len(self._waiting) >= together or number == movements - 1:
                 self._keep()
             self._judge_arm(float(movement.recorded.time[-1]))
             progress(len(self._done), total)
@@ -470,12 +472,11 @@ def transfer_into(
     :mod:`~pneumarm.control.versions`. ``monitor`` says what is done about faults that are found meanwhile.
 
     Raises:
-        UnusableInput: the folder's parent is missing, or it holds another transfer.
+        UnusableInput: the folder cannot be written, or it holds another transfer.
 
     """
     check_fit(agent, arm)
-    require_folder(folder)
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     with Store.for_arm(folder / "transitions.db", arm.spec) as store:
         moved = transfer(
             agent,

@@ -7,7 +7,6 @@ In a folder of ``pneumarm transfer`` or ``pneumarm run``:
     adapted.safetensors              the version in use
 """
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -18,10 +17,11 @@ from numpy.typing import NDArray
 
 from pneumarm.adaptation import Event, sentences
 from pneumarm.errors import UnusableInput
-from pneumarm.files import write_json
+from pneumarm.files import read_json, write_json
 from pneumarm.learning import AnyAgent, load_agent
 
 AGENTS, HISTORY, ADAPTED = "agents", "adaptation.json", "adapted.safetensors"
+_LARGEST = 64 << 20  # bytes; a movement of several joints has some hundred
 TRAINED = "agent.safetensors"
 """The agent of a run as it was trained in the simulation."""
 
@@ -121,15 +121,12 @@ def read_history(folder: Path) -> History:
 
     """
     path = folder / HISTORY
+    expected = "the history of an adaptation, as in a folder of pneumarm transfer or run whose agent adapts"
+    found = read_json(path, expected, _LARGEST)
     try:
-        return History.of(json.loads(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise UnusableInput(
-            f"{path}: cannot be read ({error.strerror or error}); give a folder of pneumarm transfer or run whose "
-            "agent adapts between movements"
-        ) from error
-    except (KeyError, TypeError, ValueError) as error:
-        raise UnusableInput(f"{path}: expected the history of an adaptation ({error!r})") from error
+        return History.of(found)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise UnusableInput(f"{path}: expected {expected} ({error!r})") from error
 
 
 def kept_versions(folder: Path) -> list[int]:

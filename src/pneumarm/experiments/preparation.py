@@ -7,7 +7,7 @@ from pathlib import Path
 from pneumarm.arm import open_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings, Report
-from pneumarm.files import write_json, write_text
+from pneumarm.files import read_json, write_json, write_text
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import WHOLE_PERIODS, Store, collect
@@ -64,10 +64,7 @@ def claim(folder: Path, wanted: object) -> None:
     if not file.exists():
         write_json(file, wanted)
         return
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UnusableInput(f"{file}: cannot be read ({error}); remove the folder {folder}") from error
+    found = read_json(file, "the settings that an experiment was begun with")
     if found != wanted:
         raise UnusableInput(
             f"{folder}: was begun with other settings ({_difference(found, wanted)}); give the same ones or another "

@@ -1,6 +1,5 @@
 """What an experiment leaves: its page and its results as JSON, from the rows and what was recorded of its arms."""
 
-import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +9,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment
 from pneumarm.experiments.preparation import SETTINGS, STORE
 from pneumarm.experiments.sweep import arm_folder
-from pneumarm.files import write_json, write_text
+from pneumarm.files import read_json, write_json, write_text
 from pneumarm.report.page import Section, Table, render
 from pneumarm.report.playing import playing
 from pneumarm.report.shown import read_shown
@@ -70,8 +69,8 @@ def _recorded(laboratory: Path, arm: str) -> Section | None:
 def _arm_of(store: Path) -> str | None:
     """Return the name of the arm that ``store`` was recorded on; None where the settings beside it do not say."""
     try:
-        return str(json.loads(store.with_name(SETTINGS).read_bytes())["arm"])
-    except (OSError, ValueError, TypeError, KeyError):
+        return str(read_json(store.with_name(SETTINGS), "settings")["arm"])
+    except (UnusableInput, KeyError):
         return None
 
 

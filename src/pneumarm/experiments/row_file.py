@@ -9,7 +9,10 @@ import msgspec
 
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Row
+from pneumarm.files import read_bytes, require_regular_file, writing
 from pneumarm.transitions.lock import WriterLock
+
+_LARGEST = 256 << 20  # bytes; a row has some hundred
 
 
 def read_rows(path: Path) -> list[Row]:
@@ -21,7 +24,7 @@ def read_rows(path: Path) -> list[Row]:
     """
     if not path.exists():
         return []
-    return _parsed(path, _whole_lines(path.read_bytes()))
+    return _parsed(path, _whole_lines(read_bytes(path, "rows of an experiment", _LARGEST)))
 
 
 def _whole_lines(content: bytes) -> bytes:
@@ -33,7 +36,7 @@ def _parsed(path: Path, content: bytes) -> list[Row]:
     for number, line in enumerate(content.splitlines(), 1):
         try:
             rows.append(msgspec.json.decode(line, type=Row))
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, RecursionError) as error:
             raise UnusableInput(
                 f"{path}, line {number}: expected a row of an experiment, {error}; remove it"
             ) from error
@@ -50,8 +53,10 @@ class RowWriter:
             UnusableInput: another process writes to it, or a line is no row.
 
         """
-        self._lock = WriterLock(path)
+        self._path, self._lock = path, WriterLock(path)
         try:
+            if path.exists():
+                require_regular_file(path, "rows of an experiment")
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
             self._file = os.fdopen(descriptor, "r+b")
             whole = _whole_lines(self._file.read())
@@ -65,9 +70,10 @@ class RowWriter:
 
     def append(self, row: Row) -> None:
         """Append ``row``; it is on disk when this returns."""
-        self._file.write(msgspec.json.encode(row) + b"\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        with writing(self._path):
+            self._file.write(msgspec.json.encode(row) + b"\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
         self.rows.append(row)
 
     def __enter__(self) -> Self:

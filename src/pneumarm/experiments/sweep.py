@@ -19,7 +19,7 @@ from pneumarm.experiments.arm_time import arm_time
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, Row, TrialRows, sorted_rows
 from pneumarm.experiments.preparation import SETTINGS, claim
 from pneumarm.experiments.row_file import RowWriter
-from pneumarm.files import require_folder
+from pneumarm.files import make_folder
 from pneumarm.learning.training import cores
 
 ROWS = "rows.jsonl"
@@ -81,10 +81,8 @@ def sweep(
             f"a sweep needs at least 1 run, 1 worker and 1 arm; got {runs} run(s), "
             f"{'as many workers as cores' if workers is None else f'{workers} worker(s)'} and {len(arms)} arm(s)"
         )
-    require_folder(laboratory)
-    laboratory.mkdir(exist_ok=True)
     folder = laboratory / experiment.name
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     arms = tuple(dict.fromkeys(arms))
     keys = [(arm, trial, run) for arm in arms for run in range(1, runs + 1) for trial in experiment.trials]
     with RowWriter(folder / ROWS) as writer:

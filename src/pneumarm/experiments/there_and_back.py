@@ -21,7 +21,7 @@ from pneumarm.control.agent import warm_up
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
-from pneumarm.files import write_json
+from pneumarm.files import read_json, write_json
 from pneumarm.learning import Acts, Method, TrainSettings, test, train
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, Simulation, StoreFit, fit_store
 from pneumarm.simulation.quality import propagation
@@ -160,8 +160,8 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
     simulation = Simulation.load(folder / SIMULATION)
     with Store.open(folder / STORE) as store:
         begin = begin_states(store.blocks(kinds=KINDS), simulation.window, simulation.scaling, simulation.spec)
-    found = json.loads((folder / _FIGURES).read_text(encoding="utf-8"))
-    return Prepared(arm, recipe, folder, simulation, begin, found)
+    figures = read_json(folder / _FIGURES, "figures of a recording")
+    return Prepared(arm, recipe, folder, simulation, begin, figures)
 
 
 def place(folder: Path, wanted: object) -> Path:

@@ -48,6 +48,9 @@ class Drawing(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._seen, reward, terminated, truncated, info = self.env.step(action)
         return self._seen, reward, terminated, truncated, info
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_figure": None}  # a copy draws its own
+
     def render(self) -> NDArray[np.uint8]:
         """Return a picture, shape (height, width, 3)."""
         if self._seen is None:

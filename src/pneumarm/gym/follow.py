@@ -1,7 +1,9 @@
 """Following a reference on an arm, holding a goal being the case of one that stays."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from reprlib import repr as shortened
 from typing import Any, cast
 
 import gymnasium
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, BeginState, Reading
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.errors import UnusableInput
+from pneumarm.gym.options import known_options
 from pneumarm.gym.spaces import View, following_space, sensor_ranges
 from pneumarm.gym.turns import Turns
 from pneumarm.learning.servo.references import draw_references
@@ -21,7 +24,7 @@ from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.moving.movement import valve_changes
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.goals import goal_in_counts
-from pneumarm.task.reference import check_reachable, parse_reference
+from pneumarm.task.reference import FORMS, check_reachable, parse_reference
 from pneumarm.task.tracker import StateTracker, scaled_goal
 from pneumarm.transitions.window import QUANTITIES
 
@@ -104,7 +107,7 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         when the environment was made.
         """
         super().reset(seed=seed)
-        chosen = self._chosen(options or {})
+        chosen = self._chosen(known_options(options, "goal_deg", "reference"))
         reading = self._turns.begin(self.np_random, fresh=seed is not None)
         self._reference = chosen or self._given or self._drawn(reading)
         self._step, self._over, self._begun = 0, False, reading.time
@@ -143,7 +146,9 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Close the arm."""
         self._turns.close()
 
-    def _chosen(self, options: dict[str, Any]) -> Reference | None:
+    def _chosen(self, options: Mapping[str, Any]) -> Reference | None:
+        if len(options) > 1:
+            raise UnusableInput("options= takes one of goal_deg and reference, got both")
         if "goal_deg" in options:
             return constant(goal_in_counts(None, options["goal_deg"], self._spec, self._goals))
         return self._checked(options.get("reference"))
@@ -152,6 +157,8 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         if reference is None:
             return None
         found = parse_reference(reference, self._spec) if isinstance(reference, str) else reference
+        if not isinstance(found, Reference):
+            raise UnusableInput(f"reference {shortened(found)}: expected a Reference, or the name of one: {FORMS}")
         check_reachable(found, self._steps * self._spec.period, self._goals, self._spec)
         return found
 

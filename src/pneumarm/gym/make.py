@@ -84,7 +84,7 @@ def point_to_point(
     ## Starting State
     At rest with closed valves: in a simulation one of the recorded resting states; on an arm all muscles are vented
     for 2 s, inflated for up to 1.5 s each, and closed for 1 s (section 5.5). The goal is uniform in the range of
-    goals, or ``reset(options={"goal": [counts]})``.
+    goals, or ``reset(options={"goal": [counts]})`` or ``{"goal_deg": [degrees]}``.
 
     ## Episode End
     Termination: every joint is within 25 counts of its goal and not faster than 1 count/ms (eq. 5.1, 5.2), judged
@@ -257,12 +257,13 @@ def point_to_point_vector(
     threads: int | None = None,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
     copy: bool = True,
+    max_episode_steps: int | None = None,
 ) -> PointToPointVector:
     """Return ``num_envs`` environments like :func:`point_to_point` in one compiled step, over a simulation only.
 
     ``gymnasium.make_vec("pneumarm/PointToPoint-v0", 4096, vectorization_mode="vector_entry_point",
     arm="simulation:arm.sim", transitions="arm.db")``; the arguments are described there and in
-    :class:`PointToPointVector`.
+    :class:`PointToPointVector`. ``max_episode_steps`` is Gymnasium's name for a cut-off; the smaller of both holds.
 
     Raises:
         UnusableInput: no simulation, or arguments that do not go together.
@@ -275,7 +276,7 @@ def point_to_point_vector(
         _with_goals(simulation, goals),
         _begin(simulation, transitions),
         num_envs,
-        TaskSettings(reward, cutoff, noise),
+        TaskSettings(reward, cutoff if max_episode_steps is None else min(cutoff, max_episode_steps), noise),
         threads=threads,
         autoreset_mode=autoreset_mode,
         copy=copy,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pneumarm.arm import Arm, BeginState, Reading
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
+from pneumarm.gym.options import chosen_goal
 from pneumarm.gym.spaces import View, action_space, numbered, observation_space, sensor_ranges
 from pneumarm.gym.turns import Turns
 from pneumarm.task.settings import TaskSettings
@@ -54,19 +55,16 @@ class ArmPointToPoint(gymnasium.Env[Observation, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Bring the arm to a begin state; ``options={"goal": [counts]}`` chooses the goal.
+        """Bring the arm to a begin state; ``options={"goal": [counts]}`` or ``{"goal_deg": [degrees]}`` is the goal.
 
         The seed decides where the arm begins and the goal. An arm that can be put into a saved state is then as it
         was when the environment was made, so that its movements repeat; no seed decides a real arm's noise.
         """
+        chosen = chosen_goal(options, self.arm.spec, self._goals)
         super().reset(seed=seed)
         low, high = self._goals.T
-        goal = self.np_random.uniform(low, high)
-        if options and "goal" in options:
-            goal = np.asarray(options["goal"], np.float64).reshape(-1)
-            if goal.shape != low.shape or not ((low <= goal) & (goal <= high)).all():
-                raise UnusableInput(f"a goal needs {low.size} angle(s) in counts within {low} to {high}, got {goal}")
-        self._goal = goal
+        drawn = self.np_random.uniform(low, high)
+        self._goal = goal = drawn if chosen is None else chosen
         reading = self._turns.begin(self.np_random, fresh=seed is not None)
         self._over, self._tally = False, Tally(self._task, self.arm.spec)
         self._tracker.reset()

@@ -1,6 +1,7 @@
 """A single movement in a simulation."""
 
-from typing import Any, cast
+from copy import deepcopy
+from typing import Any, Self, cast
 
 import gymnasium
 import numpy as np
@@ -13,12 +14,13 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.batch import act, begin_movement, observe, outcome, simulated_arms
+from pneumarm.gym.options import chosen_goal
 from pneumarm.gym.spaces import action_space, numbered, observation_space, sensor_ranges
 from pneumarm.kernels import kernel
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
-from pneumarm.task.environment import environment
+from pneumarm.task.environment import Environment, environment
 from pneumarm.task.settings import TaskSettings
 from pneumarm.task.tracker import scaled_goal
 
@@ -58,50 +60,77 @@ def _step(handle, actions):  # type: ignore[no-untyped-def]
     return result.reward[0], result.terminated[0], result.truncated[0]
 
 
-class SimulatedPointToPoint(gymnasium.Env[Observation, Any]):
+class Copied:
+    """Lets a simulated environment be copied and pickled amid its movements, which then go on independently."""
+
+    simulation: Simulation
+    _world: Environment
+    _remade: str
+    """Name of what every copy makes anew, by :meth:`_remake`."""
+
+    def _remake(self) -> None:
+        raise NotImplementedError
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != self._remade}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._remake()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        memo[id(self)] = twin = type(self).__new__(type(self))
+        for shared in (self.simulation, self._world):  # megabytes that nobody writes to
+            memo[id(shared)] = shared
+        twin.__setstate__(deepcopy(self.__getstate__(), memo))
+        return twin
+
+
+class SimulatedPointToPoint(Copied, gymnasium.Env[Observation, Any]):
     """The task of :func:`pneumarm.gym.point_to_point` in a simulation."""
 
     metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium wants it
+    _remade = "_handle"
 
     def __init__(self, simulation: Simulation, begin: BeginStates, settings: TaskSettings = TaskSettings()) -> None:
         """Move in ``simulation`` from ``begin`` states, as ``settings`` ask."""
         self.simulation = simulation
-        world = environment(simulation, begin, settings)
+        self._world = environment(simulation, begin, settings)
         window = simulation.window
-        self._many = simulated_arms(world, 1, 1)
+        self._many = simulated_arms(self._world, 1, 1)
         self._result = outcome(1, window.state_size + window.joints)
-        self._handle = _handle(world, self._many, self._result)
-        self._task = world.task
+        self._remake()
         self._over = True
         self.action_space = action_space(simulation.spec)
         self._numbered = numbered(simulation.spec)
         self._count = len(self._numbered)
         self.observation_space = cast("Space[Observation]", simulated_space(simulation, begin))
-        self._scalar = window.joints == 1
+        self._scalar, self._is_new = window.joints == 1, True
         self._actions = np.zeros((1, window.joints), np.int64)
+
+    def _remake(self) -> None:
+        self._handle = _handle(self._world, self._many, self._result)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin a movement; ``options={"goal": [counts]}`` chooses its goal."""
-        first = self._np_random is None
+        """Begin a movement; ``options={"goal": [counts]}`` or ``{"goal_deg": [degrees]}`` chooses its goal."""
+        goal = chosen_goal(options, self.simulation.spec, self._world.task.goal_range)
         super().reset(seed=seed)
         if seed is not None:
             self._many.random[0] = random_state(seed)
-        elif first:
+        elif self._is_new:
             self._many.random[0] = random_state(int(self.np_random.integers(2**63)))
+        self._is_new = False
         _begin(self._handle)
-        if options and "goal" in options:
-            self._set_goal(np.asarray(options["goal"], np.float64).reshape(-1))
+        if goal is not None:
+            self._set_goal(goal)
         self._over = False
         return self._result.observation[0].copy(), {"goal": self._many.goal[0].copy()}
 
     def _set_goal(self, goal: NDArray[np.float64]) -> None:
-        low, high = self._task.goal_range.T
-        if goal.shape != low.shape or not ((low <= goal) & (goal <= high)).all():
-            raise UnusableInput(f"a goal needs {low.size} angle(s) in counts within {low} to {high}, got {goal}")
         scaled = scaled_goal(goal, self.simulation.scaling)
-        place = self._task.goal_place
+        place = self._world.task.goal_place
         self._many.goal[0] = goal
         self._many.x[0, place : place + goal.size] = scaled
         self._result.observation[0, -goal.size :] = scaled

@@ -95,8 +95,8 @@ class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
         self._many.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute of the whole for each movement."""
-        return [getattr(self._many, attr_name, None) for _ in range(self._count(indices))]
+        """Return an attribute of the whole for each movement; AttributeError where it has none of this name."""
+        return [getattr(self._many, attr_name) for _ in range(self._count(indices))]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refuse: movements have no attributes of their own."""

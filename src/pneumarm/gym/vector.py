@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from reprlib import repr as shortened
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.batch import begin_batch, outcome, simulated_arms, step_batch
-from pneumarm.gym.simulated import simulated_space
+from pneumarm.gym.options import known_options
+from pneumarm.gym.simulated import Copied, simulated_space
 from pneumarm.gym.spaces import action_space, numbered
 from pneumarm.random import random_state
 from pneumarm.simulation.simulation import Simulation
@@ -26,12 +28,14 @@ Array = NDArray[Any]
 _FEWEST = 256  # movements that are worth a thread of their own
 
 
-class PointToPointVector(VectorEnv[Array, Array, Array]):
+class PointToPointVector(Copied, VectorEnv[Array, Array, Array]):
     """The task of :func:`pneumarm.gym.point_to_point` many times over in a simulation.
 
     Movement ``e`` of ``reset(seed=s)`` is the movement of a single environment with the seed ``s + e``, whatever the
     number of threads.
     """
+
+    _remade = "_pool"
 
     def __init__(
         self,
@@ -78,19 +82,22 @@ class PointToPointVector(VectorEnv[Array, Array, Array]):
         most = os.cpu_count() or 1 if threads is None else threads
         self._threads = max(1, min(most, num_envs // _FEWEST))
         self._edges = np.linspace(0, num_envs, self._threads + 1).astype(int).tolist()
-        self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
+        self._remake()
         self._world = environment(simulation, begin, settings)
         self._many = simulated_arms(self._world, num_envs, self._threads)
         self._result = outcome(num_envs, window.state_size + window.joints)
         self._seeded = False
 
+    def _remake(self) -> None:
+        self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
+
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Begin all movements, or with ``options={"reset_mask": (num_envs,) of bool}`` some of them."""
-        chosen = np.ones(self.num_envs, bool)
-        if options and "reset_mask" in options:
-            chosen = np.asarray(options["reset_mask"], bool).reshape(self.num_envs)
+        chosen = np.asarray(known_options(options, "reset_mask").get("reset_mask", np.ones(self.num_envs, bool)))
+        if chosen.shape != (self.num_envs,) or chosen.dtype != bool:
+            raise UnusableInput(f"reset_mask needs {self.num_envs} times True or False, got {shortened(chosen)}")
         seeds: Sequence[int | None] = [None] * self.num_envs
         if isinstance(seed, int | np.integer):
             seeds = [int(seed) + e for e in range(self.num_envs)]

@@ -11,6 +11,7 @@ Loading runs code of that module, so a file alone never decides it: the module i
 the command names it, or a program has imported it), or it is an installed entry point. Otherwise the file is refused.
 """
 
+import inspect
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -22,7 +23,7 @@ import msgspec
 import numpy as np
 
 from pneumarm.errors import UnusableInput
-from pneumarm.files import kind_of
+from pneumarm.files import kind_of, refuse_code
 from pneumarm.learning.agents import Acts, AnyAgent, LooksAhead, SelfTesting
 from pneumarm.learning.batched.settings import BatchedSettings
 from pneumarm.learning.batched.training import train_batched
@@ -124,14 +125,22 @@ def load_agent(path: Path) -> AnyAgent:
     kind = kind_of(path)
     if kind in _LOADS:
         return _LOADS[kind](path)
-    if kind.partition(":")[0] in sys.modules or kind in (one.value for one in entry_points(group=GROUP)):
+    if kind in (one.value for one in entry_points(group=GROUP)):
         return _imported(EntryPoint(kind, kind, GROUP)).load(path)
+    if (known := _already_imported(kind)) is not None:
+        return known.load(path)
     if ":" in kind:
-        raise UnusableInput(
-            f"{path}: an agent of the method {kind}, which is not installed; its code must run to read it: if you "
-            f"trust it give --method {kind}, or import its module first"
-        )
+        refuse_code(path, "method", kind)
     raise UnusableInput(f"{path}: expected an agent written by pneumarm train, its kind is {kind!r}")
+
+
+def _already_imported(kind: str) -> Method | None:
+    """Return the method MODULE:NAME if it has been imported; nothing runs, not even what modules do when asked."""
+    module, _, place = kind.partition(":")
+    found: Any = sys.modules.get(module)
+    for name in place.split("."):
+        found = inspect.getattr_static(found, name, None)
+    return found if isinstance(found, Method) else None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-TOLERANCE = 1.0
+from pneumarm.moving.movement import MoveSettings
+from pneumarm.moving.settling import settled_at
+
+TOLERANCE = MoveSettings.tolerance
 """A joint is there within so much [degrees]."""
 HELD = 2.0
 """A goal that stayed the same for so long [s] is counted."""
@@ -22,7 +25,7 @@ class Goals:
     """What came of the last goals and curves of one controller."""
 
     settled: deque[float]
-    """Time [s] from a goal until all joints stayed within TOLERANCE; infinite where they did not."""
+    """Time [s] from a goal until the arm had settled (:mod:`pneumarm.moving.settling`); infinite where it did not."""
     rest: deque[float]
     """Mean error at rest of the joint that is worst [degrees]."""
     curve: float | None = None
@@ -46,8 +49,7 @@ class PlayFigures:
     def __init__(self) -> None:
         self.by_controller: dict[str, Goals] = {}
         self._since: float | None = None  # when the goal was given that is counted; None while none is
-        self._within: float | None = None  # since when all joints are within the tolerance
-        self._errors: list[float] = []
+        self._seen: list[tuple[float, NDArray[np.float64]]] = []  # times [s], errors (joints,) [degrees]
         self._curve: tuple[float, int] | None = None  # sum of squares, number
 
     def of(self, controller: str) -> Goals:
@@ -57,7 +59,7 @@ class PlayFigures:
     def new_goal(self, time: float, error: NDArray[np.float64]) -> None:
         """Begin to count a goal that is given at ``time`` [s] and is ``error`` (joints,) [degrees] away."""
         far = float(np.abs(error).max()) >= LEAST
-        self._since, self._within, self._errors, self._curve = time if far else None, None, [], None
+        self._since, self._seen, self._curve = time if far else None, [], None
 
     def new_curve(self) -> None:
         """Begin to count a curve."""
@@ -76,17 +78,13 @@ class PlayFigures:
             return
         if self._since is None:
             return
-        if worst > TOLERANCE:
-            self._within = None
-        elif self._within is None:
-            self._within = time
-        passed = time - self._since
-        if passed > HELD - _RESTING:
-            self._errors.append(worst)
-        if passed >= HELD:
+        self._seen.append((time, error))
+        if time - self._since >= HELD:
+            times, errors = (np.array(values) for values in zip(*self._seen, strict=True))
+            settled = settled_at(times, errors, TOLERANCE, MoveSettings.dwell)
             kept = self.of(controller)
-            kept.settled.append(math.inf if self._within is None else self._within - self._since)
-            kept.rest.append(float(np.mean(self._errors)))
+            kept.settled.append(math.inf if settled is None else settled - self._since)
+            kept.rest.append(float(np.abs(errors[times - self._since > HELD - _RESTING]).max(axis=1).mean()))
             self._since = None
 
     def end_curve(self, controller: str) -> None:

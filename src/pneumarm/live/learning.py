@@ -16,7 +16,7 @@ from pneumarm.arm.seam import Reading
 from pneumarm.errors import PneumarmError
 from pneumarm.live.screen import Screen
 from pneumarm.progress import Report, compiling
-from pneumarm.run import Run, RunSettings, RunTransferSettings, settings_in
+from pneumarm.run import Run, RunSettings, RunTransferSettings
 
 TRANSITIONS = 36_000
 """How much is recorded: 20 minutes of an arm that is controlled at 30 Hz."""
@@ -87,7 +87,7 @@ class Learning:
         self._screen, self._stopped = screen, stopped
         self._begun = monotonic()
         self._at = "", 0.0, 0.0  # what is being done, how much of it is done, and the total
-        self._run = Run(folder, settings_in(folder) or settings, self._progress, self._watched)
+        self._run = Run(folder, settings, self._progress, self._watched)
 
     def do(self) -> None:
         """Do all stages that are not done yet.

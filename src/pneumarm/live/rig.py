@@ -186,7 +186,7 @@ class Rig:
 
     def _settings(self) -> RunSettings:
         assert self.folder is not None
-        return settings_in(self.folder) or self.settings
+        return settings_in(self.folder, (self.settings.arm, self._method)) or self.settings
 
     # ---- choosing
 

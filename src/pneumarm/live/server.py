@@ -9,10 +9,12 @@ import hmac
 import json
 import socket
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib.resources import files
 from types import FrameType
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
@@ -22,6 +24,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.live.door import Door
 from pneumarm.live.orders import LARGEST, AnyOrder, Choose, PutBack, read_order
 from pneumarm.live.rig import Rig
 
@@ -37,6 +40,7 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
+_QUEUE = 128  # of connections that the system keeps until they are taken in
 _REFUSED, _FULL = 4403, 4429  # codes that a refused connection is closed with
 
 
@@ -55,13 +59,15 @@ class Server:
         self._port = int(self._socket.getsockname()[1])
         self._files = dict(_page_files())
         self._serving: _Uvicorn | None = None
+        self._door = Door()
 
     @property
     def url(self) -> str:
         """Where the page is."""
         host = _own_address() if self._host in ("0.0.0.0", "::") else self._host
         host = f"[{host}]" if ":" in host else host
-        return f"http://{host}:{self._port}/" + (f"?token={self.token}" if self.token else "")
+        token = f"?token={quote(self.token, '', errors='surrogateescape')}" if self.token else ""
+        return f"http://{host}:{self._port}/{token}"
 
     def run(self, opened: Callable[[], None] = lambda: None) -> None:
         """Serve until the program, or :meth:`end`, asks for the end; ``opened`` is called once it can be reached."""
@@ -74,17 +80,29 @@ class Server:
         )
         config = uvicorn.Config(
             app,
-            log_level="warning",
+            log_level="error",  # not a line for everything that is no request
             ws="websockets-sansio",
             ws_max_size=LARGEST,
             ws_ping_interval=5.0,
             ws_ping_timeout=10.0,
             timeout_graceful_shutdown=1,
             lifespan="off",
+            proxy_headers=False,  # the door knows a connection by the address that it comes from
         )
-        self._serving = _Uvicorn(config, self.rig, opened)
+        self._serving = serving = _Uvicorn(config, self.rig, self._door, self._socket, opened)
         with _closing(self._socket):
-            self._serving.run(sockets=[self._socket])
+            try:
+                asyncio.get_running_loop()
+            except RuntimeError:
+                serving.run(sockets=[])
+                return
+            with ThreadPoolExecutor(1) as beside:  # a notebook has a loop of its own in this thread
+                served = beside.submit(serving.run, sockets=[])
+                try:
+                    served.result()
+                except BaseException:
+                    self.end()
+                    raise
 
     def end(self) -> None:
         """Have the arm vented and the serving ended, from another thread."""
@@ -96,18 +114,24 @@ class Server:
         """Whether who asks knows the token, or comes from this machine where there is none."""
         host = connection.headers.get("host", "")
         origin = connection.headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        try:
+            local = urlsplit(f"//{host}").hostname in _LOCAL
+            foreign = origin is not None and urlsplit(origin).netloc != host
+        except ValueError:  # no address of a host
             return False
-        if self.token is None:
-            return urlsplit(f"//{host}").hostname in _LOCAL
-        return hmac.compare_digest(connection.query_params.get("token", ""), self.token)
+        if foreign or self.token is None:
+            return local and not foreign
+        given = connection.query_params.get("token", "")
+        return hmac.compare_digest(*(one.encode(errors="surrogateescape") for one in (given, self.token)))
 
     async def _page(self, request: Request) -> Response:
+        self._door.hear(request.client)
         if not self._allowed(request):
             return Response("open the address that pneumarm has printed, token and all", 403)
         return self._answer("index.html")
 
     async def _file(self, request: Request) -> Response:
+        self._door.hear(request.client)
         return self._answer(request.path_params["name"])
 
     def _answer(self, name: str) -> Response:
@@ -125,6 +149,7 @@ class Server:
         if len(desk.pages) >= MOST_PAGES:
             await socket.close(_FULL)
             return
+        self._door.let_in(socket.client)
         page = desk.enter()
         showing = asyncio.create_task(self._show(socket, page))
         try:
@@ -177,14 +202,26 @@ class Server:
 class _Uvicorn(uvicorn.Server):
     """Says when it can be reached, and has the arm vented before anything else when it is to end."""
 
-    def __init__(self, config: uvicorn.Config, rig: Rig, opened: Callable[[], None]) -> None:
+    def __init__(
+        self, config: uvicorn.Config, rig: Rig, door: Door, listening: socket.socket, opened: Callable[[], None]
+    ) -> None:
         super().__init__(config)
-        self._rig, self._opened = rig, opened
+        self._rig, self._door, self._listening, self._opened = rig, door, listening, opened
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to serve."""
+        """Begin to serve what comes through the door."""
         await super().startup(sockets)
+        self._listening.listen(_QUEUE)
+        self._listening.setblocking(False)
+        kind = self.config.http_protocol_class
+        given = {"config": self.config, "server_state": self.server_state, "app_state": self.lifespan.state}
+        self._task = asyncio.create_task(self._door.open(self._listening, partial(kind, **given)))
         self._opened()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Take in nobody more, and end."""
+        self._task.cancel()
+        await super().shutdown(sockets)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Take a signal to end."""

@@ -6,7 +6,8 @@ is the mean absolute error over the last second of the hold. A *valve change* is
 valves; a pulse within a control period is two.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +22,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.moving.settling import settled_at
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.goals import Goal
+from pneumarm.transitions.recorder import Recorder
 from pneumarm.transitions.rows import Recorded
 from pneumarm.transitions.watch import Watch, watched
 
@@ -212,6 +214,7 @@ def move(
     *,
     watch: Watch | None = None,
     seen: Seen | None = None,
+    record: Recorder | None = None,
 ) -> Iterator[Moved]:
     """Move ``arm`` to one goal (joints,) [counts] after the other, hold each, and yield what came of it.
 
@@ -223,12 +226,13 @@ def move(
         settings: how long to hold, how often to try, how near is there.
         watch: sees every reading, such as a :class:`~pneumarm.control.Monitor`.
         seen: called with every reading, for a display.
+        record: stores every try as it happens, see :func:`~pneumarm.transitions.recorder.recorder`.
 
     """
     cycle = ControlCycle(guarded(arm))
     for goal in goals:
         wanted = goal if isinstance(goal, Goal) else Goal(np.array(goal, np.float64).reshape(-1))
-        moved = _move_to(cycle, controller, wanted.angle, settings, watch, seen)
+        moved = _move_to(cycle, controller, wanted.angle, settings, watch, seen, record)
         yield replace(moved, goal_xy=wanted.xy)
 
 
@@ -241,10 +245,11 @@ def track(
     lead_in: float = LEAD_IN,
     watch: Watch | None = None,
     seen: Seen | None = None,
+    record: Recorder | None = None,
 ) -> Tracked:
     """Move ``arm`` to where ``reference`` begins, then follow it for ``seconds``; see :func:`move` for the rest.
 
-    Where it is known ahead, it is known while the arm moves to its beginning, too.
+    Where it is known ahead, it is known while the arm moves to its beginning, too; that movement is not recorded.
     """
     check_seconds(seconds)
     cycle = ControlCycle(guarded(arm))
@@ -255,7 +260,7 @@ def track(
     controller.track(coming)
     before = played(cycle, controller, lead_in, coming.at, watch, seen) if lead_in > 0 else None
     air = cycle.arm.air_used()
-    recorded = played(cycle, controller, seconds, reference.at, watch, seen)
+    recorded = played(cycle, controller, seconds, reference.at, watch, seen, record)
     # Turns come milliseconds early or late: the reference began when it was said to, not with a turn.
     start = float(recorded.time[0] if before is None else before.time[0] + lead_in)
     passed = recorded.time - start
@@ -280,8 +285,13 @@ def played(
     wanted: Callable[[float], NDArray[np.float64]],
     watch: Watch | None = None,
     seen: Seen | None = None,
+    record: Recorder | None = None,
+    info: Mapping[str, Any] | None = None,
 ) -> Recorded:
-    """Let ``controller`` act for ``seconds`` on the arm's clock; return all that was read and applied."""
+    """Let ``controller`` act for ``seconds`` on the arm's clock; return all that was read and applied.
+
+    ``record`` keeps that as it happens, with ``info``.
+    """
     begin: float | None = None
 
     def decide(reading: Reading) -> NDArray[Any] | None:
@@ -293,7 +303,8 @@ def played(
         # The last turn is the one nearest to the end: a late one must not add another period.
         return None if passed > seconds - cycle.arm.spec.period / 2 else controller.act(reading)
 
-    steps = watched(cycle.run(decide), watch, at_rest=False)
+    with nullcontext() if record is None else record.sequence(KIND, info or {}) as keep:
+        steps = watched(cycle.run(decide), watch, at_rest=False, keep=keep)
     return Recorded.from_steps(steps, cycle.arm.spec, kind=KIND)
 
 
@@ -324,6 +335,7 @@ def _move_to(
     settings: MoveSettings,
     watch: Watch | None,
     seen: Seen | None,
+    record: Recorder | None,
 ) -> Moved:
     arm, spec = cycle.arm, cycle.arm.spec
     if goal.shape != (spec.joints,) or not np.isfinite(goal).all():
@@ -333,7 +345,8 @@ def _move_to(
     for number in range(1, settings.tries + 1):
         arm.make_ready()
         controller.reset(goal)
-        recorded = played(cycle, controller, settings.hold, lambda time: goal, watch, seen)
+        asked = {"goal": goal.tolist()}
+        recorded = played(cycle, controller, settings.hold, lambda time: goal, watch, seen, record, asked)
         switches += valve_changes(recorded.command[:-1], closed)
         error = (recorded.angle - goal) / spec.counts_per_degree
         dwell = min(settings.dwell, settings.hold / 2)

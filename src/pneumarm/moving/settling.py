@@ -32,6 +32,8 @@ def settled_at(times: NDArray[np.float64], off: NDArray[np.float64], tolerance: 
     outside = np.zeros(len(times), bool)
     for joint in off.T:
         noise = scatter(joint[times > times[-1] - 1])
+        if not noise < math.inf:
+            return None  # numbers too large to say anything of
         if noise <= _SCATTERED * tolerance:
             outside |= np.abs(joint) > tolerance
         else:
@@ -46,7 +48,8 @@ def scatter(readings: NDArray[np.float64]) -> float:
     """Return the standard deviation of the noise of ``readings`` (n,) that were made one period after the other."""
     if len(readings) <= _DIFFERENCES:
         return 0.0
-    return float(np.sqrt((np.diff(readings, _DIFFERENCES) ** 2).mean() / _SHARE))
+    with np.errstate(over="ignore"):
+        return float(np.sqrt((np.diff(readings, _DIFFERENCES) ** 2).mean() / _SHARE))
 
 
 def _swing(times: NDArray[np.float64], off: NDArray[np.float64], noise: float, dwell: float) -> NDArray[np.float64]:

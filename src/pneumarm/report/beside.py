@@ -30,7 +30,7 @@ class ReportBeside:
         """Begin the process, which takes a while to load what it draws with; once."""
         if self._process is not None:
             return
-        command = [sys.executable, "-m", "pneumarm.report.drawn", str(self._folder)]
+        command = [sys.executable, "-P", "-m", "pneumarm.report.drawn", str(self._folder)]
         errors = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # the run would write it itself
         with suppress(OSError):
             self._process = subprocess.Popen(

@@ -1,6 +1,5 @@
 """The files in a run's folder that its report is made of, by their names, beside the records."""
 
-import json
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ import msgspec
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
-from pneumarm.files import write_json
+from pneumarm.files import read_json, write_json
 from pneumarm.report.data import Demonstration
 
 REPORT = "report.html"
@@ -19,6 +18,17 @@ EPISODES = "episodes.csv"
 SPEC = "arm.json"
 TEST = "test_episodes.safetensors"
 DEMONSTRATIONS = "demonstration-*.safetensors"
+
+
+_TABLES = ("collect", "filter", "simulation", "training", "test", "transfer", "wall_seconds", "compile_seconds")
+
+
+def read_results(folder: Path) -> dict[str, Any]:
+    """Return the results of the run in ``folder``; raises UnusableInput where they are something else."""
+    results = read_json(folder / RESULTS, "the results of a finished run")
+    if wrong := [name for name in _TABLES if not isinstance(results.get(name, {}), dict)]:
+        raise UnusableInput(f"{folder / RESULTS}: expected tables of figures; {', '.join(wrong)} is none")
+    return results
 
 
 def save_spec(folder: Path, spec: ArmSpec) -> None:
@@ -36,21 +46,10 @@ _KNOWN = {field.name for field in fields(ArmSpec)}  # of an arm
 
 def read_spec(path: Path) -> ArmSpec:
     """Return what :func:`save_spec` wrote to ``path``; raises UnusableInput where it is something else."""
-    stored = read_json(path)
+    stored = read_json(path, "the spec of an arm")
     try:
-        if not isinstance(stored, dict) or "angle_range" not in stored or set(stored) - _KNOWN:
+        if "angle_range" not in stored or set(stored) - _KNOWN:
             raise UnusableInput(f"it has {', '.join(stored)}")
         return msgspec.convert(stored, ArmSpec)
     except (msgspec.ValidationError, UnusableInput) as error:
         raise UnusableInput(f"{path}: expected the spec of an arm, {error}") from error
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return the object in the file ``path``; raises UnusableInput where there is none."""
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UnusableInput(f"{path}: expected a JSON file of a run; finish the run first ({error})") from error
-    if not isinstance(value, dict):
-        raise UnusableInput(f"{path}: expected a JSON object, got {type(value).__name__}")
-    return value

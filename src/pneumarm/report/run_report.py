@@ -22,10 +22,9 @@ from pneumarm.report.files import (
     DEMONSTRATIONS,
     EPISODES,
     REPORT,
-    RESULTS,
     SPEC,
     TEST,
-    read_json,
+    read_results,
     read_spec,
 )
 from pneumarm.report.health import summary_of_health
@@ -92,7 +91,7 @@ def read_run(folder: Path) -> RunData:
         UnusableInput: a file is missing or is not what it should be.
 
     """
-    results = read_json(folder / RESULTS)
+    results = read_results(folder)
     return RunData(
         spec=read_spec(folder / SPEC),
         results=results,

@@ -123,7 +123,9 @@ def _wanted(entry: SequenceEntry, rows: Rows, spec: ArmSpec) -> Array:
             found = parse_reference(reference, spec)
         except UnusableInput:  # a file that is gone
             return np.full(rows.angle.shape, np.nan)
-        return np.array([found.at(float(time)) for time in rows.time - rows.time[0]])
+        began = entry.info.get("began")  # of one that goes on from the sequence before
+        passed = rows.time - (began if isinstance(began, float) else rows.time[0])
+        return np.array([found.at(float(time)) for time in passed])
     return np.full(rows.angle.shape, np.nan)
 
 

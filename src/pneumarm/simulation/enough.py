@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.fit import SINGLE_STEPS, FitResult, fit
-from pneumarm.transitions.choice import share_held_out
+from pneumarm.transitions.choice import Stretched, choose_held_out
 from pneumarm.transitions.collect import CollectResult
 from pneumarm.transitions.filtering import filter_transitions
 from pneumarm.transitions.store import Store
@@ -167,7 +167,8 @@ def collect_enough(
 def enough_data(store: Store) -> Enough | None:
     """Fit a simulation to the first half of ``store`` and one to all of it, and compare their errors.
 
-    None where there is too little to compare: fewer transitions than can be judged, or fewer than eight sequences.
+    None where there is too little to compare: fewer transitions than can be judged, fewer than eight sequences, or
+    no movement in those that are held out.
     """
     sequences = [entry.number for entry in store.catalogue()]
     if store.transitions < FEWEST_JUDGED or len(sequences) < _FEWEST_SEQUENCES:
@@ -176,11 +177,9 @@ def enough_data(store: Store) -> Enough | None:
     assert settings.history is not None
     window = Window.of(store.spec, settings.history)
     first = sequences[: len(sequences) // 2]
-    share = share_held_out(first, _HELD_OUT)
-    half, whole = (
-        filter_transitions(store.blocks(sequences=chosen), window, hold_out=share)
-        for chosen in (partial(np.isin, test_elements=first), None)
-    )
+    parts = store.blocks(sequences=partial(np.isin, test_elements=first)), store.blocks()
+    share, stretch = choose_held_out(parts[0], _HELD_OUT, 0, window.history)
+    half, whole = (filter_transitions(Stretched(part, stretch), window, hold_out=share) for part in parts)
     results = [
         fit(
             filtered.transitions,
@@ -193,13 +192,16 @@ def enough_data(store: Store) -> Enough | None:
         for filtered in (half, whole)
     ]
     before, after = map(_error, results)
+    if not (np.isfinite(before) and np.isfinite(after)):
+        return None
     ranges = (store.percentiles(_REACHED, chosen) for chosen in (None, partial(np.isin, test_elements=first)))
     whole_range, first_range = (np.ptp(one, axis=1) for one in ranges)
     return Enough(1 - after / before, after, float((1 - first_range / np.maximum(whole_range, 1.0)).max()))
 
 
 def _error(result: FitResult) -> float:
-    """Return the geometric mean of the relative one-step errors of all that is measured and predicted."""
+    """Return the geometric mean of the relative one-step errors of what is measured and predicted; NaN of none."""
     simulation = result.simulation
     errors: NDArray[np.float64] = result.held_out.relative[simulation.outputs[simulation.measured]]
-    return math.exp(np.log(errors).mean())
+    known = errors[np.isfinite(errors)]  # not of a sensor that reads one constant
+    return math.exp(np.log(known).mean()) if len(known) and known.all() else math.nan

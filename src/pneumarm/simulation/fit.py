@@ -35,7 +35,7 @@ from pneumarm.simulation.history import LONGEST, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
 from pneumarm.simulation.spread import spread_over_periods
-from pneumarm.transitions.choice import held_out, picked, share_held_out
+from pneumarm.transitions.choice import Stretched, choose_held_out, held_out, picked, stretch_of
 from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
 from pneumarm.transitions.goals import held_range, seen_goals
@@ -116,7 +116,8 @@ class FitSettings(Settings):
     """Further sensors of the arm whose readings belong to the state: velocity in place of the derived one,
     acceleration, temperature (thesis section 7.3 and appendix A; there: none)."""
     held_out: float = 0.1
-    """Share of the sequences that is kept out of the fit, to measure its errors on; at least one sequence."""
+    """Share of the sequences that is kept out of the fit, to measure its errors on; at least one sequence in which
+    the arm moves. Where too few do, stretches within sequences are held out."""
     seed: int = 0
     """Of the initial weights and of every other choice by lot."""
 
@@ -198,6 +199,8 @@ class FitResult(NamedTuple):
     """Transitions that were fitted."""
     seconds: float
     """Duration of the fits alone, without the errors."""
+    used: Sequence[str] = ()
+    """What to tell a person where not all of a store was used."""
 
     @property
     def std(self) -> dict[str, Any]:
@@ -206,19 +209,47 @@ class FitResult(NamedTuple):
 
     @property
     def relative_error(self) -> dict[str, Any]:
-        """``std`` over the standard deviation of the one-step change."""
+        """``std`` over the standard deviation of the one-step change; None where that is 0."""
         return by_quantity(self.held_out.relative, self.simulation.window.further)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What to tell a person of the fit."""
+        return [*self.used, *remarks(self.held_out, self.simulation)]
 
 
 def by_quantity(values: NDArray[np.float64], further: Sequence[str] = ()) -> dict[str, Any]:
     """Return ``values`` (observation_size,) as numbers by the names of quantities; lists where there are more joints.
 
-    What belongs to ``further`` sensors comes last, by their names.
+    What belongs to ``further`` sensors comes last, by their names. What is NaN is None.
     """
+    numbers = values.astype(object)
+    numbers[np.isnan(values)] = None
     joints = len(values) - len(further)
-    columns = zip(QUANTITIES, values[:joints].reshape(-1, len(QUANTITIES)).T.tolist(), strict=True)
+    columns = zip(QUANTITIES, numbers[:joints].reshape(-1, len(QUANTITIES)).T.tolist(), strict=True)
     named = {name: column[0] if len(column) == 1 else column for name, column in columns}
-    return named | dict(zip(further, values[joints:].tolist(), strict=True))
+    return named | dict(zip(further, numbers[joints:].tolist(), strict=True))
+
+
+def remarks(errors: Statistics, simulation: Simulation) -> list[str]:
+    """Return what to tell a person of one-step errors: of what nothing can be said, and what is useless."""
+    window = simulation.window
+    names = [name.removesuffix("[k]").replace("_", " ") for name in window.input_names()[: window.observation_size]]
+    there = np.ones(len(names), np.bool_)
+    there[simulation.outputs[~simulation.measured]] = False
+    still = [name for name, one, used in zip(names, errors.change_std, there, strict=True) if used and one == 0]
+    lines = []
+    if still:
+        lines.append(
+            f"nothing can be said of the error of {', '.join(still)}: it never changes in what was held out of the "
+            "fit; record more in which it does"
+        )
+    return lines + [
+        f"the one-step error of {name} is {error:.2g} times its change: worse than saying that nothing changes; look "
+        "at what was recorded, or record more"
+        for name, error, used in zip(names, errors.relative, there, strict=True)
+        if used and error > 1
+    ]
 
 
 def fit(
@@ -538,7 +569,8 @@ class StoreFit(NamedTuple):
         return self.result.simulation
 
     def __repr__(self) -> str:
-        errors = ", ".join(f"{name} {np.round(value, 3)}" for name, value in self.result.relative_error.items())
+        relative = self.result.relative_error.items()
+        errors = ", ".join(f"{name} {np.round(np.array(value, np.float64), 3)}" for name, value in relative)
         return f"<StoreFit of {self.simulation!r}; relative one-step errors: {errors}>"
 
     def results(self) -> dict[str, Any]:
@@ -552,7 +584,7 @@ class StoreFit(NamedTuple):
             "rows": result.rows,
             "epochs": [len(curve) - 1 for curve in result.curves],
             "seconds": result.seconds,
-        }
+        } | ({"remarks": result.remarks} if result.remarks else {})
 
 
 def fit_store(
@@ -563,24 +595,25 @@ def fit_store(
 ) -> StoreFit:
     """Filter the transitions of ``store``, fit a simulation to them, and measure its errors on the others.
 
-    Memory holds the filtered set; the rest is streamed.
+    Memory holds the filtered set; the rest is streamed. Of a large store a part is used (:meth:`Store.drawn`).
 
     Raises:
         UnusableInput: fewer than 1,000 transitions are stored, or no sequence is held out.
 
     """
-    settings = settings or FitSettings()
+    settings, store = settings or FitSettings(), store.drawn()
     if store.transitions < FEWEST_TRANSITIONS:
+        marked = "".join(f"; {count:,} rows are marked: {reason}" for reason, count in store.marked_rows().items())
         raise UnusableInput(
-            f"{store.transitions} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}"
+            f"{store.transitions} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}{marked}"
         )
     window = Window.of(store.spec, 1, settings.sensors)
     window.require(store.further, str(store.address))
     settings = settings.of_arm(store)
     window = _window(store.spec, settings)
-    sequences = [entry.number for entry in store.catalogue()]
-    settings = replace(settings, held_out=share_held_out(sequences, settings.held_out, settings.seed))
-    filtered = filter_transitions(store, window, grid, seed=settings.seed, hold_out=settings.held_out)
+    share, stretch = choose_held_out(store, settings.held_out, settings.seed, window.history)
+    settings, source = replace(settings, held_out=share), Stretched(store, stretch)
+    filtered = filter_transitions(source, window, grid, seed=settings.seed, hold_out=share)
     coverage = filtered.coverage
     result = fit(
         filtered.transitions,
@@ -589,12 +622,13 @@ def fit_store(
         goal_range=_goal_range(store),
         valves=store.valves,
         generalisation=filtered.stream("generalisation") if coverage.kept < coverage.seen else None,
-        recorded=store.blocks(),
+        recorded=source,
         settings=settings,
         progress=progress,
     )
     goals = seen_goals(store.blocks, result.simulation.goal_range)
-    return StoreFit(result._replace(simulation=result.simulation.with_goals(goals)), filtered)
+    simulation = replace(result.simulation.with_goals(goals), stretch=stretch)
+    return StoreFit(result._replace(simulation=simulation, used=store.used), filtered)
 
 
 def fitted_on(
@@ -608,10 +642,13 @@ def fitted_on(
     """
     window, places, seed = simulation.window, simulation.outputs, simulation.seed
     layers: Literal[1, 2] = 1 if simulation.networks[0].second_weights is None else 2
-    filtered = filter_transitions(store, window, seed=seed, hold_out=simulation.held_out)
+    source = Stretched(store, simulation.stretch)
+    filtered = filter_transitions(source, window, seed=seed, hold_out=simulation.held_out)
     training = filtered.transitions
     if newest is not None and layers == 2:
-        known = picked(newest, ~held_out(newest.sequence, simulation.held_out, seed))
+        ends = newest.step - window.history, newest.step + 1  # of the rows that a transition is made of
+        of = (stretch_of(newest.sequence, end, simulation.stretch) for end in ends)
+        known = picked(newest, ~np.any([held_out(one, simulation.held_out, seed) for one in of], axis=0))
         parts = zip(training, *[known] * (_NEWEST_COUNT - 1), strict=True)
         training = Transitions(*(np.concatenate(part) for part in parts))
     change = training.target[:, places].astype(np.float64) - training.observation[:, places]
@@ -631,7 +668,7 @@ def fitted_on(
     )
     steps = round(ahead / simulation.spec.period)
     if steps > 1:
-        fitted = fitted_ahead(fitted, stretches(store.blocks(), fitted, steps), seed)
+        fitted = fitted_ahead(fitted, stretches(source, fitted, steps), seed)
     return fitted.with_errors(statistics(fitted, filtered.stream("held-out")).std)
 
 
@@ -653,4 +690,5 @@ def refiltered(store: Store, simulation: Simulation, grid: GridSettings | None =
             f"the store has {store.joints} joint(s), the simulation {simulation.window.joints}; "
             "give those that belong together"
         )
-    return filter_transitions(store, simulation.window, grid, seed=simulation.seed, hold_out=simulation.held_out)
+    source = Stretched(store.drawn(), simulation.stretch)
+    return filter_transitions(source, simulation.window, grid, seed=simulation.seed, hold_out=simulation.held_out)

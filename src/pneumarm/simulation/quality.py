@@ -45,7 +45,8 @@ class Statistics(NamedTuple):
     change_std: Floats
     """Standard deviation of the observed change from one step to the next (thesis eq. 3.4)."""
     relative: Floats
-    """``std / change_std``: 0 is perfect, 1 no better than to predict the mean change."""
+    """``std / change_std``: 0 is perfect, 1 no better than to predict the mean change. NaN, as in what follows, where
+    nothing can be said because nothing changes."""
     slope: Floats
     """Slope of the isoplot: of the predicted change over the observed one. Under 1 where the change cannot be
     foreseen, be it for lack of a good fit or for noise in the sensors."""
@@ -107,7 +108,7 @@ class _Moments:
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
+    return np.divide(a, b, out=np.full_like(a, np.nan), where=b > 0)
 
 
 class Classified(NamedTuple):

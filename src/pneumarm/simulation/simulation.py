@@ -102,6 +102,8 @@ class Simulation:
     """Whether it was taught what pulses do on average, none being recorded (:mod:`pneumarm.simulation.spread`)."""
     held_out: float = 0.0
     """Share of the sequences that were kept out of the fit, chosen by :func:`pneumarm.transitions.held_out`."""
+    stretch: int = 0
+    """Where not whole sequences were held out, but stretches of them: the rows of these."""
     seed: int = 0
     """Of that choice, of the filter and of the fit, so that an analysis finds the same parts again."""
     further_std: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
@@ -223,7 +225,10 @@ class Simulation:
         for number, network in enumerate(self.networks):
             layers = {name: getattr(network, name) for name in (*_LAYERS, "direct", *_SECOND)}
             arrays |= {f"network_{number}_{name}": array for name, array in layers.items() if array is not None}
-        return asdict(header), arrays
+        settings = {**asdict(header), "stretch": self.stretch}
+        if not self.stretch:
+            del settings["stretch"]  # older versions read what has none
+        return settings, arrays
 
     @classmethod
     def of_parts(cls, settings: Any, arrays: dict[str, NDArray[Any]]) -> Self:
@@ -262,6 +267,7 @@ class Simulation:
             commands=header.commands,
             spread=header.spread,
             held_out=header.held_out,
+            stretch=header.stretch,
             seed=header.seed,
             **rest,
         )
@@ -288,6 +294,7 @@ class _Header:
     direct: list[bool]
     """For each network whether it has direct connections."""
     spread: bool = False
+    stretch: int = 0
 
 
 def _floats(name: str, array: NDArray[np.generic]) -> NDArray[np.float64]:
@@ -301,8 +308,9 @@ def _check(simulation: Simulation) -> None:
     window, scaling = simulation.window, simulation.scaling
     if window.joints != simulation.spec.joints or window.joints < 1 or window.history < 1:
         raise ValueError(f"its {window} does not fit to an arm with {simulation.spec.joints} joint(s)")
-    if not (0 <= simulation.held_out < 1 and simulation.seed >= 0):
-        raise ValueError(f"its share held out is {simulation.held_out}, its seed {simulation.seed}")
+    if not (0 <= simulation.held_out < 1 and simulation.seed >= 0 and simulation.stretch >= 0):
+        apart = simulation.held_out, simulation.stretch
+        raise ValueError(f"its share and stretch held out are {apart}, its seed {simulation.seed}")
     window.require(simulation.spec.further, "its arm")
     if window.velocity == "measured" and simulation.velocity != "network":
         raise ValueError("a measured velocity needs a network of its own")

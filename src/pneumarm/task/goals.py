@@ -2,6 +2,7 @@
 
 import math
 import re
+from reprlib import repr as shortened
 from typing import NamedTuple
 
 import numpy as np
@@ -89,15 +90,15 @@ def goal_in_counts(
     """
     if (goal is None) == (goal_deg is None):
         raise UnusableInput("expected one goal: either in counts (goal=650) or in degrees (goal_deg=20)")
-    given = goal if goal_deg is None else counts_of(goal_deg, spec)
-    assert given is not None
-    found = np.array(given, np.float64).reshape(-1)
-    if found.shape != (spec.joints,) or not np.isfinite(found).all():
-        raise UnusableInput(
-            f"a goal needs {spec.joints} finite angle(s), got {goal if goal_deg is None else goal_deg}"
-        )
-    in_counts = "counts (degrees are goal_deg, or goals_deg of move)"
-    unit, said = (in_counts, found) if goal_deg is None else ("deg", np.ravel(goal_deg))
+    given = goal if goal_deg is None else goal_deg
+    try:
+        said = np.array(given).reshape(-1)
+    except ValueError:  # lists of different lengths
+        said = np.empty(0)
+    if said.shape != (spec.joints,) or said.dtype.kind not in "iuf" or not np.isfinite(said).all():
+        raise UnusableInput(f"a goal needs {spec.joints} finite angle(s), as numbers, got {shortened(given)}")
+    unit = "counts (degrees are goal_deg, or goals_deg of move)" if goal_deg is None else "deg"
+    found = said.astype(np.float64) if goal_deg is None else counts_of(said, spec)
     return seen(found, spec, goals, f"goal {', '.join(f'{one:g}' for one in said)} {unit}")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.files import read_arrays, write_arrays, write_text
+from pneumarm.files import read_arrays, read_rows, write_arrays, write_text
 from pneumarm.statistics import summarise
 from pneumarm.transitions.rows import Recorded
 
@@ -22,6 +22,7 @@ TEST, NOISE = 3, 4
 LONGEST_PAUSE = 120.0
 """Movements that are farther apart on the arm's clock [s] were interrupted: none takes so long to begin."""
 _KIND = "pneumarm movements"
+_BY_JOINT = ("goal", "angle_begin", "angle_end", "velocity_end", "switches")
 _DECIMALS = {"time_start": 4, "time_end": 4, "velocity_end": 4}  # in a file for people
 
 
@@ -110,7 +111,11 @@ class Movements(NamedTuple):
 
         """
         _, arrays = read_arrays(path, _KIND)
-        if arrays.keys() != set(cls._fields) or len({len(column) for column in arrays.values()}) != 1:
+        angles = arrays.get("goal", np.empty(0)).shape
+        shapes = {name: {angles} if name in _BY_JOINT else {angles[:1]} for name in cls._fields}
+        shapes["switches"] |= {(*angles[:1], 1)}
+        fits = arrays.keys() == shapes.keys() and all(arrays[name].shape in shapes[name] for name in shapes)
+        if len(angles) != 2 or not fits:
             raise UnusableInput(
                 f"{path}: expected movements with the columns {', '.join(cls._fields)}; make it again"
             )
@@ -246,24 +251,15 @@ def read_episodes(path: Path) -> dict[str, Movements]:
         UnusableInput: no such file, missing columns, or a cell that is no number.
 
     """
+    table = read_rows(path, "the episodes of a transfer as CSV")
+    header = next(table, [])
+    if missing := set(COLUMNS) - set(header):
+        raise UnusableInput(f"{path}: expected the columns {', '.join(COLUMNS)}; {sorted(missing)} are missing")
+    phases: dict[str, list[dict[str, Any]]] = {}
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            missing = set(COLUMNS) - set(reader.fieldnames or ())
-            if missing:
-                raise UnusableInput(
-                    f"{path}: expected the columns {', '.join(COLUMNS)}; {sorted(missing)} are missing"
-                )
-            phases: dict[str, list[dict[str, Any]]] = {}
-            for row in reader:
-                phases.setdefault(row["phase"], []).append({name: _numbers(row[name]) for name in COLUMNS[1:]})
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UnusableInput(
-            f"{path}: expected the episodes of a transfer as CSV, it cannot be read ({error})"
-        ) from error
-    except (ValueError, TypeError, AttributeError) as error:
-        raise UnusableInput(f"{path}: a cell is not what its column says ({error})") from error
-    try:
+        for cells in table:
+            row = dict(zip(header, cells, strict=True))
+            phases.setdefault(row["phase"], []).append({name: _numbers(row[name]) for name in COLUMNS[1:]})
         return {phase: of_rows(rows) for phase, rows in phases.items()}
     except (ValueError, TypeError) as error:
         raise UnusableInput(f"{path}: a cell is not what its column says ({error})") from error

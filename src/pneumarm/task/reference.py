@@ -3,10 +3,9 @@
 Degrees in them are counted from the middle of the range of the arm's angle sensor.
 """
 
-import csv
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.arm import ArmSpec
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
+from pneumarm.files import read_rows
 
 FORMS = (
     "sine:0.5Hz,20deg, ramp:30deg/s,20deg, minimum-jerk:1s,20deg, steps:FILE.csv, or FILE.csv of time [s] and "
@@ -125,19 +125,23 @@ def _quantity(text: str, part: str, units: tuple[str, ...]) -> float:
 
 def _from_file(path: Path, spec: ArmSpec, *, jumps: bool) -> Reference:
     """Return what the file says: held until its next row where it ``jumps``, else with a cubic between."""
-    expected = f"{path}: expected rows of rising times [s] and the degrees of {spec.joints} joint(s)"
+    expected = f"rows of rising times [s] and the degrees of {spec.joints} joint(s)"
+    rows, width = read_rows(path, expected), 1 + spec.joints
+    expected = f"{path}: expected {expected}"
+
+    def numbers() -> Iterator[float]:
+        for k, row in enumerate(rows):
+            if k > 0 or _NUMBER.fullmatch(row[0].strip()):  # else a header
+                if len(row) != width:
+                    raise ValueError(f"row {k + 1} has {len(row)} cell(s)")
+                yield from map(float, row)
+
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.reader(file) if row]
-        if rows and not _NUMBER.fullmatch(rows[0][0].strip()):
-            del rows[0]  # a header
-        values = np.array([[float(cell) for cell in row] for row in rows], np.float64)
-    except OSError as error:
-        raise UnusableInput(f"{expected}; it cannot be read ({error.strerror})") from error
-    except (ValueError, csv.Error) as error:
+        values = np.fromiter(numbers(), np.float64).reshape(-1, width)
+    except ValueError as error:
         raise UnusableInput(f"{expected}; {error}") from error
-    if values.ndim != 2 or values.shape[1] != 1 + spec.joints:
-        raise UnusableInput(f"{expected}; found an array of shape {values.shape}")
+    if not len(values):
+        raise UnusableInput(f"{expected}; there is none")
     times = values[:, 0] - values[0, 0]
     if not (np.isfinite(values).all() and (np.diff(times) > 0).all()):
         raise UnusableInput(f"{expected}; a number is not finite or a time is not after the one before")

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from pneumarm.transitions.database import damaged, pages, row_columns
 from pneumarm.transitions.possible import are_possible
-from pneumarm.transitions.rows import Rows, unmarked
+from pneumarm.transitions.rows import Rows
 
 if TYPE_CHECKING:
     from pneumarm.transitions.store import Store
 
+STEPS = 1 << 32
+"""More than any step of a sequence."""
 Predicate = Callable[[NDArray[np.int64]], NDArray[np.bool_]]
 """Maps numbers of sequences (n,) to which of them are meant (n,)."""
 
@@ -88,7 +90,9 @@ class Blocks:
         marks = self._store._marks(first, last)
         if not marks:
             return rows
-        kept = np.ones(len(rows), bool)
-        for sequence, mark in marks:
-            kept &= (rows.sequence != sequence) | unmarked(rows.step, [mark])
-        return rows.where(kept)
+        # A row is marked if, of the marks that begin at it or before, the one that ends last ends at it or after.
+        ends = np.array([(n, min(one.first, STEPS - 1), n, min(one.last, STEPS - 1)) for n, one in marks], np.int64)
+        begin, end = (ends.reshape(-1, 2, 2) @ [STEPS, 1]).T
+        order, place = np.argsort(begin), rows.sequence * STEPS + rows.step
+        latest = np.concatenate([[-1], np.maximum.accumulate(end[order])])
+        return rows.where(latest[np.searchsorted(begin[order], place, "right")] < place)

@@ -6,14 +6,21 @@ Source of the mixing function: S. Vigna's splitmix64, after G. L. Steele et al.,
 generators", OOPSLA 2014.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import Transitions
 
 _TO_UNIT = 2.0**-53
+_STRETCH = 200
+"""Rows of a stretch where whole sequences cannot be held out: as long as the thesis' sequences are."""
+_STILL = 0.1
+"""A sensor stands still in a sequence in which its readings spread by less than this part of what is typical."""
 
 
 def _mixed(words: NDArray[np.uint64]) -> NDArray[np.uint64]:
@@ -43,6 +50,74 @@ def share_held_out(sequences: ArrayLike, fraction: float = 0.1, seed: int = 0) -
     """
     draws = np.sort(hashed_uniform(seed, np.atleast_1d(sequences)))
     return fraction if len(draws) < 2 or draws[0] < fraction else float(np.nextafter(draws[0], 1.0))
+
+
+class HeldOut(NamedTuple):
+    """What is held out of a fit."""
+
+    share: float
+    """Share of the sequences, or of stretches of them."""
+    stretch: int
+    """Rows of a stretch; 0 where whole sequences are held out."""
+
+
+def choose_held_out(source: Iterable[Rows], fraction: float, seed: int, window: int) -> HeldOut:
+    """Return what to hold out of ``source``, blocks of whole sequences: about ``fraction``, in which sensors move.
+
+    Whole sequences, unless more than half of all rows would be in them, or whatever moves would move in one part
+    alone; then stretches of sequences. A sequence that is no longer than a ``window`` [rows] says nothing.
+    """
+    usual: list[HeldOut] = []
+    for stretch in (0, _STRETCH):
+        number, rows, spread = _spreads(Stretched(source, stretch) if stretch else source)
+        typical = np.sqrt(np.average(spread**2, axis=0, weights=rows))
+        moves = (spread > _STILL * typical) & (rows > window)[:, None]
+        shares = [share_held_out(number[one], fraction, seed) for one in moves.T if one.any()]
+        found = HeldOut(max(shares, default=fraction), stretch)
+        apart = held_out(number, found.share, seed)
+        alone = moves.any(axis=0) & ~(moves[apart].any(axis=0) & moves[~apart].any(axis=0))
+        if not alone.any() and 0 < 2 * rows[apart].sum() < rows.sum():
+            return found
+        found = HeldOut(share_held_out(number[rows > window], fraction, seed), stretch)
+        if 0 < 2 * rows[held_out(number, found.share, seed)].sum() < rows.sum():
+            usual.append(found)
+    # Something moves too seldom to be in both parts: what can be said is said of the rest.
+    return usual[0] if usual else found
+
+
+def _spreads(source: Iterable[Rows]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return number, rows and standard deviation of angles and pressures of each sequence, (n,), (n,), (n, columns).
+
+    [counts]
+    """
+    parts = []
+    for block in source:
+        first = np.flatnonzero(np.diff(block.sequence, prepend=-1))
+        rows = np.diff(first, append=len(block))
+        values = np.concatenate([block.angle, block.pressure.reshape(len(block), -1)], axis=1)
+        mean = np.add.reduceat(values, first) / rows[:, None]
+        scatter = np.add.reduceat((values - np.repeat(mean, rows, axis=0)) ** 2, first)
+        parts.append((block.sequence[first], rows, np.sqrt(scatter / rows[:, None])))
+    number, rows, spread = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return number, rows, spread
+
+
+def stretch_of(sequence: NDArray[np.int64], step: NDArray[np.int64], stretch: int) -> NDArray[np.int64]:
+    """Return the numbers of the stretches that rows (n,) belong to, as of sequences; 0: of their sequences."""
+    return (sequence << 32) + np.maximum(step, 0) // stretch if stretch else sequence
+
+
+@dataclass(frozen=True)
+class Stretched:
+    """Blocks of rows in which every stretch of a sequence is a sequence of its own, so that no window spans two."""
+
+    source: Iterable[Rows]
+    stretch: int
+    """Steps of a stretch; 0 leaves sequences whole."""
+
+    def __iter__(self) -> Iterator[Rows]:
+        for rows in self.source:
+            yield replace(rows, sequence=stretch_of(rows.sequence, rows.step, self.stretch))
 
 
 def sample(blocks: Iterable[Transitions], count: int, seed: int = 0) -> Transitions | None:

@@ -35,11 +35,12 @@ from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.valves import Command
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.settings import Settings, Valid
+from pneumarm.transitions.doubtful import with_doubtful_marked
 from pneumarm.transitions.fill_times import FillTimes, find_fill_times
 from pneumarm.transitions.players import Trajectory
-from pneumarm.transitions.rows import Recorded, broken_off
+from pneumarm.transitions.rows import Recorded, broken_off, joinable
 from pneumarm.transitions.store import Store
-from pneumarm.transitions.watch import Patience, Watch, keep_watch, warm_up, watched
+from pneumarm.transitions.watch import MOST_SPOILED, Patience, Watch, keep_watch, warm_up, watched
 
 KINDS = ("zero-velocity", "velocity", "pulses", "sparse", "controller")
 """Kinds of the sequences made here."""
@@ -330,7 +331,7 @@ class _Collection:
         self._arm = guarded(arm)
         if kept["arm"] is not None:
             self._arm.set_state(kept["arm"])
-        self._patience = Patience(arm.spec.name)
+        self._patience, self._doubtful = Patience(arm.spec.name), 0
         if watch is not None:
             if kept["watch"] is not None:
                 watch.set_state(kept["watch"])
@@ -401,7 +402,15 @@ class _Collection:
             state["watch"] = watch.get_state()
             if whole:
                 self._patience.judge(watch, float(recorded.time[-1]))
+        before, recorded = len(recorded.marks), with_doubtful_marked(recorded, self._arm.spec, valves=True)
+        doubtful = recorded.marks[before:]
         self._store.append(recorded, state)
+        self._doubtful = 0 if joinable(recorded.step, doubtful) else self._doubtful + 1
+        if self._doubtful >= MOST_SPOILED and doubtful:
+            raise ArmFailure(
+                f"{self._arm.spec.name}: {doubtful[0].reason}, in {self._doubtful} sequences in a row; they are "
+                "stored and marked, nothing can be learned of them. See to the sensor and run the same command again"
+            )
         if whole:
             self.done += recorded.transitions
             self.number += 1

@@ -16,6 +16,7 @@ import msgspec
 from pneumarm.address import Address
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
+from pneumarm.files import parse_json
 
 VERSION = 3
 """Version of the tables. Version 1 had no marks; it is read, and made version 2 by the first writer. Version 3 has
@@ -151,6 +152,11 @@ def check_version(version: int, address: Address) -> None:
             f"{address}: a store of version {version}, this pneumarm reads versions 1 to {VERSION}; "
             "use the one that wrote it"
         )
+
+
+def kept_json(text: Any, address: Address, what: str) -> dict[str, Any]:
+    """Return the object that a store keeps as JSON of ``what``; raises UnusableInput where it is none."""
+    return parse_json(text, f"{address}: the store is damaged: expected {what}")
 
 
 def damaged(address: Address, what: str) -> UnusableInput:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.extras import extra
-from pneumarm.files import as_toml, require_folder, write_text, written_whole
+from pneumarm.files import as_toml, read_beginning, require_folder, require_output, write_text, written_whole
 from pneumarm.transitions.lerobot import export_lerobot
 from pneumarm.transitions.minari import export_minari
 from pneumarm.transitions.recording import mapping_beside
@@ -27,6 +27,7 @@ from pneumarm.transitions.store import Store
 
 FORMATS = (".csv", ".parquet", ".lerobot", ".minari", ".rrd")
 """What can be written, by the end of the file's name."""
+_FOLDERS = (".lerobot", ".minari")
 _ANYTHING = (-1e9, 1e9)
 """Range in the mapping: what was recorded has been checked."""
 _HEAD = "# How pneumarm import reads what was exported."
@@ -50,9 +51,9 @@ def export_recording(store: Store, path: Path) -> Exported:
             else has the name of the mapping beside it.
 
     """
-    require_folder(path)
     if path.suffix not in FORMATS:
         raise UnusableInput(f"{path}: a store is exported to a name that ends in {' or '.join(FORMATS)}")
+    (require_output if path.suffix in _FOLDERS else require_folder)(path)
     if path.suffix == ".minari":
         return Exported(**export_minari(store, path), mapping=None)
     if path.suffix == ".rrd":
@@ -78,9 +79,8 @@ def export_recording(store: Store, path: Path) -> Exported:
 
 def _is_ours(file: Path) -> bool:
     try:
-        with open(file, encoding="utf-8") as opened:
-            return opened.readline().rstrip() == _HEAD
-    except (OSError, UnicodeDecodeError):
+        return read_beginning(file, "a mapping", len(_HEAD)) == _HEAD.encode()
+    except UnusableInput:
         return False
 
 

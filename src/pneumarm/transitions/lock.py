@@ -2,14 +2,17 @@
 
 import os
 import socket
+import stat
 from contextlib import suppress
 from pathlib import Path
 
 from filelock import lock_descriptor
 
 from pneumarm.errors import UnusableInput
+from pneumarm.files import refuse_link, writing
 
-_CLOSED_IN_CHILDREN = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOINHERIT", 0)
+_IF_KNOWN = ("O_CLOEXEC", "O_NOINHERIT", "O_NOFOLLOW")
+_HOW = os.O_RDWR | os.O_CREAT | sum(getattr(os, name, 0) for name in _IF_KNOWN)
 
 
 class WriterLock:
@@ -28,10 +31,15 @@ class WriterLock:
         """
         self._path = store.with_name(store.name + "-writer")
         while True:
+            refuse_link(self._path)
             try:
-                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | _CLOSED_IN_CHILDREN, 0o644)
+                self._file = os.open(self._path, _HOW, 0o644)
             except OSError as error:
                 raise UnusableInput(f"{store}: cannot be written ({error.strerror})") from error
+            found = os.fstat(self._file)
+            if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:  # it is another file, too, and is to be emptied
+                os.close(self._file)
+                raise UnusableInput(f"{self._path}: is not a file of pneumarm's; remove it")
             if not lock_descriptor(self._file, blocking=False):
                 holder = self._holder()
                 os.close(self._file)
@@ -39,8 +47,9 @@ class WriterLock:
             if self._is_current():
                 break
             os.close(self._file)  # the holder before us removed it between our opening and our locking
-        os.ftruncate(self._file, 0)
-        os.write(self._file, f" process {os.getpid()} on {socket.gethostname()}".encode())
+        with writing(self._path):
+            os.ftruncate(self._file, 0)
+            os.write(self._file, f" process {os.getpid()} on {socket.gethostname()}".encode())
 
     def _holder(self) -> str:
         """Return who holds the lock; where locks are of bytes, as on Windows, the first one cannot be read."""

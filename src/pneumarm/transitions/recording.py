@@ -1,11 +1,12 @@
 """Import a recording made elsewhere into a store, by a mapping file (TOML) that says what its columns are.
 
-It is CSV, Parquet, or a dataset of LeRobot (:mod:`pneumarm.transitions.parquet`).
+It is CSV, Parquet, or a dataset of LeRobot (:mod:`pneumarm.transitions.table`).
 
 Beside a recording that pneumarm exported lies its mapping. One with every setting that is not of an arm's spec::
 
     sequence = "episode"          # column that changes where a new sequence begins; optional
-    time = "t_s"                  # column of the time [s]; without it rows are one period apart
+    time = { column = "t", unit = "ms" }   # s, ms, us, ns; "t" is as good for seconds; without it rows are one
+                                  # period apart
     commands = "continuous"       # or "valves": then commands must be -1, 0, +1; or "pulses": from -1 to +1
 
     [arm]                         # fields of ArmSpec but joints; the period is needed
@@ -25,16 +26,18 @@ Beside a recording that pneumarm exported lies its mapping. One with every setti
 in its own unit; by default the arm's range of the angle, and -0.2 to 1.2 times its largest pressure. An arm that
 measures no pressures says so by ``pressure_sensors = false`` in ``[arm]`` and has no columns of them; they are
 estimated from the commands of each sequence, at whose begin all muscles count as vented.
+
+A column of a dataset whose name is not unique in it is called with its feature, such as ``action.elbow.pos``. Rows
+that cannot be used are left out and counted, and no transition spans the place.
 """
 
-import csv
+import hashlib
 import math
-import sys
-import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Literal, TextIO
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -44,22 +47,39 @@ from pneumarm.address import StoreAddress
 from pneumarm.arm.fill import filled
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
+from pneumarm.files import as_toml, read_toml
 from pneumarm.transitions.lerobot import MAPPING
-from pneumarm.transitions.parquet import is_parquet, lines_of
+from pneumarm.transitions.parquet import files_of
 from pneumarm.transitions.rows import Recorded, steps_of
 from pneumarm.transitions.store import Store
+from pneumarm.transitions.table import Row, Table, read_table
 
-# A key of n dotted parts takes tomllib n**2 memory, hence both of these.
-_LONGEST_MAPPING = 16 << 10  # bytes
-_LONGEST_MAPPING_LINE = 1000  # characters
-_LONGEST_LINE = 64 << 10  # characters
 _LONGEST_SEQUENCE = 10_000  # rows; a longer one is stored in parts, which costs a window's length of each
 
 _BAR_RANGE = (-0.2, 1.2)  # of max_pressure
+_TOLERANCE = 0.05
+"""Share of the period by which the median step may differ from it. Speeds are wrong by as much. Whole milliseconds of
+120 Hz are 4 % off, 1/30 s written as 0.033 is 1 %; what jitters has its median where it belongs."""
+_MOST_SKIPPED = 0.05
+"""Share of the rows that may be unusable. Each takes with it the transitions whose windows hold it, four or so: at
+one row in twenty a fifth of the recording is lost, and the mapping is more likely wrong than the file."""
+_SEEN = 64 << 10  # bytes at either end of a file by which it is known again
+_LATEST = 1e12  # s; of a time far past it no step can be counted
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+_MISSING = ("", "nan", "na", "n/a", "null", "none")
+_TORN = "torn last line"
+_NOT_RISING = "time not after that of the row before"
 
 
 class _MappingTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A table of the mapping in which an unknown key is a mistake."""
+
+
+class TimeColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
+    """The column of the time."""
+
+    column: str
+    unit: Literal["s", "ms", "us", "µs", "ns"] = "s"
 
 
 class AngleColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
@@ -79,13 +99,6 @@ class PressureColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     range: tuple[float, float] | None = None
 
 
-class CommandColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
-    """The column of a muscle's command."""
-
-    column: str
-    range: tuple[float, float] | None = None
-
-
 class VelocityColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The column of a joint's velocity that a sensor of its own measured."""
 
@@ -94,8 +107,8 @@ class VelocityColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
     range: tuple[float, float] | None = None
 
 
-class FurtherColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
-    """The column of an accelerometer [m/s2] or a thermometer [Celsius]."""
+class OtherColumn(_MappingTable, frozen=True, forbid_unknown_fields=True):
+    """The column of a muscle's command, of an accelerometer [m/s2] or of a thermometer [Celsius]."""
 
     column: str
     range: tuple[float, float] | None = None
@@ -105,14 +118,14 @@ class JointColumns(_MappingTable, frozen=True, forbid_unknown_fields=True):
     """The columns of one joint; those of further sensors where it has them."""
 
     angle: AngleColumn
-    command_1: CommandColumn
-    command_2: CommandColumn
+    command_1: OtherColumn
+    command_2: OtherColumn
     pressure_1: PressureColumn | None = None
     pressure_2: PressureColumn | None = None
     velocity: VelocityColumn | None = None
-    acceleration: FurtherColumn | None = None
-    temperature_1: FurtherColumn | None = None
-    temperature_2: FurtherColumn | None = None
+    acceleration: OtherColumn | None = None
+    temperature_1: OtherColumn | None = None
+    temperature_2: OtherColumn | None = None
 
 
 class Mapping(_MappingTable, frozen=True, forbid_unknown_fields=True):
@@ -122,7 +135,7 @@ class Mapping(_MappingTable, frozen=True, forbid_unknown_fields=True):
     arm: dict[str, object]
     joint: list[JointColumns]
     sequence: str | None = None
-    time: str | None = None
+    time: str | TimeColumn | None = None
 
 
 @dataclass(frozen=True)
@@ -134,9 +147,13 @@ class ImportResult:
     sequences: int
     """Sequences stored; longer ones than 10,000 rows in parts."""
     rows: int
-    """Rows of the recording."""
+    """Rows of the recording, all of them."""
     single: int
     """Rows left out because their sequence has no other."""
+    restarts: int = 0
+    """Sequences that were begun because the time went back."""
+    skipped: dict[str, int] = field(default_factory=dict)
+    """Rows left out because they could not be used, by the reason."""
 
 
 @dataclass(frozen=True)
@@ -157,27 +174,57 @@ def mapping_beside(recording: Path) -> Path:
 
 
 def import_recording(recording: Path | str, mapping: Path | str | None, store: StoreAddress) -> ImportResult:
-    """Import ``recording`` into a new store, which is made whole or not at all, in bounded memory.
+    """Import ``recording``, whole or not at all, in bounded memory: into a new store, or one of the same arm.
 
     Without a ``mapping`` it is the one that was exported with the recording. Imported sequences do not begin at rest:
-    windows begin within them. Rows further apart than one and a half periods are not joined.
+    windows begin within them. Rows further apart than one and a half periods are not joined, nor are those between
+    which one could not be used.
 
     Raises:
-        UnusableInput: the mapping or the recording cannot be used (file, line and column are named), or there is a
-            store already.
+        UnusableInput: the mapping or the recording cannot be used (file, line and column are named), it has been
+            imported before, or the store is of another arm.
 
     """
     recording = Path(recording)
     mapping = _mapping_of(recording) if mapping is None else Path(mapping)
     chosen, spec = read_mapping(mapping)
-    columns = _columns(chosen, spec)
-    with Store.made_whole(store, spec, chosen.commands != "continuous") as made:
-        made.begin_run("import", {"recording": recording.name, "mapping": mapping.name})
-        reader = _Reader(recording, chosen, columns, spec.period)
-        made.append_all(_sequences(reader, spec))
-        if not made.sequences:
+    reader = _Reader(recording, chosen, _columns(chosen, spec), spec.period)
+    settings = {"recording": recording.name, "mapping": mapping.name, "fingerprint": _fingerprint(recording, chosen)}
+    with Store.added_whole(store, spec, chosen.commands != "continuous") as kept:
+        for number, known in kept.runs().items():
+            if known["settings"].get("fingerprint") == settings["fingerprint"]:
+                raise UnusableInput(
+                    f"{recording}: has been imported into {kept.address} already, as its run {number}"
+                )
+        before = kept.transitions, kept.sequences
+        run = kept.begin_run("import", settings)
+        kept.append_all(_sequences(reader, spec))
+        transitions, sequences = kept.transitions - before[0], kept.sequences - before[1]
+        reader.check()
+        if not sequences:
             raise UnusableInput(f"{recording}: holds no sequence of two rows or more")
-        return ImportResult(made.transitions, made.sequences, reader.rows, reader.single)
+        if not transitions:
+            marked = ", ".join(f"{count:,} x {reason}" for reason, count in kept.marked_rows(run).items())
+            why = marked or f"no two rows are one period of {spec.period:g} s apart; is it right?"
+            raise UnusableInput(f"{recording}: holds no transition to learn from: {why}")
+        return ImportResult(
+            transitions, sequences, reader.rows, reader.single, reader.restarts, dict(+reader.skipped)
+        )
+
+
+def _fingerprint(recording: Path, mapping: Mapping) -> str:
+    """Return what tells a recording read by a ``mapping`` from others: the sizes and both ends of its files."""
+    found = hashlib.sha256(msgspec.json.encode(mapping))
+    try:
+        for path in files_of(recording):
+            with open(path, "rb") as file:
+                size = path.stat().st_size
+                found.update(size.to_bytes(8, "little") + file.read(_SEEN))
+                file.seek(max(size - _SEEN, 0))
+                found.update(file.read(_SEEN))
+    except OSError as error:
+        raise UnusableInput(f"{recording}: cannot be read ({error.strerror})") from error
+    return found.hexdigest()
 
 
 def _mapping_of(recording: Path) -> Path:
@@ -197,15 +244,9 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
         UnusableInput: no such file, no TOML, or keys that are unknown, missing or of the wrong kind.
 
     """
+    table = read_toml(path, "a mapping file (TOML)")
     try:
-        if not path.is_file():
-            raise UnusableInput(f"{path}: no such file; expected a mapping file (TOML)")
-        if path.stat().st_size > _LONGEST_MAPPING:
-            raise UnusableInput(f"{path}: not a mapping file: it has more than {_LONGEST_MAPPING} bytes")
-        text = path.read_text(encoding="utf-8")
-        if max(map(len, text.splitlines()), default=0) > _LONGEST_MAPPING_LINE:
-            raise UnusableInput(f"{path}: a line has {_LONGEST_MAPPING_LINE} characters at most")
-        mapping = msgspec.convert(tomllib.loads(text), Mapping)
+        mapping = msgspec.convert(table, Mapping)
         allowed = {field.name for field in fields(ArmSpec)} - {"joints", "velocity_sensor", "sensors"}
         if unknown := mapping.arm.keys() - allowed:
             raise UnusableInput(f"[arm] has no {', '.join(sorted(unknown))}; it has {', '.join(sorted(allowed))}")
@@ -217,11 +258,8 @@ def read_mapping(path: Path) -> tuple[Mapping, ArmSpec]:
         _check_pressures(mapping, spec)
         velocity, sensors = _measures_velocity(mapping.joint), _sensors(mapping.joint)
         return mapping, replace(spec, velocity_sensor=velocity, sensors=sensors)
-    except OSError as error:
-        raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, RecursionError, UnusableInput) as error:  # TOML, UTF-8 and msgspec's errors are ValueErrors
-        message = str(error) if isinstance(error, UnusableInput | ValueError) else "too deeply nested"
-        raise UnusableInput(message if message.startswith(str(path)) else f"{path}: {message}") from error
+    except (msgspec.ValidationError, UnusableInput) as error:
+        raise UnusableInput(f"{path}: {error}") from error
 
 
 def _check_pressures(mapping: Mapping, spec: ArmSpec) -> None:
@@ -308,7 +346,7 @@ def _pressure(pressure: PressureColumn, spec: ArmSpec) -> _Column:
 
 def _sequences(reader: "_Reader", spec: ArmSpec) -> Iterator[Recorded]:
     size = 5 if spec.pressure_sensors else 3
-    for time, values in reader:
+    for time, cut, values in reader:
         per_joint = values[:, : size * spec.joints].reshape(len(time), spec.joints, size)
         command = per_joint[:, :, -2:].copy()
         command[-1] = np.nan
@@ -317,115 +355,175 @@ def _sequences(reader: "_Reader", spec: ArmSpec) -> Iterator[Recorded]:
             angle=per_joint[:, :, 0],
             pressure=per_joint[:, :, 1:3] if spec.pressure_sensors else filled(spec, time, command),
             command=command,
-            step=steps_of(time, spec.period),
+            step=steps_of(time, spec.period) + np.cumsum(cut),
             kind="imported",
             measured=dict(zip(spec.further, values[:, size * spec.joints :].T, strict=True)),
         )
 
 
+class _Unusable(Exception):  # noqa: N818 - never seen outside
+    """A row that is left out: the reason by which it is counted, and what is wrong with it in words."""
+
+
+class _Read(NamedTuple):
+    """A row that was understood."""
+
+    fields: Sequence[str]
+    sequence: str
+    time: float
+    values: list[float]
+
+
+class _Part:
+    """Rows of a sequence, until they are stored."""
+
+    def __init__(self, sequence: str | None) -> None:
+        self.sequence = sequence
+        self.rows: list[tuple[float, bool, list[float]]] = []  # time, whether one was left out before it, values
+        self.last: Sequence[str] = ()  # fields of the last row
+        self.passed = 0  # rows since it began, those left out too
+        self.broken = False  # whether one was left out since the last
+
+    def add(self, read: _Read) -> None:
+        """Add a row, which does not follow on the one before where one was left out between them."""
+        self.rows.append((read.time, self.broken and bool(self.rows), read.values))
+        self.last, self.broken = read.fields, False
+
+
 class _Reader:
-    """Iterates over the sequences of a recording as time (n,) and values (n, columns) in sensor units."""
+    """Iterates over the sequences of a recording, once.
+
+    Gives times (n,) [s], whether a row is cut off from the one before (n,), and values (n, columns) in sensor units.
+    """
 
     def __init__(self, path: Path, mapping: Mapping, columns: list[_Column], period: float) -> None:
-        self._path, self._mapping, self._columns, self._period = path, mapping, columns, period
-        self.rows = 0
-        self.single = 0
+        self._path, self._sequence, self._columns, self._period = path, mapping.sequence, columns, period
+        self._time = TimeColumn(mapping.time) if isinstance(mapping.time, str) else mapping.time
+        time = None if self._time is None else self._time.column
+        self._names = [self._sequence, time, *(column.name for column in columns)]
+        self._used = self.single = self.restarts = 0
+        self.skipped = Counter[str]()
+        self._wrong = ""  # what is wrong with the first row that was left out
+        self._steps = Counter[float]()  # how often the time went on by so much, to three digits
+        self._before = ("", math.inf)  # sequence and time of the row before
+        self._decimal = ""  # what decimals begin with, comma or point
 
-    def __iter__(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        if is_parquet(self._path):
-            yield from self._read(lines_of(self._path))
-            return
-        if not self._path.is_file():
-            raise UnusableInput(
-                f"{self._path}: expected a recording (CSV, Parquet, or a dataset of LeRobot), there is no such file"
-            )
-        try:
-            with open(self._path, encoding="utf-8-sig", newline="") as file:
-                yield from self._read(self._lines(file))
-        except OSError as error:
-            raise UnusableInput(f"{self._path}: cannot be read ({error.strerror})") from error
-        except UnicodeDecodeError as error:
-            raise UnusableInput(f"{self._path}: expected CSV in UTF-8, this is something else ({error})") from error
+    @property
+    def rows(self) -> int:
+        """Rows read, those left out too."""
+        return self._used + self.skipped.total()
 
-    def _read(self, text: Iterator[str]) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        lines = csv.reader(text)
-        try:
-            header = next(lines, [])
-            places = self._places(header)
-            sequence, times, table = "", list[float](), list[list[float]]()
-            for fields_ in lines:
-                if not fields_:
+    def __iter__(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]]:
+        table, part, early = read_table(self._path, self._names), _Part(None), None
+        for row in table.rows:
+            try:
+                read = self._read(row, table, part)
+            except _Unusable as why:
+                if not (row.lines == 1 and row.fields[0].startswith("#")):  # a comment
+                    self._skip(row, *why.args)
+                    part.broken, part.passed = True, part.passed + 1
+                continue
+            if read.sequence != part.sequence:
+                yield from self._whole(part)
+                part = _Part(read.sequence)
+            part.passed += 1
+            if part.rows and read.time - part.rows[-1][0] < self._period / 2:
+                if early is None or not 0.5 <= (read.time - early.time) / self._period < 1.5:
+                    early, before = read, part.rows[-1][0]
+                    what = f"{read.time:g} s is less than half a period of {self._period:g} s after {before:g} s"
+                    what = f"column {self._names[1]!r}: {what}; is the period right, does a new sequence begin?"
+                    self._skip(row, _NOT_RISING, what)
+                    part.broken |= read.fields != part.last  # a copy of the row before cuts nothing
                     continue
-                if len(fields_) != len(header):
-                    raise self._wrong(lines.line_num, f"expected {len(header)} fields, got {len(fields_)}")
-                of_sequence = fields_[places[0]] if self._mapping.sequence else ""
-                if times and (of_sequence != sequence or len(times) == _LONGEST_SEQUENCE):
-                    yield from self._whole(times, table)
-                    times, table = [], []
-                sequence = sys.intern(of_sequence) if len(of_sequence) < 100 else of_sequence
-                times.append(self._time(fields_, places[1], times, lines.line_num))
-                table.append(
-                    [
-                        self._value(fields_[place], column, lines.line_num)
-                        for place, column in zip(places[2:], self._columns, strict=True)
-                    ]
-                )
-                self.rows += 1
-            yield from self._whole(times, table)
-        except csv.Error as error:
-            raise self._wrong(lines.line_num, f"not CSV ({error})") from error
+                yield from self._whole(part)  # it goes on from the row left out before: the clock began anew there
+                part = _Part(read.sequence)
+                part.add(early)
+                self.skipped[_NOT_RISING] -= 1
+                self.restarts += 1
+            part.add(read)
+            early = None
+            if len(part.rows) == _LONGEST_SEQUENCE:
+                yield from self._whole(part)
+                part = _Part(part.sequence)
+        yield from self._whole(part)
 
-    def _whole(
-        self, times: list[float], table: list[list[float]]
-    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        if len(times) >= 2:
-            yield np.array(times), np.array(table)
-        else:
-            self.single += len(times)
-
-    def _lines(self, file: TextIO) -> Iterator[str]:
-        number = 0
-        while line := file.readline(_LONGEST_LINE + 1):
-            number += 1
-            if len(line) > _LONGEST_LINE:
-                raise self._wrong(number, f"longer than {_LONGEST_LINE} characters: this is not CSV")
-            yield line
-
-    def _places(self, header: list[str]) -> list[int]:
-        """Return where sequence, time and the values are; 0 for a sequence or a time that has no column."""
-        mapping = self._mapping
-        names = [mapping.sequence, mapping.time, *(column.name for column in self._columns)]
-        missing = sorted({name for name in names if name is not None and header.count(name) != 1})
-        if missing:
+    def check(self) -> None:
+        """Raise UnusableInput where the time does not go on by the period, or too many rows could not be used."""
+        steps = np.array(sorted(self._steps.items())).reshape(-1, 2)
+        passed = np.cumsum(steps[:, 1])
+        median = float(steps[np.searchsorted(passed, passed[-1] / 2), 0]) if len(steps) else self._period
+        if self._time is not None and abs(median / self._period - 1) > _TOLERANCE:
+            wrong = f"the median step of the time is {median:g} s, the mapping's period says {self._period:g} s"
+            raw = median / _SECONDS[self._time.unit] / self._period
+            likely = next((unit for unit, seconds in _SECONDS.items() if 0.5 < raw * seconds < 2), self._time.unit)
+            advice = f"set period = {median:g}, or the unit of the time" if median else "its stamps are too coarse"
+            if _SECONDS[likely] != _SECONDS[self._time.unit]:
+                told = as_toml({"column": self._time.column, "unit": likely})
+                advice = f"the time column seems to be in {likely}: set time = {told}"
+            raise UnusableInput(f"{self._path}: {wrong}; {advice}")
+        bad = self.skipped.total() - self.skipped[_TORN]
+        if bad > _MOST_SKIPPED * self.rows:
+            reasons = ", ".join(f"{reason}: {count}" for reason, count in self.skipped.most_common() if count)
             raise UnusableInput(
-                f"{self._path}: line 1: the mapping needs the column(s) {', '.join(missing)} once each; "
-                f"the file has {', '.join(header)[:300] or 'none'}"
+                f"{self._path}: {self._wrong}; {bad} of {self.rows} rows cannot be used ({reasons}), at most "
+                f"{_MOST_SKIPPED:.0%} may"
             )
-        return [0 if name is None else header.index(name) for name in names]
 
-    def _time(self, fields_: list[str], place: int, before: list[float], line: int) -> float:
-        if self._mapping.time is None:
-            return len(before) * self._period
-        time = self._value(fields_[place], _Column(self._mapping.time, -1e12, 1e12), line)
-        if before and time - before[-1] < self._period / 2:
-            raise self._wrong(
-                line,
-                f"column {self._mapping.time!r}: {time:g} s is less than half a period of {self._period:g} s after "
-                f"{before[-1]:g} s; is the period right, does a new sequence begin?",
-            )
-        return time
+    def _whole(self, part: _Part) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]]:
+        self._used += len(part.rows)
+        if len(part.rows) >= 2:
+            times, cut, values = zip(*part.rows, strict=True)
+            yield np.array(times), np.array(cut), np.array(values)
+        else:
+            self.single += len(part.rows)
 
-    def _value(self, text: str, column: _Column, line: int) -> float:
+    def _skip(self, row: Row, reason: str, what: str) -> None:
+        self.skipped[_TORN if row.torn and reason != _NOT_RISING else reason] += row.lines
+        self._wrong = self._wrong or f"line {row.line}: {what}"
+
+    def _read(self, row: Row, table: Table, part: _Part) -> _Read:
+        """Return the ``row`` of a ``table``, the next one of ``part`` or of a new sequence; or raise _Unusable."""
+        fields_, width = row.fields, table.width
+        if len(fields_) != width and (len(fields_) < width or any(map(str.strip, fields_[width:]))):
+            what = f"expected {width} fields, got {len(fields_)} separated by {table.separator!r}"
+            raise _Unusable("wrong number of fields", what)
+        of_sequence, of_time, *places = table.places
+        sequence = "" if self._sequence is None else fields_[of_sequence].strip()
+        if self._time is None:
+            time = self._period * (part.passed if sequence == part.sequence else 0)
+        else:
+            time = self._number(fields_[of_time], self._time.column, table) * _SECONDS[self._time.unit]
+            step = time - self._before[1]
+            if sequence == self._before[0] and step >= 0:
+                self._steps[float(f"{step:.3g}")] += 1
+            self._before = sequence, time
+            if abs(time) > _LATEST:
+                raise _Unusable("out of range", f"column {self._time.column!r}: expected a time, got {time:g} s")
+        values = [
+            self._value(fields_[place], column, table) for place, column in zip(places, self._columns, strict=True)
+        ]
+        return _Read(fields_, sequence, time, values)
+
+    def _value(self, text: str, column: _Column, table: Table) -> float:
+        """Return what a field holds, in sensor units; or raise _Unusable."""
+        value = self._number(text, column.name, table)
+        if not column.low <= value <= column.high or (column.whole and value != round(value)):
+            kind = "-1, 0 or 1" if column.whole else f"{column.low:g} to {column.high:g}"
+            what = f"column {column.name!r}: expected {kind}, got {text.strip()[:40]}; is the unit right?"
+            raise _Unusable("out of range", what)
+        return column.factor * value + column.offset
+
+    def _number(self, text: str, name: str, table: Table) -> float:
+        given, marks = text, {mark for mark in text if mark in ",."}
+        if marks and table.separator != ",":
+            # Decimals may have a comma, for all of the file: what groups thousands is not taken for one.
+            self._decimal = self._decimal or (marks.copy().pop() if len(marks) == 1 else "")
+            text = text.replace(",", ".") if marks == {self._decimal} else ""
         try:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
-            raise self._wrong(line, f"column {column.name!r}: expected a finite number, got {text[:40]!r}")
-        if not column.low <= value <= column.high or (column.whole and value != round(value)):
-            kind = "-1, 0 or 1" if column.whole else f"{column.low:g} to {column.high:g}"
-            raise self._wrong(line, f"column {column.name!r}: expected {kind}, got {text[:40]}; is the unit right?")
-        return column.factor * value + column.offset
-
-    def _wrong(self, line: int, what: str) -> UnusableInput:
-        return UnusableInput(f"{self._path}: line {line}: {what}")
+        if math.isfinite(value):
+            return value
+        reason = "value missing" if given.strip().lower() in _MISSING else "not a number"
+        raise _Unusable(reason, f"column {name!r}: expected a finite number, got {given[:40]!r}")

@@ -180,9 +180,12 @@ def broken_off(
     if len(steps) < _SHORTEST:
         return None
     recorded = Recorded.from_steps(steps, spec, kind=kind, at_rest=at_rest, info=info)
-    last = int(recorded.step[-1])
-    reason = f"broke off here: {str(why) or type(why).__name__}"[:LONGEST_REASON]
-    return replace(recorded, marks=(Mark(last, last, reason),))
+    return replace(recorded, marks=(broken_at(int(recorded.step[-1]), why),))
+
+
+def broken_at(step: int, why: BaseException) -> Mark:
+    """Return the mark of the last ``step`` of a sequence that broke off, with ``why``."""
+    return Mark(step, step, f"broke off here: {str(why) or type(why).__name__}"[:LONGEST_REASON])
 
 
 def rows_of(recorded: Recorded, sequence: int = 0) -> Rows:

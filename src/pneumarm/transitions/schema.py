@@ -14,7 +14,7 @@ from typing import Self
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.files import written_whole
+from pneumarm.files import read_beginning, refuse_link, written_whole
 from pneumarm.transitions.database import (
     EXPECTED,
     VERSION,
@@ -274,10 +274,7 @@ def _connect(uri: str) -> sqlite3.Connection:
 
 def is_store(path: Path) -> bool:
     """Return whether ``path`` is a file that begins as those of stores do."""
-    if not path.is_file():
-        return False
-    with open(path, "rb") as file:
-        return file.read(len(_MAGIC)) == _MAGIC
+    return path.is_file() and read_beginning(path, "a store", len(_MAGIC)) == _MAGIC
 
 
 _MAGIC = b"SQLite format 3\0"
@@ -285,15 +282,9 @@ _MAGIC = b"SQLite format 3\0"
 
 def _check_header(path: Path) -> None:
     """Refuse what is plainly no store before SQLite, which would wait for or repair it, gets to see it."""
-    if not path.exists():
-        raise UnusableInput(f"{path}: no such file; {EXPECTED}")
-    if not path.is_file():
-        raise UnusableInput(f"{path}: {EXPECTED}, this is not a file")
-    try:
-        with open(path, "rb") as file:
-            header = file.read(100)
-    except OSError as error:
-        raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
+    header = read_beginning(path, EXPECTED.removeprefix("expected "), 100)
+    for suffix in ("-wal", "-shm", "-journal"):
+        refuse_link(path.with_name(path.name + suffix))
     if len(header) < 100 or not header.startswith(_MAGIC):
         raise UnusableInput(f"{path}: {EXPECTED}, this is something else")
     version, application = struct.unpack(">I4xI", header[60:72])

@@ -7,12 +7,14 @@ A sequence is written in one transaction and is durable when :meth:`Store.append
 number read at the same time. What databases differ in is behind :class:`~pneumarm.transitions.database.Database`.
 """
 
+import copy
 import json
 import math
 import time as wall_clock
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
+from itertools import chain
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
@@ -24,15 +26,18 @@ from pneumarm.address import Address, ServerAddress, StoreAddress, address_of
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.extras import extra
-from pneumarm.transitions.blocks import Blocks, Predicate
+from pneumarm.transitions.blocks import STEPS, Blocks, Predicate
+from pneumarm.transitions.choice import hashed_uniform
 from pneumarm.transitions.database import (
     LONGEST_SEQUENCE,
     Database,
     damaged,
     further_columns,
+    kept_json,
     pages,
     row_columns,
 )
+from pneumarm.transitions.doubtful import with_doubtful_marked
 from pneumarm.transitions.possible import row_values
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.rows import Mark, Recorded, Rows, joinable, unmarked
@@ -41,10 +46,12 @@ from pneumarm.transitions.schema import SqliteFile
 BLOCK = 200_000
 """Rows of a block, about; with one joint a block takes 20 MB."""
 
+MOST_USED = 400_000
+"""Transitions that a simulation is fitted to and judged by at most: twice as many as the thesis collects."""
+_DRAWN = 11  # seed of the draw of these, not that of what is held out
 
 SEQUENCE = ("number", "run", "kind", "at_rest", '"rows"', "transitions", "info")
 """Columns of the table of sequences."""
-_STEPS = 1 << 32  # more than any step of a sequence
 _ALL = (1, 1 << 62)  # the first and the last number of any sequence
 
 
@@ -60,6 +67,15 @@ class SequenceEntry(NamedTuple):
     info: dict[str, Any]
 
 
+class _Part(NamedTuple):
+    """What was drawn from a store."""
+
+    sequences: frozenset[int]
+    transitions: int
+    of: int
+    """Transitions of the whole store."""
+
+
 class Store:
     """A store, opened; a context manager. Iterating over it gives :class:`Rows`, block by block, again and again.
 
@@ -72,6 +88,8 @@ class Store:
         """Where it is; shown without a password."""
         self.database = database
         self._run: int | None = None
+        self._part: _Part | None = None
+        self._is_writing = False
         self.spec: ArmSpec
         """The arm that the rows are of."""
         self.valves: bool
@@ -110,6 +128,22 @@ class Store:
         place = address_of(address)
         with _kind(place).made_whole(place, spec, valves) as database:
             yield cls(database)
+
+    @classmethod
+    @contextmanager
+    def added_whole(cls, address: StoreAddress, spec: ArmSpec, valves: bool = True) -> "Iterator[Store]":
+        """Give the store at ``address``, made where there is none, to be added to: all that is written, or nothing.
+
+        Raises:
+            UnusableInput: it is of another arm; else as for :meth:`create` and :meth:`append_to`.
+
+        """
+        place = address_of(address)
+        is_there = _kind(place).is_there(place)
+        with cls.append_to(place) if is_there else cls.made_whole(place, spec, valves) as store:
+            store.check_arm(spec, valves)
+            with store.writing():
+                yield store
 
     @classmethod
     def append_to(cls, address: StoreAddress) -> "Store":
@@ -161,7 +195,32 @@ class Store:
     @property
     def transitions(self) -> int:
         """Number of transitions: rows with a command and the row of the next step, none of them marked."""
+        if self._part is not None:
+            return self._part.transitions
         return int(self._one("SELECT coalesce(sum(transitions), 0) FROM sequences"))
+
+    def drawn(self, most: int = MOST_USED) -> "Store":
+        """Return the store for reading as if it held ``most`` transitions: whole sequences, drawn evenly by lot.
+
+        One that holds no more is returned as it is. The same sequences are drawn again and again.
+        """
+        total = self.transitions
+        if self._part is not None or total <= most:
+            return self
+        pairs = chain.from_iterable(pages(self.database, "sequences", ("transitions",)))
+        number, transitions = np.fromiter(pairs, np.int64).reshape(-1, 2).T
+        order = np.argsort(hashed_uniform(_DRAWN, number))
+        order = order[np.cumsum(transitions[order]) <= most]
+        part = copy.copy(self)
+        part._part = _Part(frozenset(number[order].tolist()), int(transitions[order].sum()), total)
+        return part
+
+    @property
+    def used(self) -> list[str]:
+        """What to tell a person of how much is used of a store that was :meth:`drawn` from."""
+        if self._part is None:
+            return []
+        return [f"used {self._part.transitions:,} of {self._part.of:,} transitions, evenly drawn"]
 
     @property
     def sequences(self) -> int:
@@ -174,7 +233,10 @@ class Store:
         for number, of_run, kind, at_rest, rows, transitions, info in pages(
             self.database, "sequences", SEQUENCE[1:], where=where, values={"run": run} if where else {}
         ):
-            yield SequenceEntry(number, of_run, kind, bool(at_rest), rows, transitions, json.loads(info))
+            if self._part is not None and number not in self._part.sequences:
+                continue
+            about = kept_json(info, self.address, f"what sequence {number} is")
+            yield SequenceEntry(number, of_run, kind, bool(at_rest), rows, transitions, about)
 
     @property
     def keeps_marks(self) -> bool:
@@ -189,7 +251,10 @@ class Store:
     def runs(self) -> dict[int, dict[str, Any]]:
         """Return for each run its purpose, settings, arm, version of pneumarm and time of its beginning."""
         found = pages(self.database, "runs", ("purpose", "metadata"))
-        return {number: {"purpose": purpose, **json.loads(metadata)} for number, purpose, metadata in found}
+        return {
+            number: {"purpose": purpose, **kept_json(metadata, self.address, f"what run {number} is")}
+            for number, purpose, metadata in found
+        }
 
     def state(self, name: str = "arm") -> bytes | None:
         """Return the state last kept under ``name``, or None."""
@@ -213,7 +278,15 @@ class Store:
         ``sequences`` and ``kinds`` choose what is read. Marked rows are left out, which leaves a gap in the steps
         that no transition spans, unless ``marked`` asks for them. The result can be iterated over again and again.
         """
-        return Blocks(self, rows, sequences, kinds, marked)
+        if (part := self._part) is None:
+            return Blocks(self, rows, sequences, kinds, marked)
+        drawn = np.array(sorted(part.sequences), np.int64)
+
+        def among_drawn(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+            wanted: NDArray[np.bool_] = np.isin(numbers, drawn)
+            return wanted if sequences is None else wanted & sequences(numbers)
+
+        return Blocks(self, rows, among_drawn, kinds, marked)
 
     def marks(self, number: int | None = None) -> dict[int, list[Mark]]:
         """Return the marks of every sequence that has some, or of sequence ``number``, in the order of marking."""
@@ -222,20 +295,21 @@ class Store:
             found.setdefault(sequence, []).append(mark)
         return found
 
-    def marked_rows(self, run: int) -> dict[str, int]:
-        """Return how many rows of ``run`` are marked, by reason; a row with several marks counts for each reason."""
+    def marked_rows(self, run: int | None = None) -> dict[str, int]:
+        """Return how many rows of ``run``, or of all, are marked, by reason; one marked twice counts for both."""
         database = self.database
         if not self.keeps_marks:
             return {}
+        of_run = "" if run is None else "AND sequences.run = :run "
         with database.translated():
             found = list(
                 database.execute(
-                    f'SELECT marks.reason, count(DISTINCT "rows".sequence * {_STEPS} + "rows".step) FROM marks '
-                    "JOIN sequences ON sequences.number = marks.sequence AND sequences.run = :run "
+                    f'SELECT marks.reason, count(DISTINCT "rows".sequence * {STEPS} + "rows".step) FROM marks '
+                    f"JOIN sequences ON sequences.number = marks.sequence {of_run}"
                     'JOIN "rows" ON "rows".sequence = marks.sequence '
                     'AND "rows".step BETWEEN marks.first AND marks.last '
                     "GROUP BY marks.reason ORDER BY min(marks.rowid)",
-                    {"run": run},
+                    {} if run is None else {"run": run},
                 )
             )
         return {str(reason): int(rows) for reason, rows in found}
@@ -249,7 +323,7 @@ class Store:
             found = list(
                 database.execute(
                     "SELECT sequence, first, last, reason FROM marks WHERE sequence BETWEEN :first AND :last "
-                    "ORDER BY sequence, rowid",
+                    "GROUP BY sequence, first, last, reason ORDER BY sequence, min(rowid)",
                     {"first": first, "last": last},
                 )
             )
@@ -282,10 +356,11 @@ class Store:
 
     # ---- writing
 
-    def check_arm(self, spec: ArmSpec) -> None:
+    def check_arm(self, spec: ArmSpec, valves: bool = True) -> None:
         """Raise UnusableInput where what an arm of ``spec`` does cannot be added: the store is of another one."""
-        if not self.valves:
-            raise UnusableInput(f"{self.address}: holds continuous commands; collect into a store of its own")
+        if self.valves != valves:
+            held, given = ("valves or pulses", "continuous commands")[:: 1 if self.valves else -1]
+            raise UnusableInput(f"{self.address}: holds {held}, not {given}; give another store")
         # Nothing that is stored depends on the links: they may be measured, or measured again, while an arm is used.
         mine, kept = asdict(replace(spec, links=())), asdict(replace(self.spec, links=()))
         different = [f"{name} was {kept[name]!r}, is {mine[name]!r}" for name in kept if mine[name] != kept[name]]
@@ -329,27 +404,56 @@ class Store:
             return number
         return self.begin_run(purpose, settings)
 
-    def append(self, recorded: Recorded, state: Mapping[str, bytes] | None = None) -> int:
+    def append(self, recorded: Recorded, state: Mapping[str, bytes] | None = None, *, grows: bool = False) -> int:
         """Write a sequence, and states to go on from after it, and return its number: it is durable then.
+
+        Rows that no sound sensor gives are marked (:mod:`pneumarm.transitions.doubtful`), unless the sequence
+        ``grows`` (:meth:`extend`): whoever adds to it marks them when it is complete.
 
         Raises:
             UnusableInput: shapes or numbers are impossible; nothing was written.
             PneumarmError: the disk is full, read-only or broken; nothing of this sequence was written.
 
         """
-        return self.append_all([recorded], state)
+        return self.append_all([recorded], state, grows=grows)
 
-    def append_all(self, recorded: Iterable[Recorded], state: Mapping[str, bytes] | None = None) -> int:
+    def append_all(
+        self, recorded: Iterable[Recorded], state: Mapping[str, bytes] | None = None, *, grows: bool = False
+    ) -> int:
         """Write sequences in one transaction, all or none, and return the number of the last one."""
         with self.writing() as database:
             number = int(self._one("SELECT coalesce(max(number), 0) FROM sequences"))
             for one in recorded:
                 number += 1
-                self._insert(number, one)
+                self._insert(number, one, grows)
             for name, value in (state or {}).items():
                 database.execute("DELETE FROM state WHERE name = :name", {"name": name})
                 database.insert("state", ("name", "value"), [(name, value)])
         return number
+
+    def extend(self, number: int, more: Recorded) -> None:
+        """Add to sequence ``number``, in which nothing is marked; it is durable then.
+
+        ``more`` begins with the last row that is stored, now with its command. Who adds sees to it that
+        the sequence does not get longer than one may be.
+
+        Raises:
+            UnusableInput: the sequence does not end in that row, or what follows is impossible; nothing was written.
+            PneumarmError: as for :meth:`append`.
+
+        """
+        values = row_values(more, self.spec, self.further, self.valves)
+        query = 'SELECT step, time FROM "rows" WHERE sequence = :number ORDER BY step DESC LIMIT 1'
+        with self.writing() as database:
+            step, time = next(iter(database.execute(query, {"number": number})), (0, None))
+            if time != more.time[0]:
+                raise UnusableInput(f"{self.address}: sequence {number} does not end where this goes on")
+            last = {"number": number, "step": step}
+            database.execute('DELETE FROM "rows" WHERE sequence = :number AND step = :step', last)
+            self.insert_rows(np.full(len(more), number), more.step + step, values)
+            added = {"number": number, "more": len(more) - 1, "transitions": more.transitions}
+            query = 'UPDATE sequences SET "rows" = "rows" + :more, transitions = transitions + :transitions '
+            database.execute(query + "WHERE number = :number", added)
 
     def mark(self, number: int, marks: Iterable[Mark]) -> None:
         """Mark steps of sequence ``number``, so that nothing is learned from them; marks are never taken back.
@@ -397,8 +501,10 @@ class Store:
         if lines:
             self.database.insert("marks", ("sequence", "first", "last", "reason"), lines)
 
-    def _insert(self, number: int, one: Recorded) -> None:
+    def _insert(self, number: int, one: Recorded, grows: bool) -> None:
         values = row_values(one, self.spec, self.further, self.valves)
+        if not grows:
+            one = with_doubtful_marked(one, self.spec, self.valves)
         known = (number, self._run, one.kind, int(one.at_rest), len(one), one.transitions, _as_json(one.info))
         self.database.insert("sequences", SEQUENCE, [known])
         self._insert_marks(number, one.marks)
@@ -414,11 +520,21 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[Database]:
-        """Give the database within a transaction: durable when this ends well, rolled back when it does not."""
+        """Give the database within a transaction: durable when this ends well, rolled back when it does not.
+
+        Within another one it is part of that.
+        """
         if not self.database.writer:
             raise PneumarmError(f"{self.address}: was opened for reading; open it with Store.append_to to write")
-        with self.database.transaction():
+        if self._is_writing:
             yield self.database
+            return
+        self._is_writing = True
+        try:
+            with self.database.transaction():
+                yield self.database
+        finally:
+            self._is_writing = False
 
     # ---- checks
 
@@ -445,7 +561,8 @@ class Store:
         ((count, first, last, shortest, longest),) = self.database.execute(
             'SELECT count(*), min(number), max(number), min("rows"), max("rows") FROM sequences'
         )
-        if count and not (first == 1 and last == count and shortest >= 2 and longest <= LONGEST_SEQUENCE):
+        numbers = isinstance(shortest, int) and isinstance(longest, int)  # of SQLite they may be anything
+        if count and not (numbers and first == 1 and last == count and shortest >= 2 and longest <= LONGEST_SEQUENCE):
             raise damaged(self.address, "its sequences are not numbered from 1 or are of impossible lengths")
 
     def _one(self, query: str) -> Any:

@@ -74,9 +74,10 @@ def watched(
     watch: Watch | None,
     *,
     at_rest: bool,
+    keep: Callable[[Step], None] | None = None,
     broken: Callable[[list[Step], BaseException], None] | None = None,
 ) -> list[Step]:
-    """Return all ``steps`` of a control cycle, each seen by ``watch`` as it happens.
+    """Return all ``steps`` of a control cycle, each given to ``keep`` and seen by ``watch`` as it happens.
 
     ``broken`` is given the steps that there were where the cycle breaks off, and why, before that is raised.
     """
@@ -86,6 +87,8 @@ def watched(
     try:
         with closing(steps):  # the valves are closed now, and not when the traceback is forgotten
             for step in steps:
+                if keep is not None:
+                    keep(step)
                 if watch is not None:
                     watch.see(step.reading, step.valves)
                 seen.append(step)

@@ -51,6 +51,15 @@ def test_mapped_times_never_go_back_and_lie_in_their_exchange() -> None:
         last = found
 
 
+def test_mapped_times_do_not_go_back_when_more_is_known() -> None:
+    """The first reply came late, so that its time was taken for later than it was; the next tells."""
+    clock = BoardClock()
+    first = clock.map(1_000_000, 1.0, 1.1)
+    assert first == pytest.approx(1.05)
+    assert clock.map(1_010_000, 1.0095, 1.0105) == first
+    assert clock.map(1_200_000, 1.1995, 1.2005) == pytest.approx(1.2, abs=1e-3)
+
+
 def test_nothing_under_the_seam_asks_for_the_time_on_the_wall() -> None:
     for path in Path(pneumarm.arm.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):

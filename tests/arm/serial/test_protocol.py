@@ -1,6 +1,7 @@
 """The protocol in Python against its page, and against other people's COBS and CRC."""
 
 import random
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from pneumarm.arm.serial.protocol import (
     pack_valves,
     said_twice,
     stuff,
+    summed,
     unpack_valves,
     unstuff,
 )
@@ -179,6 +181,35 @@ def test_an_exchange_says_its_valves_twice() -> None:
         if (frame := decode(stuff(content + protocol.crc(content).to_bytes(2, "little")))) is not None:
             taken.append(frame.values)
     assert taken == sorted(map(said_twice, range(256)), key=lambda values: values[1])
+
+
+def test_a_pulse_s_values_are_summed_up() -> None:
+    """With its right CRC, a payload that differs from its sum in any bit, or in the order of its bytes, is none."""
+    good = wire.layout("PULSE").pack(*summed(7, wire.valves("OUT", "IN"), 300, 400, 0, 0))
+    payloads = [
+        bytes(b ^ (at == place) << bit for at, b in enumerate(good)) for place in range(12) for bit in range(8)
+    ]
+    payloads += [good[:2] + good[4:6] + good[2:4] + good[6:], good[1::-1] + good[2:], good]
+    taken = []
+    for payload in payloads:
+        content = bytes([Request.PULSE, 1, 2]) + payload
+        if decode(stuff(content + protocol.crc(content).to_bytes(2, "little"))) is not None:
+            taken.append(payload)
+    assert taken == [good]
+
+
+def test_a_stream_without_an_end_takes_no_memory() -> None:
+    splitter = Splitter()
+    tracemalloc.start()
+    try:
+        for _ in range(1000):
+            assert list(splitter.feed(b"\7" * 1000)) == []
+        assert tracemalloc.get_traced_memory()[0] < 10_000
+    finally:
+        tracemalloc.stop()
+    frame = encode(Request.READ, 1)
+    assert [one.kind for one in splitter.feed(b"\0" + frame)] == [Request.READ]
+    assert splitter.corrupt == 1
 
 
 def test_every_byte_of_valves() -> None:

@@ -82,12 +82,13 @@ class Wired:
         return all(valve == -1 for joint in self.applied for valve in joint)
 
 
-def wired(seed: int = 1, period: float = 1 / 30, version: int = VERSION) -> Wired:
+def wired(seed: int = 1, period: float = 1 / 30, version: int = VERSION, cut_off: float | None = None) -> Wired:
     muscles = WatchedArm(seed)
     board = EmulatedBoard(muscles, version)
     line = WatchedLine(board, muscles)
     faulty = FaultyLine(line)
-    return Wired(muscles, board, line, faulty, SerialArm(faulty, replace(muscles.spec, period=period)))
+    arm = SerialArm(faulty, replace(muscles.spec, period=period), cut_off=cut_off)
+    return Wired(muscles, board, line, faulty, arm)
 
 
 def all_valves(arm: Arm, value: int) -> np.ndarray:

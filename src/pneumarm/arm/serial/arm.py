@@ -370,7 +370,7 @@ class SerialArm(Arm):
         self._armed = False
         raise ArmFailure(
             f"{self.spec.name}: the board heard nothing for a quarter of a second and vented all muscles; "
-            "this computer was too busy or asleep"
+            "this computer was too busy or asleep, or the line or the board was silent for so long"
         )
 
     def link_counts(self) -> dict[str, int]:

@@ -1,18 +1,25 @@
 """One request at a time over a line: asked again until it is answered, and given up when the board is gone."""
 
+import logging
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from pneumarm.arm.serial.line import Line
-from pneumarm.arm.serial.pace import FEWEST, Pace
+from pneumarm.arm.serial.pace import Pace
 from pneumarm.arm.serial.protocol import ANSWER, DEAD_MAN_MS, SEQUENCES, Frame, Reply, Request, Splitter, encode
 from pneumarm.errors import ArmFailure
 
-GIVE_UP = DEAD_MAN_MS / 1e3
-"""Silence after which any link is lost [s]: by then the board has vented the arm by itself."""
+DEAD_MAN = DEAD_MAN_MS / 1e3
+"""Time after which a board that hears nothing vents the arm by itself [s]."""
+GIVE_UP = 0.9 * DEAD_MAN
+"""Silence after which a link is lost [s]: just within the dead-man, which counts from the request before. Boards,
+lines and computers are busy elsewhere for less; that is noticed after a control period, and counted."""
+FEWEST = 3
+"""... but never after fewer attempts: a host that was stopped itself has not listened."""
+_log = logging.getLogger("pneumarm")
 MOMENT = 1e-9
 """Times closer than this [s] are the same: a clock that is computed may end a step of its numbers early."""
-_ADVICE = f"it vents all muscles by itself after {GIVE_UP:g} s. Look at plug and power"
+_ADVICE = f"it vents all muscles by itself after {DEAD_MAN:g} s. Look at plug and power"
 
 
 @dataclass
@@ -49,8 +56,8 @@ class Link:
     The attempt before is stale from then on, in case it still comes; an answer to it is as good. Replies of other
     sequences are dropped.
 
-    A line that fails, or a board that is silent for too long (:class:`~pneumarm.arm.serial.pace.Pace`, or
-    :data:`GIVE_UP` at the latest), makes the link ``lost``: nothing more is sent until :meth:`begin`.
+    A board that is silent for a control period is counted, and told of the first time. A line that fails, or a board
+    that is silent for :data:`GIVE_UP`, makes the link ``lost``: nothing more is sent until :meth:`begin`.
 
     Args:
         line: carries the bytes.
@@ -117,15 +124,18 @@ class Link:
             asked = sent[self._sequence] = self.line.now()
             self.line.write(encode(request, self._sequence, *values))
             timeout = self._pace.timeout if wait is None else wait
-            answer = self._listen(kinds, sent, asked + timeout)
+            until, due = asked + timeout, begun + self._period
+            if wait is None and asked < due - MOMENT < until:
+                until = due  # no later is it noticed that the board is late
+            answer = self._listen(kinds, sent, until)
             silence = self.line.now() - begun
-            self.counts.silences += silence >= self._period > asked - begun
+            if wait is None and silence >= self._period - MOMENT > asked - begun:
+                self._note_silence()
             if answer is not None:
                 self.counts.requests += 1
-                self._pace.answered(answer.received - answer.sent, silence, len(sent))
+                self._pace.answered(answer.received - answer.sent)
                 return answer
-            late = silence >= GIVE_UP and len(sent) >= FEWEST
-            if wait is not None or late or self._pace.hopeless(silence, len(sent)):
+            if wait is not None or (silence >= GIVE_UP and len(sent) >= FEWEST):
                 raise self.lose(f"the board has not answered for {silence:.2f} s; {_ADVICE}")
             self.counts.retries += 1
 
@@ -142,6 +152,12 @@ class Link:
                     self.counts.foreign += 1
             if answer is not None or received >= until - MOMENT:
                 return answer
+
+    def _note_silence(self) -> None:
+        """Count that the board is late; say so the first time, for it says nothing of that itself."""
+        self.counts.silences += 1
+        if self.counts.silences == 1:
+            _log.warning("%s: the board is late, and asked again for up to %g s", self._name, GIVE_UP)
 
     def lose(self, why: str) -> ArmFailure:
         """Ask nothing more until :meth:`begin`, and return the failure to raise."""

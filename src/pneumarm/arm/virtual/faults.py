@@ -16,7 +16,6 @@ it cannot play; the virtual arm has no link and refuses the faults of one by nam
 """
 
 import math
-import tomllib
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -24,6 +23,7 @@ from typing import Any, Literal
 import msgspec
 
 from pneumarm.errors import UnusableInput
+from pneumarm.files import read_toml
 from pneumarm.settings import Valid, validate
 
 LINK_KINDS = (
@@ -349,13 +349,7 @@ def read_plan(path: Path | str) -> Plan:
         UnusableInput: it cannot be read, or holds something else; the message says which table.
 
     """
-    path = Path(path)
-    try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise UnusableInput(f"{path}: is larger than any plan of faults")
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise UnusableInput(f"{path}: expected a TOML file with a plan of faults ({error})") from error
+    table = read_toml(path, "a TOML file with a plan of faults")
     tables = table.pop("fault", None)
     if table or not isinstance(tables, list):
         raise UnusableInput(f"{path}: expected tables [[fault]] and nothing else, got {', '.join(table) or 'none'}")

@@ -22,6 +22,7 @@ import msgspec
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.registry import PLACES, experiment
 from pneumarm.experiments.results import RESULTS
+from pneumarm.files import read_bytes
 from pneumarm.report.page import Section, Table
 
 FEWEST_ARMS, FEWEST_RUNS = 5, 16
@@ -140,8 +141,8 @@ def read_results(laboratory: Path) -> dict[str, Results]:
     found = {}
     for path in sorted(laboratory.glob(f"*/{RESULTS}")):
         try:
-            results = msgspec.json.decode(path.read_bytes(), type=Results)
-        except (OSError, msgspec.DecodeError) as error:
+            results = msgspec.json.decode(read_bytes(path, "results of an experiment"), type=Results)
+        except (msgspec.DecodeError, RecursionError) as error:
             raise UnusableInput(f"{path}: expected results of an experiment ({error}); run it again") from error
         found[results.experiment] = results
     if not found:

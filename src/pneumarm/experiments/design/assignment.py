@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.design.arrays import OrthogonalArray, orthogonal_array
+from pneumarm.files import read_toml
 
 Level = float | int | str
 
@@ -200,15 +202,17 @@ class _DesignFile(msgspec.Struct, forbid_unknown_fields=True):
     interactions: tuple[str, ...] = ()
 
 
-def parse_design(text: str, source: str) -> Design:
-    """Return the design in the TOML ``text`` of a file ``source``; see :func:`load_design`."""
+_EXPECTED = (
+    "a design: array = 'L16', interactions = ['ab', ...] and for each factor a table [[factors]] with label, name, "
+    "levels and perhaps column"
+)
+
+
+def _design_of(tables: dict[str, Any], source: str) -> Design:
     try:
-        read = msgspec.convert(tomllib.loads(text), _DesignFile)
-    except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
-        raise UnusableInput(
-            f"{source}: expected a design: array = 'L16', interactions = ['ab', ...] and for each factor a table "
-            f"[[factors]] with label, name, levels and perhaps column; {error}"
-        ) from error
+        read = msgspec.convert(tables, _DesignFile)
+    except msgspec.ValidationError as error:
+        raise UnusableInput(f"{source}: expected {_EXPECTED}; {error}") from error
     return assign(orthogonal_array(read.array), read.factors, read.interactions)
 
 
@@ -219,17 +223,13 @@ def load_design(path: Path) -> Design:
         UnusableInput: it cannot be read or is no design.
 
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UnusableInput(f"{path}: the design cannot be read ({error})") from error
-    return parse_design(text, str(path))
+    return _design_of(read_toml(path, _EXPECTED), str(path))
 
 
 def packaged_design(package: str) -> Design:
     """Return the design ``design.toml`` that lies in ``package``."""
     file = resources.files(package) / "design.toml"
-    return parse_design(file.read_text(encoding="utf-8"), f"{package}/design.toml")
+    return _design_of(tomllib.loads(file.read_text(encoding="utf-8")), f"{package}/design.toml")
 
 
 def thesis_design() -> Design:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
+from pneumarm.files import read_text
 
 _EXPECTED = "expected a table with the header trial,run 1,...,run n and a row a trial"
 
@@ -36,7 +37,10 @@ def parse_table(text: str, source: str, columns: str | None = None) -> ResultTab
         UnusableInput: it is no such table.
 
     """
-    lines = [line for line in csv.reader(text.splitlines()) if any(cell.strip() for cell in line)]
+    try:
+        lines = [line for line in csv.reader(text.splitlines()) if any(cell.strip() for cell in line)]
+    except csv.Error as error:
+        raise UnusableInput(f"{source}: {_EXPECTED}; {error}") from error
     if len(lines) < 2 or len(lines[0]) < 2:
         first = f", the first {','.join(lines[0])!r}" if lines else ""
         raise UnusableInput(f"{source}: {_EXPECTED}, separated by commas; it has {len(lines)} lines{first}")
@@ -68,12 +72,7 @@ def parse_table(text: str, source: str, columns: str | None = None) -> ResultTab
 
 def read_table(path: Path, columns: str | None = None) -> ResultTable:
     """Return the table in the file ``path``, see :func:`parse_table`."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
-        raise UnusableInput(f"{path}: {_EXPECTED}, but it cannot be read ({reason})") from error
-    return parse_table(text, str(path), columns)
+    return parse_table(read_text(path, _EXPECTED.removeprefix("expected ")), str(path), columns)
 
 
 def packaged_table(package: str, name: str) -> NDArray[np.float64]:

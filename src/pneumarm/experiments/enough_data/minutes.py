@@ -1,6 +1,5 @@
 """Minutes of collecting: parts of one collection, each with its simulation."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,7 +23,7 @@ from pneumarm.experiments.there_and_back import (
     train_and_move,
 )
 from pneumarm.experiments.words import words_of
-from pneumarm.files import write_json
+from pneumarm.files import read_json, write_json
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, Store, new_cells
@@ -72,13 +71,13 @@ class EnoughData(ThereAndBack):
                 fitted.simulation.save(file)
                 figures = {"transitions": transitions, "minutes": took, "new": found.share, **judged}
                 write_json(kept, {"sequences": sequences, "figures": figures})
-            found = json.loads(kept.read_text(encoding="utf-8"))
+            known = read_json(kept, "figures of a part of a recording")
             simulation = Simulation.load(file)
             with Store.open(whole / STORE) as store:
-                first = [entry.number for entry in store.catalogue()][: found["sequences"]]
+                first = [entry.number for entry in store.catalogue()][: known["sequences"]]
                 part = store.blocks(kinds=KINDS, sequences=partial(np.isin, test_elements=first))
                 begin = begin_states(part, simulation.window, simulation.scaling, simulation.spec)
-            made.append(Prepared(arm, recipe, whole, simulation, begin, found["figures"]))
+            made.append(Prepared(arm, recipe, whole, simulation, begin, known["figures"]))
         return made
 
     def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:

@@ -1,6 +1,5 @@
 """What is rehearsed beside a run: every stage, on made-up data, of arms of any kind; once for each cache."""
 
-import os
 import signal
 import sys
 from pathlib import Path

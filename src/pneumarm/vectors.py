@@ -102,8 +102,8 @@ def _tile(rows: int, vectors: int, lanes: int = LANES, anew: bool = False) -> An
     """Return, for kernels, a sum over inputs in ``rows`` times ``vectors`` of so many ``lanes``, held in registers.
 
     ``add(count, weights, w, w_input, w_row, x, e, x_input, out, o, o_row)`` adds to ``out``, for each row and each
-    of the ``vectors * lanes`` columns, the sum over ``count`` inputs of weights times ``x``; where it sums ``anew``, it
-    replaces what is there. After each array come the place of the first number in its memory and the steps from input
+    of the ``vectors * lanes`` columns, the sum over ``count`` inputs of weights times ``x``; ``anew``, it puts
+    the sum there. After each array come the place of the first number in its memory and the steps from input
     to input, and from row to row.
     """
 

@@ -211,7 +211,7 @@ def _is_extended() -> bool:
 
 
 EXTENDED = _is_extended()
-"""Whether code made by hand is right with this version of Numba, as tried here; otherwise loops are plain and slower."""
+"""Whether code made by hand is right with this version of Numba, as tried here; else loops are plain and slower."""
 
 
 def _same(value):  # type: ignore[no-untyped-def]

@@ -4,8 +4,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 INSTALLED := $(VENV)/.installed
+PYTHON311 ?= python3.11
+LOWEST := .venv-lowest
 
-.PHONY: setup run test lint bench held-out baselines soak mutants walk site clean
+.PHONY: setup run test lint bench held-out baselines soak mutants walk lowest site clean
 
 setup: $(READY)
 
@@ -50,9 +52,15 @@ mutants: setup  ## changes the program in one place at a time: tests must fail; 
 walk: setup  ## a new user's walk: the wheel in a fresh environment, every command of the README; takes minutes
 	$(BIN)/python -m pytest -m walk -s
 
+lowest:  ## the quick tests with Python 3.11 and the oldest versions that are allowed, without extras; after changes of kernels
+	test -x $(LOWEST)/bin/python || $(PYTHON311) -m venv $(LOWEST)
+	sed -n '/^dependencies/,/^]/s/^ *"\([a-z0-9-]*\)>=\([0-9.]*\).*/\1==\2/p' pyproject.toml > $(LOWEST)/oldest.txt
+	$(LOWEST)/bin/pip install --quiet --disable-pip-version-check --constraint $(LOWEST)/oldest.txt --editable . pytest hypothesis psutil
+	$(LOWEST)/bin/python -m pytest tests/test_kernels.py tests/test_vectors.py tests/test_public_interfaces.py tests/arm/test_*.py tests/networks tests/simulation tests/task tests/planning tests/transitions/test_store.py tests/transitions/test_window.py
+
 site: setup  ## the documentation as pages to be read in a browser, into site/
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	$(BIN)/python -m mkdocs build
 
 clean:
-	rm -rf $(VENV) runs site .mutants .pytest_cache .ruff_cache .mypy_cache
+	rm -rf $(VENV) $(LOWEST) runs site .mutants .pytest_cache .ruff_cache .mypy_cache

@@ -105,7 +105,7 @@ class SimulatedPointToPoint(Copied, gymnasium.Env[Observation, Any]):
         self._numbered = numbered(simulation.spec)
         self._count = len(self._numbered)
         self.observation_space = cast("Space[Observation]", simulated_space(simulation, begin))
-        self._scalar = window.joints == 1
+        self._scalar, self._is_new = window.joints == 1, True
         self._actions = np.zeros((1, window.joints), np.int64)
 
     def _remake(self) -> None:
@@ -116,12 +116,12 @@ class SimulatedPointToPoint(Copied, gymnasium.Env[Observation, Any]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin a movement; ``options={"goal": [counts]}`` or ``{"goal_deg": [degrees]}`` chooses its goal."""
         goal = chosen_goal(options, self.simulation.spec, self._world.task.goal_range)
-        first = self._np_random is None
         super().reset(seed=seed)
         if seed is not None:
             self._many.random[0] = random_state(seed)
-        elif first:
+        elif self._is_new:
             self._many.random[0] = random_state(int(self.np_random.integers(2**63)))
+        self._is_new = False
         _begin(self._handle)
         if goal is not None:
             self._set_goal(goal)

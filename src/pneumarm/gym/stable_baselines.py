@@ -58,14 +58,20 @@ class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
         self._reward_scale = reward_scale
         self._actions: Array = np.zeros(0, np.int64)
         self.render_mode = None
+        self._given: list[int] | None = None
         super().__init__(many.num_envs, many.single_observation_space, many.single_action_space)
 
     def reset(self) -> Array:
         """Begin all movements; seeds of :meth:`seed` are used once."""
-        seeds = [seed for seed in self._seeds if seed is not None]
-        observed, _ = self._many.reset(seed=seeds if len(seeds) == self.num_envs else None)
-        self._reset_seeds()
+        observed, _ = self._many.reset(seed=self._given)
+        self._given = None
         return observed
+
+    def seed(self, seed: int | None = None) -> list[int]:
+        """Have the next reset begin from ``seed``, one drawn unless it is given, and those after it."""
+        first = int(np.random.default_rng().integers(2**32)) if seed is None else seed
+        self._given = list(range(first, first + self.num_envs))
+        return self._given
 
     def step_async(self, actions: Array) -> None:
         """Remember ``actions``."""
@@ -90,7 +96,7 @@ class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Return an attribute of the whole for each movement; AttributeError where it has none of this name."""
-        return [getattr(self._many, attr_name) for _ in self._get_indices(indices)]
+        return [getattr(self._many, attr_name) for _ in range(self._count(indices))]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refuse: movements have no attributes of their own."""
@@ -102,7 +108,10 @@ class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Return that none is wrapped."""
-        return [False for _ in self._get_indices(indices)]
+        return [False for _ in range(self._count(indices))]
+
+    def _count(self, indices: Any) -> int:
+        return self.num_envs if indices is None else np.size(indices)
 
 
 def imported(model: Any, simulation: Simulation, settings: TrainSettings | None = None) -> ImportedPolicy:

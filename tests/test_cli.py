@@ -305,7 +305,7 @@ def test_json_is_one_object_on_stdout_and_nothing_else(
     out = ("--out", tmp_path / "t", "--episodes", 3, "--test-episodes", 4)
     moved = asked("transfer", agent, "--arm", "virtual:seed=3", *out)
     assert figures <= moved["before"].keys()  # type: ignore[attr-defined]
-    assert Outcome(capsys, "versions", tmp_path / "t").is_refused("adaptation.json", "adapts between movements")
+    assert Outcome(capsys, "versions", tmp_path / "t").is_refused("adaptation.json", "whose agent adapts")
     out = ("--out", tmp_path / "p", "--episodes", 3, "--test-episodes", 4)
     assert asked("transfer", tmp_path / "agent", "--arm", "virtual:seed=3", *out)["version"] == 0
     listed = asked("versions", tmp_path / "p", "--to", 0)

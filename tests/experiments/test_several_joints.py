@@ -133,7 +133,7 @@ def test_another_arm_has_no_simulation_of_one_joint(material: Prepared) -> None:
 
 def made_up(chosen: SeveralJoints, figures: dict[str, dict[int, float]]) -> TrialRows:
     """Return rows of five arms in which figures have the value given for a trial, else 1."""
-    columns = [*chosen.words.columns]
+    columns = [column for section in chosen.words.sections for column in section.columns]
     names = {column.figure for column in columns} | {"reward", "episodes", "success_rate", *figures}
     return sorted_rows(
         Row(f"arm {arm}", trial, 1, {n: figures.get(n, {}).get(trial, 1.0) * (1 + 1e-3 * arm) for n in names}, 0.0)

@@ -1,21 +1,23 @@
 """What an experiment is: trials as data, a measurement of one trial in one run, and an analysis of the rows."""
 
 import importlib
+import importlib.util
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
+from pneumarm.experiments.differences import Verdict
+from pneumarm.experiments.words import Words
 from pneumarm.settings import Settings, Valid
 
 if TYPE_CHECKING:
-    from pneumarm.experiments.words import Words
     from pneumarm.report.page import Section
 
 Figures = Mapping[str, float]
@@ -126,7 +128,7 @@ class Claim:
     """Its evidence."""
     ours: str
     """Ours, with an interval where there is one."""
-    verdict: Literal["holds", "does not hold", "open"]
+    verdict: Verdict
     about: str
     """Which of the thesis' conclusions it is about, by its key in ``claims/conclusions.toml``."""
 
@@ -144,12 +146,24 @@ class Analysis:
     claims: Sequence[Claim] = field(default=())
 
 
+class Axis(NamedTuple):
+    """Trials in the order of a quantity."""
+
+    label: str
+    """With its unit."""
+    places: Sequence[float]
+    """Of the trials, from left to right."""
+    ticks: Sequence[str] | None = None
+    """What is written there; by default the places."""
+    log: bool = False
+
+
 class Experiment(ABC):
     """An experiment of the laboratory. It is sent to other processes, so it must be data."""
 
     name: str
     """On the command line."""
-    words: "Words"
+    words: Words
     runs: int
     """By default."""
     arms: tuple[str, ...] = ("virtual",)
@@ -186,14 +200,20 @@ class Experiment(ABC):
         """Return for how long the arm is left alone meanwhile [s]."""
         return 0.0
 
+    @property
+    def axis(self) -> Axis | None:
+        """Where pictures have the first trials of a section; None where trials are no places on an axis."""
+        return None
+
     def analyse(self, rows: TrialRows) -> Analysis:
         """Return what the complete ``rows`` say; runs nothing.
 
-        By default the module ``analysis`` beside that of the experiment knows; it is imported here, so that processes
-        that compute rows need no pictures.
+        The module ``analysis`` in the experiment's folder knows, if it has one, otherwise the common one. It is
+        imported here, so that processes that compute rows need no pictures.
         """
-        package = type(self).__module__.rpartition(".")[0]
-        found: Analysis = importlib.import_module(f"{package}.analysis").analysis(self, rows)
+        own = f"{type(self).__module__.rpartition('.')[0]}.analysis"
+        place = own if importlib.util.find_spec(own) else "pneumarm.experiments.analysis"
+        found: Analysis = importlib.import_module(place).analysis(self, rows)
         return found
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
 from pneumarm.experiments.there_and_back import (
     MOVEMENTS,
     TRAINING,
@@ -53,6 +53,11 @@ class ControlFrequency(ThereAndBack):
     def trials(self) -> Mapping[int, str]:
         """The frequencies."""
         return {trial: f"{frequency:g} Hz" for trial, frequency in enumerate(self.frequencies, 1)}
+
+    @property
+    def axis(self) -> Axis:
+        """The frequencies."""
+        return Axis("control frequency [Hz]", self.frequencies)
 
     def train_settings(self, trial: int) -> TrainSettings:
         """Return the settings of the training in ``trial``."""

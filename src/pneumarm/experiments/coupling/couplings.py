@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pneumarm.arm.open import with_options
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
 from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned, of_several
 from pneumarm.experiments.there_and_back import Prepared
 from pneumarm.experiments.words import words_of
@@ -28,6 +28,11 @@ class Coupling(SeveralJoints):
         """By who learns and the share."""
         lessons = dict(zip(_WHO, (Lesson(self.policy), Lesson(self.thesis, goals="middle")), strict=True))
         return {f"{who}, {share:g}": lesson for who, lesson in lessons.items() for share in self.shares}
+
+    @property
+    def axis(self) -> Axis:
+        """The shares."""
+        return Axis("share of the coupling [-]", self.shares)
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
         """Return a simulation of the arm with each share of its coupling.

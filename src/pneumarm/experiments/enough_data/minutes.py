@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     MOVEMENTS,
@@ -44,6 +44,11 @@ class EnoughData(ThereAndBack):
     def trials(self) -> Mapping[int, str]:
         """The minutes."""
         return {trial: f"{minutes:g} min" for trial, minutes in enumerate(self.minutes, 1)}
+
+    @property
+    def axis(self) -> Axis:
+        """The minutes."""
+        return Axis("collecting [min]", self.minutes, log=True)
 
     def settings(self) -> Any:
         """Return minutes and training."""

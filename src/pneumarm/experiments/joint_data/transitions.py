@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pneumarm.arm.open import with_options
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
 from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned, of_several
 from pneumarm.experiments.there_and_back import Prepared, prepared
 from pneumarm.experiments.words import words_of
@@ -35,6 +35,11 @@ class JointData(SeveralJoints):
     def trials(self) -> Mapping[int, str]:
         """The transitions, and one joint."""
         return {**super().trials, self.alone: f"one joint, {self.sizes[-1]:,}"}
+
+    @property
+    def axis(self) -> Axis:
+        """The transitions."""
+        return Axis("transitions [1000]", [size / 1000 for size in self.sizes], log=True)
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
         """Return a simulation of each number of transitions, and of a virtual arm one of an arm of one joint."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
@@ -125,6 +125,11 @@ class StateHistory(ThereAndBack):
         """Histories, first without and then with the period."""
         words = [_called(history) for history in self.histories]
         return dict(enumerate([*words, *(f"{one}, and the step's length" for one in words)], 1))
+
+    @property
+    def axis(self) -> Axis:
+        """The histories."""
+        return Axis("observations in the state [-]", self.histories)
 
     def settings(self) -> Any:
         """Return histories, fit and training."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import guarded
 from pneumarm.control import BEGIN
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.there_and_back import (
     TRAINING,
     Prepared,
@@ -73,6 +73,11 @@ class ValvesClosed(ThereAndBack):
     def trials(self) -> Mapping[int, str]:
         """The two ways."""
         return {OPEN: "left as they are", CLOSED: "closed while computing"}
+
+    @property
+    def axis(self) -> Axis:
+        """The two ways."""
+        return Axis("valves while computing", (0.0, 1.0), ("left", "closed"))
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of each way."""

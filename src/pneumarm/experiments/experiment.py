@@ -164,9 +164,9 @@ class Experiment(ABC):
     name: str
     """On the command line."""
     words: Words
-    runs: int
+    runs: int = 4
     """By default."""
-    arms: tuple[str, ...] = ("virtual",)
+    arms: tuple[str, ...] = ARMS
     """By default."""
     records: ClassVar[bool] = False
     """Whether it is prepared by recording the arm, as :func:`pneumarm.experiments.preparation.simulated` does."""

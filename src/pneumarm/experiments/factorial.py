@@ -55,13 +55,14 @@ class Said(NamedTuple):
     """Or std: whether the runs spread more."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Factorial(Trainings):
     """Trainings by an orthogonal array, each tested; all criteria of section 5.2."""
 
     name: str
     words: Words
     runs: int
+    arms = ("virtual",)
     design: Design
     base: TrainSettings
     """What no factor sets."""

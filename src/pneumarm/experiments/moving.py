@@ -2,7 +2,6 @@
 
 import functools
 import threading
-from abc import abstractmethod
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.virtual import ArmParameters, VirtualArm
 from pneumarm.control.movement import BEGIN, drawn
 from pneumarm.control.turns import player
-from pneumarm.experiments.experiment import ARMS, Experiment, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import Agent, Exploration, TrainSettings
 from pneumarm.learning.online.testing import GREEDY, run_test
@@ -58,15 +57,21 @@ class Material:
 
 
 @dataclass(frozen=True)
+class TestSizes:
+    """How much agents are tested in a row."""
+
+    test: int = 300
+    """Movements on the arm."""
+
+
+@dataclass(frozen=True)
 class OnTheArm(Experiment):
     """An experiment in which agents move the arm, by default that of a run in all its trials."""
 
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
     agent: TrainSettings = THESIS
     """How it learned."""
-    sizes: Any = None
-    """How much is moved in a row: a dataclass of each experiment's own."""
+    sizes: Any = TestSizes()
+    """How much is moved in a row, by default a test; a dataclass."""
 
     records = True
 
@@ -78,33 +83,9 @@ class OnTheArm(Experiment):
         """Return the arm and its simulation."""
         return Material(arm, simulated(arm, folder, settings, progress))
 
-
-@dataclass(frozen=True)
-class TestSizes:
-    """How much agents are tested in a row."""
-
-    test: int = 300
-    """Movements on the arm."""
-
-
-@dataclass(frozen=True)
-class AgentsByTrial(OnTheArm):
-    """An experiment in which every trial has an agent of its own, tested in the simulation and on the arm."""
-
-    sizes: TestSizes = TestSizes()
-
     def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
         """Return those of the test."""
-        return self.sizes.test
-
-    @abstractmethod
-    def train_settings(self, trial: int) -> TrainSettings:
-        """Return how the agents of ``trial`` learn."""
-
-    def settings(self) -> Any:
-        """Return the settings of all agents and the sizes."""
-        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
-        return {"agents": agents, "sizes": asdict(self.sizes)}
+        return int(self.sizes.test)
 
 
 def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Arm:

@@ -1,6 +1,6 @@
 """What experiments of chapter 6 share: arms of two joints, and agents that learn one goal or all of them.
 
-They go from an arm and back to it as those of :mod:`.there_and_back` do. What a trial learns is a :class:`Lesson`.
+They go from an arm and back to it with :mod:`.there_and_back`. What a trial learns is a :class:`Lesson`.
 """
 
 import zlib
@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.there_and_back import (
     BEFORE,
     MOVEMENTS,
     Prepared,
     Recipe,
-    ThereAndBack,
     opened,
     prepared,
     train_and_move,
@@ -56,7 +55,7 @@ class Lesson:
 
 
 @dataclass(frozen=True)
-class SeveralJoints(ThereAndBack):
+class SeveralJoints(Experiment):
     """An experiment on arms of several joints, by default of two, in which every trial is a lesson."""
 
     runs: int = 1

@@ -7,13 +7,12 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report
 from pneumarm.experiments.there_and_back import (
     MOVEMENTS,
     TRAINING,
     TRANSITIONS,
     Prepared,
-    ThereAndBack,
     prepared,
     train_and_move,
     usual,
@@ -41,7 +40,7 @@ def at_frequency(settings: TrainSettings, frequency: float) -> TrainSettings:
 
 
 @dataclass(frozen=True)
-class ControlFrequency(ThereAndBack):
+class ControlFrequency(Experiment):
     """The whole job at several frequencies."""
 
     frequencies: tuple[float, ...] = _FREQUENCIES

@@ -9,14 +9,13 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     MOVEMENTS,
     TRAINING,
     Prepared,
     Recipe,
-    ThereAndBack,
     collected,
     place,
     quality,
@@ -32,7 +31,7 @@ _MINUTES = (1.7, 5.0, 10.0, 20.0, 50.0, 110.0, 220.0)
 
 
 @dataclass(frozen=True)
-class EnoughData(ThereAndBack):
+class EnoughData(Experiment):
     """The whole job after more and more minutes of collecting."""
 
     minutes: tuple[float, ...] = _MINUTES

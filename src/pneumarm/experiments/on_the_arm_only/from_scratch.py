@@ -70,7 +70,7 @@ class OnTheArmOnly(OnTheArm):
 
     name = "on-the-arm-only"
     words = words_of(__package__)
-    runs: int = 1
+    runs = 1
     agent: TrainSettings = ONE
     sizes: FromScratchSizes = FromScratchSizes()
 

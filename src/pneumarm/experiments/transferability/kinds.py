@@ -1,14 +1,16 @@
 """Kinds of agents by how they learned, each in the simulation and on the arm."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
+
+import msgspec
 
 from pneumarm.experiments.experiment import Figures, LaboratorySettings
 from pneumarm.experiments.moving import (
     SIMULATION,
-    AgentsByTrial,
     Material,
+    OnTheArm,
     agent_of,
     greedy_test,
     means,
@@ -32,7 +34,7 @@ KINDS: Mapping[int, tuple[str, dict[str, Any]]] = {
 
 
 @dataclass(frozen=True)
-class Transferability(AgentsByTrial):
+class Transferability(OnTheArm):
     """Agents that learned in different ways, in the simulation and on the arm."""
 
     name = "transferability"
@@ -46,6 +48,11 @@ class Transferability(AgentsByTrial):
     def train_settings(self, trial: int) -> TrainSettings:
         """Return how the agents of ``trial`` learn."""
         return replace(self.agent, **KINDS[trial][1])
+
+    def settings(self) -> Any:
+        """Return the settings of all agents and the sizes."""
+        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
+        return {"agents": agents, "sizes": asdict(self.sizes)}
 
     def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train, and move in the simulation and on the arm."""

@@ -7,24 +7,17 @@ from typing import Any
 
 from pneumarm.arm.open import with_options
 from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
-from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned, of_several
+from pneumarm.experiments.several_joints import POLICY, Lesson, SeveralJoints, learned, of_several
 from pneumarm.experiments.there_and_back import Prepared, prepared
 from pneumarm.experiments.words import words_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JointData(SeveralJoints):
     """Simulations of more and more transitions, and one of one joint."""
 
-    sizes: tuple[int, ...] = (3_000, 6_000, 12_000, 24_000)
+    sizes: tuple[int, ...]
     """Transitions, in ascending order; the laboratory's number does not shorten them: they are the question."""
-    name: str = "joint-data"
-    words = words_of(__package__)
-
-    @property
-    def lessons(self) -> Mapping[str, Lesson]:
-        """By the transitions."""
-        return {f"{size:,}": Lesson(self.policy) for size in self.sizes}
 
     @property
     def alone(self) -> int:
@@ -58,3 +51,9 @@ class JointData(SeveralJoints):
         if trial == self.alone:
             return chosen.figures
         return {**chosen.figures, **learned(chosen, self.lessons[self.trials[trial]], run, settings)}
+
+
+def joint_data(name: str, *sizes: int) -> JointData:
+    """Return the experiment called ``name`` with these numbers of transitions, in ascending order."""
+    lessons = {f"{size:,}": Lesson(POLICY) for size in sizes}
+    return JointData(name=name, words=words_of(__package__), lessons=lessons, sizes=sizes)

@@ -168,8 +168,8 @@ def test_factors_reach_the_training(name: str) -> None:
     assert last == ({(0.98, -8.0), (0.98, 0.0)} if name == "switch-punishment" else {(0.95, -8.0), (0.98, -8.0)})
     for table in chosen.thesis.values():
         assert len(table) == len(chosen.trials) == 16
-    for said in chosen.said:
-        assert said.criterion in chosen.thesis
+    for claim in chosen.effect_claims:
+        assert claim.criterion in chosen.thesis
 
 
 def test_no_experiment_is_said() -> None:

@@ -33,7 +33,7 @@ class LaboratorySettings(Settings):
     """What decides the rows of an experiment, besides the experiment itself. More arms and runs only add rows."""
 
     seed: int = 0
-    """Of everything that is drawn at random."""
+    """Random seed."""
     transitions: int = 200_000
     """How many to collect on each arm (thesis section 3.2.2: 200,000, two hours)."""
     test_episodes: int = 10_000
@@ -56,12 +56,12 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     arm: str
     trial: int
-    """From 1."""
+    """Number, from 1."""
     run: int
-    """From 1."""
+    """Number, from 1."""
     figures: dict[str, float]
     seconds: float
-    """That it took [s]."""
+    """Time that it took [s]."""
 
     @property
     def key(self) -> tuple[str, int, int]:
@@ -125,7 +125,7 @@ class Claim:
 
     text: str
     thesis: str
-    """Its evidence."""
+    """The thesis' evidence."""
     ours: str
     """Ours, with an interval where there is one."""
     verdict: Verdict
@@ -142,7 +142,7 @@ class Analysis:
     figures: Mapping[str, Any]
     """For programs: what ``results.json`` holds."""
     sections: Sequence["Section"]
-    """Of the page."""
+    """Sections of the page."""
     claims: Sequence[Claim] = field(default=())
 
 
@@ -150,9 +150,9 @@ class Axis(NamedTuple):
     """Trials in the order of a quantity."""
 
     label: str
-    """With its unit."""
+    """Name of the quantity, with its unit."""
     places: Sequence[float]
-    """Of the trials, from left to right."""
+    """Places of the trials, from left to right."""
     ticks: Sequence[str] | None = None
     """What is written there; by default the places."""
     log: bool = False
@@ -165,9 +165,9 @@ class Experiment(ABC):
     """On the command line."""
     words: Words
     runs: int = 4
-    """By default."""
+    """Default number of runs."""
     arms: tuple[str, ...] = ARMS
-    """By default."""
+    """Default arms."""
     records: ClassVar[bool] = False
     """Whether it is prepared by recording the arm, as :func:`pneumarm.experiments.preparation.simulated` does."""
 
@@ -202,7 +202,7 @@ class Experiment(ABC):
 
     @property
     def axis(self) -> Axis | None:
-        """Where pictures have the first trials of a section; None where trials are no places on an axis."""
+        """Axis along which pictures have the first trials of a section, if there is one."""
         return None
 
     def analyse(self, rows: TrialRows) -> Analysis:

@@ -33,7 +33,7 @@ ARMS = tuple(f"virtual:joints=2,seed={number}" for number in range(1, 6))
 TRANSITIONS = 12_000
 """Transitions of a simulation, at most as many as the laboratory's: 7 minutes on the arm."""
 FIT = replace(SINGLE_STEPS, epochs=30)
-"""Of a simulation: twice the thesis' epochs; twice as many again take 5 % off its errors."""
+"""Fit of a simulation: twice the thesis' epochs; twice as many again take 5 % off its errors."""
 THESIS = TrainSettings(agents=1, validation_episodes=100, max_episodes=100_000)
 """Thesis' agents, one a joint, with as many episodes as it needed for a single goal (section 6.1.4)."""
 HALF_AS_LONG = replace(THESIS, max_episodes=50_000)

@@ -1,4 +1,4 @@
-"""From an arm and back to it: collect, fit, train, move; with what an experiment varies on the way.
+"""Collect, fit, train and move the arm, with what an experiment varies on the way.
 
 Collecting and fitting belong to an arm (:func:`prepared`), training and moving to a row (:func:`train_and_move`).
 """
@@ -70,11 +70,11 @@ class Recipe:
     """How the transitions of a simulation are collected and how it is fitted to them."""
 
     transitions: int = FEWEST_TRANSITIONS
-    """At least."""
+    """Fewest transitions."""
     minutes: float = 0.0
-    """At least, on the arm's clock."""
+    """Shortest time of collecting, on the arm's clock [min]."""
     frequency: float | None = None
-    """Of control [Hz]; None for the arm's own."""
+    """Control frequency [Hz]; None for the arm's own."""
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting."""
     pulses: float = 0.0
@@ -124,7 +124,7 @@ class Prepared:
     simulation: Simulation
     begin: BeginStates
     figures: Figures
-    """Of collecting and fitting."""
+    """Figures of collecting and fitting."""
 
 
 def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySettings, progress: Report) -> Prepared:

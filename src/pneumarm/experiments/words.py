@@ -37,7 +37,7 @@ class Estimate(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A quantity in one trial."""
 
     trial: str | int
-    """By name, or by number, negative from the last."""
+    """Name of the trial, or its number, negative from the last."""
 
 
 class Column(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -57,7 +57,7 @@ class ClaimWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """See :attr:`~.experiment.Claim.about`."""
     claim: str
     thesis: str
-    """Its evidence."""
+    """The thesis' evidence."""
     ours: str
     holds: str
     """When it holds: ``drop > 15``, ``drop < 0``, ``|drop| < 3``, several with ``and``; or the name of a verdict that
@@ -89,7 +89,7 @@ class SectionWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     called: str | None = None
     """Replaces in these names what the expression matches."""
     columns: tuple[Column, ...] = ()
-    """Of its table."""
+    """Columns of its table."""
     table: str = ""
     """Caption of its table."""
     figure: str = ""

@@ -44,7 +44,7 @@ class ControlFrequency(Experiment):
     """The whole job at several frequencies."""
 
     frequencies: tuple[float, ...] = _FREQUENCIES
-    """In ascending order, 20, 30 and 40 Hz among them [Hz]."""
+    """Control frequencies in ascending order, 20, 30 and 40 Hz among them [Hz]."""
     name = "control-frequency"
     words = words_of(__package__)
 

@@ -16,7 +16,7 @@ class Coupling(SeveralJoints):
     """A policy with all goals and thesis' agents with one, on arms of more and more coupling."""
 
     shares: tuple[float, ...]
-    """Of the coupling that the arm has, in ascending order."""
+    """Shares of the arm's coupling, in ascending order."""
 
     @property
     def axis(self) -> Axis:

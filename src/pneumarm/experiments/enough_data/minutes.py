@@ -35,7 +35,7 @@ class EnoughData(Experiment):
     """The whole job after more and more minutes of collecting."""
 
     minutes: tuple[float, ...] = _MINUTES
-    """That collecting may take, in ascending order [min]."""
+    """Times of collecting, in ascending order [min]."""
     name = "enough-data"
     words = words_of(__package__)
 

@@ -46,9 +46,9 @@ class OvernightSizes:
     block: int = 100
     """Movements in a point of the courses."""
     hours: float = 14.0
-    """Of rest [h]."""
+    """Hours of rest [h]."""
     learning_rate: float = 0.05
-    """Of agents that learn (thesis: 0.05)."""
+    """Learning rate of agents that learn (thesis: 0.05)."""
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,9 @@ _CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episode
 _SHOWN = ("reward", "success_rate", "episodes")
 
 Tables = Mapping[str, NDArray[np.float64]]
-"""By figure, shapes (trials, runs)."""
+"""Tables by figure, shapes (trials, runs)."""
 Differences = Mapping[str, list[Interval | None]]
-"""By figure, each trial's difference from its reference, None for a reference itself."""
+"""Differences of the trials from their references by figure, None for a reference itself."""
 
 
 def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
@@ -42,7 +42,7 @@ def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     words, found = filled(
         experiment,
         rows,
-        **measured(experiment, tables, samples, len(rows.arms)),
+        **measured(experiment, tables, len(rows.arms)),
         **{f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")},
     )
     strategy, results = words.sections
@@ -67,12 +67,11 @@ def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     )
 
 
-def measured(experiment: ShapingSettings, tables: Tables, samples: Tables, arms: int) -> dict[str, Any]:
+def measured(experiment: ShapingSettings, tables: Tables, arms: int) -> dict[str, Any]:
     """Return what claims are judged by, and the thesis' numbers beside it."""
     by_name = {name: number - 1 for number, name in experiment.trials.items()}
     shaped, without = by_name["as in the thesis"], by_name["no shaping"]
     worn, worn_without = by_name["worn, as in the thesis"], by_name["worn, no shaping"]
-    reward, episodes, met = (samples[name] for name in ("reward", "episodes", "met"))
     # The thesis made runs 1 to 3 with shaping and without.
     with_it, without_it = (
         {name: table[:, :3] for name, table in packaged_results(f"pneumarm.experiments.{one}", *_THEIRS).items()}
@@ -81,11 +80,6 @@ def measured(experiment: ShapingSettings, tables: Tables, samples: Tables, arms:
     spreads = (one["reward"].std(axis=1, ddof=1).mean() for one in (with_it, without_it))
     spread, narrower = _spread(tables["reward"][shaped], tables["reward"][without], arms)
     return {
-        "gain": interval(reward[shaped] - reward[without]),
-        "solved": interval(met[without]),
-        "worn_solved": interval(met[worn_without]),
-        "sooner": interval(episodes[without] - episodes[shaped]),
-        "fewer": interval(episodes[by_name["adjusted every 100 episodes"]] - episodes[shaped]),
         "spread": spread,
         "narrower": narrower,
         "share": _share(tables["met"][without]),

@@ -47,7 +47,7 @@ class HistoryMaterial:
     spec: ArmSpec
     longest: Window
     begin: Mapping[int, BeginStates]
-    """By history."""
+    """Begin states by history."""
 
 
 def shortened(whole: Transitions, longest: Window, history: int) -> Transitions:

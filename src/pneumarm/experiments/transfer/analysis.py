@@ -80,13 +80,10 @@ def analysis(experiment: TransferToTheArm, rows: TrialRows) -> Analysis:
 
 
 def measured(rows: TrialRows, progress: int) -> dict[str, Any]:
-    """Return what claims are judged by; ``progress`` is the block in which the thesis sees some."""
+    """Return what else claims are judged by; ``progress`` is the block in which the thesis sees some."""
     frozen, slow = (blocks(rows, "reward", trial) for trial in (1, 2))
     return {
-        "drop": over_arms(_arrival(rows, 1, "reward")),
         "success": over_arms(np.mean([blocks(rows, "success_rate", t).mean(axis=-1) for t in RATES], axis=0)),
-        "actions": over_arms(-_arrival(rows, 1, "actions")),
-        **{f"switches_{trial}": over_arms(-_arrival(rows, trial, "switches")) for trial in (1, 2)},
         "warmed": over_arms(_last(frozen) - frozen[:, :, 0]),
         **{
             f"better_{trial}": over_arms(_last(blocks(rows, "reward", trial)) - _last(frozen))
@@ -95,11 +92,6 @@ def measured(rows: TrialRows, progress: int) -> dict[str, Any]:
         },
         "progress": over_arms(slow[:, :, progress] - slow[:, :, 0]) if progress < slow.shape[-1] else None,
     }
-
-
-def _arrival(rows: TrialRows, trial: int, figure: str) -> Array:
-    """Return by how much ``figure`` is lower in the first block than in the simulation, shape (arms, runs)."""
-    return values(rows, EXPLORING + figure, trial) - values(rows, f"{figure} @1", trial)
 
 
 def _last(course: Array) -> Array:

@@ -40,22 +40,6 @@ SIMULATION = "simulation: "
 """Prefix of the figures of a test in the simulation; those on the arm have none."""
 
 
-@dataclass(frozen=True, eq=False)
-class Material:
-    """An arm by name, and its simulation."""
-
-    arm: str
-    simulated: Simulated
-
-    @property
-    def parameters(self) -> ArmParameters | None:
-        """What the arm is made of, if that is known: it is of a virtual arm."""
-        if not self.arm.startswith("virtual"):
-            return None
-        with open_arm(self.arm) as arm:
-            return arm.parameters if isinstance(arm, VirtualArm) else None
-
-
 @dataclass(frozen=True)
 class TestSizes:
     """How much agents are tested in a row."""
@@ -79,16 +63,24 @@ class OnTheArm(Experiment):
         """Return the trials in words, the settings of the agent and the sizes."""
         return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
 
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-        """Return the arm and its simulation."""
-        return Material(arm, simulated(arm, folder, settings, progress))
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
+        """Return the arm's simulation."""
+        return simulated(arm, folder, settings, progress)
 
     def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
         """Return those of the test."""
         return int(self.sizes.test)
 
 
-def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Arm:
+def parameters_of(arm: str) -> ArmParameters | None:
+    """Return what the arm of this name is made of, if that is known: it is of a virtual arm."""
+    if not arm.startswith("virtual"):
+        return None
+    with open_arm(arm) as opened:
+        return opened.parameters if isinstance(opened, VirtualArm) else None
+
+
+def new_arm(of: Simulated, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Arm:
     """Return the arm: a virtual one as it is in the morning, after a night of rest, any other as it is.
 
     All trials of a run on a virtual arm meet the same noise. ``parameters`` are others than its own.
@@ -110,7 +102,7 @@ _locks: dict[Any, threading.Lock] = {}
 _guard = threading.Lock()
 
 
-def agent_of(of: Material, settings: TrainSettings, run: int, laboratory: LaboratorySettings) -> Agent:
+def agent_of(of: Simulated, settings: TrainSettings, run: int, laboratory: LaboratorySettings) -> Agent:
     """Return the agent of ``run``, the best of ``settings.agents``; trained once in a process.
 
     All trials of a run that train alike begin on the arm with the same agent.
@@ -124,8 +116,8 @@ def agent_of(of: Material, settings: TrainSettings, run: int, laboratory: Labora
 
 
 @functools.lru_cache(maxsize=64)
-def _trained(of: Material, settings: TrainSettings, seed: int) -> Agent:
-    return train(of.simulated.simulation, of.simulated.begin, settings, seed, threads=1).agent
+def _trained(of: Simulated, settings: TrainSettings, seed: int) -> Agent:
+    return train(of.simulation, of.begin, settings, seed, threads=1).agent
 
 
 def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> tuple[Array, Array]:
@@ -147,7 +139,7 @@ def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> t
 
 
 def simulated_test(
-    of: Material,
+    of: Simulated,
     agent: Agent,
     episodes: int,
     *,
@@ -160,13 +152,13 @@ def simulated_test(
     Their names are preceded by ``prefix``.
     """
     settings = agent.settings if noise is None else replace(agent.settings, noise=noise)
-    env = environment(of.simulated.simulation, of.simulated.begin, settings)
+    env = environment(of.simulation, of.begin, settings)
     tested = run_test(env, agent.weights(), agent.settings, episodes, (_TEST_SEED, TEST), exploration)
     return means(tested, prefix)
 
 
 def greedy_test(
-    of: Material,
+    of: Simulated,
     agent: Agent,
     episodes: int,
     run: int,

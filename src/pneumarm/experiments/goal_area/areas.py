@@ -10,13 +10,13 @@ import numpy as np
 from pneumarm.experiments.experiment import Figures, LaboratorySettings
 from pneumarm.experiments.moving import (
     SIMULATION,
-    Material,
     OnTheArm,
     agent_of,
     greedy_test,
     means,
     simulated_test,
 )
+from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import TrainSettings
 from pneumarm.task import Reward
@@ -47,7 +47,7 @@ class GoalArea(OnTheArm):
         agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
         return {"agents": agents, "sizes": asdict(self.sizes)}
 
-    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train, and move in the simulation and on the arm."""
         agent = agent_of(material, self.train_settings(trial), run, settings)
         before = simulated_test(material, agent, settings.test_episodes, prefix=SIMULATION)

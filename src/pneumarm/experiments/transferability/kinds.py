@@ -9,13 +9,13 @@ import msgspec
 from pneumarm.experiments.experiment import Figures, LaboratorySettings
 from pneumarm.experiments.moving import (
     SIMULATION,
-    Material,
     OnTheArm,
     agent_of,
     greedy_test,
     means,
     simulated_test,
 )
+from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import Exploration, TrainSettings
 from pneumarm.simulation.noise import NoiseSettings
@@ -54,7 +54,7 @@ class Transferability(OnTheArm):
         agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
         return {"agents": agents, "sizes": asdict(self.sizes)}
 
-    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train, and move in the simulation and on the arm."""
         found = agent_of(material, self.train_settings(trial), run, settings)
         judged = replace(found, settings=replace(found.settings, reward=Reward()))  # all by the same reward

@@ -10,12 +10,12 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import spearmanr
 
 from pneumarm.experiments.differences import Interval, interval, within
-from pneumarm.experiments.experiment import Row, TrialRows, sorted_rows
+from pneumarm.experiments.experiment import Axis, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import rank_correlation
 from pneumarm.experiments.means import (
-    Column,
     change,
     difference,
+    estimate,
     from_series,
     mean,
     numbers,
@@ -23,10 +23,11 @@ from pneumarm.experiments.means import (
     samples,
     series,
     table,
+    text,
 )
 from pneumarm.experiments.overnight.analysis import answer
-from pneumarm.experiments.pictures import Axis, Curve, against, courses, dots
-from pneumarm.experiments.words import ClaimWords, Words
+from pneumarm.experiments.pictures import Curve, against, courses, dots
+from pneumarm.experiments.words import ClaimWords, Column, Quantity, Words
 
 TRIALS = {1: "one", 2: "the second of them"}
 VALUES = {("a", 1): (1.0, 3.0), ("a", 2): (2.0, 6.0), ("b", 1): (5.0, 5.0), ("b", 2): (8.0, 10.0)}
@@ -47,6 +48,11 @@ def test_arms_are_the_sample_and_runs_where_there_is_one() -> None:
     assert (found.mean, found.samples) == (3.0, 2)
     assert found.half == pytest.approx(12.7062, abs=1e-3)  # Student's t for one degree of freedom, times 1
     assert change(ROWS, "x", 2, 1).mean == pytest.approx((100 + 80) / 2)
+    twice = Quantity(figure="x", less="x", factor=2.0)
+    assert estimate(ROWS, Quantity(figure="x", factor=2.0), 2, 1).mean == 6.0
+    assert estimate(ROWS, twice, 2).mean == estimate(ROWS, twice, 2, 1).mean == 0.0
+    assert estimate(ROWS, Quantity(figure="x", percent=True), 2, 1) == change(ROWS, "x", 2, 1)
+    assert estimate(ROWS, Quantity(figure="x", less="x", percent=True), 2).mean == 0.0
     alone = sorted_rows(row for row in ROWS.rows if row.arm == "a")
     assert samples(alone, "x", 1).tolist() == [1.0, 3.0]
     assert mean(alone, "x", 1).samples == 2
@@ -99,10 +105,11 @@ def test_within_a_margin() -> None:
 
 
 def test_a_table_says_what_programs_are_told() -> None:
-    columns = [Column("x", "x [%]", 1, 100.0, thesis={TRIALS[2]: 0.5}), Column("x", "x")]
+    percent = Column(figure="x", words="x [%]", digits=1, factor=100.0, thesis={TRIALS[2]: 0.5})
+    columns = [percent, Column(figure="x", words="x")]
     made = table(ROWS, TRIALS, columns, "Means.")
     assert made.header == ["trial", "x [%]", "thesis", "x"]
-    told = numbers(ROWS, TRIALS, columns)["ours"]["x"]
+    told = numbers(ROWS, TRIALS, columns)["x"]
     for line, words, thesis in zip(made.rows, TRIALS.values(), ("", "0.5"), strict=True):
         found = Interval(told[words]["mean"], told[words]["half"], 2)
         assert line[1:] == [f"{found.times(100):.1f}", thesis, f"{found:.2f}"]
@@ -117,18 +124,17 @@ def test_words_are_filled_with_what_was_found_and_claims_judged_by_it() -> None:
     }  # fmt: skip
     claims = tuple(ClaimWords("it", "says {sure:.1f}", "yes", "{vague:.0f}", rule) for rule in rules)
     words = Words("title", "question", "source", ("{sure:+.2f}",), claims=claims).filled(found)
-    made = words.analysis(found, {}, [])
-    assert made.summary == ["question", "+5.00\u00a0±\u00a01.00"]
-    assert [claim.verdict for claim in made.claims] == [verdict for verdict in rules.values() if verdict]
-    assert {(claim.text, claim.ours) for claim in made.claims} == {("says 5.0\u00a0±\u00a01.0", "0\u00a0±\u00a09")}
+    assert words.summary == ("+5.00\u00a0±\u00a01.00",)
+    assert [claim.verdict(found) for claim in words.claims] == [verdict for verdict in rules.values() if verdict]
+    assert {(claim.claim, claim.ours) for claim in words.claims} == {("says 5.0\u00a0±\u00a01.0", "0\u00a0±\u00a09")}
     with pytest.raises(ValueError, match="expected a rule"):
-        ClaimWords("it", "says", "yes", "no", "sure <> 0").judged(found)
+        ClaimWords("it", "says", "yes", "no", "sure <> 0").verdict(found)
 
 
 def test_pictures_say_in_words_what_they_draw() -> None:
-    column = Column("x", "the x [-]", 1)
+    column = Column(figure="x", words="the x [-]", digits=1)
     made = against(ROWS, TRIALS, Axis("place [-]", (0.5, 2.0)), [column], "X by place.")
-    assert made.alt == f"the x [-]: {column.text(ROWS, 1)} (one), {column.text(ROWS, 2)} (the second of them)."
+    assert made.alt == f"the x [-]: {text(ROWS, column, 1)} (one), {text(ROWS, column, 2)} (the second of them)."
     ticks = made.figure.axes[0].get_xticklabels()
     assert [tick.get_text() for tick in ticks] == ["0.5", "2"]
     found = [mean(ROWS, "x", trial) for trial in TRIALS]

@@ -22,11 +22,11 @@ from pneumarm.experiments.means import blocks, values
 from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,
-    Material,
     agent_of,
     draws,
     from_visits,
     new_arm,
+    parameters_of,
 )
 from pneumarm.experiments.on_the_arm_only import from_scratch
 from pneumarm.experiments.overnight.days import DAYS
@@ -65,14 +65,14 @@ SMALL_ONES = {
 
 
 @pytest.fixture(scope="module")
-def small_material(small_run: Path) -> Material:
+def small_material(small_run: Path) -> Simulated:
     simulation = Simulation.load(small_run / "simulation.safetensors")
     with Store.open(small_run / "transitions.db") as store:
         begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
-    return Material(SMALL.arm, Simulated(simulation, begin))
+    return Simulated(SMALL.arm, simulation, begin)
 
 
-def rows_of(experiment: Experiment, of: Material, runs: int = 2) -> TrialRows:
+def rows_of(experiment: Experiment, of: Simulated, runs: int = 2) -> TrialRows:
     measured = [
         (trial, run, experiment.measure(of, trial, run, LABORATORY))
         for run in range(1, runs + 1)
@@ -82,7 +82,7 @@ def rows_of(experiment: Experiment, of: Material, runs: int = 2) -> TrialRows:
 
 
 @pytest.mark.parametrize("name", SMALL_ONES)
-def test_an_experiment_leaves_a_page(name: str, small_material: Material, tmp_path: Path) -> None:
+def test_an_experiment_leaves_a_page(name: str, small_material: Simulated, tmp_path: Path) -> None:
     experiment = SMALL_ONES[name]
     rows = rows_of(experiment, small_material)
     assert all(np.isfinite(list(row.figures.values())).all() for row in rows.rows)  # JSON knows no others
@@ -98,7 +98,7 @@ def test_an_experiment_leaves_a_page(name: str, small_material: Material, tmp_pa
     assert json.dumps(experiment.settings()) != json.dumps(type(experiment)().settings())
 
 
-def test_the_agents_that_are_compared_come_from_the_same_training(small_material: Material) -> None:
+def test_the_agents_that_are_compared_come_from_the_same_training(small_material: Simulated) -> None:
     """The test in the simulation is of the agent as it arrives, whatever it will learn with, and another a run."""
     experiment = SMALL_ONES["transfer"]
     rows = rows_of(experiment, small_material)
@@ -120,7 +120,7 @@ def test_conditions_change_what_they_say() -> None:
     assert changed[conditions.ALL] == ideal
 
 
-def test_days_are_alike_until_they_differ(small_material: Material) -> None:
+def test_days_are_alike_until_they_differ(small_material: Simulated) -> None:
     rows = rows_of(SMALL_ONES["overnight"], small_material, runs=1)
     learning, first_day, frozen, no_night = (blocks(rows, "actions", trial)[0, 0] for trial in DAYS)
     rewards = [blocks(rows, "reward", trial)[0, 0] for trial in DAYS]
@@ -169,9 +169,9 @@ def test_learning_on_the_arm_ends_when_the_criterion_is_met() -> None:
     assert (cut.movements, cut.met) == (15, False)
 
 
-def test_movements_of_a_given_displacement(small_material: Material) -> None:
+def test_movements_of_a_given_displacement(small_material: Simulated) -> None:
     agent = agent_of(small_material, AGENT, 1, LABORATORY)
-    arm = VirtualArm(small_material.parameters, seed=2)
+    arm = VirtualArm(parameters_of(small_material.arm), seed=2)
     made = typical.typical_movement(agent, arm, 20.0, np.random.default_rng(1))
     assert made is not None
     step = 20.0 * arm.spec.counts_per_degree
@@ -207,7 +207,7 @@ def test_thirds_and_relations_by_hand() -> None:
     assert related["few switches"] == 1.0
 
 
-def test_draws_go_on(small_material: Material) -> None:
+def test_draws_go_on(small_material: Simulated) -> None:
     agent = agent_of(small_material, AGENT, 1, LABORATORY)
     seed = run_seed(LABORATORY, 1)
     whole, rest = draws(agent, seed, 6, MOVEMENTS), draws(agent, seed, 2, MOVEMENTS, 4)
@@ -272,8 +272,8 @@ def test_it_is_said_for_how_long_an_arm_will_be_needed(tmp_path: Path) -> None:
 def test_a_virtual_arm_is_moved_as_it_is_named(tmp_path: Path) -> None:
     """Not as a plain one with the same parameters: without what is left out of it, at the rate that it is read at."""
     name = "virtual:seed=3,rate=40,pressure_sensors=off,sensors=velocity"
-    of = Material(name, None)  # type: ignore[arg-type]
-    parameters = of.parameters
+    of = Simulated(name, None, None)  # type: ignore[arg-type]
+    parameters = parameters_of(name)
     assert parameters is not None
     with (
         new_arm(of, 1, LABORATORY) as arm,
@@ -292,7 +292,7 @@ def test_a_virtual_arm_is_moved_as_it_is_named(tmp_path: Path) -> None:
     assert all(row.figures for row in done.rows.rows)
 
 
-def test_turn_by_turn_it_is_the_compiled_loop(small_material: Material) -> None:
+def test_turn_by_turn_it_is_the_compiled_loop(small_material: Simulated) -> None:
     agent, seed = agent_of(small_material, AGENT, 1, LABORATORY), 3
     made = []
     for kind in (Player, TurnPlayer):

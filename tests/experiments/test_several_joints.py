@@ -14,13 +14,10 @@ from matplotlib.figure import Figure
 from pneumarm.arm.open import names_in, with_options
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.claims import keys_of
-from pneumarm.experiments.coupling.couplings import Coupling
+from pneumarm.experiments.coupling.couplings import coupling
 from pneumarm.experiments.experiment import Claim, LaboratorySettings, Row, TrialRows, sorted_rows
-from pneumarm.experiments.goal_pairs.pairs import GoalPairs
-from pneumarm.experiments.hierarchy.levels import Levels
-from pneumarm.experiments.joint_agents.teams import JointAgents
-from pneumarm.experiments.joint_data.transitions import JointData
-from pneumarm.experiments.joint_exploration.rates import TOGETHER, JointExploration
+from pneumarm.experiments.joint_data.transitions import JointData, joint_data
+from pneumarm.experiments.joint_exploration.rates import TOGETHER
 from pneumarm.experiments.registry import experiment
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.several_joints import POLICY, SeveralJoints, one_goal
@@ -31,18 +28,30 @@ from pneumarm.simulation import FitSettings
 SIMULATED = "in simulation: success_rate"
 ARM = "virtual:joints=2,seed=3"
 SMALL = LaboratorySettings(transitions=2400, test_episodes=4, max_episodes=20)
-FEW: dict[str, Any] = {
-    "recipe": Recipe(2400, fit=FitSettings(epochs=3)),
-    "policy": replace(POLICY, updates=2, arms=16, steps=8, validation_episodes=2),
-}
+FEW = replace(POLICY, updates=2, arms=16, steps=8, validation_episodes=2)
+
+
+def small(made: Any) -> Any:
+    """Return an experiment whose simulation and policies learn little."""
+    lessons = {
+        words: replace(lesson, learning=FEW) if lesson.learning == POLICY else lesson
+        for words, lesson in made.lessons.items()
+    }
+    return replace(made, recipe=Recipe(2400, fit=FitSettings(epochs=3)), lessons=lessons)
+
+
 EXPERIMENTS: list[SeveralJoints] = [
-    GoalPairs(**FEW),
-    JointData(sizes=(2000, 2400), **FEW),
-    JointExploration(**FEW),
-    Coupling(shares=(0.0, 1.0), **FEW),
-    JointAgents(**FEW),
-    Levels(**FEW),
+    small(made)
+    for made in (
+        experiment("goal-pairs"),
+        joint_data("joint-data", 2000, 2400),
+        experiment("joint-exploration"),
+        coupling(0.0, 1.0),
+        experiment("joint-agents"),
+        experiment("hierarchy"),
+    )
 ]
+GOAL_PAIRS, DATA, EXPLORATION, COUPLING, AGENTS, HIERARCHY = EXPERIMENTS
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +111,7 @@ def test_the_goal_of_a_run_is_one_that_the_arm_can_hold(material: Prepared) -> N
 
 def test_two_agents_explore_together_as_often_as_one() -> None:
     assert pytest.approx(0.5) == TOGETHER * (2 - TOGETHER)
-    rates = [lesson.learning.shaping for lesson in JointExploration().lessons.values()]
+    rates = [lesson.learning.shaping for lesson in EXPLORATION.lessons.values()]
     assert [one and one.exploration.epsilon for one in rates] == [0.5, TOGETHER, 0.1, 0.5, None]
 
 
@@ -121,7 +130,8 @@ def test_options_of_an_arm_change() -> None:
 
 def test_another_arm_has_no_simulation_of_one_joint(material: Prepared) -> None:
     """Then that trial has no figures, and claims that need them are left out."""
-    chosen = JointData(sizes=(2000, 2400), **FEW)
+    chosen = DATA
+    assert isinstance(chosen, JointData)
     assert chosen.measure([material, material], chosen.alone, 1, SMALL) == {}
     rows = [row for row in made_up(chosen, {}).rows if row.trial != chosen.alone]
     rows += [Row(f"arm {arm}", chosen.alone, 1, {}, 0.0) for arm in range(5)]
@@ -133,7 +143,7 @@ def test_another_arm_has_no_simulation_of_one_joint(material: Prepared) -> None:
 
 def made_up(chosen: SeveralJoints, figures: dict[str, dict[int, float]]) -> TrialRows:
     """Return rows of five arms in which figures have the value given for a trial, else 1."""
-    columns = [*chosen.words.columns]
+    columns = [column for section in chosen.words.sections for column in section.columns]
     names = {column.figure for column in columns} | {"reward", "episodes", "success_rate", *figures}
     return sorted_rows(
         Row(f"arm {arm}", trial, 1, {n: figures.get(n, {}).get(trial, 1.0) * (1 + 1e-3 * arm) for n in names}, 0.0)
@@ -183,7 +193,7 @@ def claims_of(chosen: SeveralJoints, rows: TrialRows) -> Sequence[Claim]:
 
 
 def test_what_the_thesis_has_is_in_the_unit_of_its_column() -> None:
-    (section,) = JointExploration(**FEW).analyse(made_up(JointExploration(**FEW), {"exploring": {1: 0.76}})).sections
+    (section,) = EXPLORATION.analyse(made_up(EXPLORATION, {"exploring": {1: 0.76}})).sections
     header, first = section.tables[0].header, section.tables[0].rows[0]
     assert header[1:3] == ["at least one explores, at the begin [%]", "thesis"]
     assert first[1].startswith("76.")
@@ -191,19 +201,18 @@ def test_what_the_thesis_has_is_in_the_unit_of_its_column() -> None:
 
 
 def test_trials_of_the_coupling_are_called_by_its_share() -> None:
-    made = Coupling(shares=(0.0, 1.0), **FEW)
-    for section in made.analyse(made_up(made, {})).sections:
+    for section in COUPLING.analyse(made_up(COUPLING, {})).sections:
         assert [row[0].replace("\u00a0", " ") for row in section.tables[0].rows] == ["coupling 0", "coupling 1"]
 
 
 def test_flat_and_hierarchical_agents_have_the_same_budget() -> None:
     """All but who acts is alike."""
-    lessons = [lesson.learning for lesson in Levels().lessons.values()]
+    lessons = [lesson.learning for lesson in HIERARCHY.lessons.values()]
     for name in ("max_episodes", "shaping", "exploration", "learning_rate", "hidden", "reward", "agents", "method"):
         assert len({getattr(learning, name) for learning in lessons}) == 1
 
 
-@pytest.mark.parametrize("asked", EXPERIMENTS, ids=lambda asked: type(asked).__name__)
+@pytest.mark.parametrize("asked", EXPERIMENTS, ids=lambda asked: asked.name)
 def test_an_arm_of_one_joint_is_refused(asked: SeveralJoints, tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match=r"'virtual:seed=1.*one joint"):
         asked.prepare("virtual:seed=1", tmp_path, SMALL, _silent)

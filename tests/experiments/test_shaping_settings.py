@@ -52,9 +52,9 @@ def test_a_worn_potentiometer_spoils_the_fit(tmp_path: Path) -> None:
 
 def test_worn_trials_are_measured_on_the_worn_arm() -> None:
     simulation = synthetic_simulation()
-    here = Simulated(simulation, synthetic_begin_states(simulation))
+    here = Simulated("synthetic", simulation, synthetic_begin_states(simulation))
     noisy = replace(simulation, error_std=3 * simulation.error_std)
-    there = Simulated(noisy, here.begin)
+    there = replace(here, simulation=noisy)
     found = EXPERIMENT.measure(WholeAndWorn(here, there), WORN, 1, SHORT)
     assert found == EXPERIMENT.measure(WholeAndWorn(there, here), THESIS, 1, SHORT)
     assert found != EXPERIMENT.measure(WholeAndWorn(here, there), THESIS, 1, SHORT)

@@ -25,7 +25,7 @@ FACTORIALS = [name for name in PLACES if isinstance(experiment(name), Factorial)
 @pytest.fixture(scope="module")
 def material() -> Simulated:
     simulation = synthetic_simulation()
-    return Simulated(simulation, synthetic_begin_states(simulation))
+    return Simulated("synthetic", simulation, synthetic_begin_states(simulation))
 
 
 def test_settings_are_changed_by_their_place() -> None:
@@ -104,7 +104,7 @@ def test_a_single_goal(material: Simulated) -> None:
     goal = 650.0
     narrowed = replace(material.simulation, goal_range=np.array([[goal, goal]]))
     alone = train_and_test(material, TrainSettings(), 1, SHORT, goal)
-    assert alone == train_and_test(Simulated(narrowed, material.begin), TrainSettings(), 1, SHORT)
+    assert alone == train_and_test(replace(material, simulation=narrowed), TrainSettings(), 1, SHORT)
     assert alone != train_and_test(material, TrainSettings(), 1, SHORT)
 
 
@@ -168,8 +168,8 @@ def test_factors_reach_the_training(name: str) -> None:
     assert last == ({(0.98, -8.0), (0.98, 0.0)} if name == "switch-punishment" else {(0.95, -8.0), (0.98, -8.0)})
     for table in chosen.thesis.values():
         assert len(table) == len(chosen.trials) == 16
-    for said in chosen.said:
-        assert said.criterion in chosen.thesis
+    for claim in chosen.effect_claims:
+        assert claim.criterion in chosen.thesis
 
 
 def test_no_experiment_is_said() -> None:

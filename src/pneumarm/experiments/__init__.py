@@ -12,19 +12,18 @@ All experiments of a laboratory share a folder:
 To add an experiment, make a folder (a package) here and name it in :mod:`.registry`. The folder holds
 
 - ``__init__.py``: the question, the factors, the command and the answer in two sentences, and ``EXPERIMENT``;
-- a module named for what is varied: the trials, ``settings`` (JSON that decides the rows), ``prepare`` (what is
-  needed of an arm; :func:`~.preparation.simulated` collects and fits) and ``measure`` (a row: pure, seeded by
-  :func:`~.experiment.run_seed`, so that all trials of a run begin alike);
-- ``analysis.py``: pure functions from rows to intervals, tables and pictures; runs nothing;
-- ``words.toml``: the words that go with them, and the claims of the thesis with the rule each is judged by
-  (:mod:`.words`);
+- ``words.toml``: what is estimated from the rows, the tables and pictures of the page, and the claims of the thesis
+  with the rule each is judged by (:mod:`.words`); :mod:`.analysis` makes the page of it;
+- where what is varied is more than data, a module named for it: the trials, ``settings`` (JSON that decides the
+  rows), ``prepare`` (what is needed of an arm; :func:`~.preparation.simulated` collects and fits) and ``measure`` (a
+  row: pure, seeded by :func:`~.experiment.run_seed`, so that all trials of a run begin alike);
+- where the page needs something of its own, ``analysis.py``: pure functions from rows to estimates, tables, pictures;
 - a ``design.toml`` where there is an orthogonal array, and the thesis' tables as ``thesis_*.csv``, trials by runs.
 
-What experiments have in common is in the class that theirs are of: trainings in an arm's simulation
-(:class:`~.trainings.Trainings`), an agent that moves the arm or agents that are compared on it
-(:class:`~.moving.OnTheArm`, :class:`~.moving.AgentsByTrial`), and all the way from an arm, however it is collected
-from, back to it (:class:`~.there_and_back.ThereAndBack`). What rows say over arms, with intervals and tables, is
-:mod:`.means`, and :mod:`.pictures` draws it.
+An experiment is an :class:`~.experiment.Experiment`. Several are made alike: trainings in an arm's simulation
+(:class:`~.trainings.Trainings`), agents that move the arm (:class:`~.moving.OnTheArm`), lessons for several joints
+(:class:`~.several_joints.SeveralJoints`); :mod:`.there_and_back` goes from an arm, however it is collected from, back
+to it. Means over arms, with intervals and tables, are in :mod:`.means`, and :mod:`.pictures` draws them.
 
 Trainings of the thesis' agent by an orthogonal array need no code: :class:`~.factorial.Factorial` is such an
 experiment. :mod:`.design` is of use for tables from anywhere (``pneumarm taguchi analyse``).

@@ -1,4 +1,4 @@
-"""For how long an experiment will need an arm, told before it begins."""
+"""Estimate how long an experiment will need an arm, before it begins."""
 
 from collections.abc import Iterable
 from pathlib import Path

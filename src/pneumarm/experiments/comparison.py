@@ -11,7 +11,7 @@ from pneumarm.report.page import Section, Table
 
 Array = NDArray[np.float64]
 Results = Mapping[str, Sequence[Any] | Array]
-"""By criterion the results of every trial: (trials, runs), or an array of runs for each trial."""
+"""Results by criterion: (trials, runs), or an array of runs for each trial."""
 
 
 def side_by_side(

@@ -1,21 +1,23 @@
 """What an experiment is: trials as data, a measurement of one trial in one run, and an analysis of the rows."""
 
 import importlib
+import importlib.util
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
+from pneumarm.experiments.differences import Verdict
+from pneumarm.experiments.words import Words
 from pneumarm.settings import Settings, Valid
 
 if TYPE_CHECKING:
-    from pneumarm.experiments.words import Words
     from pneumarm.report.page import Section
 
 Figures = Mapping[str, float]
@@ -31,7 +33,7 @@ class LaboratorySettings(Settings):
     """What decides the rows of an experiment, besides the experiment itself. More arms and runs only add rows."""
 
     seed: int = 0
-    """Of everything that is drawn at random."""
+    """Random seed."""
     transitions: int = 200_000
     """How many to collect on each arm (thesis section 3.2.2: 200,000, two hours)."""
     test_episodes: int = 10_000
@@ -54,12 +56,12 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     arm: str
     trial: int
-    """From 1."""
+    """Number, from 1."""
     run: int
-    """From 1."""
+    """Number, from 1."""
     figures: dict[str, float]
     seconds: float
-    """That it took [s]."""
+    """Time that it took [s]."""
 
     @property
     def key(self) -> tuple[str, int, int]:
@@ -123,10 +125,10 @@ class Claim:
 
     text: str
     thesis: str
-    """Its evidence."""
+    """The thesis' evidence."""
     ours: str
     """Ours, with an interval where there is one."""
-    verdict: Literal["holds", "does not hold", "open"]
+    verdict: Verdict
     about: str
     """Which of the thesis' conclusions it is about, by its key in ``claims/conclusions.toml``."""
 
@@ -140,8 +142,20 @@ class Analysis:
     figures: Mapping[str, Any]
     """For programs: what ``results.json`` holds."""
     sections: Sequence["Section"]
-    """Of the page."""
+    """Sections of the page."""
     claims: Sequence[Claim] = field(default=())
+
+
+class Axis(NamedTuple):
+    """Trials in the order of a quantity."""
+
+    label: str
+    """Name of the quantity, with its unit."""
+    places: Sequence[float]
+    """Places of the trials, from left to right."""
+    ticks: Sequence[str] | None = None
+    """What is written there; by default the places."""
+    log: bool = False
 
 
 class Experiment(ABC):
@@ -149,11 +163,11 @@ class Experiment(ABC):
 
     name: str
     """On the command line."""
-    words: "Words"
-    runs: int
-    """By default."""
-    arms: tuple[str, ...] = ("virtual",)
-    """By default."""
+    words: Words
+    runs: int = 4
+    """Default number of runs."""
+    arms: tuple[str, ...] = ARMS
+    """Default arms."""
     records: ClassVar[bool] = False
     """Whether it is prepared by recording the arm, as :func:`pneumarm.experiments.preparation.simulated` does."""
 
@@ -186,14 +200,20 @@ class Experiment(ABC):
         """Return for how long the arm is left alone meanwhile [s]."""
         return 0.0
 
+    @property
+    def axis(self) -> Axis | None:
+        """Axis along which pictures have the first trials of a section, if there is one."""
+        return None
+
     def analyse(self, rows: TrialRows) -> Analysis:
         """Return what the complete ``rows`` say; runs nothing.
 
-        By default the module ``analysis`` beside that of the experiment knows; it is imported here, so that processes
-        that compute rows need no pictures.
+        The module ``analysis`` in the experiment's folder knows, if it has one, otherwise the common one. It is
+        imported here, so that processes that compute rows need no pictures.
         """
-        package = type(self).__module__.rpartition(".")[0]
-        found: Analysis = importlib.import_module(f"{package}.analysis").analysis(self, rows)
+        own = f"{type(self).__module__.rpartition('.')[0]}.analysis"
+        place = own if importlib.util.find_spec(own) else "pneumarm.experiments.analysis"
+        found: Analysis = importlib.import_module(place).analysis(self, rows)
         return found
 
 

@@ -33,7 +33,7 @@ def _goal(criterion: str) -> Goal:
 
 _IN_WORDS = {**CRITERIA, "gain": "change of the reward by training on"}
 Analyses = Mapping[str, TableAnalysis]
-"""By criterion."""
+"""Analyses by criterion."""
 Finding = Callable[["Factorial", TrialRows, Analyses, Analyses], Claim]
 """Makes a claim of the rows, their analyses and the thesis'."""
 
@@ -42,7 +42,7 @@ Spread = Literal["mean", "std"]
 """The losses that the thesis ranks by."""
 
 
-class Said(NamedTuple):
+class EffectClaim(NamedTuple):
     """What the thesis says of the effect of a column of two levels on a criterion."""
 
     criterion: str
@@ -52,16 +52,17 @@ class Said(NamedTuple):
     about: str
     """See :attr:`~.experiment.Claim.about`."""
     loss: Spread = "mean"
-    """Or std: whether the runs spread more."""
+    """Loss that the effect is on; ``std`` for the spread of the runs."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Factorial(Trainings):
     """Trainings by an orthogonal array, each tested; all criteria of section 5.2."""
 
     name: str
     words: Words
     runs: int
+    arms = ("virtual",)
     design: Design
     base: TrainSettings
     """What no factor sets."""
@@ -73,7 +74,7 @@ class Factorial(Trainings):
     """Episodes until which training goes on after the criterion is met; then ``gain`` is what it changed."""
     criteria: tuple[str, ...] = (*ALL, "episodes")
     """What is analysed."""
-    said: tuple[Said, ...] = ()
+    effect_claims: tuple[EffectClaim, ...] = ()
     """What the thesis concludes of single effects."""
     findings: tuple["Finding", ...] = ()
     """What else it concludes (:mod:`.findings`)."""
@@ -152,12 +153,12 @@ class Factorial(Trainings):
     def claims(self, rows: TrialRows, ours: Analyses, theirs: Analyses) -> tuple[Claim, ...]:
         """Return what the thesis says of single effects, its effect next to ours, and what else it concludes."""
         found = []
-        for said in self.said:
-            for name in (said.criterion, EXPLORING + said.criterion):
+        for claim in self.effect_claims:
+            for name in (claim.criterion, EXPLORING + claim.criterion):
                 # One run says nothing of the spread.
-                if name in ours and (said.loss == "mean" or rows.runs > 1):
-                    effect = self.effect(rows, name, said.column, ours[name], said.loss)
-                    found.append(_effect_claim(said, _IN_WORDS[name], theirs[said.criterion], ours[name], effect))
+                if name in ours and (claim.loss == "mean" or rows.runs > 1):
+                    effect = self.effect(rows, name, claim.column, ours[name], claim.loss)
+                    found.append(_effect_claim(claim, _IN_WORDS[name], theirs[claim.criterion], ours[name], effect))
         return (*found, *(find(self, rows, ours, theirs) for find in self.findings))
 
     def effect(
@@ -262,10 +263,12 @@ def _level(level: Any) -> str:
     return f"{level:g}" if isinstance(level, float) else str(level)
 
 
-def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAnalysis, effect: Interval) -> Claim:
+def _effect_claim(
+    claim: EffectClaim, quantity: str, their: TableAnalysis, our: TableAnalysis, effect: Interval
+) -> Claim:
     """Return whether an effect has the sign that the thesis says, beyond chance."""
-    column, design = said.column, our.design
-    theirs = float(their.effects[said.loss].signed[column - 1])
+    column, design = claim.column, our.design
+    theirs = float(their.effects[claim.loss].signed[column - 1])
     factor = design.on(column)
     if factor:
         what = f"{factor.name[0].upper()}{factor.name[1:]} {_step(factor)}"
@@ -273,11 +276,11 @@ def _effect_claim(said: Said, quantity: str, their: TableAnalysis, our: TableAna
         what = (
             f"That {' and '.join(design.factor(label).name for label in design.label(column))} are at unlike levels"
         )
-    of = "" if said.loss == "mean" else "standard deviation of the "
+    of = "" if claim.loss == "mean" else "standard deviation of the "
     return Claim(
-        f"{what} (column {column}) {'raises' if said.raises else 'lowers'} the {of}{quantity}",
-        str(Interval(theirs, their.margin(said.loss), their.results.shape[1])),
+        f"{what} (column {column}) {'raises' if claim.raises else 'lowers'} the {of}{quantity}",
+        str(Interval(theirs, their.margin(claim.loss), their.results.shape[1])),
         str(effect),
-        above(effect) if said.raises else below(effect),
-        said.about,
+        above(effect) if claim.raises else below(effect),
+        claim.about,
     )

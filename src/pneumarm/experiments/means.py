@@ -8,12 +8,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.experiments.differences import Interval, interval
 from pneumarm.experiments.experiment import Row, TrialRows
+from pneumarm.experiments.words import Column, Quantity
 from pneumarm.report.page import Table
 
 Array = NDArray[np.float64]
@@ -95,6 +95,19 @@ def mean(rows: TrialRows, figure: str, trial: int) -> Interval:
     return over_arms(values(rows, figure, trial))
 
 
+def estimate(rows: TrialRows, quantity: Quantity, trial: int, base: int | None = None) -> Interval:
+    """Return the mean of ``quantity`` over arms in ``trial``, less that in ``base``, its base if it has one."""
+    if quantity.percent:
+        other = samples(rows, quantity.less or quantity.figure, trial if base is None else base)
+        return interval(100 * (samples(rows, quantity.figure, trial) / other - 1))
+
+    def of(trial: int) -> Array:
+        found = values(rows, quantity.figure, trial)
+        return found if quantity.less is None else found - values(rows, quantity.less, trial)
+
+    return over_arms(quantity.factor * (of(trial) if base is None else of(trial) - of(base)))
+
+
 def difference(rows: TrialRows, figure: str, trial: int, reference: int) -> Interval:
     """Return by how much ``figure`` is more in ``trial`` than in ``reference``, within runs."""
     return over_arms(values(rows, figure, trial) - values(rows, figure, reference))
@@ -108,26 +121,9 @@ def change(rows: TrialRows, figure: str, trial: int, reference: int) -> Interval
 # For people and programs ----------------------------------------------------------------------------------------
 
 
-class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A figure of the rows, shown in a table or a picture."""
-
-    figure: str
-    """Its name in the rows."""
-    words: str
-    """What people call it, with its unit."""
-    digits: int = 2
-    factor: float = 1.0
-    """That it is multiplied by to be shown."""
-    thesis: Mapping[str, float] | None = None
-    """What the thesis has, by the words of the trial."""
-
-    def interval(self, rows: TrialRows, trial: int) -> Interval:
-        """Return the mean in ``trial`` as it is shown."""
-        return over_arms(self.factor * values(rows, self.figure, trial))
-
-    def text(self, rows: TrialRows, trial: int) -> str:
-        """Return the mean in ``trial`` for people."""
-        return f"{self.interval(rows, trial):.{self.digits}f}"
+def text(rows: TrialRows, column: Column, trial: int) -> str:
+    """Return the mean of ``column`` in ``trial`` for people."""
+    return f"{estimate(rows, column, trial):.{column.digits}f}"
 
 
 def table(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column], caption: str) -> Table:
@@ -139,21 +135,16 @@ def table(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column],
     for trial, words in trials.items():
         line = [words.replace(" ", "\N{NO-BREAK SPACE}") if len(words) < _SHORT else words]
         for column in columns:
-            line.append(column.text(rows, trial))
+            line.append(text(rows, column, trial))
             if column.thesis:
                 line.append(f"{column.thesis[words]:.{column.digits}f}" if words in column.thesis else "")
         lines.append(line)
     return Table(header, lines, caption)
 
 
-def by_trial(rows: TrialRows, trials: Mapping[int, str], figure: str) -> dict[str, Any]:
-    """Return the means of ``figure`` by trial for programs."""
-    return {words: mean(rows, figure, trial)._asdict() for trial, words in trials.items()}
-
-
 def numbers(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column]) -> dict[str, Any]:
-    """Return for programs what :func:`table` shows."""
-    found = {
+    """Return for programs the means of the figures that :func:`table` shows, by trial."""
+    return {
         column.figure: {
             words: {"mean": one.mean, "half": one.half}
             for trial, words in trials.items()
@@ -161,4 +152,3 @@ def numbers(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column
         }
         for column in columns
     }
-    return {"ours": found}

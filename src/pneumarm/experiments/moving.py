@@ -2,7 +2,6 @@
 
 import functools
 import threading
-from abc import abstractmethod
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.virtual import ArmParameters, VirtualArm
 from pneumarm.control.movement import BEGIN, drawn
 from pneumarm.control.turns import player
-from pneumarm.experiments.experiment import ARMS, Experiment, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import Agent, Exploration, TrainSettings
 from pneumarm.learning.online.testing import GREEDY, run_test
@@ -41,44 +40,6 @@ SIMULATION = "simulation: "
 """Prefix of the figures of a test in the simulation; those on the arm have none."""
 
 
-@dataclass(frozen=True, eq=False)
-class Material:
-    """An arm by name, and its simulation."""
-
-    arm: str
-    simulated: Simulated
-
-    @property
-    def parameters(self) -> ArmParameters | None:
-        """What the arm is made of, if that is known: it is of a virtual arm."""
-        if not self.arm.startswith("virtual"):
-            return None
-        with open_arm(self.arm) as arm:
-            return arm.parameters if isinstance(arm, VirtualArm) else None
-
-
-@dataclass(frozen=True)
-class OnTheArm(Experiment):
-    """An experiment in which agents move the arm, by default that of a run in all its trials."""
-
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
-    agent: TrainSettings = THESIS
-    """How it learned."""
-    sizes: Any = None
-    """How much is moved in a row: a dataclass of each experiment's own."""
-
-    records = True
-
-    def settings(self) -> Any:
-        """Return the trials in words, the settings of the agent and the sizes."""
-        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
-
-    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Material:
-        """Return the arm and its simulation."""
-        return Material(arm, simulated(arm, folder, settings, progress))
-
-
 @dataclass(frozen=True)
 class TestSizes:
     """How much agents are tested in a row."""
@@ -88,26 +49,38 @@ class TestSizes:
 
 
 @dataclass(frozen=True)
-class AgentsByTrial(OnTheArm):
-    """An experiment in which every trial has an agent of its own, tested in the simulation and on the arm."""
+class OnTheArm(Experiment):
+    """An experiment in which agents move the arm, by default that of a run in all its trials."""
 
-    sizes: TestSizes = TestSizes()
+    agent: TrainSettings = THESIS
+    """How it learned."""
+    sizes: Any = TestSizes()
+    """How much is moved in a row, by default a test; a dataclass."""
+
+    records = True
+
+    def settings(self) -> Any:
+        """Return the trials in words, the settings of the agent and the sizes."""
+        return {"trials": dict(self.trials), "agent": msgspec.to_builtins(self.agent), "sizes": asdict(self.sizes)}
+
+    def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Simulated:
+        """Return the arm's simulation."""
+        return simulated(arm, folder, settings, progress)
 
     def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
         """Return those of the test."""
-        return self.sizes.test
-
-    @abstractmethod
-    def train_settings(self, trial: int) -> TrainSettings:
-        """Return how the agents of ``trial`` learn."""
-
-    def settings(self) -> Any:
-        """Return the settings of all agents and the sizes."""
-        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
-        return {"agents": agents, "sizes": asdict(self.sizes)}
+        return int(self.sizes.test)
 
 
-def new_arm(of: Material, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Arm:
+def parameters_of(arm: str) -> ArmParameters | None:
+    """Return what the arm of this name is made of, if that is known: it is of a virtual arm."""
+    if not arm.startswith("virtual"):
+        return None
+    with open_arm(arm) as opened:
+        return opened.parameters if isinstance(opened, VirtualArm) else None
+
+
+def new_arm(of: Simulated, run: int, laboratory: LaboratorySettings, parameters: ArmParameters | None = None) -> Arm:
     """Return the arm: a virtual one as it is in the morning, after a night of rest, any other as it is.
 
     All trials of a run on a virtual arm meet the same noise. ``parameters`` are others than its own.
@@ -129,7 +102,7 @@ _locks: dict[Any, threading.Lock] = {}
 _guard = threading.Lock()
 
 
-def agent_of(of: Material, settings: TrainSettings, run: int, laboratory: LaboratorySettings) -> Agent:
+def agent_of(of: Simulated, settings: TrainSettings, run: int, laboratory: LaboratorySettings) -> Agent:
     """Return the agent of ``run``, the best of ``settings.agents``; trained once in a process.
 
     All trials of a run that train alike begin on the arm with the same agent.
@@ -143,8 +116,8 @@ def agent_of(of: Material, settings: TrainSettings, run: int, laboratory: Labora
 
 
 @functools.lru_cache(maxsize=64)
-def _trained(of: Material, settings: TrainSettings, seed: int) -> Agent:
-    return train(of.simulated.simulation, of.simulated.begin, settings, seed, threads=1).agent
+def _trained(of: Simulated, settings: TrainSettings, seed: int) -> Agent:
+    return train(of.simulation, of.begin, settings, seed, threads=1).agent
 
 
 def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> tuple[Array, Array]:
@@ -166,7 +139,7 @@ def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> t
 
 
 def simulated_test(
-    of: Material,
+    of: Simulated,
     agent: Agent,
     episodes: int,
     *,
@@ -179,13 +152,13 @@ def simulated_test(
     Their names are preceded by ``prefix``.
     """
     settings = agent.settings if noise is None else replace(agent.settings, noise=noise)
-    env = environment(of.simulated.simulation, of.simulated.begin, settings)
+    env = environment(of.simulation, of.begin, settings)
     tested = run_test(env, agent.weights(), agent.settings, episodes, (_TEST_SEED, TEST), exploration)
     return means(tested, prefix)
 
 
 def greedy_test(
-    of: Material,
+    of: Simulated,
     agent: Agent,
     episodes: int,
     run: int,

@@ -5,16 +5,15 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.experiment import TrialRows
-from pneumarm.experiments.means import Array, Column, over_arms, samples, table
-from pneumarm.experiments.words import SectionWords
+from pneumarm.experiments.experiment import Axis, TrialRows
+from pneumarm.experiments.means import Array, estimate, over_arms, samples, text
+from pneumarm.experiments.words import Column
 from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE, PALE
-from pneumarm.report.page import Picture, Section, Table
+from pneumarm.report.page import Picture
 from pneumarm.report.style import key, legend_below, panels, styled
 
 _INKS = ((DARK, "-", "o"), (MIDDLE, "--", "s"), (GREY, "-.", "^"), (LIGHT, ":", "D"), (INK, (0, (1, 1)), "v"))
@@ -133,18 +132,6 @@ def _dots(
     return figure
 
 
-class Axis(NamedTuple):
-    """Trials in the order of a quantity."""
-
-    label: str
-    """With its unit."""
-    places: Sequence[float]
-    """Of the trials, from left to right."""
-    ticks: Sequence[str] | None = None
-    """What is written there; by default the places."""
-    log: bool = False
-
-
 def against(
     rows: TrialRows, trials: Mapping[int, str], axis: Axis, columns: Sequence[Column], caption: str
 ) -> Picture:
@@ -159,7 +146,7 @@ def against(
 
     """
     said = [
-        f"{column.words}: " + ", ".join(f"{column.text(rows, trial)} ({words})" for trial, words in trials.items())
+        f"{column.words}: " + ", ".join(f"{text(rows, column, trial)} ({words})" for trial, words in trials.items())
         for column in columns
     ]
     return Picture(_against(rows, trials, axis, columns), caption, ". ".join(said) + ".")
@@ -176,7 +163,7 @@ def _against(rows: TrialRows, trials: Mapping[int, str], along: Axis, columns: S
         axis.set_visible(False)
     for axis, column in zip(axes.flat, columns, strict=False):
         axis.plot(places, [column.factor * samples(rows, column.figure, t) for t in trials], color=GREY, lw=0.7)
-        found = [column.interval(rows, trial) for trial in trials]
+        found = [estimate(rows, column, trial) for trial in trials]
         means = [one.mean for one in found]
         axis.errorbar(places, means, _halves(found), color=DARK, marker="o", lw=1.6, capsize=3)
         if column.thesis:
@@ -199,36 +186,6 @@ def _against(rows: TrialRows, trials: Mapping[int, str], along: Axis, columns: S
         names.append("thesis")
     legend_below(figure, handles, names)
     return figure
-
-
-def section(
-    words: SectionWords,
-    rows: TrialRows,
-    trials: Mapping[int, str],
-    axis: Axis | None = None,
-    *,
-    compared: bool = True,
-    figures: Sequence[Picture] = (),
-    tables: Sequence[Table] = (),
-) -> Section:
-    """Return a section of these ``words``.
-
-    Args:
-        words: its title and text, the columns of its table, and captions of what there is.
-        rows: of all arms.
-        trials: in words.
-        axis: along which the columns are drawn too, where there is one.
-        compared: whether the thesis' numbers are drawn; they stand in the table in any case.
-        figures: further ones.
-        tables: further ones.
-
-    """
-    of_columns = [table(rows, trials, words.columns, words.table)] if words.table and words.columns else []
-    drawn = []
-    if axis is not None and words.figure:
-        columns = words.columns if compared else [msgspec.structs.replace(c, thesis=None) for c in words.columns]
-        drawn.append(against(rows, trials, axis, columns, words.figure))
-    return Section(words.title, words.text, [*drawn, *figures], [*of_columns, *tables])
 
 
 def _halves(found: Sequence[Interval]) -> list[float]:

@@ -18,10 +18,11 @@ PLAN = "faults.toml"
 SETTINGS = "settings.json"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Simulated:
-    """An arm's simulation and the begin states that go with it."""
+    """An arm by name, its simulation and the begin states that go with it."""
 
+    arm: str
     simulation: Simulation
     begin: BeginStates
 
@@ -36,19 +37,20 @@ def simulated(arm: str, folder: Path, settings: LaboratorySettings, progress: Re
         UnusableInput: no arm has this name, or the folder was begun with other settings.
 
     """
-    wanted = {"arm": arm, "seed": settings.seed, "transitions": settings.transitions}
+    recorded, wanted = arm, {"arm": arm, "seed": settings.seed, "transitions": settings.transitions}
     claim(folder, wanted | ({"faults": faults} if faults else {}))
     if faults:
         write_text(folder / PLAN, faults)
-        arm = f"{arm}{',' if ':' in arm else ':'}faults={folder / PLAN}"
+        recorded = f"{arm}{',' if ':' in arm else ':'}faults={folder / PLAN}"
     if not (folder / SIMULATION).exists():
-        with open_arm(arm, settings.seed) as opened, Store.for_arm(folder / STORE, opened.spec) as store:
+        with open_arm(recorded, settings.seed) as opened, Store.for_arm(folder / STORE, opened.spec) as store:
             collect(opened, store, settings.transitions, settings.seed, progress=progress, settings=WHOLE_PERIODS)
         with Store.open(folder / STORE) as store:
             fit_store(store, replace(SINGLE_STEPS, seed=settings.seed)).simulation.save(folder / SIMULATION)
     simulation = Simulation.load(folder / SIMULATION)
     with Store.open(folder / STORE) as store:
-        return Simulated(simulation, begin_states(store, simulation.window, simulation.scaling, simulation.spec))
+        begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
+    return Simulated(arm, simulation, begin)
 
 
 def claim(folder: Path, wanted: object) -> None:

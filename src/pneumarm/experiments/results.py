@@ -15,7 +15,7 @@ from pneumarm.report.playing import playing
 from pneumarm.report.shown import read_shown
 
 _HYPHEN = re.compile(r"(?<!\w)-(?=\d)")
-"""In the place of a minus."""
+"""Hyphen in the place of a minus."""
 PAGE = "page.html"
 RESULTS = "results.json"
 _SHOWN = 12.0

@@ -1,10 +1,9 @@
 """What experiments of chapter 6 share: arms of two joints, and agents that learn one goal or all of them.
 
-They go from an arm and back to it as those of :mod:`.there_and_back` do. What a trial learns is a :class:`Lesson`.
+They go from an arm and back to it with :mod:`.there_and_back`. What a trial learns is a :class:`Lesson`.
 """
 
 import zlib
-from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,17 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.there_and_back import (
     BEFORE,
     MOVEMENTS,
     Prepared,
     Recipe,
-    ThereAndBack,
     opened,
     prepared,
     train_and_move,
 )
+from pneumarm.experiments.words import Words
 from pneumarm.learning import PolicySettings, TrainSettings, find_method
 from pneumarm.simulation import SINGLE_STEPS
 
@@ -34,9 +33,11 @@ ARMS = tuple(f"virtual:joints=2,seed={number}" for number in range(1, 6))
 TRANSITIONS = 12_000
 """Transitions of a simulation, at most as many as the laboratory's: 7 minutes on the arm."""
 FIT = replace(SINGLE_STEPS, epochs=30)
-"""Of a simulation: twice the thesis' epochs; twice as many again take 5 % off its errors."""
+"""Fit of a simulation: twice the thesis' epochs; twice as many again take 5 % off its errors."""
 THESIS = TrainSettings(agents=1, validation_episodes=100, max_episodes=100_000)
 """Thesis' agents, one a joint, with as many episodes as it needed for a single goal (section 6.1.4)."""
+HALF_AS_LONG = replace(THESIS, max_episodes=50_000)
+"""The thesis' agents with half the episodes at most."""
 POLICY = PolicySettings(agents=1, validation_episodes=100, lookahead=0)
 """A policy learned in many simulated arms; on the arm it does what it says, as the thesis' agents do."""
 _GOAL = 6  # stream of random numbers
@@ -55,23 +56,18 @@ class Lesson:
     arm, or the one in the middle of the ranges of the joints."""
 
 
-@dataclass(frozen=True)
-class SeveralJoints(ThereAndBack):
+@dataclass(frozen=True, kw_only=True)
+class SeveralJoints(Experiment):
     """An experiment on arms of several joints, by default of two, in which every trial is a lesson."""
 
-    runs: int = 1
-    arms: tuple[str, ...] = ARMS
+    name: str
+    words: Words
+    lessons: Mapping[str, Lesson]
+    """What is learned in each trial, by what the trial is called."""
+    runs = 1
+    arms = ARMS
     recipe: Recipe = field(default_factory=lambda: Recipe(TRANSITIONS, fit=FIT))
-    """Of the simulation; never more transitions than the laboratory's."""
-    thesis: TrainSettings = THESIS
-    """Of trials in which the thesis' agents learn."""
-    policy: PolicySettings = POLICY
-    """Of trials in which a policy learns."""
-
-    @property
-    @abstractmethod
-    def lessons(self) -> Mapping[str, Lesson]:
-        """What is learned in each trial, by what the trial is called."""
+    """How the simulation is made; never from more transitions than the laboratory's."""
 
     @property
     def trials(self) -> Mapping[int, str]:

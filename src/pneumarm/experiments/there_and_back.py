@@ -1,7 +1,6 @@
-"""From an arm and back to it: collect, fit, train, move; with what an experiment varies on the way.
+"""Collect, fit, train and move the arm, with what an experiment varies on the way.
 
 Collecting and fitting belong to an arm (:func:`prepared`), training and moving to a row (:func:`train_and_move`).
-What such experiments have in common is :class:`ThereAndBack`.
 """
 
 import hashlib
@@ -19,7 +18,7 @@ from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
 from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.control.agent import warm_up
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import ARMS, Experiment, Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
 from pneumarm.files import read_json, write_json
 from pneumarm.learning import Acts, Method, TrainSettings, test, train
@@ -43,20 +42,10 @@ TRAINING = TrainSettings(agents=4, validation_episodes=500)
 
 The first weights decide most (section 5.4.2): with a single agent a row the intervals would be twice as wide.
 """
+DECISIVE = {"transitions": TRANSITIONS, "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
+"""What the rows of such experiments rest on, as JSON."""
 _FIGURES = "figures.json"
 _SAME = 1e-9
-
-
-@dataclass(frozen=True)
-class ThereAndBack(Experiment):
-    """An experiment that goes from an arm back to it."""
-
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
-
-    def settings(self) -> Any:
-        """Return the training of a row, and the transitions and movements that it rests on."""
-        return {"transitions": TRANSITIONS, "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
 
 
 def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:
@@ -81,11 +70,11 @@ class Recipe:
     """How the transitions of a simulation are collected and how it is fitted to them."""
 
     transitions: int = FEWEST_TRANSITIONS
-    """At least."""
+    """Fewest transitions."""
     minutes: float = 0.0
-    """At least, on the arm's clock."""
+    """Shortest time of collecting, on the arm's clock [min]."""
     frequency: float | None = None
-    """Of control [Hz]; None for the arm's own."""
+    """Control frequency [Hz]; None for the arm's own."""
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting."""
     pulses: float = 0.0
@@ -135,7 +124,7 @@ class Prepared:
     simulation: Simulation
     begin: BeginStates
     figures: Figures
-    """Of collecting and fitting."""
+    """Figures of collecting and fitting."""
 
 
 def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySettings, progress: Report) -> Prepared:

@@ -1,23 +1,53 @@
-"""The words of an experiment, as data: ``words.toml`` in its folder.
+"""The page of an experiment as data: ``words.toml`` in its folder.
 
+It says what is estimated from the rows, how each section shows them, and by what each claim of the thesis is judged.
 Texts hold what was found, by name and with the form of a number, as of :meth:`str.format`: ``lost: {drop:.2f}``,
 ``{success:.1%}`` (:class:`~.differences.Interval`). Line breaks in them are spaces.
 """
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from importlib import resources
 from typing import Any
 
 import msgspec
 
 from pneumarm.experiments.differences import Interval, Verdict, above, all_hold, below, within
-from pneumarm.experiments.experiment import Analysis, Claim
-from pneumarm.experiments.means import Column
-from pneumarm.report.page import Section
 
 _RULE = re.compile(r"(\|?)(\w+)\|? ([<>]) (-?[\d.]+)")
+
+
+class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A figure of the rows, or by how much it differs; see :func:`~.means.estimate`."""
+
+    figure: str
+    """Its name in the rows."""
+    less: str | None = None
+    """Figure of the same row that is subtracted."""
+    base: str | int | None = None
+    """Trial that is subtracted, within runs: by name, or by number, negative from the last."""
+    percent: bool = False
+    """Whether what is subtracted is what the difference is given in percent of."""
+    factor: float = 1.0
+    """Multiplies the values."""
+
+
+class Estimate(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A quantity in one trial."""
+
+    trial: str | int
+    """Name of the trial, or its number, negative from the last."""
+
+
+class Column(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A quantity of all trials, shown in a table or a picture."""
+
+    words: str
+    """What people call it, with its unit."""
+    digits: int = 2
+    thesis: Mapping[str, float] | None = None
+    """What the thesis has, by the words of the trial."""
 
 
 class ClaimWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -27,18 +57,16 @@ class ClaimWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """See :attr:`~.experiment.Claim.about`."""
     claim: str
     thesis: str
-    """Its evidence."""
+    """The thesis' evidence."""
     ours: str
     holds: str
     """When it holds: ``drop > 15``, ``drop < 0``, ``|drop| < 3``, several with ``and``; or the name of a verdict that
     was found. It is open while a 95 % interval allows both."""
 
-    def judged(self, found: Mapping[str, Any]) -> Claim:
-        """Return the claim with the verdict that what was ``found`` allows."""
-        verdict: Verdict | None = found.get(self.holds)
-        if verdict is None:
-            verdict = all_hold([_verdict(rule, found) for rule in self.holds.split(" and ")])
-        return Claim(self.claim, self.thesis, self.ours, verdict, self.about)
+    def verdict(self, found: Mapping[str, Any]) -> Verdict:
+        """Return the verdict that what was ``found`` allows."""
+        known: Verdict | None = found.get(self.holds)
+        return known or all_hold([_verdict(rule, found) for rule in self.holds.split(" and ")])
 
 
 def _verdict(rule: str, found: Mapping[str, Any]) -> Verdict:
@@ -52,16 +80,34 @@ def _verdict(rule: str, found: Mapping[str, Any]) -> Verdict:
 
 
 class SectionWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A section of the page."""
+    """A section of the page: a table of trials by columns, and a picture of them where it has a caption."""
 
     title: str
     text: tuple[str, ...] = ()
+    trials: str = ""
+    """Regular expression found in the names of the trials that are shown; by default all are."""
+    called: str | None = None
+    """Replaces in these names what the expression matches."""
     columns: tuple[Column, ...] = ()
-    """Of its table."""
+    """Columns of its table."""
     table: str = ""
     """Caption of its table."""
     figure: str = ""
-    """Caption of its figure."""
+    """Caption of its figure: the columns against the experiment's axis, or dots."""
+    compared: bool = True
+    """Whether the thesis' numbers are drawn too."""
+    dots: tuple[str | Column, ...] = ()
+    """What is drawn as dots, a line a trial: columns of the table by their figure, or others."""
+    reference: int | None = None
+    """Place of the trial that the others are compared with in the dots."""
+    results: str = "ours"
+    """Where the columns are in the results for programs."""
+
+    @property
+    def drawn(self) -> tuple[Column, ...]:
+        """Return the columns that are drawn as dots."""
+        known = {column.figure: column for column in self.columns}
+        return tuple(known[one] if isinstance(one, str) else one for one in self.dots)
 
 
 class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -74,13 +120,12 @@ class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where in the thesis."""
     summary: tuple[str, ...] = ()
     """Paragraphs after the question."""
+    estimates: Mapping[str, Estimate] = {}
+    """What texts name and claims are judged by."""
+    results: Mapping[str, Quantity] = {}
+    """What programs get of every trial, in place of the columns."""
     sections: tuple[SectionWords, ...] = ()
     claims: tuple[ClaimWords, ...] = ()
-
-    @property
-    def columns(self) -> list[Column]:
-        """Columns of all sections."""
-        return [column for section in self.sections for column in section.columns]
 
     def filled(self, found: Mapping[str, Any]) -> "Words":
         """Return the words with what was ``found`` in its places; claims on what is None are left out."""
@@ -89,11 +134,6 @@ class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         missing = found.keys() - known.keys()
         words["claims"] = [claim for claim in words["claims"] if claim["holds"].split()[0] not in missing]
         return msgspec.convert(_changed(words, lambda text: text.format_map(known)), Words)
-
-    def analysis(self, found: Mapping[str, Any], figures: Mapping[str, Any], sections: Sequence[Section]) -> Analysis:
-        """Return what an experiment says in these words, which are filled already."""
-        claims = [claim.judged(found) for claim in self.claims]
-        return Analysis([self.question, *self.summary], figures, sections, claims)
 
 
 def _changed(words: Any, change: Callable[[str], str]) -> Any:
@@ -108,4 +148,4 @@ def _changed(words: Any, change: Callable[[str], str]) -> Any:
 def words_of(package: str | None) -> Words:
     """Return the words in the file ``words.toml`` of a ``package``."""
     text = (resources.files(package or "") / "words.toml").read_text(encoding="utf-8")
-    return msgspec.convert(_changed(tomllib.loads(text), lambda one: " ".join(one.split())), Words)
+    return msgspec.convert(_changed(tomllib.loads(text), lambda one: re.sub(r"\n\s*", " ", one)), Words)

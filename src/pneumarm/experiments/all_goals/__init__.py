@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_results
-from pneumarm.experiments.factorial import Factorial, Said
+from pneumarm.experiments.factorial import EffectClaim, Factorial
 from pneumarm.experiments.findings import (
     fewest_switches,
     nearly_all_succeed,
@@ -44,19 +44,19 @@ EXPERIMENT = Factorial(
     design=thesis_design(),
     base=BASE,
     thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),
-    said=(
-        Said("reward", 4, raises=False, about="sarsa"),
-        Said("reward", 4, raises=True, loss="std", about="sarsa"),
-        Said("reward", 8, raises=False, loss="std", about="column-8"),
-        Said("reward", 2, raises=False, about="neurons"),
-        Said("reward", 2, raises=True, loss="std", about="neurons"),
-        Said("reward", 1, raises=False, about="learning-rate"),
-        Said("reward", 1, raises=True, loss="std", about="learning-rate"),
-        Said("reward", 11, raises=False, about="traces"),
-        Said("reward", 12, raises=True, about="gamma"),
-        Said("reward", 12, raises=True, loss="std", about="gamma"),
-        Said("episodes", 12, raises=False, about="gamma-episodes"),
-        Said("episodes", 11, raises=True, about="traces"),
+    effect_claims=(
+        EffectClaim("reward", 4, raises=False, about="sarsa"),
+        EffectClaim("reward", 4, raises=True, loss="std", about="sarsa"),
+        EffectClaim("reward", 8, raises=False, loss="std", about="column-8"),
+        EffectClaim("reward", 2, raises=False, about="neurons"),
+        EffectClaim("reward", 2, raises=True, loss="std", about="neurons"),
+        EffectClaim("reward", 1, raises=False, about="learning-rate"),
+        EffectClaim("reward", 1, raises=True, loss="std", about="learning-rate"),
+        EffectClaim("reward", 11, raises=False, about="traces"),
+        EffectClaim("reward", 12, raises=True, about="gamma"),
+        EffectClaim("reward", 12, raises=True, loss="std", about="gamma"),
+        EffectClaim("episodes", 12, raises=False, about="gamma-episodes"),
+        EffectClaim("episodes", 11, raises=True, about="traces"),
     ),
     findings=(
         weights_matter_more_than_settings,

@@ -35,11 +35,11 @@ class Conclusion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     key: str
     section: str
-    """Of the thesis."""
+    """Section of the thesis."""
     says: str
-    """In words."""
+    """What it concludes, in words."""
     experiments: tuple[str, ...]
-    """That test it."""
+    """Experiments that test it."""
 
 
 class _ConclusionsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -57,7 +57,7 @@ class FoundClaim(msgspec.Struct, frozen=True):
 
 
 class Results(msgspec.Struct, frozen=True):
-    """Of ``results.json`` what matters here."""
+    """The part of ``results.json`` that claims rest on."""
 
     experiment: str
     arms: tuple[str, ...]

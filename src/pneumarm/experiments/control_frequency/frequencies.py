@@ -7,13 +7,12 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report
 from pneumarm.experiments.there_and_back import (
     MOVEMENTS,
     TRAINING,
     TRANSITIONS,
     Prepared,
-    ThereAndBack,
     prepared,
     train_and_move,
     usual,
@@ -41,11 +40,11 @@ def at_frequency(settings: TrainSettings, frequency: float) -> TrainSettings:
 
 
 @dataclass(frozen=True)
-class ControlFrequency(ThereAndBack):
+class ControlFrequency(Experiment):
     """The whole job at several frequencies."""
 
     frequencies: tuple[float, ...] = _FREQUENCIES
-    """In ascending order, 20, 30 and 40 Hz among them [Hz]."""
+    """Control frequencies in ascending order, 20, 30 and 40 Hz among them [Hz]."""
     name = "control-frequency"
     words = words_of(__package__)
 
@@ -53,6 +52,11 @@ class ControlFrequency(ThereAndBack):
     def trials(self) -> Mapping[int, str]:
         """The frequencies."""
         return {trial: f"{frequency:g} Hz" for trial, frequency in enumerate(self.frequencies, 1)}
+
+    @property
+    def axis(self) -> Axis:
+        """The frequencies."""
+        return Axis("control frequency [Hz]", self.frequencies)
 
     def train_settings(self, trial: int) -> TrainSettings:
         """Return the settings of the training in ``trial``."""

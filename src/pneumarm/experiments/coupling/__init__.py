@@ -11,6 +11,6 @@ Answer here, on arms 1 to 3: with all of the coupling the error of the angle is 
 costs the policy reward, or the thesis' agents episodes, is not shown; both did worse on one of the arms without it.
 """
 
-from pneumarm.experiments.coupling.couplings import Coupling
+from pneumarm.experiments.coupling.couplings import coupling
 
-EXPERIMENT = Coupling()
+EXPERIMENT = coupling(0.0, 0.5, 1.0)

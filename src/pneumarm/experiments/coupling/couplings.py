@@ -1,33 +1,27 @@
 """Arms whose joints act on each other less."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pneumarm.arm.open import with_options
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
-from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned, of_several
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
+from pneumarm.experiments.several_joints import POLICY, THESIS, Lesson, SeveralJoints, learned, of_several
 from pneumarm.experiments.there_and_back import Prepared
 from pneumarm.experiments.words import words_of
 
-_WHO = ("policy, all goals", "thesis' agents, one goal")
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Coupling(SeveralJoints):
     """A policy with all goals and thesis' agents with one, on arms of more and more coupling."""
 
-    shares: tuple[float, ...] = (0.0, 0.5, 1.0)
-    """Of the coupling that the arm has, in ascending order."""
-    name = "coupling"
-    words = words_of(__package__)
+    shares: tuple[float, ...]
+    """Shares of the arm's coupling, in ascending order."""
 
     @property
-    def lessons(self) -> Mapping[str, Lesson]:
-        """By who learns and the share."""
-        lessons = dict(zip(_WHO, (Lesson(self.policy), Lesson(self.thesis, goals="middle")), strict=True))
-        return {f"{who}, {share:g}": lesson for who, lesson in lessons.items() for share in self.shares}
+    def axis(self) -> Axis:
+        """The shares."""
+        return Axis("share of the coupling [-]", self.shares)
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
         """Return a simulation of the arm with each share of its coupling.
@@ -43,3 +37,10 @@ class Coupling(SeveralJoints):
         """Learn with the share of ``trial``, and move that arm."""
         chosen = material[(trial - 1) % len(self.shares)]
         return {**chosen.figures, **learned(chosen, self.lessons[self.trials[trial]], run, settings)}
+
+
+def coupling(*shares: float) -> Coupling:
+    """Return the experiment with these shares of the coupling, in ascending order."""
+    learners = {"policy, all goals": Lesson(POLICY), "thesis' agents, one goal": Lesson(THESIS, goals="middle")}
+    lessons = {f"{who}, {share:g}": lesson for who, lesson in learners.items() for share in shares}
+    return Coupling(name="coupling", words=words_of(__package__), lessons=lessons, shares=shares)

@@ -32,17 +32,17 @@ class TableAnalysis:
     results: Array
     """Shape (trials, runs)."""
     losses: Mapping[str, Array]
-    """By name, shapes (trials,): mean, std where there are two runs, and the signal-to-noise ratios where defined."""
+    """Losses by name, shapes (trials,): mean, std where there are two runs, and the signal-to-noise ratios."""
     effects: Mapping[str, Effects]
-    """Of these losses."""
+    """Effects on these losses."""
     runs: tuple[Effects, ...]
-    """Of each run apart."""
+    """Effects on the results of each run."""
     lenth: Mapping[str, Lenth]
-    """Of these losses; empty for arrays of fewer than three columns or with more than two levels."""
+    """Margins of error of these losses; empty for arrays of fewer than three columns or with more than two levels."""
     variance: tuple[Source, ...]
     """Analysis of variance of the results with the runs as blocks; of one run, half the columns pooled as error."""
     best: Best
-    """By the rankings of mean and std together."""
+    """Best settings by the rankings of mean and std together."""
 
     @property
     def names(self) -> tuple[str, ...]:

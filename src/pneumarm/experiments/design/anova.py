@@ -36,7 +36,7 @@ class Source:
     p: float = float("nan")
     """Probability of such an F by chance."""
     share: float = float("nan")
-    """Of the total sum of squares, without what the error alone would contribute; not below 0."""
+    """Share of the total sum of squares, without what the error alone would contribute; not below 0."""
 
     @property
     def mean_square(self) -> float:

@@ -27,7 +27,7 @@ class Factor:
     levels: tuple[Level, ...]
     """The lowest first."""
     column: int
-    """Of the array, from 1."""
+    """Column of the array, from 1."""
     setting: str = ""
     """What it sets, for experiments that pneumarm runs itself, such as ``learning_rate`` or ``reward.switch``."""
 

@@ -41,12 +41,12 @@ class FixedFactor:
     factor: str
     """Label."""
     level: int
-    """From 0."""
+    """Number of the level, from 0."""
     column: int
-    """That decided."""
+    """Name of the criterion that decided."""
     criterion: str
     rank: int
-    """Of the column there, from 1."""
+    """Rank of the column by that criterion, from 1."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class Confirmation:
     predicted: float
     low: float
     high: float
-    """Where the mean of so many runs is expected with 95 % confidence."""
+    """Interval in which the mean of so many runs is expected with 95 % confidence."""
     observed: float
     confirmed: bool
 

@@ -16,7 +16,7 @@ class Effects:
     """The average loss table and what follows from it."""
 
     averages: tuple[Array, ...]
-    """By column the average loss at each level, shapes (levels,)."""
+    """Average loss at each level by column, shapes (levels,)."""
     sizes: Array
     """Estimated effects: highest minus lowest average of each column, shape (columns,)."""
 

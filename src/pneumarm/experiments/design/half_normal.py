@@ -41,9 +41,9 @@ class Lenth(NamedTuple):
 
     pseudo_standard_error: float
     margin: float
-    """Of error, for one effect that was singled out beforehand."""
+    """Margin of error of one effect that was chosen beforehand."""
     simultaneous_margin: float
-    """For the largest of all."""
+    """Margin of error of the largest effect."""
 
 
 def lenth(sizes: ArrayLike, confidence: float = CONFIDENCE) -> Lenth:

@@ -14,7 +14,8 @@ from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_see
 from pneumarm.experiments.means import (
     series,
 )
-from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, draws, new_arm
+from pneumarm.experiments.moving import MOVEMENTS, OnTheArm, agent_of, draws, new_arm
+from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import Agent
 
@@ -89,7 +90,7 @@ class Displacement(OnTheArm):
         """The one agent."""
         return {1: f"learning rate {self.sizes.learning_rate:g}"}
 
-    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Adapt, move, and make the typical movements."""
         sizes, seed = self.sizes, run_seed(settings, run)
         agent = agent_of(material, self.agent, run, settings)

@@ -1,13 +1,11 @@
-"""What the rows say of the minutes of collecting."""
-
-from typing import Any
+"""What the rows say of the fewest minutes of collecting that are enough."""
 
 import numpy as np
 
+from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.enough_data.minutes import EnoughData
 from pneumarm.experiments.experiment import Analysis, TrialRows
-from pneumarm.experiments.means import difference, mean, numbers
-from pneumarm.experiments.pictures import Axis, section
+from pneumarm.experiments.means import difference, mean
 
 _THESIS = 120.0  # minutes (section 3.2.2)
 _MARGIN = 2.0  # reward that does not matter: two actions of some seventeen
@@ -15,35 +13,26 @@ _MARGIN = 2.0  # reward that does not matter: two actions of some seventeen
 
 def analysis(experiment: EnoughData, rows: TrialRows) -> Analysis:
     """Return coverage, fit and performance by minutes."""
-    found, trials = measured(experiment, rows), experiment.trials
-    words = experiment.words.filled(found)
-    axis = Axis("collecting [min]", experiment.minutes, log=True)
-    sections = [section(one, rows, trials, axis) for one in words.sections]
-    return words.analysis(found, numbers(rows, trials, words.columns), sections)
-
-
-def measured(experiment: EnoughData, rows: TrialRows) -> dict[str, Any]:
-    """Return what claims are judged by, and the words that they need."""
     trials, last = experiment.trials, len(experiment.minutes)
     usual = 1 + int(np.argmin([abs(minutes - _THESIS) for minutes in experiment.minutes]))
     fewest = _fewest(rows, last)
-    enough = f"nothing less than {trials[last]} is shown to be as good, within {_MARGIN:g} of its reward"
-    shown = ""
+    enough, shown = f"nothing less than {trials[last]} is shown to be as good, within {_MARGIN:g} of its reward", ""
     if fewest is not None:
         enough = f"from {trials[fewest]} on the reward is that of {trials[last]}, within {_MARGIN:g}"
         less, transitions = difference(rows, "reward", fewest, last), mean(rows, "transitions", fewest).mean
         shown = f": {transitions:.0f} transitions; reward less that of the longest: {less:+.2f}"
-    return {
-        "gain": difference(rows, "reward", last, usual),
-        "new": mean(rows, "new", last),
-        "least": difference(rows, "reward", last, 1),
-        "fewer": "open" if fewest is None else "holds" if fewest < usual else "does not hold",
-        "enough": enough,
-        "shown": shown,
-        "usual": trials[usual],
-        "shortest": trials[1],
-        "longest": trials[last],
-    }
+    words, found = filled(
+        experiment,
+        rows,
+        gain=difference(rows, "reward", last, usual),
+        fewer="open" if fewest is None else "holds" if fewest < usual else "does not hold",
+        enough=enough,
+        shown=shown,
+        usual=trials[usual],
+        shortest=trials[1],
+        longest=trials[last],
+    )
+    return analysed(experiment, rows, words, found)
 
 
 def _fewest(rows: TrialRows, last: int) -> int | None:

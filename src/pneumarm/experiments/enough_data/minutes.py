@@ -9,14 +9,13 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     MOVEMENTS,
     TRAINING,
     Prepared,
     Recipe,
-    ThereAndBack,
     collected,
     place,
     quality,
@@ -32,11 +31,11 @@ _MINUTES = (1.7, 5.0, 10.0, 20.0, 50.0, 110.0, 220.0)
 
 
 @dataclass(frozen=True)
-class EnoughData(ThereAndBack):
+class EnoughData(Experiment):
     """The whole job after more and more minutes of collecting."""
 
     minutes: tuple[float, ...] = _MINUTES
-    """That collecting may take, in ascending order [min]."""
+    """Times of collecting, in ascending order [min]."""
     name = "enough-data"
     words = words_of(__package__)
 
@@ -44,6 +43,11 @@ class EnoughData(ThereAndBack):
     def trials(self) -> Mapping[int, str]:
         """The minutes."""
         return {trial: f"{minutes:g} min" for trial, minutes in enumerate(self.minutes, 1)}
+
+    @property
+    def axis(self) -> Axis:
+        """The minutes."""
+        return Axis("collecting [min]", self.minutes, log=True)
 
     def settings(self) -> Any:
         """Return minutes and training."""

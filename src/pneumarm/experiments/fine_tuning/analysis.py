@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.figure import Figure
 
+from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.differences import above, interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.fine_tuning.levels import FineTuning
@@ -23,8 +24,7 @@ def analysis(experiment: FineTuning, rows: TrialRows) -> Analysis:
     """Return the analysis of the array, and how the settings chosen by odd runs do in the even ones."""
     array, trials = experiment.array, experiment.trials
     of_array = array.analyse(rows.of(array.trials))
-    found = confirmation(experiment, rows)
-    words = experiment.words.filled(found)
+    words, found = filled(experiment, rows, **confirmation(experiment, rows))
     shown = {
         CRITERIA[name]: [interval(rows.samples(values)) for values in rows.table(name, list(trials))]
         for name in ("reward", "success_rate", "episodes")
@@ -42,8 +42,8 @@ def analysis(experiment: FineTuning, rows: TrialRows) -> Analysis:
         *of_array.sections,
         Section(discount.title, discount.text, [returns]),
     ]
-    made = words.analysis(found, figures, sections)
-    return replace(made, summary=[*made.summary, *of_array.summary[1:]])
+    made = analysed(experiment, rows, words, found, figures=figures)
+    return replace(made, sections=sections, summary=[*made.summary, *of_array.summary[1:]])
 
 
 def confirmation(experiment: FineTuning, rows: TrialRows) -> dict[str, str]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
-from pneumarm.experiments.experiment import ARMS
 from pneumarm.experiments.factorial import Factorial
 from pneumarm.experiments.trainings import Trainings
 from pneumarm.experiments.words import Words, words_of
@@ -20,8 +19,6 @@ class FineTuning(Trainings):
 
     name = "fine-tuning"
     words = words_of(__package__)
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
     array: Factorial = field(
         default_factory=lambda: Factorial(
             name="fine-tuning",

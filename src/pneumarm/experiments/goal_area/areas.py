@@ -1,20 +1,22 @@
 """Goal areas, each learned and tested."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from pneumarm.experiments.experiment import Figures, LaboratorySettings
 from pneumarm.experiments.moving import (
     SIMULATION,
-    AgentsByTrial,
-    Material,
+    OnTheArm,
     agent_of,
     greedy_test,
     means,
     simulated_test,
 )
+from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import TrainSettings
 from pneumarm.task import Reward
@@ -24,7 +26,7 @@ AREAS = {1: (25.0, 1.0), 2: (25.0, 0.5), 3: (12.0, 1.0), 4: (12.0, 0.5)}
 
 
 @dataclass(frozen=True)
-class GoalArea(AgentsByTrial):
+class GoalArea(OnTheArm):
     """Four goal areas, each learned and tested."""
 
     name = "goal-area"
@@ -40,7 +42,12 @@ class GoalArea(AgentsByTrial):
         angle, velocity = AREAS[trial]
         return replace(self.agent, reward=Reward(angle_tolerance=angle, velocity_tolerance=velocity))
 
-    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+    def settings(self) -> Any:
+        """Return the settings of all agents and the sizes."""
+        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
+        return {"agents": agents, "sizes": asdict(self.sizes)}
+
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train, and move in the simulation and on the arm."""
         agent = agent_of(material, self.train_settings(trial), run, settings)
         before = simulated_test(material, agent, settings.test_episodes, prefix=SIMULATION)

@@ -12,6 +12,20 @@ anywhere in 42,500 and 94,000 on two of the arms, on the third not in 100,000; a
 once they reach 7 %, the policy all of them, on the arm 99.7 %.
 """
 
-from pneumarm.experiments.goal_pairs.pairs import GoalPairs
+from collections.abc import Mapping
+from typing import Literal
 
-EXPERIMENT = GoalPairs()
+from pneumarm.experiments.several_joints import POLICY, THESIS, Lesson, SeveralJoints
+from pneumarm.experiments.words import words_of
+
+_GOALS: Mapping[str, Literal["all", "one", "middle"]] = {"middle goal": "middle", "a goal": "one", "all goals": "all"}
+
+EXPERIMENT = SeveralJoints(
+    name="goal-pairs",
+    words=words_of(__name__),
+    lessons={
+        f"{who}, {what}": Lesson(learning, goals=goals)
+        for who, learning in (("thesis' agents", THESIS), ("policy", POLICY))
+        for what, goals in _GOALS.items()
+    },
+)

@@ -13,6 +13,29 @@ their own (of all goals 65 % against 82 %), a large one over those with a common
 joint has a goal of its own.
 """
 
-from pneumarm.experiments.hierarchy.levels import Levels
+from dataclasses import fields, replace
 
-EXPERIMENT = Levels()
+from pneumarm.experiments.several_joints import HALF_AS_LONG, Lesson, SeveralJoints
+from pneumarm.experiments.words import words_of
+from pneumarm.learning.hierarchy import HierarchySettings
+
+_METHOD = "pneumarm.learning.hierarchy:HIERARCHY"
+_UPPER = HierarchySettings(
+    **{field.name: getattr(HALF_AS_LONG, field.name) for field in fields(HALF_AS_LONG) if field.name != "team"}
+)
+_AGENTS = {
+    "flat, common goal": Lesson(HALF_AS_LONG),
+    "flat, own goals": Lesson(replace(HALF_AS_LONG, team="own")),
+    "upper agent sees angles": Lesson(_UPPER, _METHOD),
+    "upper agent sees all": Lesson(replace(_UPPER, upper_state="whole"), _METHOD),
+}
+
+EXPERIMENT = SeveralJoints(
+    name="hierarchy",
+    words=words_of(__name__),
+    lessons={
+        f"{who}, {what}": replace(lesson, goals="middle" if what == "one goal" else "all")
+        for what in ("one goal", "all goals")
+        for who, lesson in _AGENTS.items()
+    },
+)

@@ -12,6 +12,25 @@ goals of their own reach 82 %, those with a common goal 6 %. One agent with 81 a
 the movements. The policy reaches all.
 """
 
-from pneumarm.experiments.joint_agents.teams import JointAgents
+from dataclasses import replace
+from typing import Any
 
-EXPERIMENT = JointAgents()
+from pneumarm.experiments.several_joints import HALF_AS_LONG, POLICY, Lesson, SeveralJoints
+from pneumarm.experiments.words import words_of
+
+_TEAMS: dict[str, Any] = {
+    "common goal": HALF_AS_LONG,
+    "own goals": replace(HALF_AS_LONG, team="own"),
+    "one agent": replace(HALF_AS_LONG, team="one"),
+    "policy": POLICY,
+}
+
+EXPERIMENT = SeveralJoints(
+    name="joint-agents",
+    words=words_of(__name__),
+    lessons={
+        f"{who}, {what}": Lesson(learning, goals="middle" if what == "one goal" else "all")
+        for what in ("one goal", "all goals")
+        for who, learning in _TEAMS.items()
+    },
+)

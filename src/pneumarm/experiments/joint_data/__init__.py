@@ -11,6 +11,6 @@ Answer here, on arms 1 to 3: 3,000 transitions, three minutes, let a policy reac
 there to 24,000 its reward rises from -9 to 5. The error of the angle is about twice that of one joint.
 """
 
-from pneumarm.experiments.joint_data.transitions import JointData
+from pneumarm.experiments.joint_data.transitions import joint_data
 
-EXPERIMENT = JointData()
+EXPERIMENT = joint_data("joint-data", 3_000, 6_000, 12_000, 24_000)

@@ -6,25 +6,18 @@ from pathlib import Path
 from typing import Any
 
 from pneumarm.arm.open import with_options
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
-from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned, of_several
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
+from pneumarm.experiments.several_joints import POLICY, Lesson, SeveralJoints, learned, of_several
 from pneumarm.experiments.there_and_back import Prepared, prepared
 from pneumarm.experiments.words import words_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JointData(SeveralJoints):
     """Simulations of more and more transitions, and one of one joint."""
 
-    sizes: tuple[int, ...] = (3_000, 6_000, 12_000, 24_000)
+    sizes: tuple[int, ...]
     """Transitions, in ascending order; the laboratory's number does not shorten them: they are the question."""
-    name: str = "joint-data"
-    words = words_of(__package__)
-
-    @property
-    def lessons(self) -> Mapping[str, Lesson]:
-        """By the transitions."""
-        return {f"{size:,}": Lesson(self.policy) for size in self.sizes}
 
     @property
     def alone(self) -> int:
@@ -35,6 +28,11 @@ class JointData(SeveralJoints):
     def trials(self) -> Mapping[int, str]:
         """The transitions, and one joint."""
         return {**super().trials, self.alone: f"one joint, {self.sizes[-1]:,}"}
+
+    @property
+    def axis(self) -> Axis:
+        """The transitions."""
+        return Axis("transitions [1000]", [size / 1000 for size in self.sizes], log=True)
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Any:
         """Return a simulation of each number of transitions, and of a virtual arm one of an arm of one joint."""
@@ -53,3 +51,9 @@ class JointData(SeveralJoints):
         if trial == self.alone:
             return chosen.figures
         return {**chosen.figures, **learned(chosen, self.lessons[self.trials[trial]], run, settings)}
+
+
+def joint_data(name: str, *sizes: int) -> JointData:
+    """Return the experiment called ``name`` with these numbers of transitions, in ascending order."""
+    lessons = {f"{size:,}": Lesson(POLICY) for size in sizes}
+    return JointData(name=name, words=words_of(__package__), lessons=lessons, sizes=sizes)

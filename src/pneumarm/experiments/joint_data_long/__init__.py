@@ -5,6 +5,6 @@ Collecting these takes hours of an arm's time, and minutes of a virtual one's.
     pneumarm experiment joint-data-long --out laboratory
 """
 
-from pneumarm.experiments.joint_data.transitions import JointData
+from pneumarm.experiments.joint_data.transitions import joint_data
 
-EXPERIMENT = JointData(name="joint-data-long", sizes=(36_000, 100_000, 200_000, 400_000))
+EXPERIMENT = joint_data("joint-data-long", 36_000, 100_000, 200_000, 400_000)

@@ -10,6 +10,13 @@ Answer here, on arms 1 to 3: three of four actions explore indeed, but neither l
 shown to save episodes with the goal in the middle.
 """
 
-from pneumarm.experiments.joint_exploration.rates import JointExploration
+from pneumarm.experiments.joint_exploration.rates import VARIED, JointExploration
+from pneumarm.experiments.several_joints import THESIS, Lesson
+from pneumarm.experiments.trainings import with_settings
+from pneumarm.experiments.words import words_of
 
-EXPERIMENT = JointExploration()
+EXPERIMENT = JointExploration(
+    name="joint-exploration",
+    words=words_of(__name__),
+    lessons={words: Lesson(with_settings(THESIS, changes), goals="middle") for words, changes in VARIED.items()},
+)

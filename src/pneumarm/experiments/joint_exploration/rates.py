@@ -2,15 +2,14 @@
 
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
-from pneumarm.experiments.several_joints import Lesson, SeveralJoints, learned
+from pneumarm.experiments.several_joints import SeveralJoints, learned
 from pneumarm.experiments.there_and_back import Prepared
-from pneumarm.experiments.trainings import with_settings
-from pneumarm.experiments.words import words_of
 from pneumarm.learning import OnlineLearner, Shaping, TrainSettings, train
 
 _FIRST = Shaping().exploration.epsilon
@@ -19,29 +18,19 @@ TOGETHER = 1 - (1 - _FIRST) ** (1 / _AGENTS)
 """Rate of each of two agents of which one or both explore as often as a single one with the thesis' rate."""
 _LOW = 0.1
 _COUNTED = 2000  # actions in which exploring is counted
+_RATE, _CRITERION = "shaping.exploration.epsilon", "shaping.initial_criterion"
+VARIED: Mapping[str, Mapping[str, Any]] = {
+    f"{_FIRST:g} each, as in the thesis": {},
+    f"{TOGETHER:.2f} each, {_FIRST:g} together": {_RATE: TOGETHER},
+    f"{_LOW:g} each": {_RATE: _LOW},
+    "half the criterion": {_CRITERION: Shaping().initial_criterion / 2},
+    "no shaping": {"shaping": None},
+}
+"""What differs from the thesis, by trial."""
 
 
-@dataclass(frozen=True)
 class JointExploration(SeveralJoints):
     """The thesis' agents with one goal, exploring more and less."""
-
-    name = "joint-exploration"
-    words = words_of(__package__)
-
-    @property
-    def lessons(self) -> Mapping[str, Lesson]:
-        """By what differs from the thesis."""
-        rate, criterion = "shaping.exploration.epsilon", "shaping.initial_criterion"
-        varied = {
-            f"{_FIRST:g} each, as in the thesis": {},
-            f"{TOGETHER:.2f} each, {_FIRST:g} together": {rate: TOGETHER},
-            f"{_LOW:g} each": {rate: _LOW},
-            "half the criterion": {criterion: Shaping().initial_criterion / 2},
-            "no shaping": {"shaping": None},
-        }
-        return {
-            words: Lesson(with_settings(self.thesis, changes), goals="middle") for words, changes in varied.items()
-        }
 
     def measure(self, material: Prepared, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Learn with the rate of ``trial`` and move the arm; count how often an agent of any joint explores."""

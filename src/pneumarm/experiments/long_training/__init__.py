@@ -13,7 +13,7 @@ not overtake the fast ones: the rank correlation of the episodes until the crite
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_results
-from pneumarm.experiments.factorial import ALL, Factorial, Said
+from pneumarm.experiments.factorial import ALL, EffectClaim, Factorial
 from pneumarm.experiments.findings import training_on_improves, training_on_improves_little, trial_10_is_good
 from pneumarm.experiments.words import Words
 
@@ -30,6 +30,6 @@ EXPERIMENT = Factorial(
     thesis=packaged_results(__name__, "reward", "gain", "actions", "switches"),
     continued=50_000,
     criteria=("gain", *ALL),
-    said=(Said("gain", 4, raises=True, loss="std", about="q-fluctuates"),),
+    effect_claims=(EffectClaim("gain", 4, raises=True, loss="std", about="q-fluctuates"),),
     findings=(training_on_improves, training_on_improves_little, trial_10_is_good),
 )

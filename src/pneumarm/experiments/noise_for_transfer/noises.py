@@ -7,11 +7,11 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report
 from pneumarm.experiments.there_and_back import (
+    DECISIVE,
     TRAINING,
     Prepared,
-    ThereAndBack,
     prepared,
     train_and_move,
     usual,
@@ -21,7 +21,7 @@ from pneumarm.simulation.noise import NoiseSettings
 
 
 @dataclass(frozen=True)
-class NoiseForTransfer(ThereAndBack):
+class NoiseForTransfer(Experiment):
     """Agents trained with noises, on the arm."""
 
     factors: tuple[float, ...] = (1.0, 2.0, 4.0)
@@ -48,7 +48,7 @@ class NoiseForTransfer(ThereAndBack):
     def settings(self) -> Any:
         """Return the noises and the training."""
         noises = {words: msgspec.to_builtins(noise) for words, noise in self.noises.items()}
-        return {**super().settings(), "noises": noises}
+        return {**DECISIVE, "noises": noises}
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Prepared:
         """Return the arm's simulation."""

@@ -15,7 +15,6 @@ from pneumarm.experiments.means import (
 from pneumarm.experiments.moving import (
     MOVEMENTS,
     THESIS,
-    Material,
     OnTheArm,
     agent_of,
     clock,
@@ -24,6 +23,7 @@ from pneumarm.experiments.moving import (
     means,
     new_arm,
 )
+from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import Agent, TrainSettings
 from pneumarm.learning.online.shaping import adjusted, initial_deviation, stage
@@ -70,7 +70,7 @@ class OnTheArmOnly(OnTheArm):
 
     name = "on-the-arm-only"
     words = words_of(__package__)
-    runs: int = 1
+    runs = 1
     agent: TrainSettings = ONE
     sizes: FromScratchSizes = FromScratchSizes()
 
@@ -79,7 +79,7 @@ class OnTheArmOnly(OnTheArm):
         """Where the agent learned."""
         return {ON_ARM: "learned on the arm", IN_SIMULATION: "learned in the simulation"}
 
-    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Learn, and move greedily on the arm in another morning."""
         if trial == IN_SIMULATION:
             agent = agent_of(material, self.agent, run, settings)

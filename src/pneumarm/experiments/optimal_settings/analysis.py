@@ -1,7 +1,9 @@
 """What the rows say of the two learning rates."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import interval
@@ -22,17 +24,16 @@ def analysis(experiment: DerivedSettings, rows: TrialRows) -> Analysis:
         packaged_results(f"pneumarm.experiments.{one}", *_CRITERIA) for one in ("optimal_settings", "all_goals")
     )
     thesis = {name: [printed[name][0], arrayed[name][_TRIAL_10 - 1]] for name in _CRITERIA}
-    # Runs on one arm share its simulation, so where there are several arms they are the sample.
-    found = {
-        "difference": interval(rows.samples(ours["reward"][1] - ours["reward"][0])),
-        "theirs": interval(thesis["reward"][1] - thesis["reward"][0]),
-    }
-    means = {"our_means": _against(ours["reward"]), "their_means": _against(thesis["reward"])}
-    return experiment.words.filled(found | means).analysis(
-        found,
-        {name: {"mean": table.mean(axis=1).tolist(), "runs": table.tolist()} for name, table in ours.items()},
-        [side_by_side(trials, ours, thesis, CRITERIA)],
+    words, found = filled(
+        experiment,
+        rows,
+        theirs=interval(thesis["reward"][1] - thesis["reward"][0]),
+        our_means=_against(ours["reward"]),
+        their_means=_against(thesis["reward"]),
     )
+    figures = {name: {"mean": table.mean(axis=1).tolist(), "runs": table.tolist()} for name, table in ours.items()}
+    made = analysed(experiment, rows, words, found, figures=figures)
+    return replace(made, sections=[side_by_side(trials, ours, thesis, CRITERIA)])
 
 
 def _against(reward: Sequence[Array] | Array) -> str:

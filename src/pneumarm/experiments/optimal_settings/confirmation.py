@@ -17,7 +17,8 @@ class DerivedSettings(Trainings):
 
     name = "optimal-settings"
     words = words_of(__package__)
-    runs: int = 8
+    runs = 8
+    arms = ("virtual",)
 
     @property
     def trials(self) -> Mapping[int, str]:

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.differences import Interval, above
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array, blocks, over_arms
 from pneumarm.experiments.overnight.days import DAYS, FROZEN, LEARNING, NO_NIGHT, Overnight
-from pneumarm.experiments.pictures import Curve, courses, section
+from pneumarm.experiments.pictures import Curve, courses
 from pneumarm.report.page import Table
 
 _SPAN = 3  # blocks before the night, and at the end, that are the level of a day
@@ -22,10 +23,17 @@ def analysis(experiment: Overnight, rows: TrialRows) -> Analysis:
     gains = {trial: over_arms(_gain(reward, place)) for trial, reward in rewards.items()}
     lost = over_arms((rewards[NO_NIGHT] - rewards[LEARNING])[:, :, place])
     adapted = over_arms(_gain(rewards[LEARNING], place) - _gain(rewards[NO_NIGHT], place))
-    of_frozen = {"drop": drops[FROZEN], "warmed": gains[FROZEN]}
-    found = {"lost": lost, "adapted": adapted, **of_frozen}
-    named = {"answer": answer(lost, drops[FROZEN]), "span": _SPAN * sizes.block, "block": sizes.block}
-    words = experiment.words.filled(found | named)
+    words, found = filled(
+        experiment,
+        rows,
+        lost=lost,
+        adapted=adapted,
+        drop=drops[FROZEN],
+        warmed=gains[FROZEN],
+        answer=answer(lost, drops[FROZEN]),
+        span=_SPAN * sizes.block,
+        block=sizes.block,
+    )
     header = ["trial", "drop to the second day", "gained on the second day"]
     lines = [[days.words, f"{drops[t]:.2f}", f"{gains[t]:.2f}"] for t, days in DAYS.items()]
     shown = {
@@ -34,7 +42,10 @@ def analysis(experiment: Overnight, rows: TrialRows) -> Analysis:
     }
     (two_days,) = words.sections
     picture = courses(shown, sizes.block, two_days.figure, {float(sizes.first): f"{sizes.hours:g} h of rest"})
-    return words.analysis(
+    return analysed(
+        experiment,
+        rows,
+        words,
         found,
         figures={
             "drop": {DAYS[t].words: one._asdict() for t, one in drops.items()},
@@ -42,7 +53,8 @@ def analysis(experiment: Overnight, rows: TrialRows) -> Analysis:
             "lost": lost._asdict(),
             "adapted": adapted._asdict(),
         },
-        sections=[section(two_days, rows, {}, figures=[picture], tables=[Table(header, lines, two_days.table)])],
+        pictures={0: [picture]},
+        tables={0: [Table(header, lines, two_days.table)]},
     )
 
 

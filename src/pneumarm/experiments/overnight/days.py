@@ -10,7 +10,8 @@ from pneumarm.arm import Arm, BeginState, guarded
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control.turns import player
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
-from pneumarm.experiments.moving import MOVEMENTS, Material, OnTheArm, agent_of, course, draws, new_arm
+from pneumarm.experiments.moving import MOVEMENTS, OnTheArm, agent_of, course, draws, new_arm
+from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
 from pneumarm.task.movements import joined
 
@@ -46,9 +47,9 @@ class OvernightSizes:
     block: int = 100
     """Movements in a point of the courses."""
     hours: float = 14.0
-    """Of rest [h]."""
+    """Hours of rest [h]."""
     learning_rate: float = 0.05
-    """Of agents that learn (thesis: 0.05)."""
+    """Learning rate of agents that learn (thesis: 0.05)."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Overnight(OnTheArm):
         """Who learns when."""
         return {trial: days.words for trial, days in DAYS.items()}
 
-    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Move for two days, exploring as at the end of training on both."""
         sizes, days, seed = self.sizes, DAYS[trial], run_seed(settings, run)
         agent = agent_of(material, self.agent, run, settings)

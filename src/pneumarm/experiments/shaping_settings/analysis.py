@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
+from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import Interval, Verdict, below, interval
@@ -17,20 +18,19 @@ from pneumarm.experiments.means import Array
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
 from pneumarm.experiments.trainings import CRITERIA, LEARNING
-from pneumarm.experiments.words import SectionWords
 from pneumarm.learning import TrainSettings
 from pneumarm.learning.online.shaping import initial_deviation, stage
 from pneumarm.report.colours import DARK, GREY, MIDDLE
-from pneumarm.report.page import Picture, Section, Table
+from pneumarm.report.page import Picture, Table
 from pneumarm.report.style import panels, styled
 
 _CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episodes", "met")
 _SHOWN = ("reward", "success_rate", "episodes")
 
 Tables = Mapping[str, NDArray[np.float64]]
-"""By figure, shapes (trials, runs)."""
+"""Tables by figure, shapes (trials, runs)."""
 Differences = Mapping[str, list[Interval | None]]
-"""By figure, each trial's difference from its reference, None for a reference itself."""
+"""Differences of the trials from their references by figure, None for a reference itself."""
 
 
 def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
@@ -39,40 +39,39 @@ def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     # From here on columns are samples: runs where there is one arm, else the arms.
     samples = {name: np.stack([rows.samples(line) for line in table]) for name, table in tables.items()}
     differences = {name: _differences(experiment, table) for name, table in samples.items()}
-    found = measured(experiment, tables, samples, len(rows.arms))
-    significant = {
-        f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")
-    }
-    words = experiment.words.filled(found | significant)
+    words, found = filled(
+        experiment,
+        rows,
+        **measured(experiment, tables, len(rows.arms)),
+        **{f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")},
+    )
     strategy, results = words.sections
     drawn = Picture(
         strategy_figure(experiment.train_settings(1), ArmSpec()),
         strategy.figure,
         "Exploration falls from 0.5 to 0.05 and temperature from 20 to 1; the criterion rises to 0.95.",
     )
-    return words.analysis(
+    shown = {CRITERIA[name]: [interval(values) for values in samples[name]] for name in _SHOWN}
+    changes = {
+        name: [[each.mean, each.half] if each else None for each in ones] for name, ones in differences.items()
+    }
+    means = {name: table.mean(axis=1).tolist() for name, table in tables.items()}
+    return analysed(
+        experiment,
+        rows,
+        words,
         found,
-        {
-            "rows": len(rows.rows),
-            "results": {name: table.mean(axis=1).tolist() for name, table in tables.items()},
-            "differences": {
-                name: [[each.mean, each.half] if each else None for each in ones]
-                for name, ones in differences.items()
-            },
-        },
-        [
-            Section(strategy.title, strategy.text, [drawn]),
-            _results(experiment, results, tables, samples, differences),
-        ],
+        figures={"rows": len(rows.rows), "results": means, "differences": changes},
+        pictures={0: [drawn], 1: [dots(list(experiment.trials.values()), shown, results.figure, reference=0)]},
+        tables={1: [_results(experiment, tables, differences, results.table)]},
     )
 
 
-def measured(experiment: ShapingSettings, tables: Tables, samples: Tables, arms: int) -> dict[str, Any]:
+def measured(experiment: ShapingSettings, tables: Tables, arms: int) -> dict[str, Any]:
     """Return what claims are judged by, and the thesis' numbers beside it."""
     by_name = {name: number - 1 for number, name in experiment.trials.items()}
     shaped, without = by_name["as in the thesis"], by_name["no shaping"]
     worn, worn_without = by_name["worn, as in the thesis"], by_name["worn, no shaping"]
-    reward, episodes, met = (samples[name] for name in ("reward", "episodes", "met"))
     # The thesis made runs 1 to 3 with shaping and without.
     with_it, without_it = (
         {name: table[:, :3] for name, table in packaged_results(f"pneumarm.experiments.{one}", *_THEIRS).items()}
@@ -81,11 +80,6 @@ def measured(experiment: ShapingSettings, tables: Tables, samples: Tables, arms:
     spreads = (one["reward"].std(axis=1, ddof=1).mean() for one in (with_it, without_it))
     spread, narrower = _spread(tables["reward"][shaped], tables["reward"][without], arms)
     return {
-        "gain": interval(reward[shaped] - reward[without]),
-        "solved": interval(met[without]),
-        "worn_solved": interval(met[worn_without]),
-        "sooner": interval(episodes[without] - episodes[shaped]),
-        "fewer": interval(episodes[by_name["adjusted every 100 episodes"]] - episodes[shaped]),
         "spread": spread,
         "narrower": narrower,
         "share": _share(tables["met"][without]),
@@ -116,9 +110,7 @@ def _significant(experiment: ShapingSettings, name: str, differences: Difference
     return "; ".join(significant) or "none"
 
 
-def _results(
-    experiment: ShapingSettings, words: SectionWords, tables: Tables, samples: Tables, differences: Differences
-) -> Section:
+def _results(experiment: ShapingSettings, tables: Tables, differences: Differences, caption: str) -> Table:
     header = ["settings", "reward", "difference within runs", "greedy success", "success, learning on"]
     header += ["episodes", "difference within runs", "criterion met"]
     lines = [
@@ -133,9 +125,7 @@ def _results(
         ]
         for place, (trial, name) in enumerate(experiment.trials.items())
     ]
-    shown = {CRITERIA[name]: [interval(values) for values in samples[name]] for name in _SHOWN}
-    picture = dots(list(experiment.trials.values()), shown, words.figure, reference=0)
-    return Section(words.title, figures=[picture], tables=[Table(header, lines, words.table)])
+    return Table(header, lines, caption)
 
 
 def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Verdict]:

@@ -11,7 +11,6 @@ import msgspec
 
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.experiment import (
-    ARMS,
     Experiment,
     Figures,
     LaboratorySettings,
@@ -60,8 +59,6 @@ class ShapingSettings(Experiment):
 
     name = "shaping-settings"
     words = words_of(__package__)
-    runs: int = 4
-    arms: tuple[str, ...] = ARMS
     plan: tuple[ShapingTrial, ...] = field(
         default_factory=lambda: msgspec.convert(tomllib.loads(_packaged("trials.toml")), _TrialsFile).trials
     )

@@ -4,53 +4,29 @@ from collections.abc import Mapping
 
 import msgspec
 
-from pneumarm.experiments.differences import Interval
+from pneumarm.experiments.analysis import analysed, filled, shown
 from pneumarm.experiments.experiment import Analysis, TrialRows
-from pneumarm.experiments.means import Column, change, difference, numbers
-from pneumarm.experiments.pictures import Axis, against, section
+from pneumarm.experiments.means import change
+from pneumarm.experiments.pictures import against
 from pneumarm.experiments.state_history.histories import StateHistory
+from pneumarm.experiments.words import Column
 from pneumarm.report.page import Table
-
-_THESIS = 3  # observations in the state (eq. 3.5)
 
 
 def analysis(experiment: StateHistory, rows: TrialRows) -> Analysis:
     """Return errors and agents by history."""
-    found, trials, count = measured(experiment, rows), experiment.trials, len(experiment.histories)
-    words = experiment.words.filled({**found, "known": "{known}"})
-    without = {trial: called for trial, called in trials.items() if trial <= count}
-    axis = Axis("observations in the state [-]", experiment.histories)
+    trials, count = experiment.trials, len(experiment.histories)
+    words, found = filled(experiment, rows, known="{known}")
     step, second = words.sections
     # The thesis' numbers are of another arm, and out of scale.
     drawn = [msgspec.structs.replace(column, thesis=None) for column in step.columns]
+    without = shown(experiment, second)
     pictures = [
-        against(rows, which, axis, drawn, step.figure.format(known=known))
+        against(rows, which, experiment.axis, drawn, step.figure.format(known=known))
         for which, known in ((without, "unknown"), ({t: trials[t] for t in trials if t > count}, "known"))
     ]
-    return words.analysis(
-        found,
-        numbers(rows, trials, step.columns) | {"agents": numbers(rows, without, second.columns)["ours"]},
-        [
-            section(step, rows, trials, figures=pictures, tables=[_nested(rows, trials, count, step.columns)]),
-            section(second, rows, without, axis, compared=False),
-        ],
-    )
-
-
-def measured(experiment: StateHistory, rows: TrialRows) -> dict[str, Interval]:
-    """Return what claims are judged by."""
-    one, three = (1 + experiment.histories.index(history) for history in (1, _THESIS))
-    four, period = three + 1, three + len(experiment.histories)
-    compared = {"history": (three, one), "more": (four, three), "known": (period, three)}
-    return {
-        **{
-            f"{called}_{name}": change(rows, f"std {name}", trial, reference)
-            for called, (trial, reference) in compared.items()
-            for name in ("angle", "pressure_1", "pressure_2")
-        },
-        "reward": difference(rows, "reward", three, one),
-        "further": difference(rows, "reward", four, three),
-    }
+    nested = _nested(rows, trials, count, step.columns)
+    return analysed(experiment, rows, words, found, pictures={0: pictures}, tables={0: [nested]})
 
 
 def _nested(rows: TrialRows, trials: Mapping[int, str], count: int, columns: tuple[Column, ...]) -> Table:

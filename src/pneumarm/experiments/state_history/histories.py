@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
+    DECISIVE,
     TRAINING,
     Prepared,
-    ThereAndBack,
     over_joints,
     prepared,
     train_and_move,
@@ -47,7 +47,7 @@ class HistoryMaterial:
     spec: ArmSpec
     longest: Window
     begin: Mapping[int, BeginStates]
-    """By history."""
+    """Begin states by history."""
 
 
 def shortened(whole: Transitions, longest: Window, history: int) -> Transitions:
@@ -111,7 +111,7 @@ def errors_with_period(
 
 
 @dataclass(frozen=True)
-class StateHistory(ThereAndBack):
+class StateHistory(Experiment):
     """Fits and agents by history."""
 
     histories: tuple[int, ...] = _HISTORIES
@@ -126,10 +126,15 @@ class StateHistory(ThereAndBack):
         words = [_called(history) for history in self.histories]
         return dict(enumerate([*words, *(f"{one}, and the step's length" for one in words)], 1))
 
+    @property
+    def axis(self) -> Axis:
+        """The histories."""
+        return Axis("observations in the state [-]", self.histories)
+
     def settings(self) -> Any:
         """Return histories, fit and training."""
         fits = {"histories": list(self.histories), "fit": msgspec.to_builtins(self.fit)}
-        return {**super().settings(), **fits}
+        return {**DECISIVE, **fits}
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> HistoryMaterial:
         """Return the arm's filtered transitions."""

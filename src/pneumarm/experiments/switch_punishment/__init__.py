@@ -13,7 +13,7 @@ range.
 from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.design.table import packaged_results
-from pneumarm.experiments.factorial import Factorial, Said
+from pneumarm.experiments.factorial import EffectClaim, Factorial
 from pneumarm.experiments.findings import punishment_costs_actions, punishment_halves_switches
 from pneumarm.experiments.words import Words
 
@@ -29,10 +29,10 @@ EXPERIMENT = Factorial(
     base=BASE,
     thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),
     goal=650.0,
-    said=(
-        Said("switches", 12, raises=True, about="punishment"),
-        Said("actions", 12, raises=False, about="punishment"),
-        Said("episodes", 12, raises=True, about="punishment-episodes"),
+    effect_claims=(
+        EffectClaim("switches", 12, raises=True, about="punishment"),
+        EffectClaim("actions", 12, raises=False, about="punishment"),
+        EffectClaim("episodes", 12, raises=True, about="punishment-episodes"),
     ),
     findings=(punishment_halves_switches, punishment_costs_actions),
 )

@@ -1,17 +1,17 @@
 """What the rows say of the drop on arrival, its causes, and what learning brings back."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import msgspec
 import numpy as np
 
+from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
-from pneumarm.experiments.means import Array, blocks, difference, mean, over_arms, values
+from pneumarm.experiments.means import Array, blocks, difference, mean, over_arms, text, values
 from pneumarm.experiments.moving import SIMULATION
-from pneumarm.experiments.pictures import Curve, courses, dots, section
+from pneumarm.experiments.pictures import Curve, courses, dots
 from pneumarm.experiments.transfer.conditions import (
     ALL,
     AS_IT_IS,
@@ -26,8 +26,7 @@ from pneumarm.experiments.transfer.conditions import (
     WITHOUT_NOISE,
     TransferToTheArm,
 )
-from pneumarm.experiments.words import SectionWords
-from pneumarm.report.page import Section
+from pneumarm.report.page import Picture
 
 _ALL_THREE, _MODEL, _COLD = "noise, lateness and cold together", "error of the model", "cold arm"
 _PROGRESS = 750  # movements until the thesis sees real progress, about an hour
@@ -43,43 +42,48 @@ def analysis(experiment: TransferToTheArm, rows: TrialRows) -> Analysis:
     causes = causes_of_the_drop(rows)
     known = [name for name, one in causes.items() if one.samples and name != _ALL_THREE]
     largest = max(known, key=lambda name: causes[name].mean)
-    found = {
+    words, found = filled(
+        experiment,
+        rows,
         **measured(rows, _PROGRESS // experiment.sizes.block),
-        "model": causes[_MODEL],
-        "cold": causes[_COLD],
-        "largest": largest,
-        "taken": causes[largest],
-        "block": experiment.sizes.block,
-    }
-    words = experiment.words.filled(found)
+        model=causes[_MODEL],
+        cold=causes[_COLD],
+        largest=largest,
+        taken=causes[largest],
+        block=experiment.sizes.block,
+    )
     without = [row.arm for row in rows.rows if row.trial in IDEAL and not row.figures]
     if without:
         conditions, arms = ", ".join(CONDITIONS[trial] for trial in IDEAL), ", ".join(sorted(set(without)))
         left_out = f"Only a virtual arm can be put into these conditions, {arms} was not: {conditions}."
         words = msgspec.structs.replace(words, summary=(*words.summary, left_out))
     last = {experiment.trials[t]: over_arms(blocks(rows, "reward", t)[:, :, -1])._asdict() for t in RATES}
-    return words.analysis(
+    on_arm, taken = words.sections
+    drawn = {name: one for name, one in causes.items() if one.samples}
+    lost = dots(list(drawn), {"lost reward [-]": list(drawn.values())}, taken.figure, zero=True)
+    figures = {"drop": found["drop"]._asdict(), "causes": {name: one._asdict() for name, one in causes.items()}}
+    made = analysed(
+        experiment,
+        rows,
+        words,
         found,
-        figures={
-            "drop": found["drop"]._asdict(),
-            "causes": {name: one._asdict() for name, one in causes.items()},
-            "last": last,
-        },
-        sections=[
-            _on_the_arm(words.sections[0], rows, experiment.sizes.block),
-            _causes(words.sections[1], rows, causes),
-        ],
+        figures={**figures, "last": last},
+        pictures={0: [_courses(rows, experiment.sizes.block, on_arm.figure)], 1: [lost]},
     )
+    (table,) = made.sections[1].tables
+    simulated = [
+        [name, *(text(rows, msgspec.structs.replace(c, figure=prefix + c.figure), AS_IT_IS) for c in taken.columns)]
+        for name, prefix in _SIMULATIONS
+    ]
+    whole = replace(made.sections[1], tables=[replace(table, rows=[*simulated, *table.rows])])
+    return replace(made, sections=[made.sections[0], whole])
 
 
 def measured(rows: TrialRows, progress: int) -> dict[str, Any]:
-    """Return what claims are judged by; ``progress`` is the block in which the thesis sees some."""
+    """Return what else claims are judged by; ``progress`` is the block in which the thesis sees some."""
     frozen, slow = (blocks(rows, "reward", trial) for trial in (1, 2))
     return {
-        "drop": over_arms(_arrival(rows, 1, "reward")),
         "success": over_arms(np.mean([blocks(rows, "success_rate", t).mean(axis=-1) for t in RATES], axis=0)),
-        "actions": over_arms(-_arrival(rows, 1, "actions")),
-        **{f"switches_{trial}": over_arms(-_arrival(rows, trial, "switches")) for trial in (1, 2)},
         "warmed": over_arms(_last(frozen) - frozen[:, :, 0]),
         **{
             f"better_{trial}": over_arms(_last(blocks(rows, "reward", trial)) - _last(frozen))
@@ -88,11 +92,6 @@ def measured(rows: TrialRows, progress: int) -> dict[str, Any]:
         },
         "progress": over_arms(slow[:, :, progress] - slow[:, :, 0]) if progress < slow.shape[-1] else None,
     }
-
-
-def _arrival(rows: TrialRows, trial: int, figure: str) -> Array:
-    """Return by how much ``figure`` is lower in the first block than in the simulation, shape (arms, runs)."""
-    return values(rows, EXPLORING + figure, trial) - values(rows, f"{figure} @1", trial)
 
 
 def _last(course: Array) -> Array:
@@ -114,7 +113,7 @@ def causes_of_the_drop(rows: TrialRows) -> dict[str, Interval]:
     }
 
 
-def _on_the_arm(words: SectionWords, rows: TrialRows, block: int) -> Section:
+def _courses(rows: TrialRows, block: int, caption: str) -> Picture:
     shown = {}
     for figure, label, factor in (
         ("reward", "reward [-]", 1.0),
@@ -127,16 +126,4 @@ def _on_the_arm(words: SectionWords, rows: TrialRows, block: int) -> Section:
             Curve(f"learning rate {rate:.2f}", factor * blocks(rows, figure, trial), level)
             for trial, rate in RATES.items()
         ]
-    return section(words, rows, {}, figures=[courses(shown, block, words.figure)])
-
-
-def _causes(words: SectionWords, rows: TrialRows, causes: Mapping[str, Interval]) -> Section:
-    known = {name: one for name, one in causes.items() if one.samples}
-    drawn = dots(list(known), {"lost reward [-]": list(known.values())}, words.figure, zero=True)
-    made = section(words, rows, CONDITIONS, figures=[drawn])
-    simulated = [
-        [name, *(msgspec.structs.replace(c, figure=prefix + c.figure).text(rows, AS_IT_IS) for c in words.columns)]
-        for name, prefix in _SIMULATIONS
-    ]
-    (on_arm,) = made.tables
-    return replace(made, tables=[replace(on_arm, rows=[*simulated, *on_arm.rows])])
+    return courses(shown, block, caption)

@@ -11,7 +11,6 @@ from pneumarm.experiments.moving import (
     MOVEMENTS,
     SIMULATION,
     TEST_MOVEMENTS,
-    Material,
     OnTheArm,
     agent_of,
     clock,
@@ -21,8 +20,10 @@ from pneumarm.experiments.moving import (
     greedy_test,
     means,
     new_arm,
+    parameters_of,
     simulated_test,
 )
+from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
 from pneumarm.simulation.noise import NoiseSettings
 
@@ -70,7 +71,7 @@ class TransferToTheArm(OnTheArm):
         """Learning rates, then conditions of the arm."""
         return {trial: f"learning rate {rate:.2f}" for trial, rate in RATES.items()} | CONDITIONS
 
-    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Move on the arm, learning or under a condition."""
         if trial in RATES:
             return self._learning(material, RATES[trial], run, settings)
@@ -85,7 +86,7 @@ class TransferToTheArm(OnTheArm):
         warming = self.sizes.warming if trial in (WARM, ALL) else 0
         return warming + self.sizes.test * (2 if trial == AS_IT_IS else 1)
 
-    def _learning(self, of: Material, rate: float, run: int, laboratory: LaboratorySettings) -> Figures:
+    def _learning(self, of: Simulated, rate: float, run: int, laboratory: LaboratorySettings) -> Figures:
         agent, seed = agent_of(of, self.agent, run, laboratory), run_seed(laboratory, run)
         explores = self.agent.exploration
         with new_arm(of, run, laboratory) as arm:
@@ -97,8 +98,8 @@ class TransferToTheArm(OnTheArm):
             "hours": float((played.time_end[-1] - began) / 3600),
         }
 
-    def _condition(self, of: Material, trial: int, run: int, laboratory: LaboratorySettings) -> Figures:
-        parameters = of.parameters
+    def _condition(self, of: Simulated, trial: int, run: int, laboratory: LaboratorySettings) -> Figures:
+        parameters = parameters_of(of.arm)
         if trial in IDEAL and parameters is None:
             return {}
         agent, seed = agent_of(of, self.agent, run, laboratory), run_seed(laboratory, run)
@@ -113,7 +114,7 @@ class TransferToTheArm(OnTheArm):
         _, durations = draws(agent, seed, self.sizes.test, TEST_MOVEMENTS)
         with new_arm(of, run, laboratory) as arm:
             begin = from_visits(agent, *player(agent, arm).visit(durations))
-        there = replace(of, simulated=replace(of.simulated, begin=begin))
+        there = replace(of, begin=begin)
         quiet = NoiseSettings(kind="none")
         return {
             **found,

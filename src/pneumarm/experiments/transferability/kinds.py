@@ -1,19 +1,21 @@
 """Kinds of agents by how they learned, each in the simulation and on the arm."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
+
+import msgspec
 
 from pneumarm.experiments.experiment import Figures, LaboratorySettings
 from pneumarm.experiments.moving import (
     SIMULATION,
-    AgentsByTrial,
-    Material,
+    OnTheArm,
     agent_of,
     greedy_test,
     means,
     simulated_test,
 )
+from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import Exploration, TrainSettings
 from pneumarm.simulation.noise import NoiseSettings
@@ -32,7 +34,7 @@ KINDS: Mapping[int, tuple[str, dict[str, Any]]] = {
 
 
 @dataclass(frozen=True)
-class Transferability(AgentsByTrial):
+class Transferability(OnTheArm):
     """Agents that learned in different ways, in the simulation and on the arm."""
 
     name = "transferability"
@@ -47,7 +49,12 @@ class Transferability(AgentsByTrial):
         """Return how the agents of ``trial`` learn."""
         return replace(self.agent, **KINDS[trial][1])
 
-    def measure(self, material: Material, trial: int, run: int, settings: LaboratorySettings) -> Figures:
+    def settings(self) -> Any:
+        """Return the settings of all agents and the sizes."""
+        agents = {words: msgspec.to_builtins(self.train_settings(trial)) for trial, words in self.trials.items()}
+        return {"agents": agents, "sizes": asdict(self.sizes)}
+
+    def measure(self, material: Simulated, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train, and move in the simulation and on the arm."""
         found = agent_of(material, self.train_settings(trial), run, settings)
         judged = replace(found, settings=replace(found.settings, reward=Reward()))  # all by the same reward

@@ -6,10 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pneumarm.experiments.differences import Interval
+from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.experiment import Analysis, TrialRows
-from pneumarm.experiments.means import Array, change, difference, mean, numbers, samples
-from pneumarm.experiments.pictures import Axis, section
+from pneumarm.experiments.means import Array, mean, samples
 from pneumarm.experiments.valves_closed.inflation import CLOSED, OPEN, ValvesClosed
 from pneumarm.report.colours import DARK, MIDDLE
 from pneumarm.report.page import Picture
@@ -18,10 +17,8 @@ from pneumarm.report.style import panels, styled
 
 def analysis(experiment: ValvesClosed, rows: TrialRows) -> Analysis:
     """Return fit and performance each way."""
-    trials, found = experiment.trials, measured(rows)
     period, pause = (mean(rows, name, OPEN).mean for name in ("period", "pause"))
-    words = experiment.words.filled({**found, "period_ms": 1e3 * period, "pause_ms": 1e3 * pause})
-    inflated, simulation, agent = words.sections
+    words, found = filled(experiment, rows, period_ms=1e3 * period, pause_ms=1e3 * pause)
     times = sorted(
         int(name.split()[1]) for name in rows.rows[0].figures if name.startswith("after ") and name.endswith("angle")
     )
@@ -30,38 +27,16 @@ def analysis(experiment: ValvesClosed, rows: TrialRows) -> Analysis:
             name: np.array([samples(rows, f"after {t} ms {name}", trial).mean() for t in times])
             for name in ("angle", "pressure")
         }
-        for trial in trials
+        for trial in experiment.trials
     }
     left, closed = (float(traces[trial]["angle"][-1]) for trial in (OPEN, CLOSED))
     watched = Picture(
         inflations(np.array(times), traces, period, pause),
-        inflated.figure,
+        words.sections[0].figure,
         f"After {times[-1]} ms the angle has changed by {left:.1f} counts with the valve left open and by "
         f"{closed:.1f} counts with pauses.",
     )
-    axis = Axis("valves while computing", (0.0, 1.0), ("left", "closed"))
-    return words.analysis(
-        found,
-        numbers(rows, trials, words.columns),
-        [
-            section(inflated, rows, trials, figures=[watched]),
-            # The thesis' numbers are of another arm, and out of scale.
-            section(simulation, rows, trials, axis, compared=False),
-            section(agent, rows, trials, axis),
-        ],
-    )
-
-
-def measured(rows: TrialRows) -> dict[str, Interval]:
-    """Return what claims are judged by, each of valves left as they are against closed ones."""
-    return {
-        "error": change(rows, "relative angle", OPEN, CLOSED),
-        "counts": change(rows, "std angle", OPEN, CLOSED),
-        "thrust": change(rows, "change velocity", OPEN, CLOSED),
-        "time": difference(rows, "seconds", OPEN, CLOSED),
-        "switches": difference(rows, "switches", OPEN, CLOSED),
-        "reward": difference(rows, "reward", OPEN, CLOSED),
-    }
+    return analysed(experiment, rows, words, found, pictures={0: [watched]})
 
 
 @styled

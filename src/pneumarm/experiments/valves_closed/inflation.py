@@ -3,17 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import guarded
 from pneumarm.control import BEGIN
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report, run_seed
 from pneumarm.experiments.there_and_back import (
+    DECISIVE,
     TRAINING,
     Prepared,
-    ThereAndBack,
     opened,
     prepared,
     train_and_move,
@@ -63,7 +64,7 @@ def inflation(
 
 
 @dataclass(frozen=True)
-class ValvesClosed(ThereAndBack):
+class ValvesClosed(Experiment):
     """The whole job with valves left open and closed while computing."""
 
     name = "valves-closed"
@@ -73,6 +74,15 @@ class ValvesClosed(ThereAndBack):
     def trials(self) -> Mapping[int, str]:
         """The two ways."""
         return {OPEN: "left as they are", CLOSED: "closed while computing"}
+
+    @property
+    def axis(self) -> Axis:
+        """The two ways."""
+        return Axis("valves while computing", (0.0, 1.0), ("left", "closed"))
+
+    def settings(self) -> Any:
+        """Return the training, and the transitions and movements that a row rests on."""
+        return DECISIVE
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of each way."""

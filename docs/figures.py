@@ -13,8 +13,7 @@ if __name__ == "__main__":
     docs, run = Path(__file__).parent, read_run(Path(sys.argv[1]))
     moved = read_shown(Path(sys.argv[1]), begin=6.0, seconds=12.0)
     for name, narrow in (("arm.svg", False), ("arm-narrow.svg", True)):
-        playing = moving_arm(moved.time, moved.angle, moved.wanted, moved.spec, narrow=narrow)
-        (docs / name).write_text(playing, encoding="utf-8")
+        (docs / name).write_text(moving_arm(moved, narrow=narrow), encoding="utf-8")
     shown = run.demonstrations[-1]
     figure = movement(shown.time, shown.angle, shown.pressure, shown.valves, shown.goal, shown.end, run.spec)
     (docs / "movement.svg").write_text(svg(figure), encoding="utf-8")

@@ -19,6 +19,7 @@ from pneumarm.live.pace import in_real_time
 from pneumarm.live.picture import measures_of
 from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
+from pneumarm.report.drawn_arm import PROPORTIONS
 from pneumarm.run import RunSettings, settings_in
 from pneumarm.simulation.enough import EnoughSettings
 
@@ -140,6 +141,7 @@ class Rig:
             goals=None if mover is None else spec.degrees(mover.goal_range),
             most_bar=spec.max_pressure,
             measures=[asdict(one) for one in measures],
+            proportions=PROPORTIONS,
             to_scale=to_scale,
             offered={name: [one.words, one.place] for name, one in OFFERED.items()},
             choices=[[one.name, one.version] for one in choices],

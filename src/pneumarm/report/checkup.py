@@ -1,6 +1,7 @@
 """The page of an arm's check-up: what its muscles, its sensors and its joint do, and what is wrong."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -23,6 +24,7 @@ from pneumarm.checkup.figures import (
 )
 from pneumarm.checkup.measure import Checkup
 from pneumarm.report.colours import DARK, GREY, LIGHT, MIDDLE
+from pneumarm.report.moving_arm import Shown
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.playing import playing
 from pneumarm.report.style import panels, styled
@@ -85,8 +87,11 @@ def _playing(checkup: Checkup, j: int) -> Picture:
     time = np.concatenate([one.time, two.time + one.time[-1] + checkup.settings.step])
     caption = "muscle 1 is filled, held and exhausted, and turns it one way; then muscle 2 turns it the other way."
     name = _name(checkup, j).replace("it", "the joint").capitalize()
-    angle = np.concatenate([one.angle, two.angle])[:, None]
-    return playing(time, angle, None, checkup.spec, f"{name} moves: {caption}")
+    angle, pressure = (
+        np.concatenate(both)[:, None] for both in ((one.angle, two.angle), (one.pressure, two.pressure))
+    )
+    alone = replace(checkup.spec, joints=1, links=checkup.spec.links[j : j + 1], sensors=())
+    return playing(Shown(alone, time, angle, pressure=pressure), f"{name} moves: {caption}")
 
 
 def _of_joint(checkup: Checkup, j: int) -> Section:

@@ -11,7 +11,7 @@ from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Column, from_series, mean, over_arms, series_of, values
 from pneumarm.experiments.pictures import section
 from pneumarm.experiments.words import SectionWords
-from pneumarm.report.figures import against_displacement, against_displacement_alt, movement, movement_alt
+from pneumarm.report.figures import against_displacement, movement
 from pneumarm.report.page import Picture, Section, Table
 
 _THIRDS = (("success", 1, 100.0), ("actions", 2, 1.0), ("switches", 2, 1.0), ("ratio", 3, 1.0))
@@ -38,11 +38,7 @@ def analysis(experiment: Displacement, rows: TrialRows) -> Analysis:
             "after": AFTER,
         }
     )
-    scatter = Picture(
-        against_displacement(distance[:, None], actions, switches, spec),
-        words.sections[0].figure,
-        against_displacement_alt(distance[:, None], actions, switches, spec),
-    )
+    scatter = Picture(against_displacement(distance[:, None], actions, switches, spec), words.sections[0].figure)
     names = sorted(name for name in rows.figures if "#" not in name)
     return words.analysis(
         found,
@@ -92,17 +88,9 @@ def _typical(words: SectionWords, rows: TrialRows, spec: ArmSpec, displacements:
         lines.append([f"{degrees:g}°", *shown])
         time, angle, p1, p2, v1, v2 = (from_series(first, name + label) for label in SERIES)
         pressure, valves = (np.stack(pair, axis=-1)[:, None] for pair in ((p1, p2), (v1, v2)))
-        drawn = (
-            time,
-            angle[:, None],
-            pressure,
-            valves,
-            np.array([first[name + "goal"]]),
-            first.get(name + "end"),
-            spec,
-        )
+        goal, end = np.array([first[name + "goal"]]), first.get(name + "end")
         caption = f"A movement by {degrees:g}° on {rows.rows[0].arm} (thesis figure {figure})."
-        pictures.append(Picture(movement(*drawn), caption, movement_alt(*drawn)))
+        pictures.append(Picture(movement(time, angle[:, None], pressure, valves, goal, end, spec), caption))
     header = ["displacement", "success [%]", "time [s]", "out of the way [°]", "ringing [°]"]
     return section(words, rows, {}, figures=pictures, tables=[Table(header, lines, words.table)])
 

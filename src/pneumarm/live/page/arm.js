@@ -1,12 +1,10 @@
 // The arm as a drawing: each joint's link, pulley and muscles with their valves, and the goal to be dragged.
 // Lengths are millimetres. Angles are degrees from the middle of the range; higher ones turn the link to the right,
-// where muscle 1 pulls. Where a joint has one muscle, a spring is drawn in place of the other.
+// where muscle 1 pulls. Where a joint has one muscle, a spring is drawn in place of the other. Reports and films show the
+// same picture: report/drawn_arm.py, which says what the proportions are that come with the state.
 
 const SVG = "http://www.w3.org/2000/svg";
-const PLATE = 16; // from the valves to where the muscles hang
-const TENDON = 26; // least length of the cord between a muscle and its pulley
 const ABOVE = 52; // from the valves' hoses to the upper end of the picture: words stand there
-const FADING = 0.75; // of a valve's light, a frame: pulses of milliseconds are to be seen
 
 function make(name, attributes, parent) {
   const element = document.createElementNS(SVG, name);
@@ -37,14 +35,12 @@ class Spring {
     Object.assign(this, measures, { side });
     const group = make("g", { class: "spring", transform: `translate(${side * this.radius} ${-this.top})` }, parent);
     this.coil = make("path", { class: "coil" }, group);
-    this.tendon = make("line", { class: "tendon", x1: 0, x2: 0, y2: this.top }, group);
     if (this.worded) make("text", beside(side, this.diameter, this.rest * 0.5), group).textContent = "spring";
   }
 
   show(angle) {
-    const length = this.rest - this.side * this.radius * angle * Math.PI / 180;
+    const length = this.top - this.side * this.radius * angle * Math.PI / 180;
     this.coil.setAttribute("d", coil(length, this.diameter * 0.7));
-    this.tendon.setAttribute("y1", length);
   }
 }
 
@@ -57,16 +53,16 @@ class Muscle {
   constructor(parent, side, measures) {
     this.side = side; // +1: muscle 1, on the right, pulls to higher angles
     this.number = side > 0 ? 1 : 2;
-    Object.assign(this, measures); // radius, rest, diameter, top, worded
+    Object.assign(this, measures); // radius, rest, diameter, top, worded, proportions
     this.group = make("g", { class: `muscle of-${this.number}`, transform: `translate(${side * this.radius} ${-this.top})` }, parent);
     this.tendon = make("line", { class: "tendon", x1: 0, x2: 0, y2: this.top }, this.group);
     this.rubber = make("path", { class: "rubber" }, this.group);
     this.air = make("path", { class: "air" }, this.group);
     this.weave = make("path", { class: "weave" }, this.group);
-    const x = side * 15;
-    this.inlet = make("path", { class: "valve", d: `M${x - 6} ${-PLATE - 9}h12l-6 9z` }, this.group);
-    this.outlet = make("path", { class: "valve", d: `M${x - 6} ${-PLATE + 13}h12l-6 -9z` }, this.group);
-    make("path", { class: "tendon", d: `M0 0V${-PLATE + 2}H${x}`, fill: "none" }, this.group);
+    const x = side * 15, plate = this.proportions.plate;
+    this.inlet = make("path", { class: "valve", d: `M${x - 6} ${-plate - 9}h12l-6 9z` }, this.group);
+    this.outlet = make("path", { class: "valve", d: `M${x - 6} ${-plate + 13}h12l-6 -9z` }, this.group);
+    make("path", { class: "tendon", d: `M0 0V${-plate + 2}H${x}`, fill: "none" }, this.group);
     this.inGlow = make("path", { class: "open", d: this.inlet.getAttribute("d"), opacity: 0 }, this.group);
     this.outGlow = make("path", { class: "open", d: this.outlet.getAttribute("d"), opacity: 0 }, this.group);
     const name = make("text", { class: "name", ...beside(side, this.diameter, this.rest * 0.5) }, this.group);
@@ -74,16 +70,17 @@ class Muscle {
     this.label = this.worded ? make("text", { ...beside(side, this.diameter, this.rest * 0.5), dy: "1.3em" }, this.group) : null;
     if (this.worded) {
       const at = { x: side * 26, "text-anchor": side > 0 ? "start" : "end" };
-      make("text", { ...at, y: -PLATE - 1, dy: "-0.05em" }, this.group).textContent = "in";
-      make("text", { ...at, y: -PLATE + 11, dy: "0.3em" }, this.group).textContent = "out";
+      make("text", { ...at, y: -plate - 1, dy: "-0.05em" }, this.group).textContent = "in";
+      make("text", { ...at, y: -plate + 11, dy: "0.3em" }, this.group).textContent = "out";
     }
     this.light = [0, 0];
   }
 
   show(angle, pressure, most, valve) {
     const length = this.rest - this.side * this.radius * angle * Math.PI / 180;
-    const full = Math.min(Math.max(pressure / most, 0), 1.3);
-    const width = this.diameter * (0.82 + 0.55 * full * (this.rest / length));
+    const { slim, swell, fullest, fading } = this.proportions;
+    const full = Math.min(Math.max(pressure / most, 0), fullest);
+    const width = this.diameter * (slim + swell * full * (this.rest / length));
     this.rubber.setAttribute("d", spindle(length, width));
     this.air.setAttribute("d", spindle(length, width * 0.86, 4));
     this.air.setAttribute("fill-opacity", (0.08 + 0.82 * Math.min(full, 1)).toFixed(3));
@@ -91,8 +88,8 @@ class Muscle {
     for (let y = 12; y < length - 14; y += 9) strands += `M${-width * 0.4} ${y}L${width * 0.4} ${y + 8}M${width * 0.4} ${y}L${-width * 0.4} ${y + 8}`;
     this.weave.setAttribute("d", strands);
     this.tendon.setAttribute("y1", length);
-    this.light[0] = Math.max(Math.sqrt(Math.max(valve, 0)), this.light[0] * FADING);
-    this.light[1] = Math.max(Math.sqrt(Math.max(-valve, 0)), this.light[1] * FADING);
+    this.light[0] = Math.max(Math.sqrt(Math.max(valve, 0)), this.light[0] * fading);
+    this.light[1] = Math.max(Math.sqrt(Math.max(-valve, 0)), this.light[1] * fading);
     this.inGlow.setAttribute("opacity", this.light[0].toFixed(2));
     this.outGlow.setAttribute("opacity", this.light[1].toFixed(2));
     if (this.label) this.label.textContent = `${pressure.toFixed(2)} bar`;
@@ -109,9 +106,10 @@ export class ArmDrawing {
     for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) svg.addEventListener(name, (event) => this[name](event));
   }
 
-  build({ measures, muscles, range, goals, most_bar }) {
+  build({ measures, muscles, range, goals, most_bar, proportions }) {
     this.svg.replaceChildren();
     this.each = muscles;
+    this.proportions = proportions;
     this.links = measures.map((one) => one.link * 1000);
     this.range = range;
     this.goals = goals ?? measures.map(() => range);
@@ -119,7 +117,7 @@ export class ArmDrawing {
     this.goal = measures.map(() => 0);
     this.angle = measures.map(() => 0);
     const reach = this.links.reduce((a, b) => a + b, 0);
-    const top = Math.min(measures[0].muscle * 1000, 230) + TENDON + PLATE + ABOVE;
+    const top = Math.min(measures[0].muscle * 1000, 230) + proportions.tendon + proportions.plate + ABOVE;
     let turned = 0, aside = 0; // as far as all links reach to a side together
     this.links.forEach((length, j) => {
       turned = Math.min(turned + Math.max(...this.goals[j].map(Math.abs)), 90);
@@ -164,8 +162,8 @@ export class ArmDrawing {
   joint(turn, still, j, measures) {
     const room = j ? this.links[j - 1] * 0.6 : measures.muscle * 1000;
     const rest = Math.min(measures.muscle * 1000, room);
-    const radius = measures.pulley * 1000, top = rest + TENDON + radius * 0.8;
-    const own = { radius, rest, diameter: measures.diameter * 1000, top, worded: this.links.length === 1 };
+    const radius = measures.pulley * 1000, top = rest + this.proportions.tendon + radius * 0.8;
+    const own = { radius, rest, diameter: measures.diameter * 1000, top, worded: this.links.length === 1, proportions: this.proportions };
     this.muscles.push([new Muscle(still, 1, own), this.each > 1 ? new Muscle(still, -1, own) : new Spring(still, -1, own)]);
     if (!own.worded) make("text", { class: "name", x: radius + 26, y: 4, "text-anchor": "start" }, still).textContent = `joint ${j + 1}`;
     make("line", { class: "link", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, turn);
@@ -173,7 +171,7 @@ export class ArmDrawing {
     make("circle", { class: "pulley", r: radius }, turn);
     make("line", { class: "mark", x1: 0, y1: radius * 0.4, x2: 0, y2: radius }, turn);
     make("circle", { class: "weight", r: 4 }, turn);
-    if (j === this.links.length - 1) make("circle", { class: "weight", cx: 0, cy: this.links[j], r: 13 }, turn);
+    if (j === this.links.length - 1) make("circle", { class: "weight", cx: 0, cy: this.links[j], r: this.proportions.weight }, turn);
   }
 
   // What a goal is dragged by: a ring with arrows to both sides.

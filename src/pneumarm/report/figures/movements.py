@@ -2,12 +2,11 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
-from pneumarm.report.style import of_joint, panels, styled
+from pneumarm.report.style import Described, of_joint, panels, styled
 from pneumarm.report.thesis import GOAL_TOLERANCE
 
 Array = NDArray[np.float64]
@@ -16,7 +15,7 @@ Array = NDArray[np.float64]
 @styled
 def movement(
     time: Array, angle: Array, pressure: Array, valves: Array, goal: Array, end: float | None, spec: ArmSpec
-) -> Figure:
+) -> Described:
     """Draw a movement, and what the arm does after its end if that was recorded too.
 
     Args:
@@ -32,6 +31,7 @@ def movement(
     joints = angle.shape[1]
     figure, axes = panels(3, joints, 4.8, sharex=True, height_ratios=(4, 3, 2.2))
     t = time - time[0] if len(time) else time
+    words = []
     for joint in range(joints):
         above, middle, below = axes[:, joint]
         above.set_ylabel(f"angle{of_joint(joint, joints)} [°]")
@@ -54,7 +54,21 @@ def movement(
                            textcoords="offset points", ha="center", va="bottom", fontsize=8)  # fmt: skip
         above.legend(loc="best")
         middle.legend(loc="best")
+        if len(time):
+            seen, aim = spec.degrees(angle[:, joint]), float(spec.degrees(goal[joint]))
+            beyond = max(0.0, float(((seen - aim) * np.sign(aim - seen[0])).max()))
+            words.append(
+                f"the angle{of_joint(joint, joints)} goes from {seen[0]:.1f}° to a goal of {aim:.1f}°, at most "
+                f"{beyond:.1f}° beyond it; the highest {spec.pressure_word} is "
+                f"{spec.bar(pressure[:, joint]).max():.2f} bar"
+            )
     figure.align_ylabels(axes[:, 0])
+    figure.alt = "Nothing was recorded of this movement."
+    if words:
+        reached = "the goal is not reached" if end is None else f"the goal is reached after {end - time[0]:.2f} s"
+        moving = valves[time < (np.inf if end is None else end)]
+        changes = int((np.diff(moving, axis=0) != 0).any(axis=(1, 2)).sum())
+        figure.alt = f"On the way {'; '.join(words)}; {reached}, with {changes} changes of the valves."
     return figure
 
 
@@ -71,31 +85,3 @@ def _valves(place: Axes, t: Array, valves: Array) -> None:
     place.set_yticks([1.25, 0.75, 0.25, -0.25], ["in", "out", "in", "out"])
     place.set_ylabel("valves")
     place.grid(visible=False, axis="y")
-
-
-def movement_alt(
-    time: Array, angle: Array, pressure: Array, valves: Array, goal: Array, end: float | None, spec: ArmSpec
-) -> str:
-    """Say in words what :func:`movement` shows."""
-    if len(time) == 0:
-        return "Nothing was recorded of this movement."
-    moving = time < (end if end is not None else np.inf)
-    parts = []
-    for joint in range(angle.shape[1]):
-        seen = spec.degrees(angle[:, joint])
-        overshoot = _overshoot(seen, float(spec.degrees(goal[joint])))
-        peak = spec.bar(pressure[:, joint]).max()
-        parts.append(
-            f"the angle{of_joint(joint, angle.shape[1])} goes from {seen[0]:.1f}° to a goal of "
-            f"{float(spec.degrees(goal[joint])):.1f}°, at most {overshoot:.1f}° beyond it; the highest "
-            f"{spec.pressure_word} is {peak:.2f} bar"
-        )
-    reached = "the goal is not reached" if end is None else f"the goal is reached after {end - time[0]:.2f} s"
-    changes = int((np.diff(valves[moving], axis=0) != 0).any(axis=(1, 2)).sum()) if moving.any() else 0
-    return f"On the way {'; '.join(parts)}; {reached}, with {changes} changes of the valves."
-
-
-def _overshoot(angle: Array, goal: float) -> float:
-    """Return how far the angle (n,) goes beyond the goal, seen from where it began."""
-    beyond = (angle - goal) * np.sign(goal - angle[0])
-    return max(0.0, float(beyond.max()))

@@ -1,10 +1,10 @@
-"""The measures that an arm is drawn with, in metres."""
+"""The arm that is drawn on the page."""
 
 from typing import TypeVar
 
 from pneumarm.arm.seam import Arm
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.report.drawn_arm import USUAL, Measures
+from pneumarm.report.drawn_arm import DrawnArm, Measures
 
 _Kind = TypeVar("_Kind", bound=Arm)
 
@@ -16,12 +16,12 @@ def behind(arm: Arm | None, kind: type[_Kind]) -> _Kind | None:
     return arm
 
 
-def measures_of(arm: Arm) -> tuple[list[Measures], bool]:
-    """Return what to draw each joint of ``arm`` with, and whether that is to scale."""
+def drawing_of(arm: Arm) -> tuple[DrawnArm, bool]:
+    """Return ``arm`` as it is drawn, and whether that is to scale."""
     virtual = behind(arm, VirtualArm)
     if virtual is None:
-        return [USUAL] * arm.spec.joints, False
-    return [
+        return DrawnArm.of(arm.spec), False
+    measures = [
         Measures(
             link=link,
             pulley=joint.radius,
@@ -29,4 +29,5 @@ def measures_of(arm: Arm) -> tuple[list[Measures], bool]:
             diameter=joint.muscles[0].diameter,
         )
         for joint, link in zip(virtual.parameters.joints, virtual.parameters.links, strict=True)
-    ], True
+    ]
+    return DrawnArm(measures, arm.spec.muscles), True

@@ -12,8 +12,10 @@ from typing import Annotated, ClassVar, Self, get_origin, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
+from pneumarm.report.moving_arm import Shown
 from pneumarm.task.movements import Movements
 
 Array = NDArray[np.float64]
@@ -243,3 +245,15 @@ class MovingData(Record):
     """[counts]"""
     wanted: Annotated[Array, "n joints"]
     """The goal at that time [counts]."""
+    pressure: Annotated[Array, "measured joints 2"] = field(default_factory=lambda: np.empty((0, 1, 2)))
+    """[counts]; of records of older versions nothing, else shape (n, joints, 2)."""
+
+    def __post_init__(self) -> None:
+        if len(self.pressure) == 0:
+            object.__setattr__(self, "pressure", np.empty((0, np.shape(self.angle)[1], 2)))
+        super().__post_init__()
+
+    def shown(self, spec: ArmSpec) -> Shown:
+        """Return it as a stretch of movement of the arm ``spec``."""
+        pressure = self.pressure if len(self.pressure) else None
+        return Shown(spec, self.time, self.angle, self.wanted, pressure)

@@ -4,10 +4,9 @@ Lengths are millimetres, y points down. At 0 degrees the arm hangs down; higher 
 muscle 1 pulls. Where a joint has one muscle, a spring is drawn in place of the other.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +17,17 @@ from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
 Array = NDArray[np.float64]
 
 PROPORTIONS = {
-    "plate": 16,  # from the valves to the muscles' upper ends
+    "plate_gap": 16,  # from the valves to the muscles' upper ends
     "tendon": 26,  # least length of the cord between a muscle and its pulley
     "slim": 0.82,  # width of an empty muscle over its diameter
     "swell": 0.55,  # what a full one is wider by
     "fullest": 1.3,  # of the highest pressure of the arm; beyond it a muscle is not drawn wider
+    "pale": 0.08,  # opacity of the air in an empty muscle
+    "air": 0.82,  # what it is more opaque by in a full one
     "weight": 13,  # radius of the weight at the end
     "fading": 0.75,  # of a valve's light from one picture to the next: pulses of milliseconds are to be seen
 }
-"""Lengths [mm] and shares, of the page in the browser too."""
+"""Lengths [mm] and shares."""
 
 COLOURS = {
     "paper": ("#ffffff", "#0f1418"),
@@ -113,6 +114,10 @@ class Shape(NamedTuple):
     points: Array
     """Shape (n, 2)."""
 
+    def named(self) -> tuple[str, str]:
+        """Return its kind and its path."""
+        return self.kind, self.path()
+
     def path(self) -> str:
         """Return it as the data of an SVG path."""
         numbers = iter(self.points)
@@ -192,6 +197,11 @@ class Muscle:
         full = np.clip(full, 0, PROPORTIONS["fullest"])
         return PROPORTIONS["slim"] + PROPORTIONS["swell"] * full / length, length
 
+    def for_page(self) -> dict[str, Any]:
+        """Return it as JSON."""
+        shapes = {name: [one.named() for one in getattr(self, name)] for name in ("body", "fixed", "lights")}
+        return {"at": self.at, "rest": self.rest, **shapes}
+
 
 class DrawnArm:
     """The shapes of an arm.
@@ -212,10 +222,10 @@ class DrawnArm:
             made = [_muscle(n + 1, one, rest) if n < muscles else _spring(one, rest) for n in range(2)]
             self.muscles.append(made)
             self.turning.append(_joint(self.links[j], 1000 * one.pulley, last=j == len(measures) - 1))
-        top = self.muscles[0][0].at[1] - PROPORTIONS["plate"]
-        self.above, self.reach = -top + 20, sum(self.links)
+        top = self.muscles[0][0].at[1] - PROPORTIONS["plate_gap"]
+        self.above, self.reach = 26 - top, sum(self.links)
         """From the first hinge to the upper end of the picture, and to the end of the arm that hangs down."""
-        self.plate = [_line("plate", (-70, top - 12), (70, top - 12)), _line("column", (0, top - 12), (0, 0))]
+        self.plate = [_line("plate", (-70, top - 18), (70, top - 18)), _line("column", (0, top - 18), (0, 0))]
         self.ghost = [[_line("ghost", (0, 0), (0, length))] for length in self.links]
         """Of each joint, its bare link."""
 
@@ -243,6 +253,19 @@ class DrawnArm:
                 for shape, scale, opacity in shapes:
                     yield shape._replace(points=(shape.points * scale + muscle.at) @ still + origin), opacity
 
+    def for_page(self, place: str) -> dict[str, Any]:
+        """Return all of it as JSON, for a page that moves it itself in the SVG at the CSS selector ``place``."""
+        return {
+            **PROPORTIONS,
+            "style": style(place),
+            "above": self.above,
+            "links": self.links,
+            "plate": [shape.named() for shape in self.plate],
+            "ghost": [[shape.named() for shape in one] for one in self.ghost],
+            "turning": [[shape.named() for shape in one] for one in self.turning],
+            "muscles": [[muscle.for_page() for muscle in pair] for pair in self.muscles],
+        }
+
     def links_at(self, degrees: Array, kind: str = "ghost") -> Iterator[Shape]:
         """Yield the bare links as shapes of a ``kind``, with the joints at ``degrees`` (joints,)."""
         for (turned, origin, _), (shape,) in zip(self._frames(degrees), self.ghost, strict=True):
@@ -258,22 +281,37 @@ class DrawnArm:
             origin, still = origin + (0, link) @ turned, turned
 
 
+def style(place: str, looks: Mapping[str, Look] = LOOKS) -> str:
+    """Return ``looks`` as a style element for the SVG at the CSS selector ``place``, as it reaches the whole page."""
+    light, dark = (
+        "".join(
+            f"{place} .{kind}{{fill:{COLOURS[look.fill][i] if look.fill else 'none'}"
+            + (f";stroke:{COLOURS[look.stroke][i]};stroke-width:{look.width}" if look.stroke else "")
+            + (f";opacity:{look.opacity}" if look.opacity < 1 else "")
+            + "}"
+            for kind, look in looks.items()
+        )
+        for i in (0, 1)
+    )
+    return f"<style>{light}@media screen and (prefers-color-scheme:dark){{{dark}}}</style>"
+
+
 def air(full: Array) -> Array:
     """Return how opaque the air in a muscle is that is ``full`` of pressure."""
-    return 0.08 + 0.82 * np.clip(full, 0, 1)
+    return PROPORTIONS["pale"] + PROPORTIONS["air"] * np.clip(full, 0, 1)
 
 
 def faded(valves: Array) -> Array:
     """Return how bright the lights of ``valves`` (n, ...) are, -1 to 1 as they are, from picture to picture."""
     lights = np.sign(valves) * np.sqrt(np.abs(valves))
-    for before, now in pairwise(lights):
-        now[:] = np.where(now == 0, PROPORTIONS["fading"] * before, now)
+    for k in range(1, len(lights)):
+        lights[k] = np.where(valves[k] == 0, PROPORTIONS["fading"] * lights[k - 1], lights[k])
     return lights
 
 
 def _muscle(number: int, measures: Measures, rest: float) -> Muscle:
     side, radius, width = (1, -1)[number - 1], 1000 * measures.pulley, 1000 * measures.diameter
-    top, up, x = rest + PROPORTIONS["tendon"] + radius * 0.8, -PROPORTIONS["plate"], side * 15
+    top, up, x = rest + PROPORTIONS["tendon"] + radius * 0.8, -PROPORTIONS["plate_gap"], side * 15
     valves = [((x - 6, y), (x + 6, y), (x, y + down)) for y, down in ((up - 9, 9), (up + 13, -9))]
     return Muscle(
         (side * radius, -top),

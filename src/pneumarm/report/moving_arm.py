@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.hand import link_ends
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.drawn_arm import COLOURS, LOOKS, DrawnArm, Look, Muscle, Pose, Shape, air, faded
+from pneumarm.report.drawn_arm import LOOKS, DrawnArm, Look, Muscle, Pose, Shape, air, faded, style
 
 Array = NDArray[np.float64]
 
@@ -98,27 +98,13 @@ def moving_arm(shown: Shown, *, dashed: str = "asked for", narrow: bool = False)
     if shown.wanted is not None and np.isfinite(shown.wanted).all():
         goals = shown.at(grid, shown.spec.degrees(shown.wanted))
     arm = _arm(DrawnArm.of(shown.spec), poses, goals, seconds, at)
+    looks = style(".pneumarm", _LOOKS)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="pneumarm" viewBox="0 0 {at.width} {at.height}" '
-        f'width="{at.width}" height="{at.height}" font-family="sans-serif" font-size="14">{_style()}'
+        f'width="{at.width}" height="{at.height}" font-family="sans-serif" font-size="14">{looks}'
         f'<rect class="paper" width="{at.width}" height="{at.height}"/>'
         f"{arm}{_curves(grid, poses.degrees, goals, at, dashed)}</svg>"
     )
-
-
-def _style() -> str:
-    """Return the looks as a style sheet; it names the picture, because in a notebook it reaches the whole page."""
-    light, dark = (
-        "".join(
-            f".pneumarm .{kind}{{fill:{COLOURS[look.fill][i] if look.fill else 'none'}"
-            + (f";stroke:{COLOURS[look.stroke][i]};stroke-width:{look.width}" if look.stroke else "")
-            + (f";opacity:{look.opacity}" if look.opacity < 1 else "")
-            + "}"
-            for kind, look in _LOOKS.items()
-        )
-        for i in (0, 1)
-    )
-    return f"<style>{light}@media screen and (prefers-color-scheme:dark){{{dark}}}</style>"
 
 
 def _arm(arm: DrawnArm, poses: Pose, goals: Array | None, seconds: float, at: _Layout) -> str:

@@ -111,13 +111,14 @@ def one_after_the_other(shown: Sequence[Demonstration]) -> MovingData | None:
         time=np.concatenate(times),
         angle=np.concatenate([one.angle for one in shown]),
         wanted=np.concatenate([np.tile(one.goal, (len(one.time), 1)) for one in shown]),
+        pressure=np.concatenate([one.pressure for one in shown]),
     )
 
 
 def moving(data: MovingData, results: Mapping[str, Any], spec: ArmSpec) -> Section:
     """Return how the arm moves, as a picture that plays, and in degrees and seconds."""
     caption = "The arm as it moved to goals; the broad one behind it is where it was asked to be."
-    picture = playing(Shown(spec, data.time, data.angle, data.wanted), caption)
+    picture = playing(data.shown(spec), caption)
     tracked = [
         (
             f"{one['frequency_hz']:g} Hz, {one['amplitude_deg']:.0f}°",

@@ -59,8 +59,7 @@ def _in_folder(folder: Path) -> Path:
 def _of_record(path: Path) -> Shown:
     spec = read_spec(path.parent / SPEC)
     if path.name == MovingData.file:
-        moved = MovingData.load(path.parent)
-        return Shown(spec, moved.time, moved.angle, moved.wanted)
+        return MovingData.load(path.parent).shown(spec)
     one = Demonstration.load(path.parent, path.name)
     wanted = np.tile(one.goal, (len(one.time), 1))
     return Shown(spec, one.time, one.angle, wanted, one.pressure, one.valves)

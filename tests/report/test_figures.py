@@ -48,7 +48,7 @@ def figures_of(n, joints):
         "baselines": figures.baselines(*(builders.baselines(min(n, 10)) if n else ([], {}))),
         "adaptation": figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14),
         "marked": figures.marked_rows(k.spans, k.reason, k.reasons, k.ends.tolist(), k.stages, spec.period),
-        "movement": figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
+        "movement": figures.movement(m.shown(spec), m.seconds, tolerance=25.0),
     }
     if t is not None:
         made["shaping"] = figures.training_curves(t.curves, t.columns, t.evaluated, t.chosen, spec)
@@ -64,7 +64,7 @@ def figures_of(n, joints):
 def test_every_axis_is_labelled_with_its_unit(joints):
     for name, figure in figures_of(400, joints).items():
         figure.draw_without_rendering()
-        for axes in (a for a in figure.axes if a.get_visible()):
+        for axes in (a for a in figure.axes if a.get_visible() and a.axison):
             labels = []
             for axis in (axes.xaxis, axes.yaxis):
                 shown = axis.get_visible() and any(t.get_text() for t in axis.get_ticklabels() if t.get_visible())
@@ -138,7 +138,7 @@ def test_same_arrays_give_the_same_svg():
     for _ in range(2):
         m, c = arrays
         pair = (
-            figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, SPEC),
+            figures.movement(m.shown(SPEC), m.seconds, tolerance=25.0),
             figures.projections(c.observation, SPEC),
         )
         made.append([svg(f) for f in pair])
@@ -186,14 +186,18 @@ def test_cells_counts_every_occupied_cell_once():
 
 def test_movement_marks_goal_and_valves():
     m = builders.movement()
-    figure = figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, SPEC)
-    angle, pressure, valves = figure.axes
-    assert angle.get_legend() is not None
-    assert [t.get_text() for t in pressure.get_legend().get_texts()] == ["muscle 1", "muscle 2"]
-    assert [t.get_text() for t in valves.texts] == ["muscle 1", "muscle 2"]
+    figure = figures.movement(m.shown(SPEC), m.seconds, tolerance=25.0)
+    _arm, angle, _pressure, valves = figure.axes
+    (legend,) = figure.legends
+    assert [t.get_text() for t in legend.get_texts()] == ["angle", "asked for", "muscle 1", "muscle 2"]
+    assert [t.get_text() for t in valves.get_yticklabels()] == ["2", "1"]
+    (band,) = angle.collections
+    low, high = band.get_datalim(angle.transData).intervaly
+    assert (low + high) / 2 == pytest.approx(SPEC.degrees(m.goal[0]))
+    assert high - low == pytest.approx(50 / SPEC.counts_per_degree)
     alt = figure.alt
     assert "goes from -30.0° to a goal of 40.0°" in alt
-    assert "reached after 0.73 s, with 3 changes of the valves" in alt
+    assert "reached after 0.73 s; the valves change 3 times" in alt
 
 
 def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():

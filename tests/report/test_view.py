@@ -11,7 +11,7 @@ from PIL import Image
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.report.drawn_arm import DrawnArm, Pose
-from pneumarm.report.figures.film import still
+from pneumarm.report.figures.film import movement
 from pneumarm.report.moving_arm import Shown, moving_arm
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
@@ -113,7 +113,7 @@ def test_two_joints_are_a_chain() -> None:
     two = Shown(
         replace(SPEC, joints=2), time, np.full((11, 2), 500.0), None, np.ones((11, 2, 2)), np.ones((11, 2, 2))
     )
-    assert len(still(two).axes) == 4
+    assert len(movement(two).axes) == 4
 
 
 def test_without_a_goal_none_is_drawn() -> None:

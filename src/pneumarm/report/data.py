@@ -232,6 +232,16 @@ class Demonstration(Record):
     name: str
     """What is typical of it, such as "large displacement"."""
 
+    def shown(self, spec: ArmSpec) -> Shown:
+        """Return it as a stretch of movement of the arm ``spec``, that begins at 0 s."""
+        wanted = np.tile(self.goal, (len(self.time), 1))
+        return Shown(spec, self.time - self.time[:1], self.angle, wanted, self.pressure, self.valves)
+
+    @property
+    def seconds(self) -> float | None:
+        """How long it took to reach the goal [s], None if it was not reached."""
+        return None if self.end is None else self.end - float(self.time[0])
+
 
 @dataclass(frozen=True)
 class MovingData(Record):

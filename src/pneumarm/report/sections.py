@@ -31,6 +31,7 @@ from pneumarm.report.moving_arm import Shown
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.playing import playing
 from pneumarm.report.style import of_joint, quantities
+from pneumarm.report.thesis import GOAL_TOLERANCE
 from pneumarm.task import Movements, running_time
 
 
@@ -117,7 +118,7 @@ def one_after_the_other(shown: Sequence[Demonstration]) -> MovingData | None:
 
 def moving(data: MovingData, results: Mapping[str, Any], spec: ArmSpec) -> Section:
     """Return how the arm moves, as a picture that plays, and in degrees and seconds."""
-    caption = "The arm as it moved to goals; the broad one behind it is where it was asked to be."
+    caption = "The arm as it moved to its goals, which are orange. The more pressure in a muscle, the thicker it is."
     picture = playing(data.shown(spec), caption)
     tracked = [
         (
@@ -305,7 +306,7 @@ def one_step(data: QualityData, spec: ArmSpec) -> Section:
     shown = slice(IN_A_ROW)
     observed, simulated = (one[shown, :, 0].astype(np.float64) for one in (data.target, data.predicted))
     time = spec.period * np.arange(len(observed), dtype=np.float64)
-    caption = "The recorded arm, and broad behind it where the simulation said one reading before that it would be."
+    caption = "The recorded arm, and in orange where the simulation expected it one reading before."
     return Section(
         "How it moved", (), [playing(Shown(spec, time, observed, simulated), caption, dashed="predicted")], opens=True
     )
@@ -560,9 +561,10 @@ def demonstrated(demonstrations: tuple[Demonstration, ...], spec: ArmSpec) -> Se
     """Return the typical movements."""
     pictures = [
         Picture(
-            figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
+            figures.movement(m.shown(spec), m.seconds, tolerance=GOAL_TOLERANCE),
             f"A movement on the arm: {m.name} (compare thesis figures 5.17 to 5.19, which have neither pressures nor "
-            "valve signals). The dotted line is where the control ends.",
+            f"valve signals). The band is the goal ± {GOAL_TOLERANCE / spec.counts_per_degree:.1f}°; at the dotted "
+            "line it is reached and the control ends.",
         )
         for m in demonstrations
     ]

@@ -60,9 +60,7 @@ def _of_record(path: Path) -> Shown:
     spec = read_spec(path.parent / SPEC)
     if path.name == MovingData.file:
         return MovingData.load(path.parent).shown(spec)
-    one = Demonstration.load(path.parent, path.name)
-    wanted = np.tile(one.goal, (len(one.time), 1))
-    return Shown(spec, one.time, one.angle, wanted, one.pressure, one.valves)
+    return Demonstration.load(path.parent, path.name).shown(spec)
 
 
 def _of_store(store: Store, sequence: int | None, seconds: float) -> Shown:

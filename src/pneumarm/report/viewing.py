@@ -42,10 +42,10 @@ def check_view(path: Path) -> Callable[[Shown, Path], None]:
 
 
 def _png(shown: Shown, path: Path) -> None:
-    from pneumarm.report.figures.film import still
+    from pneumarm.report.figures.film import movement
 
     with written_whole(path) as temporary:
-        still(shown).savefig(temporary, format="png", dpi=_DPI)
+        movement(shown).savefig(temporary, format="png", dpi=_DPI)
 
 
 def _svg(shown: Shown, path: Path) -> None:

@@ -11,8 +11,10 @@ from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Column, from_series, mean, over_arms, series_of, values
 from pneumarm.experiments.pictures import section
 from pneumarm.experiments.words import SectionWords
+from pneumarm.report.data import Demonstration
 from pneumarm.report.figures import against_displacement, movement
 from pneumarm.report.page import Picture, Section, Table
+from pneumarm.report.thesis import GOAL_TOLERANCE
 
 _THIRDS = (("success", 1, 100.0), ("actions", 2, 1.0), ("switches", 2, 1.0), ("ratio", 3, 1.0))
 _TYPICAL = (("success", 1, 100.0), ("seconds", 2, 1.0), ("out of the way", 1, 1.0), ("ringing", 1, 1.0))
@@ -89,8 +91,9 @@ def _typical(words: SectionWords, rows: TrialRows, spec: ArmSpec, displacements:
         time, angle, p1, p2, v1, v2 = (from_series(first, name + label) for label in SERIES)
         pressure, valves = (np.stack(pair, axis=-1)[:, None] for pair in ((p1, p2), (v1, v2)))
         goal, end = np.array([first[name + "goal"]]), first.get(name + "end")
+        one = Demonstration(time, angle[:, None], pressure, valves, goal, end, name)
         caption = f"A movement by {degrees:g}° on {rows.rows[0].arm} (thesis figure {figure})."
-        pictures.append(Picture(movement(time, angle[:, None], pressure, valves, goal, end, spec), caption))
+        pictures.append(Picture(movement(one.shown(spec), one.seconds, tolerance=GOAL_TOLERANCE), caption))
     header = ["displacement", "success [%]", "time [s]", "out of the way [°]", "ringing [°]"]
     return section(words, rows, {}, figures=pictures, tables=[Table(header, lines, words.table)])
 

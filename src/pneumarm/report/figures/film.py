@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.hand import link_ends
@@ -13,7 +12,7 @@ from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE, PALE
 from pneumarm.report.drawn_arm import DrawnArm
 from pneumarm.report.figures.arm import ArmPicture
 from pneumarm.report.moving_arm import Shown
-from pneumarm.report.style import key, legend_below, of_joint, styled
+from pneumarm.report.style import Described, key, legend_below, of_joint, styled
 
 Array = NDArray[np.float64]
 
@@ -25,9 +24,25 @@ _PAST = 8  # places where the arm was before, in a figure
 _STYLES = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)))  # of the joints' curves
 
 
-def still(shown: Shown) -> Figure:
-    """Return the whole stretch as a figure: the arm at its end and every now and then before, and what was read."""
+def movement(shown: Shown, end: float | None = None, *, tolerance: float = 0.0) -> Described:
+    """Draw a stretch of movement: the arm at its end and every now and then before, and what was read.
+
+    Args:
+        shown: the stretch (thesis figures 5.17 to 5.19).
+        end: when the goal was reached [s] of ``shown.time``, or None.
+        tolerance: around what was asked for, drawn as a band [counts].
+
+    """
     figure, arm = _stage(shown)
+    axes = figure.axes[1:]
+    if shown.wanted is not None and tolerance:
+        for wanted in shown.wanted.T:
+            low, high = (shown.spec.degrees(wanted + one) for one in (-tolerance, tolerance))
+            axes[0].fill_between(shown.time, low, high, color=LIGHT, alpha=0.5, linewidth=0)
+    for place in axes:
+        if end is not None:
+            place.axvline(end, color=INK, linestyle=":", linewidth=1)
+    figure.alt = _in_words(shown, end)
     poses = shown.poses(shown.time - shown.time[0])
     degrees = poses.degrees
     way = np.cumsum(np.abs(np.diff(degrees, axis=0, prepend=degrees[:1])).sum(axis=1))
@@ -36,6 +51,26 @@ def still(shown: Shown) -> Figure:
     goal = None if shown.wanted is None else shown.spec.degrees(shown.wanted[-1])
     arm.show(poses[-1], goal)
     return figure
+
+
+def _in_words(shown: Shown, end: float | None) -> str:
+    spec, joints, words = shown.spec, shown.spec.joints, []
+    for j, seen in enumerate(spec.degrees(shown.angle).T):
+        text = f"the angle{of_joint(j, joints)} goes from {seen[0]:.1f}° "
+        if shown.wanted is None or not np.isfinite(shown.wanted[-1, j]):
+            text += f"to {seen[-1]:.1f}°"
+        else:
+            goal = float(spec.degrees(shown.wanted[-1, j]))
+            beyond = max(0.0, float(((seen - goal) * np.sign(goal - seen[0])).max()))
+            text += f"to a goal of {goal:.1f}°, at most {beyond:.1f}° beyond it"
+        if shown.pressure is not None:
+            text += f"; the highest {spec.pressure_word} is {spec.bar(shown.pressure[:, j]).max():.2f} bar"
+        words.append(text)
+    reached = "" if end is None else f"; the goal is reached after {end:.2f} s"
+    if shown.command is not None:
+        moving = shown.command[shown.time < (np.inf if end is None else end)]
+        reached += f"; the valves change {int((np.diff(moving, axis=0) != 0).any(axis=(1, 2)).sum())} times"
+    return f"On the way {'; '.join(words)}{reached}."
 
 
 def frames(shown: Shown) -> Iterator[NDArray[np.uint8]]:
@@ -59,7 +94,7 @@ def frames(shown: Shown) -> Iterator[NDArray[np.uint8]]:
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _stage(shown: Shown, **style: Any) -> tuple[Figure, ArmPicture]:
+def _stage(shown: Shown, **style: Any) -> tuple[Described, ArmPicture]:
     """Return the figure with all curves, and the arm in it."""
     figure, arm = _figure(shown), DrawnArm.of(shown.spec)
     figure.set_dpi(_DPI)
@@ -69,9 +104,9 @@ def _stage(shown: Shown, **style: Any) -> tuple[Figure, ArmPicture]:
 
 
 @styled
-def _figure(shown: Shown) -> Figure:
+def _figure(shown: Shown) -> Described:
     """Return the figure with all curves; its first axes are for the arm."""
-    figure = Figure(figsize=_SIZE, layout="constrained")
+    figure = Described(figsize=_SIZE, layout="constrained")
     FigureCanvasAgg(figure)
     rows = [2.2] + [1.0] * (shown.pressure is not None) + [0.8] * (shown.command is not None)
     grid = figure.add_gridspec(len(rows), 2, width_ratios=(1, 1.75), height_ratios=rows)
@@ -84,7 +119,7 @@ def _figure(shown: Shown) -> Figure:
     if shown.command is not None:
         _valves(curves[-1], shown)
     for axes in curves:
-        axes.set_xlim(0, shown.time[-1])
+        axes.set_xlim(0, max(shown.time[-1], shown.spec.period))
         axes.tick_params(labelbottom=axes is curves[-1])
     curves[-1].set_xlabel("time [s]")
     figure.align_ylabels(curves)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pneumarm.files import write_text
-from pneumarm.report.figures import Baseline, baselines, baselines_alt
+from pneumarm.report.figures import Baseline, baselines
 from pneumarm.report.ledger import with_interval
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.style import RASTER_DPI
@@ -155,7 +155,6 @@ def write_page(folder: Path, rows: list[Row]) -> None:
         figure,
         "Reward on arrival against the processor time of training, all threads together; small markers are agents, "
         "large ones with 95% intervals all their movements. Lines need no training.",
-        baselines_alt(trained, untrained),
     )
     sections = [
         Section("All arms", (), [picture], tables[:1]),

@@ -75,6 +75,7 @@ def moving_record(tried: MoveTrial, most: int = _SHOWN_GOALS) -> MovingData:
         time=np.concatenate([one.recorded.time for one in shown]),
         angle=np.concatenate([one.recorded.angle for one in shown]),
         wanted=np.concatenate([np.tile(one.goal, (n, 1)) for one, n in zip(shown, lengths, strict=True)]),
+        pressure=np.concatenate([one.recorded.pressure for one in shown]),
     )
 
 

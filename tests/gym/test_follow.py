@@ -147,7 +147,7 @@ def test_mistakes_are_told(env: ArmFollow) -> None:
 
 @pytest.mark.parametrize("reference", [None, "sine:1Hz,15deg"])
 def test_a_copy_carries_the_state_and_goes_its_own_way(reference: str | None) -> None:
-    env = Drawing(on_arm(reference), lambda seen: (seen[:1] * 0, seen[:1]), VirtualArm().spec)
+    env = Drawing(on_arm(reference), lambda seen: (seen[:1] * 0, seen[:1], np.zeros((1, 2))), VirtualArm().spec)
     env.reset(seed=2)
     env.render()
     random = np.random.default_rng(0)

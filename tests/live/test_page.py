@@ -54,7 +54,9 @@ def page_of(browser: Browser, server: Server, width: int = 800, **options: objec
 
 def drag_to(page: Page, degrees: float) -> None:
     """Drag the goal with the mouse."""
-    reach = page.evaluate("document.querySelector('#arm .weight:last-of-type').cy.baseVal.value")
+    reach = page.evaluate(
+        "(box => box.y + box.height / 2)(document.querySelector('#arm .weight:last-of-type').getBBox())"
+    )
     place = page.evaluate(
         """([degrees, reach]) => {
           const turned = degrees * Math.PI / 180, matrix = document.getElementById("arm").getScreenCTM();

@@ -40,7 +40,6 @@ def figures_of(n, joints):
         "residue": figures.residue(q.target[:, :, 0], q.predicted[:, :, 0], spec),
         "residue_by_class": figures.residue_by_class(simulated[:, 0, 0], classifications(q, 0, spec)),
         "isoplot": figures.isoplot(real, simulated, spec),
-        "density": figures.isoplot(real, simulated, spec, density=True),
         "propagation": figures.error_propagation(q.propagation, spec),
         "importance": figures.input_importance(q.weights, q.inputs, q.outputs),
         "distributions": figures.distributions(test.reward, test.actions, test.all_switches, won),
@@ -49,7 +48,7 @@ def figures_of(n, joints):
         "baselines": figures.baselines(*(builders.baselines(min(n, 10)) if n else ([], {}))),
         "adaptation": figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14),
         "marked": figures.marked_rows(k.spans, k.reason, k.reasons, k.ends.tolist(), k.stages, spec.period),
-        "movement": figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec),
+        "movement": figures.movement(m.shown(spec), m.seconds, tolerance=25.0),
     }
     if t is not None:
         made["shaping"] = figures.training_curves(t.curves, t.columns, t.evaluated, t.chosen, spec)
@@ -65,7 +64,7 @@ def figures_of(n, joints):
 def test_every_axis_is_labelled_with_its_unit(joints):
     for name, figure in figures_of(400, joints).items():
         figure.draw_without_rendering()
-        for axes in (a for a in figure.axes if a.get_visible()):
+        for axes in (a for a in figure.axes if a.get_visible() and a.axison):
             labels = []
             for axis in (axes.xaxis, axes.yaxis):
                 shown = axis.get_visible() and any(t.get_text() for t in axis.get_ticklabels() if t.get_visible())
@@ -139,7 +138,7 @@ def test_same_arrays_give_the_same_svg():
     for _ in range(2):
         m, c = arrays
         pair = (
-            figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, SPEC),
+            figures.movement(m.shown(SPEC), m.seconds, tolerance=25.0),
             figures.projections(c.observation, SPEC),
         )
         made.append([svg(f) for f in pair])
@@ -152,7 +151,7 @@ def test_isoplot_shows_the_bias_of_a_simulation_that_predicts_too_little():
     real = random.normal(0, 10, (500, 1, 4))
     figure = figures.isoplot(real, 0.5 * real, SPEC)
     assert [t.get_text() for t in figure.axes[0].get_legend().get_texts()] == ["ideal, 45°", "slope 0.500"]
-    assert "angle: slope 0.500" in figures.isoplot_alt(real, 0.5 * real, SPEC)
+    assert "angle: slope 0.500" in figure.alt
 
 
 def test_expected_propagation_is_equation_3_7_with_the_thesis_numbers():
@@ -166,7 +165,7 @@ def test_residue_by_class_tells_where_the_simulation_is_unsure():
     random = np.random.default_rng(0)
     velocity = random.uniform(-3, 3, 9000)
     residue = random.normal(0, 1 + np.abs(velocity))
-    text = figures.residue_by_class_alt(residue, [Classification("velocity [°/s]", velocity)])
+    text = figures.residue_by_class(residue, [Classification("velocity [°/s]", velocity)]).alt
     least, where_least, most, where_most = (
         float(v) for v in re.search(r"from ([\d.]+)° \(at (\S+)\) to ([\d.]+)° \(at (\S+)\)", text).groups()
     )
@@ -187,14 +186,18 @@ def test_cells_counts_every_occupied_cell_once():
 
 def test_movement_marks_goal_and_valves():
     m = builders.movement()
-    figure = figures.movement(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, SPEC)
-    angle, pressure, valves = figure.axes
-    assert angle.get_legend() is not None
-    assert [t.get_text() for t in pressure.get_legend().get_texts()] == ["muscle 1", "muscle 2"]
-    assert [t.get_text() for t in valves.texts] == ["muscle 1", "muscle 2"]
-    alt = figures.movement_alt(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, SPEC)
+    figure = figures.movement(m.shown(SPEC), m.seconds, tolerance=25.0)
+    _arm, angle, _pressure, valves = figure.axes
+    (legend,) = figure.legends
+    assert [t.get_text() for t in legend.get_texts()] == ["angle", "asked for", "muscle 1", "muscle 2"]
+    assert [t.get_text() for t in valves.get_yticklabels()] == ["2", "1"]
+    (band,) = angle.collections
+    low, high = band.get_datalim(angle.transData).intervaly
+    assert (low + high) / 2 == pytest.approx(SPEC.degrees(m.goal[0]))
+    assert high - low == pytest.approx(50 / SPEC.counts_per_degree)
+    alt = figure.alt
     assert "goes from -30.0° to a goal of 40.0°" in alt
-    assert "reached after 0.73 s, with 3 changes of the valves" in alt
+    assert "reached after 0.73 s; the valves change 3 times" in alt
 
 
 def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():
@@ -207,7 +210,7 @@ def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():
 
 def test_the_alternative_of_distributions_holds_their_numbers():
     test = builders.run().test
-    alt = figures.distributions_alt(test.reward, test.actions, test.all_switches, test.success)
+    alt = figures.distributions(test.reward, test.actions, test.all_switches, test.success).alt
     assert f"{test.success.mean():.2%}" in alt
     assert f"median {np.median(test.actions):g}" in alt
 
@@ -231,7 +234,8 @@ def test_rewards_far_below_are_cut_off_but_never_those_of_the_best_method():
 
 def test_baselines_stand_at_their_rewards_beside_the_bound():
     trained, untrained = builders.baselines()
-    place = figures.baselines(trained, untrained).axes[0]
+    figure = figures.baselines(trained, untrained)
+    place = figure.axes[0]
     drawn = {(x, y) for line in place.lines for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)}
     for baseline in trained:
         assert set(zip(baseline.seconds, baseline.reward, strict=True)) <= drawn
@@ -239,14 +243,14 @@ def test_baselines_stand_at_their_rewards_beside_the_bound():
     assert {level.mean for level in untrained.values()} <= {y for _, y in drawn}
     low, high = place.get_ylim()
     assert low < min(baseline.reward.min() for baseline in trained) < 40.2 < high
-    assert "open loop: 40.20 without training" in figures.baselines_alt(trained, untrained)
-    assert figures.baselines_alt([], {}) == "Reward against training time. No baseline was measured."
+    assert "open loop: 40.20 without training" in figure.alt
+    assert figures.baselines([], {}).alt == "Reward against training time. No baseline was measured."
 
 
 def test_the_adaptation_is_told_with_its_figures():
     adapted = builders.adaptation()
     marks = [figures.CurveMark(event.movement, event.what) for event in adapted.events]
-    words = figures.adaptation_curves_alt(adapted.squares, adapted.quantities, marks)
+    words = figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14).alt
     first = np.sqrt(adapted.squares[:100, 1, 0].mean())
     assert f"angle {first:.2f} in the first hundred" in words
     assert words.endswith(

@@ -10,9 +10,10 @@ from PIL import Image
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
-from pneumarm.report.figures.film import chain, still
-from pneumarm.report.moving_arm import moving_arm
-from pneumarm.report.shown import Shown, read_shown
+from pneumarm.report.drawn_arm import DrawnArm, Pose
+from pneumarm.report.figures.film import movement
+from pneumarm.report.moving_arm import Shown, moving_arm
+from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded
@@ -104,15 +105,18 @@ def test_what_cannot_be_written_is_said(store: Path, tmp_path: Path, monkeypatch
 
 
 def test_two_joints_are_a_chain() -> None:
-    np.testing.assert_allclose(chain(np.array([90.0, -90.0])), [[0, 0], [0.5, 0], [0.5, -0.5]], atol=1e-12)
+    spec = replace(SPEC, joints=2, links=(0.1, 0.1))
+    shapes = DrawnArm.of(spec).placed(Pose(np.array([90.0, -90.0]), np.zeros((2, 2)), np.zeros((2, 2))))
+    *_, weight = (shape for shape, _ in shapes if shape.kind == "weight")
+    np.testing.assert_allclose((weight.points.min(axis=0) + weight.points.max(axis=0)) / 2, [100, 100], atol=1e-9)
     time = np.linspace(0, 1, 11)
     two = Shown(
         replace(SPEC, joints=2), time, np.full((11, 2), 500.0), None, np.ones((11, 2, 2)), np.ones((11, 2, 2))
     )
-    assert len(still(two).axes) == 4
+    assert len(movement(two).axes) == 4
 
 
 def test_without_a_goal_none_is_drawn() -> None:
     time = np.linspace(0, 1, 11)
-    drawn = moving_arm(time, np.full((11, 1), 500.0), None, SPEC)
+    drawn = moving_arm(Shown(SPEC, time, np.full((11, 1), 500.0)))
     assert "asked for" not in drawn

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pneumarm.appendix_a.runs import Case
 from pneumarm.checkup import Checkup
 from pneumarm.checkup.figures import LAGS, detrended
-from pneumarm.report.checkup import spectrum
+from pneumarm.report.checkup import draw_sweep, spectrum
 from pneumarm.report.colours import DARK, GREY, INK, MIDDLE, PALE
 from pneumarm.report.style import key, legend_below, panels, quantities, scatter, styled
 from pneumarm.statistics import binned
@@ -61,16 +61,11 @@ def isoplots(cases: Sequence[Case], which: Sequence[int]) -> Figure:
 def sweeps(cases: Sequence[Case]) -> Figure:
     """Draw the angle at rest against the difference of the pressures, from one end to the other and back."""
     figure, axes = panels(1, len(cases), 2.8, sharey=True)
-    looks = (("up", DARK, "-"), ("down", MIDDLE, "--"))
     for place, case in zip(axes[0], cases, strict=True):
-        sweep = _checked(case).joints[_JOINT].sweep
-        difference, turn = case.spec.bar(sweep.pressure[:, 0] - sweep.pressure[:, 1]), len(sweep.angle) // 2
-        for piece, (_, color, line) in zip((slice(0, turn + 1), slice(turn, None)), looks, strict=True):
-            place.plot(difference[piece], case.spec.degrees(sweep.angle[piece]), line, color=color, marker="o")
-        place.set_xlabel("pressure 1 − pressure 2 [bar]")
+        draw_sweep(place, _checked(case).joints[_JOINT].sweep, case.spec)
         place.set_title(case.name)
     axes[0, 0].set_ylabel("angle as read [°]")
-    legend_below(figure, [key(color, line, marker="o") for _, color, line in looks], [name for name, *_ in looks])
+    legend_below(figure, *axes[0, 0].get_legend_handles_labels())
     return figure
 
 

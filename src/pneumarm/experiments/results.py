@@ -60,9 +60,7 @@ def _recorded(laboratory: Path, arm: str) -> Section | None:
         except UnusableInput:
             continue
         caption = f"{arm}, as it was recorded to learn its simulation from."
-        return Section(
-            "How the arm moved", (), [playing(shown.time, shown.angle, None, shown.spec, caption)], opens=True
-        )
+        return Section("How the arm moved", (), [playing(shown, caption)], opens=True)
     return None
 
 

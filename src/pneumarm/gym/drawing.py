@@ -1,4 +1,4 @@
-"""Pictures of an environment: the arm as it hangs, and in grey where it is wanted."""
+"""Pictures of an environment: the arm, and behind it where it is wanted."""
 
 from collections.abc import Callable
 from typing import Any, SupportsFloat
@@ -7,13 +7,12 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.hand import link_ends
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 
-Angles = NDArray[np.float64]
-Pose = Callable[[NDArray[np.float32]], tuple[Angles, Angles]]
-"""Returns from an observation where the joints are and where they are wanted, each (joints,) [counts]."""
+Counts = NDArray[np.float64]
+Pose = Callable[[NDArray[np.float32]], tuple[Counts, Counts, Counts]]
+"""Returns from an observation the angles, where they are wanted, both (joints,), and the pressures (joints, 2)."""
 MODES = ["rgb_array"]
 """What can be rendered; Gymnasium makes a window ("human") and lists of pictures of it by itself."""
 _INCHES, _DOTS = 4.0, 100
@@ -55,8 +54,8 @@ class Drawing(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Return a picture, shape (height, width, 3)."""
         if self._seen is None:
             raise UnusableInput("call reset() before render()")
-        self._figure = self._figure or _Figure(self._spec.joints)
-        return self._figure.draw(*(self._spec.degrees(angles) for angles in self._pose(self._seen)))
+        self._figure = self._figure or _Figure(self._spec)
+        return self._figure.draw(*self._pose(self._seen))
 
 
 def drawn(env: gymnasium.Env[Any, Any], pose: Pose, spec: ArmSpec, mode: str | None) -> gymnasium.Env[Any, Any]:
@@ -76,30 +75,31 @@ def drawn(env: gymnasium.Env[Any, Any], pose: Pose, spec: ArmSpec, mode: str | N
 class _Figure:
     """The picture, of which only what moves is drawn anew."""
 
-    def __init__(self, joints: int) -> None:
+    def __init__(self, spec: ArmSpec) -> None:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        from pneumarm.report.colours import DARK, INK, LIGHT
+        from pneumarm.report.colours import INK
+        from pneumarm.report.drawn_arm import DrawnArm
+        from pneumarm.report.figures.arm import ArmPicture
 
-        self._joints = joints
+        self._spec, arm = spec, DrawnArm.of(spec)
         figure = Figure(figsize=(_INCHES, _INCHES), dpi=_DOTS)
         self._canvas = FigureCanvasAgg(figure)
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axes.set(xlim=(-1.2, 1.2), ylim=(-1.2, 1.2), aspect="equal")
-        axes.axis("off")
-        axes.plot([-0.3, 0.3], [0.0, 0.0], color=INK, linewidth=3)
-        (self._wanted,) = axes.plot([], [], color=LIGHT, linewidth=14, solid_capstyle="round")
-        (self._arm,) = axes.plot([], [], color=DARK, linewidth=7, solid_capstyle="round", marker="o")
-        self._words = axes.text(0.0, 1.1, "", ha="center", va="top", color=INK, fontsize=12)
+        axes = figure.add_axes((0.0, 0.09, 1.0, 0.91))
+        self._arm = ArmPicture(axes, arm, arm.reach + 20, arm.reach + 20)
+        self._words = figure.text(0.5, 0.03, "", ha="center", color=INK, fontsize=12)
 
-    def draw(self, degrees: Angles, wanted: Angles) -> NDArray[np.uint8]:
-        for line, angles in ((self._arm, degrees), (self._wanted, wanted)):
-            line.set_data(*link_ends(angles, [1 / self._joints] * self._joints).T)
-        self._words.set_text(f"{_listed(degrees)}°, wanted {_listed(wanted)}°")
+    def draw(self, angle: Counts, wanted: Counts, pressure: Counts) -> NDArray[np.uint8]:
+        from pneumarm.report.drawn_arm import Pose
+
+        degrees, goal = self._spec.degrees(angle), self._spec.degrees(wanted)
+        full = self._spec.bar(pressure) / self._spec.max_pressure
+        self._arm.show(Pose(degrees, full, np.zeros_like(full)), goal)
+        self._words.set_text(f"{_listed(degrees)}°, wanted {_listed(goal)}°")
         self._canvas.draw()
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
 
-def _listed(values: Angles) -> str:
+def _listed(values: Counts) -> str:
     return ", ".join(f"{value:.1f}" for value in values)

@@ -12,7 +12,7 @@ from pneumarm.address import StoreAddress
 from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.drawing import Angles, Drawing, Pose, drawn
+from pneumarm.gym.drawing import Counts, Drawing, Pose, drawn
 from pneumarm.gym.follow import ArmFollow, FollowSettings
 from pneumarm.gym.on_arm import ArmPointToPoint
 from pneumarm.gym.simulated import SimulatedPointToPoint
@@ -217,10 +217,9 @@ def _pose_with_goal(scaling: Scaling) -> Pose:
     """Return where the arm is and its goal, from an observation that ends with the goal."""
     joints = len(scaling.command_scale) // 2
 
-    def pose(observation: NDArray[np.float32]) -> tuple[Angles, Angles]:
-        return _angle(observation[: joints * len(QUANTITIES) : len(QUANTITIES)], scaling), _angle(
-            observation[-joints:], scaling
-        )
+    def pose(observation: NDArray[np.float32]) -> tuple[Counts, Counts, Counts]:
+        now = _latest(observation, scaling)
+        return now[:, 0], _angle(observation[-joints:], scaling), now[:, 2:]
 
     return pose
 
@@ -229,16 +228,23 @@ def _pose_with_distance(window: Window, scaling: Scaling) -> Pose:
     """Return where the arm is and is wanted, from an observation with the distances after the state."""
     joints, first = window.joints, window.state_size
 
-    def pose(observation: NDArray[np.float32]) -> tuple[Angles, Angles]:
-        at = observation[: joints * len(QUANTITIES) : len(QUANTITIES)]
-        return _angle(at, scaling), _angle(at + observation[first : first + joints], scaling)
+    def pose(observation: NDArray[np.float32]) -> tuple[Counts, Counts, Counts]:
+        at, now = observation[: joints * len(QUANTITIES) : len(QUANTITIES)], _latest(observation, scaling)
+        return now[:, 0], _angle(at + observation[first : first + joints], scaling), now[:, 2:]
 
     return pose
 
 
-def _angle(scaled: NDArray[np.float32], scaling: Scaling) -> Angles:
+def _latest(observation: NDArray[np.float32], scaling: Scaling) -> Counts:
+    """Return the newest reading in an observation, shape (joints, 4) [counts]."""
+    joints = slice(len(scaling.command_scale) // 2 * len(QUANTITIES))
+    found = observation[joints] * scaling.observation_scale[joints] + scaling.observation_offset[joints]
+    return np.asarray(found, np.float64).reshape(-1, len(QUANTITIES))
+
+
+def _angle(scaled: NDArray[np.float32], scaling: Scaling) -> Counts:
     places = slice(0, len(scaled) * len(QUANTITIES), len(QUANTITIES))
-    found: Angles = scaled * scaling.observation_scale[places] + scaling.observation_offset[places]
+    found: Counts = scaled * scaling.observation_scale[places] + scaling.observation_offset[places]
     return found
 
 

@@ -1,30 +1,12 @@
-"""The measures that an arm is drawn with, in metres."""
+"""The arm that is drawn on the page."""
 
-from dataclasses import dataclass
 from typing import TypeVar
 
 from pneumarm.arm.seam import Arm
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.report.drawn_arm import DrawnArm, Measures
 
 _Kind = TypeVar("_Kind", bound=Arm)
-
-
-@dataclass(frozen=True)
-class Measures:
-    """One joint: its link, its pulley, and the muscles that pull at it from the link before."""
-
-    link: float
-    """From the hinge to the next one, or to the weight at the end [m]."""
-    pulley: float
-    """Radius [m]."""
-    muscle: float
-    """Length of a muscle with the joint in the middle [m]."""
-    diameter: float
-    """Of a muscle without pressure [m]."""
-
-
-USUAL = Measures(link=0.21, pulley=0.034, muscle=0.19, diameter=0.03)
-"""How an arm is drawn of which nobody knows the measures; then nothing is to scale."""
 
 
 def behind(arm: Arm | None, kind: type[_Kind]) -> _Kind | None:
@@ -34,12 +16,12 @@ def behind(arm: Arm | None, kind: type[_Kind]) -> _Kind | None:
     return arm
 
 
-def measures_of(arm: Arm) -> tuple[list[Measures], bool]:
-    """Return what to draw each joint of ``arm`` with, and whether that is to scale."""
+def drawing_of(arm: Arm) -> tuple[DrawnArm, bool]:
+    """Return ``arm`` as it is drawn, and whether that is to scale."""
     virtual = behind(arm, VirtualArm)
     if virtual is None:
-        return [USUAL] * arm.spec.joints, False
-    return [
+        return DrawnArm.of(arm.spec), False
+    measures = [
         Measures(
             link=link,
             pulley=joint.radius,
@@ -47,4 +29,5 @@ def measures_of(arm: Arm) -> tuple[list[Measures], bool]:
             diameter=joint.muscles[0].diameter,
         )
         for joint, link in zip(virtual.parameters.joints, virtual.parameters.links, strict=True)
-    ], True
+    ]
+    return DrawnArm(measures, arm.spec.muscles), True

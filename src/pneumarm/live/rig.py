@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import Any
@@ -16,7 +15,7 @@ from pneumarm.live.faults import OFFERED
 from pneumarm.live.learning import Learning, LeftOff
 from pneumarm.live.orders import AnyOrder, Beat, Choose, HandOver, Learn, PutBack, Stop, Take
 from pneumarm.live.pace import in_real_time
-from pneumarm.live.picture import measures_of
+from pneumarm.live.picture import drawing_of
 from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
 from pneumarm.run import RunSettings, settings_in
@@ -129,7 +128,7 @@ class Rig:
         except BaseException:
             arm.close()
             raise
-        measures, to_scale = measures_of(arm)
+        drawing, to_scale = drawing_of(arm)
         spec = arm.spec
         self.screen.tell(
             arm=self.settings.arm,
@@ -139,7 +138,7 @@ class Rig:
             range=spec.degrees(spec.angle_range),
             goals=None if mover is None else spec.degrees(mover.goal_range),
             most_bar=spec.max_pressure,
-            measures=[asdict(one) for one in measures],
+            drawing=drawing.for_page("#arm"),
             to_scale=to_scale,
             offered={name: [one.words, one.place] for name, one in OFFERED.items()},
             choices=[[one.name, one.version] for one in choices],

@@ -384,6 +384,7 @@ def _listed(values: NDArray[np.float64], form: str) -> str:
 
 def _picture(recorded: Recorded, wanted: NDArray[np.float64], spec: ArmSpec) -> str:
     """Return an SVG that plays what was ``recorded``, for a notebook."""
-    from pneumarm.report.moving_arm import moving_arm
+    from pneumarm.report.moving_arm import Shown, moving_arm
 
-    return moving_arm(recorded.time, recorded.angle, wanted, spec)
+    command = np.nan_to_num(recorded.command)
+    return moving_arm(Shown(spec, recorded.time, recorded.angle, wanted, recorded.pressure, command))

@@ -1,10 +1,13 @@
 """The page of an arm's check-up: what its muscles, its sensors and its joint do, and what is wrong."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.spec_file import SoundState
 from pneumarm.checkup.diagnose import WHITE, WORN, Complaint
 from pneumarm.checkup.figures import (
@@ -21,8 +24,9 @@ from pneumarm.checkup.figures import (
     joint_row,
     muscle_row,
 )
-from pneumarm.checkup.measure import Checkup
+from pneumarm.checkup.measure import Checkup, Trace
 from pneumarm.report.colours import DARK, GREY, LIGHT, MIDDLE
+from pneumarm.report.moving_arm import Shown
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.playing import playing
 from pneumarm.report.style import panels, styled
@@ -85,8 +89,11 @@ def _playing(checkup: Checkup, j: int) -> Picture:
     time = np.concatenate([one.time, two.time + one.time[-1] + checkup.settings.step])
     caption = "muscle 1 is filled, held and exhausted, and turns it one way; then muscle 2 turns it the other way."
     name = _name(checkup, j).replace("it", "the joint").capitalize()
-    angle = np.concatenate([one.angle, two.angle])[:, None]
-    return playing(time, angle, None, checkup.spec, f"{name} moves: {caption}")
+    angle, pressure = (
+        np.concatenate(both)[:, None] for both in ((one.angle, two.angle), (one.pressure, two.pressure))
+    )
+    alone = replace(checkup.spec, joints=1, links=checkup.spec.links[j : j + 1], sensors=())
+    return playing(Shown(alone, time, angle, pressure=pressure), f"{name} moves: {caption}")
 
 
 def _of_joint(checkup: Checkup, j: int) -> Section:
@@ -174,18 +181,23 @@ def spectrum(values: np.ndarray, step: float, pieces: int = 16) -> tuple[np.ndar
 def potentiometer(checkup: Checkup, j: int) -> Figure:
     """Draw the angle against the pressure difference, and its irregularity by place."""
     figure, axes = panels(1, 2, 2.8)
-    spec, test = checkup.spec, checkup.joints[j]
-    difference = spec.bar(test.sweep.pressure[:, 0] - test.sweep.pressure[:, 1])
-    turn = len(difference) // 2
-    for piece, (color, line), name in ((slice(0, turn + 1), _LINES[0], "up"), (slice(turn, None), _LINES[1], "down")):
-        angle = spec.degrees(test.sweep.angle[piece])
-        axes[0, 0].plot(difference[piece], angle, line, color=color, marker="o", label=name)
-    places, off = irregularity(test, spec)
+    test = checkup.joints[j]
+    draw_sweep(axes[0, 0], test.sweep, checkup.spec)
+    places, off = irregularity(test, checkup.spec)
     axes[0, 1].bar(places, off, width=0.8, color=DARK)
     axes[0, 1].axhline(WORN, color=GREY, linewidth=0.8, linestyle=":")
-    axes[0, 0].set_xlabel("pressure 1 − pressure 2 [bar]")
     axes[0, 0].set_ylabel("angle at rest [°]")
     axes[0, 0].legend()
     axes[0, 1].set_xlabel("angle [°]")
     axes[0, 1].set_ylabel("irregularity, rms [°]")
     return figure
+
+
+def draw_sweep(place: Axes, sweep: Trace, spec: ArmSpec) -> None:
+    """Draw the angle at rest against the difference of the pressures, from one end to the other and back."""
+    difference = spec.bar(sweep.pressure[:, 0] - sweep.pressure[:, 1])
+    turn = len(difference) // 2
+    for piece, (color, line), name in ((slice(0, turn + 1), _LINES[0], "up"), (slice(turn, None), _LINES[1], "down")):
+        angle = spec.degrees(sweep.angle[piece])
+        place.plot(difference[piece], angle, line, color=color, marker="o", label=name)
+    place.set_xlabel("pressure 1 − pressure 2 [bar]")

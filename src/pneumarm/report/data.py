@@ -12,8 +12,10 @@ from typing import Annotated, ClassVar, Self, get_origin, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
+from pneumarm.report.moving_arm import Shown
 from pneumarm.task.movements import Movements
 
 Array = NDArray[np.float64]
@@ -230,6 +232,16 @@ class Demonstration(Record):
     name: str
     """What is typical of it, such as "large displacement"."""
 
+    def shown(self, spec: ArmSpec) -> Shown:
+        """Return it as a stretch of movement of the arm ``spec``, that begins at 0 s."""
+        wanted = np.tile(self.goal, (len(self.time), 1))
+        return Shown(spec, self.time - self.time[:1], self.angle, wanted, self.pressure, self.valves)
+
+    @property
+    def seconds(self) -> float | None:
+        """How long it took to reach the goal [s], None if it was not reached."""
+        return None if self.end is None else self.end - float(self.time[0])
+
 
 @dataclass(frozen=True)
 class MovingData(Record):
@@ -243,3 +255,15 @@ class MovingData(Record):
     """[counts]"""
     wanted: Annotated[Array, "n joints"]
     """The goal at that time [counts]."""
+    pressure: Annotated[Array, "measured joints 2"] = field(default_factory=lambda: np.empty((0, 1, 2)))
+    """[counts]; of records of older versions nothing, else shape (n, joints, 2)."""
+
+    def __post_init__(self) -> None:
+        if len(self.pressure) == 0:
+            object.__setattr__(self, "pressure", np.empty((0, np.shape(self.angle)[1], 2)))
+        super().__post_init__()
+
+    def shown(self, spec: ArmSpec) -> Shown:
+        """Return it as a stretch of movement of the arm ``spec``."""
+        pressure = self.pressure if len(self.pressure) else None
+        return Shown(spec, self.time, self.angle, self.wanted, pressure)

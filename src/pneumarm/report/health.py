@@ -140,5 +140,4 @@ def _picture(marked: MarkedData, spec: ArmSpec) -> Picture:
         figures.marked_rows(*numbers, marked.ends.tolist(), [_STAGES.get(s, s) for s in marked.stages], spec.period),
         "Stored rows that are marked, by what was found, over the time that was recorded; the ways to begin states "
         "are not recorded (no figure in the thesis).",
-        figures.marked_rows_alt(*numbers, spec.period),
     )

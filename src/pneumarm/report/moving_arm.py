@@ -1,4 +1,4 @@
-"""An arm that moves by itself, as recorded, with the angle that was asked for beside it: a picture that plays."""
+"""An arm that moves by itself, as recorded, with the angle that was asked for beside it: an SVG that plays."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -6,10 +6,49 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.hand import link_ends
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
+from pneumarm.report.drawn_arm import LOOKS, DrawnArm, Look, Muscle, Pose, Shape, air, faded, style
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A stretch of ``n`` readings."""
+
+    spec: ArmSpec
+    time: Array
+    """From 0, shape (n,) [s]."""
+    angle: Array
+    """Shape (n, joints) [counts]."""
+    wanted: Array | None = None
+    """What was asked for, shape (n, joints) [counts]; None where nothing was."""
+    pressure: Array | None = None
+    """Shape (n, joints, 2) [counts]; None where it was not kept."""
+    command: Array | None = None
+    """In force from each reading to the next, shape (n, joints, 2)."""
+
+    def poses(self, times: Array) -> Pose:
+        """Return what the arm did at ``times`` (m,) [s] since the first reading."""
+        shape = (len(self.time), self.spec.joints, 2)
+        full = (
+            np.full(shape, _UNKNOWN)
+            if self.pressure is None
+            else self.spec.bar(self.pressure) / self.spec.max_pressure
+        )
+        lights = faded(np.zeros(shape) if self.command is None else self.command)
+        begin = np.clip(np.searchsorted(self.time - self.time[0], times, "right") - 1, 0, None)
+        return Pose(self.at(times, self.spec.degrees(self.angle)), self.at(times, full), lights[begin])
+
+    def at(self, times: Array, values: Array) -> Array:
+        """Return ``values`` (n, ...) of the readings at ``times`` (m,) [s] since the first, shape (m, ...)."""
+        flat = values.reshape(len(values), -1).T
+        known = self.time - self.time[0]
+        return np.stack([np.interp(times, known, one) for one in flat], axis=1).reshape(len(times), *values.shape[1:])
+
+
+_UNKNOWN = 0.4  # of the highest pressure: what muscles are drawn with that nobody measured
 
 
 @dataclass(frozen=True)
@@ -18,9 +57,8 @@ class _Layout:
 
     width: int
     height: int
-    pivot: tuple[int, int]
-    link: int
-    """Of the arm, all links together."""
+    arm: tuple[int, int, int]
+    """Middle, upper and lower end of the arm."""
     left: int
     """Of the curve, as are the next three."""
     right: int
@@ -28,47 +66,107 @@ class _Layout:
     bottom: int
 
 
-_WIDE = _Layout(720, 300, pivot=(130, 70), link=150, left=320, right=700, top=30, bottom=250)
-_NARROW = _Layout(360, 410, pivot=(180, 30), link=135, left=42, right=350, top=200, bottom=360)
+_WIDE = _Layout(720, 300, arm=(140, 12, 288), left=320, right=700, top=30, bottom=250)
+_NARROW = _Layout(360, 500, arm=(180, 8, 272), left=42, right=350, top=290, bottom=450)
 _NAMES = 56  # beside the curves, for the names of several joints
 _APART = 18.0  # of two names
 _FRAMES_A_SECOND = 15
-_COLORS = {
-    "paper": ("fill", "#ffffff", "#0f1418"),
-    "words": ("fill", INK, "#e7ebee"),
-    "ink": ("stroke", INK, "#e7ebee"),
-    "arm": ("stroke", DARK, "#7fbfee"),
-    "asked": ("stroke", MIDDLE, "#ff9560"),
-    "goal": ("stroke", LIGHT, "#7a6128"),
+_LOOKS = {
+    **LOOKS,
+    "paper": Look("paper"),
+    "words": Look("ink"),
+    "axis": Look(None, "ink", 1),
+    "is": Look(None, "blue", 2),
+    "asked": Look(None, "orange", 2),
 }
-"""What has a color: whether lines or areas have it, and what it is on light and on dark screens."""
 
 
-def moving_arm(
-    time: Array, angle: Array, wanted: Array | None, spec: ArmSpec, *, dashed: str = "asked for", narrow: bool = False
-) -> str:
+def moving_arm(shown: Shown, *, dashed: str = "asked for", narrow: bool = False) -> str:
     """Return an SVG that plays the record for ever, in light or dark as the screen is.
 
     Args:
-        time: of the readings, shape (n,) [s].
-        angle: shape (n, joints) [counts].
-        wanted: what was asked for, shape (n, joints) [counts]; None where nothing was.
-        spec: the arm, for units.
-        dashed: what ``wanted`` is.
+        shown: what was recorded.
+        dashed: what ``shown.wanted`` is.
         narrow: draw the arm above the curve, for the width of a phone.
 
     """
     at = _NARROW if narrow else _WIDE
-    known = wanted is not None and bool(np.isfinite(wanted).all())
-    asked = wanted if wanted is not None and known else angle
-    seconds = float(time[-1] - time[0])
+    seconds = float(shown.time[-1] - shown.time[0])
     grid = np.linspace(0.0, seconds, max(round(seconds * _FRAMES_A_SECOND), 2))
-    degrees, goals = (
-        np.stack([np.interp(grid, time - time[0], column) for column in spec.degrees(values).T], axis=1)
-        for values in (angle, asked)
+    poses = shown.poses(grid)
+    goals = None
+    if shown.wanted is not None and np.isfinite(shown.wanted).all():
+        goals = shown.at(grid, shown.spec.degrees(shown.wanted))
+    arm = _arm(DrawnArm.of(shown.spec), poses, goals, seconds, at)
+    looks = style(".pneumarm", _LOOKS)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="pneumarm" viewBox="0 0 {at.width} {at.height}" '
+        f'width="{at.width}" height="{at.height}" font-family="sans-serif" font-size="14">{looks}'
+        f'<rect class="paper" width="{at.width}" height="{at.height}"/>'
+        f"{arm}{_curves(grid, poses.degrees, goals, at, dashed)}</svg>"
     )
-    low, high = min(degrees.min(), goals.min()) - 3, max(degrees.max(), goals.max()) + 3
-    joints = degrees.shape[1]
+
+
+def _arm(arm: DrawnArm, poses: Pose, goals: Array | None, seconds: float, at: _Layout) -> str:
+    """Return the arm, and its goal behind it."""
+    degrees = poses.degrees
+    aside = np.abs(link_ends(degrees, arm.links)[..., 0]).max() + 30
+    middle, top, bottom = at.arm
+    scale = min((bottom - top) / (arm.above + arm.reach + 20), middle / aside)
+    muscles = [
+        "".join(
+            _muscle(one, degrees[:, j], poses.full[:, j, m], poses.lights[:, j, m], seconds)
+            for m, one in enumerate(pair)
+        )
+        for j, pair in enumerate(arm.muscles)
+    ]
+    chain = _chain(arm.turning, muscles, degrees, arm.links, seconds)
+    ghost = "" if goals is None else _chain(arm.ghost, [""] * len(arm.links), goals, arm.links, seconds)
+    return (
+        f'<g transform="translate({middle} {top + scale * arm.above:.1f}) scale({scale:.3f})" stroke-linecap="round" '
+        f'stroke-linejoin="round">{_paths(arm.plate)}{ghost}{chain}</g>'
+    )
+
+
+def _paths(shapes: list[Shape] | tuple[Shape, ...]) -> str:
+    return "".join(f'<path class="{shape.kind}" d="{shape.path()}"/>' for shape in shapes)
+
+
+def _chain(turning: list[list[Shape]], still: list[str], degrees: Array, links: list[float], seconds: float) -> str:
+    """Return what turns about each joint, and over it what does not turn with it."""
+    inner = ""
+    for j in reversed(range(len(links))):
+        turn = _animated("rotate", [f"{-value:.2f}" for value in degrees[:, j]], seconds)
+        place = f' transform="translate(0 {links[j - 1]:.1f})"' if j else ""
+        inner = f"<g{place}><g>{turn}{_paths(turning[j])}{inner}</g>{still[j]}</g>"
+    return inner
+
+
+def _muscle(muscle: Muscle, degrees: Array, full: Array, light: Array, seconds: float) -> str:
+    wide, long = muscle.stretch(degrees, full)
+    body = "".join(
+        f'<path class="{shape.kind}" d="{shape.path()}">'
+        + (_animated("fill-opacity", [f"{one:.2f}" for one in air(full)], seconds) if "air" in shape.kind else "")
+        + "</path>"
+        for shape in muscle.body
+    )
+    stretch = _animated("scale", [f"{x:.3f} {y:.3f}" for x, y in zip(wide, long, strict=True)], seconds)
+    lit = "".join(
+        f'<path class="{shape.kind}" d="{shape.path()}" fill-opacity="0">'
+        + _animated("fill-opacity", [f"{max(sign * one, 0):.1f}" for one in light], seconds)
+        + "</path>"
+        for sign, shape in zip((1, -1), muscle.lights, strict=False)
+        if (sign * light > 0).any()
+    )
+    x, y = muscle.at
+    return f'<g transform="translate({x:.4g} {y:.4g})">{_paths(muscle.fixed)}<g>{stretch}{body}</g>{lit}</g>'
+
+
+def _curves(grid: Array, degrees: Array, goals: Array | None, at: _Layout, dashed: str) -> str:
+    """Return the angles over time with a cursor that moves along."""
+    seconds, joints = float(grid[-1]), degrees.shape[1]
+    both = degrees if goals is None else np.concatenate([degrees, goals])
+    low, high = both.min() - 3, both.max() + 3
     right = at.right if joints == 1 else at.right - _NAMES
     x = at.left + (right - at.left) * grid / seconds
 
@@ -77,14 +175,10 @@ def moving_arm(
 
     def line(values: Array, style: str) -> str:
         points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, height(values), strict=True))
-        return f'<polyline points="{points}" fill="none" stroke-width="2" {style}/>'
+        return f'<polyline points="{points}" {style}/>'
 
-    curves = "".join(
-        (line(goals[:, j], 'class="asked" stroke-dasharray="6 4"') if known else "")
-        + line(degrees[:, j], 'class="arm"')
-        for j in range(joints)
-    )
-    cursor = _animated("x1", x, seconds) + _animated("x2", x, seconds)
+    curves = "" if goals is None else "".join(line(one, 'class="asked" stroke-dasharray="6 4"') for one in goals.T)
+    curves += "".join(line(one, 'class="is"') for one in degrees.T)
     ticks = "".join(
         f'<text x="{at.left - 6}" y="{height(tick) + 4:.1f}" text-anchor="end">{tick:g}°</text>'.replace(">-", ">−")
         for tick in np.array(_ticks(low, high))
@@ -93,44 +187,15 @@ def moving_arm(
         f'<text x="{right + 8}" y="{y + 4:.1f}">joint {joint + 1}</text>'
         for joint, y in enumerate(_spread(height(degrees[-1])) if joints > 1 else ())
     )
-    links = _links(goals, seconds, at, 'class="goal" stroke-width="14"') if known else ""
-    links += _links(degrees, seconds, at, 'class="arm" stroke-width="7"')
+    places = [f"{one:.1f}" for one in x]
+    cursor = _animated("x1", places, seconds) + _animated("x2", places, seconds)
+    legend = "" if goals is None else f"dashed: {dashed}; solid: the arm"
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="pneumarm" viewBox="0 0 {at.width} {at.height}" '
-        f'width="{at.width}" height="{at.height}" font-family="sans-serif" font-size="14">{_style()}'
-        f'<rect class="paper" width="{at.width}" height="{at.height}"/><g class="words">'
-        f'<path class="ink" d="M{at.pivot[0] - 60} {at.pivot[1] - 8}h120" stroke-width="3"/>{links}'
-        f'<path class="ink" d="M{at.left} {at.top}V{at.bottom}H{right}" fill="none"/>{ticks}{curves}{names}'
-        f'<line class="ink" y1="{at.top}" y2="{at.bottom}">{cursor}</line>'
+        f'<g class="words"><path class="axis" d="M{at.left} {at.top}V{at.bottom}H{right}"/>{ticks}{curves}{names}'
+        f'<line class="axis" y1="{at.top}" y2="{at.bottom}">{cursor}</line>'
         f'<text x="{right}" y="{at.bottom + 18}" text-anchor="end">{seconds:.0f} s</text>'
-        f'<text x="{at.left}" y="{at.bottom + 36}">{f"dashed: {dashed}; solid: the arm" if known else ""}</text>'
-        "</g></svg>"
+        f'<text x="{at.left}" y="{at.bottom + 36}">{legend}</text></g>'
     )
-
-
-def _style() -> str:
-    """Return the colors as a style sheet; it names the picture, because in a notebook it reaches the whole page."""
-    light, dark = (
-        "".join(f".pneumarm .{name}{{{kind}:{shades[i]}}}" for name, (kind, *shades) in _COLORS.items())
-        for i in (0, 1)
-    )
-    return f"<style>{light}@media screen and (prefers-color-scheme:dark){{{dark}}}</style>"
-
-
-def _links(degrees: Array, seconds: float, at: _Layout, style: str) -> str:
-    """Return a chain of links that turn about their joints, 0 degrees hanging down."""
-    joints, length = degrees.shape[1], at.link / degrees.shape[1]
-    inner = ""
-    for joint in reversed(range(joints)):
-        turns = ";".join(f"{-value:.2f}" for value in degrees[:, joint])
-        turning = (
-            f'<animateTransform attributeName="transform" type="rotate" values="{turns}" dur="{seconds:.2f}s" '
-            'repeatCount="indefinite"/>'
-        )
-        link = f'<path d="M0 0V{length:.1f}" {style} stroke-linecap="round"/>'
-        end = f'<g transform="translate(0 {length:.1f})">{inner}</g>' if inner else ""
-        inner = f"<g>{turning}{link}{end}</g>"
-    return f'<g transform="translate({at.pivot[0]} {at.pivot[1]})">{inner}</g>'
 
 
 def _spread(heights: Array) -> Array:
@@ -141,26 +206,16 @@ def _spread(heights: Array) -> Array:
     return spread
 
 
-def _animated(name: str, values: Array, seconds: float) -> str:
-    places = ";".join(f"{value:.1f}" for value in values)
-    return f'<animate attributeName="{name}" values="{places}" dur="{seconds:.2f}s" repeatCount="indefinite"/>'
+def _animated(name: str, values: list[str], seconds: float) -> str:
+    turning = name in ("rotate", "scale")
+    tag, attribute = ("animateTransform", "transform") if turning else ("animate", name)
+    kind = f' type="{name}"' if turning else ""
+    return (
+        f'<{tag} attributeName="{attribute}"{kind} values="{";".join(values)}" dur="{seconds:.2f}s" '
+        'repeatCount="indefinite"/>'
+    )
 
 
 def _ticks(low: float, high: float) -> list[float]:
     step = next(one for one in (5, 10, 20, 30, 60, 90) if (high - low) / one <= 8 or one == 90)
     return [float(tick) for tick in np.arange(np.ceil(low / step) * step, high, step)]
-
-
-def moving_arm_alt(
-    time: Array, angle: Array, wanted: Array | None, spec: ArmSpec, *, dashed: str = "asked for"
-) -> str:
-    """Return in words what the picture shows."""
-    degrees = spec.degrees(angle)
-    words = (
-        f"{time[-1] - time[0]:.0f} seconds of movement between {degrees.min():.0f} and {degrees.max():.0f} degrees"
-    ).replace("-", "−")
-    if wanted is None:
-        return f"{words}."
-    off = np.abs(degrees - spec.degrees(wanted))
-    share = (off <= 1).all(axis=1).mean()
-    return f"{words}; the arm is within 1 degree of what is {dashed} in {share:.0%} of the time."

@@ -9,7 +9,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from pneumarm.report.style import svg
+from pneumarm.report.style import Described, svg
 
 
 @dataclass(frozen=True)
@@ -19,9 +19,16 @@ class Picture:
     figure: Figure | str
     """Drawn, or an SVG as text."""
     caption: str
-    alt: str
+    alt: str = ""
+    """That of a figure that carries its own where none is given."""
     narrow: str | None = None
     """The same SVG, laid out for the width of a phone. A figure that has it also knows dark screens by itself."""
+
+    def __post_init__(self) -> None:
+        if not self.alt:
+            if not isinstance(self.figure, Described) or not self.figure.alt:
+                raise ValueError(f"a picture needs a text alternative: {self.caption}")
+            object.__setattr__(self, "alt", self.figure.alt)
 
 
 @dataclass(frozen=True)

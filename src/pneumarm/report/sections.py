@@ -27,9 +27,11 @@ from pneumarm.report.figures.residues import IN_A_ROW
 from pneumarm.report.figures.training import PRICE
 from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger, written
+from pneumarm.report.moving_arm import Shown
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.playing import playing
 from pneumarm.report.style import of_joint, quantities
+from pneumarm.report.thesis import GOAL_TOLERANCE
 from pneumarm.task import Movements, running_time
 
 
@@ -110,13 +112,14 @@ def one_after_the_other(shown: Sequence[Demonstration]) -> MovingData | None:
         time=np.concatenate(times),
         angle=np.concatenate([one.angle for one in shown]),
         wanted=np.concatenate([np.tile(one.goal, (len(one.time), 1)) for one in shown]),
+        pressure=np.concatenate([one.pressure for one in shown]),
     )
 
 
 def moving(data: MovingData, results: Mapping[str, Any], spec: ArmSpec) -> Section:
     """Return how the arm moves, as a picture that plays, and in degrees and seconds."""
-    caption = "The arm as it moved to goals; the broad one behind it is where it was asked to be."
-    picture = playing(data.time, data.angle, data.wanted, spec, caption)
+    caption = "The arm as it moved to its goals, which are orange. The more pressure in a muscle, the thicker it is."
+    picture = playing(data.shown(spec), caption)
     tracked = [
         (
             f"{one['frequency_hz']:g} Hz, {one['amplitude_deg']:.0f}°",
@@ -249,14 +252,11 @@ def collected(data: CoverageData, spec: ArmSpec) -> Section:
                 figures.projections(data.observation, spec),
                 "Where the observations lie (99.9% of each quantity); where it is blank there were none "
                 "(thesis section 3.2.2; no figure there).",
-                figures.projections_alt(data.observation, spec),
             ),
             Picture(
                 figures.cells(data.cells_holding, data.per_cell, data.growth),
-                "Transitions in the cells of the filter's grid and, where it was followed, the "
-                "number of cells occupied "
-                "while collecting (thesis section 3.2.3; no figure there).",
-                figures.cells_alt(data.cells_holding, data.per_cell, data.growth),
+                "Transitions in the cells of the filter's grid and, where it was followed, the number of cells "
+                "occupied while collecting (thesis section 3.2.3; no figure there).",
             ),
         ),
     )
@@ -306,9 +306,9 @@ def one_step(data: QualityData, spec: ArmSpec) -> Section:
     shown = slice(IN_A_ROW)
     observed, simulated = (one[shown, :, 0].astype(np.float64) for one in (data.target, data.predicted))
     time = spec.period * np.arange(len(observed), dtype=np.float64)
-    caption = "The recorded arm, and broad behind it where the simulation said one reading before that it would be."
+    caption = "The recorded arm, and in orange where the simulation expected it one reading before."
     return Section(
-        "How it moved", (), [playing(time, observed, simulated, spec, caption, dashed="predicted")], opens=True
+        "How it moved", (), [playing(Shown(spec, time, observed, simulated), caption, dashed="predicted")], opens=True
     )
 
 
@@ -322,7 +322,6 @@ def predicted(data: QualityData, spec: ArmSpec) -> Section:
             figures.residue(data.target[:, :, 0], data.predicted[:, :, 0], spec),
             "Observed and simulated angle of successive transitions and the residue between them "
             "(thesis figure 3.1).",
-            figures.residue_alt(data.target[:, :, 0], data.predicted[:, :, 0], spec),
         )
     ]
     for joint in range(joints):
@@ -335,22 +334,15 @@ def predicted(data: QualityData, spec: ArmSpec) -> Section:
                 "points are transitions, squares and bars are mean and standard deviation in a class. A trend of the "
                 "means is a bias, a trend of the bars shows where the simulation is unsure. Valves: + in, 0 closed, "
                 "−\u00a0out.",
-                figures.residue_by_class_alt(error[:, joint], classes),
             )
         )
-    caption = (
-        "Simulated against observed change. The closer to the 45° line and the narrower, the better; a slope other "
-        "than 1 is a structural error"
-    )
-    alt = figures.isoplot_alt(real, simulated, spec)
-    pictures += [
-        Picture(figures.isoplot(real, simulated, spec), f"{caption} (thesis figures 3.3 and 3.4).", alt),
+    pictures.append(
         Picture(
-            figures.isoplot(real, simulated, spec, density=True),
-            f"{caption}; coloured by the number of transitions (thesis figure 3.5).",
-            alt,
-        ),
-    ]
+            figures.isoplot(real, simulated, spec),
+            "Simulated against observed change, coloured by the number of transitions. The closer to the 45° line "
+            "and the narrower, the better; a slope other than 1 is a structural error (thesis figures 3.3 to 3.5).",
+        )
+    )
     return Section(
         "How well the simulation predicts one step",
         (
@@ -369,10 +361,8 @@ def propagated(data: QualityData, spec: ArmSpec, figures_found: Mapping[str, Any
     pictures = [
         Picture(
             figures.error_propagation(data.propagation, spec),
-            "Standard deviation of the error when the simulation runs freely, beside the growth with "
-            "the square root of "
-            "the steps that uncorrelated errors would give (thesis eq. 3.7; no figure there).",
-            figures.error_propagation_alt(data.propagation, spec),
+            "Standard deviation of the error when the simulation runs freely, beside the growth with the square root "
+            "of the steps that uncorrelated errors would give (thesis eq. 3.7; no figure there).",
         )
     ]
     if data.weights.size:
@@ -382,7 +372,6 @@ def propagated(data: QualityData, spec: ArmSpec, figures_found: Mapping[str, Any
                 "Weights of a least-squares fit as the importance of its inputs: the change of an output, in its "
                 "standard deviations, for one standard deviation of the input (thesis section 3.2.4; "
                 "no figure there).",
-                figures.input_importance_alt(data.weights, data.inputs, data.outputs),
             )
         )
     return Section(
@@ -441,23 +430,16 @@ def trained(data: TrainingData, spec: ArmSpec) -> Section:
             Picture(
                 figures.training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec),
                 learned,
-                figures.training_curves_alt(data.curves, data.columns, data.evaluated, data.chosen, spec),
             )
         )
-    numbers = (data.reward, data.success, data.chosen)
     pictures.append(
-        Picture(
-            figures.spread_of_agents(*numbers, priced=priced),
-            validated,
-            figures.spread_of_agents_alt(*numbers, priced=priced),
-        )
+        Picture(figures.spread_of_agents(data.reward, data.success, data.chosen, priced=priced), validated)
     )
     return Section("Training in the simulation", text, pictures)
 
 
 def tested(test: Movements) -> Section:
     """Return the distribution of the test's episodes."""
-    numbers = (test.reward, test.actions, test.all_switches, test.success)
     return Section(
         "Test in the simulation",
         (
@@ -466,11 +448,9 @@ def tested(test: Movements) -> Section:
         ),
         (
             Picture(
-                figures.distributions(*numbers),
-                "Reward, actions and switches of the test's episodes; the dashed line is the median. "
-                "Values beyond the "
-                "drawn range are counted in the outermost bar (thesis section 5.2; no figure there).",
-                figures.distributions_alt(*numbers),
+                figures.distributions(test.reward, test.actions, test.all_switches, test.success),
+                "Reward, actions and switches of the test's episodes; the dashed line is the median. Values beyond "
+                "the drawn range are counted in the outermost bar (thesis section 5.2; no figure there).",
             ),
         ),
     )
@@ -495,7 +475,6 @@ def transferred(data: TransferData, test: Movements | None) -> Section:
                 figures.transfer_curves(phases, reference),
                 "Reward, success, actions and switches on the arm (thesis figures 5.9 to 5.12; as there actions and "
                 "switches are those of successful episodes). Averages do not reach over the borders of the phases.",
-                figures.transfer_curves_alt(phases, reference),
             ),
         ),
     )
@@ -523,7 +502,6 @@ def adapted(data: Adapted, spec: ArmSpec) -> Section:
                 figures.adaptation_curves(squares, names, marks, math.sqrt(WatchSettings().allowance)),
                 "Error of the simulation on the arm over that of its fit, as moving means of 20 movements; 1 is an "
                 "arm that is as it was (no figure in the thesis, whose agent learns while it moves, section 5.5).",
-                figures.adaptation_curves_alt(squares, names, marks),
             ),
         ),
     )
@@ -560,13 +538,13 @@ def by_displacement(data: TransferData, test: Movements | None, spec: ArmSpec) -
             continue
         where = "on the arm on arrival" if episodes is data.before else name
         won = episodes.success
-        numbers = (episodes.distance[won], episodes.actions[won], episodes.all_switches[won])
         pictures.append(
             Picture(
-                figures.against_displacement(*numbers, spec),
+                figures.against_displacement(
+                    episodes.distance[won], episodes.actions[won], episodes.all_switches[won], spec
+                ),
                 f"Actions and switches of successful episodes {where} against their angular displacement (thesis "
                 "figures 5.15 and 5.16). Points are shifted up and down a little to show how many there are.",
-                figures.against_displacement_alt(*numbers, spec),
             )
         )
     return Section(
@@ -581,16 +559,13 @@ def by_displacement(data: TransferData, test: Movements | None, spec: ArmSpec) -
 
 def demonstrated(demonstrations: tuple[Demonstration, ...], spec: ArmSpec) -> Section:
     """Return the typical movements."""
-    pictures = []
-    for m in demonstrations:
-        numbers = (m.time, m.angle, m.pressure, m.valves, m.goal, m.end, spec)
-        pictures.append(
-            Picture(
-                figures.movement(*numbers),
-                f"A movement on the arm: {m.name} (compare thesis figures 5.17 to 5.19, which have "
-                "neither pressures nor "
-                "valve signals). The dotted line is where the control ends.",
-                figures.movement_alt(*numbers),
-            )
+    pictures = [
+        Picture(
+            figures.movement(m.shown(spec), m.seconds, tolerance=GOAL_TOLERANCE),
+            f"A movement on the arm: {m.name} (compare thesis figures 5.17 to 5.19, which have neither pressures nor "
+            f"valve signals). The band is the goal ± {GOAL_TOLERANCE / spec.counts_per_degree:.1f}°; at the dotted "
+            "line it is reached and the control ends.",
         )
+        for m in demonstrations
+    ]
     return Section("Typical movements", ("Angle, pressures and valves of both muscles against time.",), pictures)

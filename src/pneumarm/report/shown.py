@@ -2,7 +2,6 @@
 
 import operator
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.report.data import Demonstration, MovingData
 from pneumarm.report.files import DEMONSTRATIONS, SPEC, read_spec
+from pneumarm.report.moving_arm import Shown
 from pneumarm.task.reference import parse_reference
 from pneumarm.transitions.rows import Rows, joined
 from pneumarm.transitions.store import SequenceEntry, Store
@@ -22,23 +22,6 @@ Array = NDArray[np.float64]
 
 _STORE = "transitions.db"
 _PAUSE = 3.0  # s, at most, between two sequences that are shown as one
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A stretch of ``n`` readings."""
-
-    spec: ArmSpec
-    time: Array
-    """From 0, shape (n,) [s]."""
-    angle: Array
-    """Shape (n, joints) [counts]."""
-    wanted: Array | None = None
-    """What was asked for, shape (n, joints) [counts]; None where nothing was."""
-    pressure: Array | None = None
-    """Shape (n, joints, 2) [counts]; None where it was not kept."""
-    command: Array | None = None
-    """In force from each reading to the next, shape (n, joints, 2)."""
 
 
 def read_shown(path: Address, sequence: int | None = None, begin: float = 0.0, seconds: float = 20.0) -> Shown:
@@ -76,11 +59,8 @@ def _in_folder(folder: Path) -> Path:
 def _of_record(path: Path) -> Shown:
     spec = read_spec(path.parent / SPEC)
     if path.name == MovingData.file:
-        moved = MovingData.load(path.parent)
-        return Shown(spec, moved.time, moved.angle, moved.wanted)
-    one = Demonstration.load(path.parent, path.name)
-    wanted = np.tile(one.goal, (len(one.time), 1))
-    return Shown(spec, one.time, one.angle, wanted, one.pressure, one.valves)
+        return MovingData.load(path.parent).shown(spec)
+    return Demonstration.load(path.parent, path.name).shown(spec)
 
 
 def _of_store(store: Store, sequence: int | None, seconds: float) -> Shown:

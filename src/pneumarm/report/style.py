@@ -8,7 +8,7 @@ import functools
 import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ParamSpec
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib
 import numpy as np
@@ -64,14 +64,23 @@ _RC: Any = {
     "text.parse_math": True,
 }
 
+
+class Described(Figure):
+    """A figure with its text alternative."""
+
+    alt: str = ""
+    """What it shows, with its main numbers, for those who do not see it."""
+
+
 _Arguments = ParamSpec("_Arguments")
+_Drawn = TypeVar("_Drawn", bound=Figure)
 
 
-def styled(draw: Callable[_Arguments, Figure]) -> Callable[_Arguments, Figure]:
+def styled(draw: Callable[_Arguments, _Drawn]) -> Callable[_Arguments, _Drawn]:
     """Let the function ``draw`` build its figure in the style of the report, laid out for good."""
 
     @functools.wraps(draw)
-    def drawn(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> Figure:
+    def drawn(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Drawn:
         with _style():
             figure = draw(*args, **kwargs)
             _freeze(figure)
@@ -84,9 +93,9 @@ def _style() -> Any:
     return matplotlib.rc_context(_RC)
 
 
-def panels(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
+def panels(rows: int, columns: int, height: float, **options: Any) -> tuple[Described, Any]:
     """Return a figure ``height`` inches high and its axes, shape (rows, columns)."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure = Described(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 

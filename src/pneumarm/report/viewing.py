@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_text, written_whole
-from pneumarm.report.moving_arm import moving_arm
-from pneumarm.report.shown import Shown
+from pneumarm.report.moving_arm import Shown, moving_arm
 
 _COLORS = 64  # of a GIF: lines on white
 _DPI = 160
@@ -43,14 +42,14 @@ def check_view(path: Path) -> Callable[[Shown, Path], None]:
 
 
 def _png(shown: Shown, path: Path) -> None:
-    from pneumarm.report.figures.film import still
+    from pneumarm.report.figures.film import movement
 
     with written_whole(path) as temporary:
-        still(shown).savefig(temporary, format="png", dpi=_DPI)
+        movement(shown).savefig(temporary, format="png", dpi=_DPI)
 
 
 def _svg(shown: Shown, path: Path) -> None:
-    write_text(path, moving_arm(shown.time, shown.angle, shown.wanted, shown.spec))
+    write_text(path, moving_arm(shown))
 
 
 def _gif(shown: Shown, path: Path) -> None:

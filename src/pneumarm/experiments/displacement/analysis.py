@@ -11,8 +11,10 @@ from pneumarm.experiments.displacement.typical import AFTER, SERIES, Displacemen
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import estimate, from_series, mean, series_of
 from pneumarm.experiments.words import Quantity
-from pneumarm.report.figures import against_displacement, against_displacement_alt, movement, movement_alt
+from pneumarm.report.data import Demonstration
+from pneumarm.report.figures import against_displacement, movement
 from pneumarm.report.page import Picture, Table
+from pneumarm.report.thesis import GOAL_TOLERANCE
 
 _THIRDS = (("success", 1, 100.0), ("actions", 2, 1.0), ("switches", 2, 1.0), ("ratio", 3, 1.0))
 _TYPICAL = (("success", 1, 100.0), ("seconds", 2, 1.0), ("out of the way", 1, 1.0), ("ringing", 1, 1.0))
@@ -39,11 +41,7 @@ def analysis(experiment: Displacement, rows: TrialRows) -> Analysis:
         count=len(actions),
         after=AFTER,
     )
-    scatter = Picture(
-        against_displacement(distance[:, None], actions, switches, spec),
-        words.sections[0].figure,
-        against_displacement_alt(distance[:, None], actions, switches, spec),
-    )
+    scatter = Picture(against_displacement(distance[:, None], actions, switches, spec), words.sections[0].figure)
     typical, pictures = _typical(rows, spec, displacements, words.sections[1].table)
     return analysed(
         experiment,
@@ -77,17 +75,10 @@ def _typical(
         lines.append([f"{degrees:g}°", *means])
         time, angle, p1, p2, v1, v2 = (from_series(first, name + label) for label in SERIES)
         pressure, valves = (np.stack(pair, axis=-1)[:, None] for pair in ((p1, p2), (v1, v2)))
-        drawn = (
-            time,
-            angle[:, None],
-            pressure,
-            valves,
-            np.array([first[name + "goal"]]),
-            first.get(name + "end"),
-            spec,
-        )
-        moved = f"A movement by {degrees:g}° on {rows.rows[0].arm} (thesis figure {figure})."
-        pictures.append(Picture(movement(*drawn), moved, movement_alt(*drawn)))
+        goal, end = np.array([first[name + "goal"]]), first.get(name + "end")
+        one = Demonstration(time, angle[:, None], pressure, valves, goal, end, name)
+        caption = f"A movement by {degrees:g}° on {rows.rows[0].arm} (thesis figure {figure})."
+        pictures.append(Picture(movement(one.shown(spec), one.seconds, tolerance=GOAL_TOLERANCE), caption))
     header = ["displacement", "success [%]", "time [s]", "out of the way [°]", "ringing [°]"]
     return Table(header, lines, caption), pictures
 

@@ -1,12 +1,9 @@
-// The arm as a drawing: each joint's link, pulley and muscles with their valves, and the goal to be dragged.
-// Lengths are millimetres. Angles are degrees from the middle of the range; higher ones turn the link to the right,
-// where muscle 1 pulls. Where a joint has one muscle, a spring is drawn in place of the other.
+// The arm as a drawing, with the goal to be dragged. What its shapes are comes with the state, from
+// report/drawn_arm.py, which reports and films are drawn by too; here they are moved. Lengths are millimetres. Angles are
+// degrees from the middle of the range; higher ones turn the link to the right, where muscle 1 pulls.
 
 const SVG = "http://www.w3.org/2000/svg";
-const PLATE = 16; // from the valves to where the muscles hang
-const TENDON = 26; // least length of the cord between a muscle and its pulley
-const ABOVE = 52; // from the valves' hoses to the upper end of the picture: words stand there
-const FADING = 0.75; // of a valve's light, a frame: pulses of milliseconds are to be seen
+const ABOVE = 12; // from the drawing to the upper end of the picture
 
 function make(name, attributes, parent) {
   const element = document.createElementNS(SVG, name);
@@ -15,86 +12,41 @@ function make(name, attributes, parent) {
   return element;
 }
 
-// A muscle from its upper end (0, 0) to (0, length): conical ends, thicker in the middle.
-function spindle(length, width, shorter = 0) {
-  const w = width / 2, end = Math.min(w * 0.9, length * 0.2), e = w * 0.45;
-  return `M${-e} ${shorter}C${-w} ${shorter + end * 0.4} ${-w} ${end} ${-w} ${end * 1.4}V${length - end * 1.4}` +
-    `C${-w} ${length - end} ${-w} ${length - end * 0.4} ${-e} ${length - shorter}H${e}` +
-    `C${w} ${length - end * 0.4} ${w} ${length - end} ${w} ${length - end * 1.4}V${end * 1.4}` +
-    `C${w} ${end} ${w} ${shorter + end * 0.4} ${e} ${shorter}Z`;
-}
+const paths = (shapes, parent) => shapes.map(([kind, d]) => make("path", { class: kind, d }, parent));
 
-// A spring from (0, 0) to (0, length).
-function coil(length, width, turns = 11) {
-  const end = 12, step = (length - 2 * end) / (2 * turns);
-  let path = `M0 0V${end}`;
-  for (let k = 0; k < 2 * turns; k++) path += `L${(k % 2 ? -1 : 1) * width / 2} ${end + (k + 0.5) * step}`;
-  return `${path}L0 ${length - end}V${length}`;
-}
-
-class Spring {
-  constructor(parent, side, measures) {
-    Object.assign(this, measures, { side });
-    const group = make("g", { class: "spring", transform: `translate(${side * this.radius} ${-this.top})` }, parent);
-    this.coil = make("path", { class: "coil" }, group);
-    this.tendon = make("line", { class: "tendon", x1: 0, x2: 0, y2: this.top }, group);
-    if (this.worded) make("text", beside(side, this.diameter, this.rest * 0.5), group).textContent = "spring";
-  }
-
-  show(angle) {
-    const length = this.rest - this.side * this.radius * angle * Math.PI / 180;
-    this.coil.setAttribute("d", coil(length, this.diameter * 0.7));
-    this.tendon.setAttribute("y1", length);
-  }
-}
-
-// Where words stand beside a muscle.
-function beside(side, diameter, y) {
-  return { x: side * (diameter * 0.75 + 6), y, "text-anchor": side > 0 ? "start" : "end" };
-}
-
+// A muscle, or the spring in its place.
 class Muscle {
-  constructor(parent, side, measures) {
-    this.side = side; // +1: muscle 1, on the right, pulls to higher angles
-    this.number = side > 0 ? 1 : 2;
-    Object.assign(this, measures); // radius, rest, diameter, top, worded
-    this.group = make("g", { class: `muscle of-${this.number}`, transform: `translate(${side * this.radius} ${-this.top})` }, parent);
-    this.tendon = make("line", { class: "tendon", x1: 0, x2: 0, y2: this.top }, this.group);
-    this.rubber = make("path", { class: "rubber" }, this.group);
-    this.air = make("path", { class: "air" }, this.group);
-    this.weave = make("path", { class: "weave" }, this.group);
-    const x = side * 15;
-    this.inlet = make("path", { class: "valve", d: `M${x - 6} ${-PLATE - 9}h12l-6 9z` }, this.group);
-    this.outlet = make("path", { class: "valve", d: `M${x - 6} ${-PLATE + 13}h12l-6 -9z` }, this.group);
-    make("path", { class: "tendon", d: `M0 0V${-PLATE + 2}H${x}`, fill: "none" }, this.group);
-    this.inGlow = make("path", { class: "open", d: this.inlet.getAttribute("d"), opacity: 0 }, this.group);
-    this.outGlow = make("path", { class: "open", d: this.outlet.getAttribute("d"), opacity: 0 }, this.group);
-    const name = make("text", { class: "name", ...beside(side, this.diameter, this.rest * 0.5) }, this.group);
-    name.textContent = this.worded ? `muscle ${this.number}` : this.number;
-    this.label = this.worded ? make("text", { ...beside(side, this.diameter, this.rest * 0.5), dy: "1.3em" }, this.group) : null;
-    if (this.worded) {
-      const at = { x: side * 26, "text-anchor": side > 0 ? "start" : "end" };
-      make("text", { ...at, y: -PLATE - 1, dy: "-0.05em" }, this.group).textContent = "in";
-      make("text", { ...at, y: -PLATE + 11, dy: "0.3em" }, this.group).textContent = "out";
-    }
-    this.light = [0, 0];
+  constructor(parent, drawn, number, worded, drawing) {
+    Object.assign(this, { drawn, drawing, light: [0, 0], swells: drawn.lights.length > 0 });
+    const [x, y] = drawn.at, side = Math.sign(x), anchor = { "text-anchor": side > 0 ? "start" : "end" };
+    const group = make("g", { class: `${this.swells ? "muscle" : "spring"} of-${number}`, transform: `translate(${x} ${y})` }, parent);
+    paths(drawn.fixed, group);
+    this.body = make("g", {}, group);
+    this.air = paths(drawn.body, this.body)[1];
+    this.lights = paths(drawn.lights, group);
+    const words = (text, x, y, more = {}) => {
+      const element = make("text", { x: side * x, y, ...anchor, ...more }, group);
+      element.textContent = text;
+      return element;
+    };
+    if (!worded && this.swells) words(number, 28, drawn.rest * 0.5, { class: "name" });
+    if (!worded) return;
+    words(this.swells ? `muscle ${number}` : "spring", 28, drawn.rest * 0.5, this.swells ? { class: "name" } : {});
+    if (!this.swells) return;
+    this.label = words("", 28, drawn.rest * 0.5, { dy: "1.3em" });
+    words("in", 26, -drawing.plate_gap - 1, { dy: "-0.05em" });
+    words("out", 26, -drawing.plate_gap + 11, { dy: "0.3em" });
   }
 
   show(angle, pressure, most, valve) {
-    const length = this.rest - this.side * this.radius * angle * Math.PI / 180;
-    const full = Math.min(Math.max(pressure / most, 0), 1.3);
-    const width = this.diameter * (0.82 + 0.55 * full * (this.rest / length));
-    this.rubber.setAttribute("d", spindle(length, width));
-    this.air.setAttribute("d", spindle(length, width * 0.86, 4));
-    this.air.setAttribute("fill-opacity", (0.08 + 0.82 * Math.min(full, 1)).toFixed(3));
-    let strands = "";
-    for (let y = 12; y < length - 14; y += 9) strands += `M${-width * 0.4} ${y}L${width * 0.4} ${y + 8}M${width * 0.4} ${y}L${-width * 0.4} ${y + 8}`;
-    this.weave.setAttribute("d", strands);
-    this.tendon.setAttribute("y1", length);
-    this.light[0] = Math.max(Math.sqrt(Math.max(valve, 0)), this.light[0] * FADING);
-    this.light[1] = Math.max(Math.sqrt(Math.max(-valve, 0)), this.light[1] * FADING);
-    this.inGlow.setAttribute("opacity", this.light[0].toFixed(2));
-    this.outGlow.setAttribute("opacity", this.light[1].toFixed(2));
+    const { slim, swell, fullest, pale, air, fading } = this.drawing;
+    const length = 1 - this.drawn.at[0] * angle * Math.PI / 180 / this.drawn.rest;
+    const full = Math.min(Math.max(pressure / most, 0), fullest);
+    this.body.setAttribute("transform", `scale(${this.swells ? slim + swell * full / length : 1} ${length})`);
+    if (!this.swells) return;
+    this.air.setAttribute("fill-opacity", (pale + air * Math.min(full, 1)).toFixed(3));
+    this.light = [valve, -valve].map((open, i) => Math.max(Math.sqrt(Math.max(open, 0)), this.light[i] * fading));
+    this.lights.forEach((light, i) => light.setAttribute("opacity", this.light[i].toFixed(2)));
     if (this.label) this.label.textContent = `${pressure.toFixed(2)} bar`;
   }
 }
@@ -109,36 +61,34 @@ export class ArmDrawing {
     for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) svg.addEventListener(name, (event) => this[name](event));
   }
 
-  build({ measures, muscles, range, goals, most_bar }) {
-    this.svg.replaceChildren();
-    this.each = muscles;
-    this.links = measures.map((one) => one.link * 1000);
-    this.range = range;
-    this.goals = goals ?? measures.map(() => range);
+  build({ drawing, range, goals, most_bar }) {
+    const { links, above, plate, ghost, turning, muscles, style } = drawing;
+    this.svg.innerHTML = style;
+    this.links = links;
+    this.goals = goals ?? links.map(() => range);
     this.most = most_bar;
-    this.goal = measures.map(() => 0);
-    this.angle = measures.map(() => 0);
-    const reach = this.links.reduce((a, b) => a + b, 0);
-    const top = Math.min(measures[0].muscle * 1000, 230) + TENDON + PLATE + ABOVE;
+    this.goal = links.map(() => 0);
+    const reach = links.reduce((a, b) => a + b, 0), top = above + ABOVE;
     let turned = 0, aside = 0; // as far as all links reach to a side together
-    this.links.forEach((length, j) => {
+    links.forEach((length, j) => {
       turned = Math.min(turned + Math.max(...this.goals[j].map(Math.abs)), 90);
       aside += length * Math.sin(turned * Math.PI / 180);
     });
-    const half = Math.max(aside + 46, 150);
+    const half = Math.max(aside + 46, 150), worded = links.length === 1;
     this.svg.setAttribute("viewBox", `${-half} ${-top} ${2 * half} ${top + reach + 44}`);
     this.fit();
-    if (measures.length === 1) this.scale(reach + 24);
-    this.ghosts = this.chain((parent, j) => {
-      make("line", { class: "ghost", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, parent);
-    }, "goal");
-    this.handles = this.links.map(() => this.handle(Math.max(13, reach / 16)));
+    if (worded) this.scale(reach + 24);
+    paths(plate, this.svg);
+    this.ghosts = this.chain((turn, j) => paths(ghost[j], turn), "goal");
+    this.handles = links.map(() => this.handle(Math.max(13, reach / 16)));
     this.muscles = [];
-    this.joints = this.chain((parent, j, frame) => this.joint(parent, frame, j, measures[j]), "is");
+    this.joints = this.chain((turn, j, still) => {
+      this.muscles.push(muscles[j].map((one, m) => new Muscle(still, one, m + 1, worded, drawing)));
+      if (!worded) make("text", { class: "name", x: muscles[j][0].at[0] + 26, y: 4, "text-anchor": "start" }, still).textContent = `joint ${j + 1}`;
+      paths(turning[j], turn);
+    }, "is");
     this.handleLayer = make("g", { class: "handles" }, this.svg);
     this.handleLayer.append(...this.handles);
-    make("line", { class: "plate", x1: -70, x2: 70, y1: -top + ABOVE - 6, y2: -top + ABOVE - 6 }, this.svg);
-    make("line", { class: "plate", x1: 0, x2: 0, y1: -top + ABOVE - 6, y2: 0, opacity: 0.14 }, this.svg);
   }
 
   // Text is as large on a phone as elsewhere.
@@ -161,21 +111,6 @@ export class ArmDrawing {
     return turning;
   }
 
-  joint(turn, still, j, measures) {
-    const room = j ? this.links[j - 1] * 0.6 : measures.muscle * 1000;
-    const rest = Math.min(measures.muscle * 1000, room);
-    const radius = measures.pulley * 1000, top = rest + TENDON + radius * 0.8;
-    const own = { radius, rest, diameter: measures.diameter * 1000, top, worded: this.links.length === 1 };
-    this.muscles.push([new Muscle(still, 1, own), this.each > 1 ? new Muscle(still, -1, own) : new Spring(still, -1, own)]);
-    if (!own.worded) make("text", { class: "name", x: radius + 26, y: 4, "text-anchor": "start" }, still).textContent = `joint ${j + 1}`;
-    make("line", { class: "link", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, turn);
-    make("line", { class: "bone", x1: 0, y1: 0, x2: 0, y2: this.links[j] }, turn);
-    make("circle", { class: "pulley", r: radius }, turn);
-    make("line", { class: "mark", x1: 0, y1: radius * 0.4, x2: 0, y2: radius }, turn);
-    make("circle", { class: "weight", r: 4 }, turn);
-    if (j === this.links.length - 1) make("circle", { class: "weight", cx: 0, cy: this.links[j], r: 13 }, turn);
-  }
-
   // What a goal is dragged by: a ring with arrows to both sides.
   handle(r) {
     const group = make("g", { class: "handle" });
@@ -196,7 +131,6 @@ export class ArmDrawing {
   }
 
   show({ angle, goal, pressure, valves }) {
-    this.angle = angle;
     this.joints.forEach((joint, j) => joint.setAttribute("transform", `rotate(${-angle[j]})`));
     this.muscles.forEach((pair, j) => pair.forEach((muscle, m) => muscle.show(angle[j], pressure[j][m] ?? 0, this.most, valves?.[j]?.[m] ?? 0)));
     if (this.dragging === null) this.place(goal ?? angle, goal !== null);

@@ -101,7 +101,7 @@ function showMode() {
 }
 
 function build(now) {
-  const key = JSON.stringify([now.arm, now.measures, now.range, now.goals, now.most_bar, now.muscles]);
+  const key = JSON.stringify([now.arm, now.drawing, now.range, now.goals, now.most_bar, now.muscles]);
   if (key === built) return;
   built = key;
   drawing.build(now);
@@ -113,7 +113,7 @@ function build(now) {
     now.to_scale ? "" : "The measures of this arm are not known: it is not drawn to scale.",
   ].join(" ").trim();
   document.body.classList.toggle("one-muscle", now.muscles < 2);
-  $("angles").replaceChildren(...now.measures.map((_, j) => {
+  $("angles").replaceChildren(...now.drawing.links.map((_, j) => {
     const place = document.createElement("div");
     place.append(document.createElement("small"), document.createElement("b"), document.createElement("span"));
     place.firstChild.textContent = now.joints > 1 ? `joint ${j + 1}` : "angle";
@@ -161,7 +161,7 @@ function fill(place, key, make) {
 function showState(now) {
   const before = state;
   state = now;
-  if (now.measures) build(now);
+  if (now.drawing) build(now);
   document.body.dataset.mode = now.mode ?? "relaxed";
   document.body.dataset.role = writes() ? "writer" : "watcher";
   showMode();

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.report.colours import DARK, GREY, INK, MIDDLE
-from pneumarm.report.style import key, legend_below, nothing, panels, styled
+from pneumarm.report.style import Described, key, legend_below, nothing, panels, styled
 from pneumarm.statistics import moving_mean
 
 Array = NDArray[np.float64]
@@ -31,7 +30,7 @@ _MARKS["rolled back"] = (INK, "X", "version taken back")
 @styled
 def adaptation_curves(
     squares: Array, quantities: Sequence[str], marks: Sequence[CurveMark], tolerated: float
-) -> Figure:
+) -> Described:
     """Draw the error of the simulation on the arm over that of its fit.
 
     Args:
@@ -71,19 +70,18 @@ def adaptation_curves(
             labels.append(words)
     legend_below(figure, handles, labels)
     figure.align_ylabels(axes[:, 0])
+    figure.alt = "No movements were made on the arm."
+    if len(squares):
+        first, last = (np.sqrt(part.mean(axis=0)) for part in (squares[:100], squares[-100:]))
+        errors = "; ".join(
+            f"{name.replace('_', ' ')} {first[1, i]:.2f} in the first hundred movements, {last[1, i]:.2f} in the "
+            f"last ({last[0, i]:.2f} with the simulation that arrived)"
+            for i, name in enumerate(quantities)
+        )
+        happened = "; ".join(
+            f"{_MARKS[mark.what][2]} after movement {mark.movement}" for mark in marks if mark.what in _MARKS
+        )
+        figure.alt = f"Error of the simulation in use over that of its fit: {errors}." + f" {happened}." * bool(
+            happened
+        )
     return figure
-
-
-def adaptation_curves_alt(squares: Array, quantities: Sequence[str], marks: Sequence[CurveMark]) -> str:
-    """Say in words what :func:`adaptation_curves` shows."""
-    if len(squares) == 0:
-        return "No movements were made on the arm."
-    first, last = (np.sqrt(part.mean(axis=0)) for part in (squares[:100], squares[-100:]))
-    parts = [
-        f"{name.replace('_', ' ')} {first[1, i]:.2f} in the first hundred movements, {last[1, i]:.2f} in the last "
-        f"({last[0, i]:.2f} with the simulation that arrived)"
-        for i, name in enumerate(quantities)
-    ]
-    happened = [f"{_MARKS[mark.what][2]} after movement {mark.movement}" for mark in marks if mark.what in _MARKS]
-    told = f" {'; '.join(happened)}." if happened else ""
-    return f"Error of the simulation in use over that of its fit: {'; '.join(parts)}.{told}"

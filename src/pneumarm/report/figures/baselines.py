@@ -5,11 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
-from pneumarm.report.style import key, legend_below, nothing, panels, styled
+from pneumarm.report.style import Described, key, legend_below, nothing, panels, styled
 from pneumarm.statistics import Estimate
 
 Array = NDArray[np.float64]
@@ -36,7 +35,7 @@ class Baseline(NamedTuple):
 
 
 @styled
-def baselines(trained: Sequence[Baseline], untrained: Mapping[str, Estimate]) -> Figure:
+def baselines(trained: Sequence[Baseline], untrained: Mapping[str, Estimate]) -> Described:
     """Draw reward against the processor time of training.
 
     Args:
@@ -50,18 +49,24 @@ def baselines(trained: Sequence[Baseline], untrained: Mapping[str, Estimate]) ->
     place.set_ylabel("reward a movement on arrival on the arm [-]")
     if not trained and not untrained:
         nothing(place, "no baseline was measured")
+        figure.alt = "Reward against training time. No baseline was measured."
         return figure
-    handles, labels = [], []
+    handles, labels, words = [], [], []
     for number, (name, level) in enumerate(untrained.items()):
         ink, line = (INK, MIDDLE, GREY)[number % 3], _LINES[number % 3]
         place.axhline(level.mean, color=ink, ls=line, lw=1.2)
         handles.append(key(ink, line, lw=1.2))
         labels.append(f"{name} {level.mean:.1f}")
+        words.append(f"{name}: {level.mean:.2f} without training")
     for number, baseline in enumerate(trained):
         ink, marker = _INKS[number % len(_INKS)], _MARKERS[number % len(_MARKERS)]
         _marked(place, baseline, ink, marker)
         handles.append(key(ink, "", marker=marker, ms=7, mec=INK, mew=0.6))
         labels.append(f"{baseline.name} {baseline.mean.mean:.1f}")
+        words.append(
+            f"{baseline.name}: {baseline.mean.mean:.2f} after {baseline.seconds.mean():.1f} s of training, its "
+            f"{len(baseline.seconds)} agents {baseline.reward.min():.2f} to {baseline.reward.max():.2f}"
+        )
     place.set_xscale("log")
     if trained:
         seconds = np.concatenate([baseline.seconds for baseline in trained])
@@ -77,6 +82,7 @@ def baselines(trained: Sequence[Baseline], untrained: Mapping[str, Estimate]) ->
         worst = min(worst, *_paid(max(trained, key=lambda baseline: baseline.mean.mean)))
     place.set_ylim(max(min(paid), worst) - _AIR, max(paid) + _AIR)
     legend_below(figure, handles, labels)
+    figure.alt = f"Reward against training time. {'; '.join(words)}."
     return figure
 
 
@@ -93,14 +99,3 @@ def _marked(place: Axes, baseline: Baseline, ink: str, marker: str) -> None:
         if np.isfinite(baseline.mean.low) else None,
         fmt=marker, color=ink, ecolor=INK, elinewidth=1.0, capsize=3, ms=8, mec=INK, mew=0.6, zorder=3,
     )  # fmt: skip
-
-
-def baselines_alt(trained: Sequence[Baseline], untrained: Mapping[str, Estimate]) -> str:
-    """Say in words what :func:`baselines` shows."""
-    parts = [f"{name}: {level.mean:.2f} without training" for name, level in untrained.items()]
-    parts += [
-        f"{baseline.name}: {baseline.mean.mean:.2f} after {baseline.seconds.mean():.1f} s of training, its "
-        f"{len(baseline.seconds)} agents {baseline.reward.min():.2f} to {baseline.reward.max():.2f}"
-        for baseline in trained
-    ]
-    return "Reward against training time. " + ("; ".join(parts) or "No baseline was measured") + "."

@@ -4,13 +4,13 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.report.colours import DARK, INK, MIDDLE
 from pneumarm.report.style import (
     DENSITY,
+    Described,
     counts_bar,
     counts_norm,
     nothing,
@@ -30,7 +30,7 @@ _BANDS = 7  # cells holding 1, 2-3, 4-7, ... transitions are too many bars beyon
 
 
 @styled
-def projections(observation: Array, spec: ArmSpec) -> Figure:
+def projections(observation: Array, spec: ArmSpec) -> Described:
     """Draw how many observations lie where, for pairs of quantities.
 
     Args:
@@ -42,9 +42,14 @@ def projections(observation: Array, spec: ArmSpec) -> Figure:
     figure, axes = panels(joints, len(PROJECTIONS), 2.7 * joints)
     kinds = quantities(spec)
     scale = np.array([k.per_count for k in kinds])
+    words = []
     for joint in range(joints):
         seen = observation[:, joint] * scale
         seen[:, 0] = spec.degrees(observation[:, joint, 0])
+        if len(seen):
+            within = zip(kinds, *np.percentile(seen, (1, 99), axis=0), strict=True)
+            ranges = ", ".join(f"{kind.name} {low:.3g} to {high:.3g} {kind.unit}" for kind, low, high in within)
+            words.append(f"98% of the observations{of_joint(joint, joints)} lie within {ranges}.")
         for place, (i, j) in zip(axes[joint], PROJECTIONS, strict=True):
             place.set_xlabel(kinds[i].in_units() + of_joint(joint, joints))
             place.set_ylabel(kinds[j].in_units() + of_joint(joint, joints))
@@ -59,33 +64,15 @@ def projections(observation: Array, spec: ArmSpec) -> Figure:
                 xs, ys, np.ma.masked_equal(count.T, 0), cmap=DENSITY, norm=counts_norm(count), rasterized=True
             )
             counts_bar(figure, image, place, "observations", location="top", aspect=30)
+    maps = (
+        f"Maps of {len(observation):,} observations over angle and velocity, angle and pressure 1, and the pressures."
+    )
+    figure.alt = " ".join([maps, *words]) if words else "No observations were recorded."
     return figure
 
 
-def projections_alt(observation: Array, spec: ArmSpec) -> str:
-    """Say in words what :func:`projections` shows."""
-    if len(observation) == 0:
-        return "No observations were recorded."
-    kinds = quantities(spec)
-    parts = []
-    for joint in range(observation.shape[1]):
-        low, high = np.percentile(observation[:, joint], (1, 99), axis=0)
-        ranges = [
-            f"{k.name} {spec.degrees(a) if k.name == 'angle' else a * k.per_count:.3g} to "
-            f"{spec.degrees(b) if k.name == 'angle' else b * k.per_count:.3g} {k.unit}"
-            for k, a, b in zip(kinds, low, high, strict=True)
-        ]
-        parts.append(
-            f"98% of the observations{of_joint(joint, observation.shape[1])} lie within " + ", ".join(ranges)
-        )
-    return (
-        f"Maps of {len(observation):,} observations over angle and velocity, angle and pressure 1, and the two "
-        f"pressures. " + ". ".join(parts) + "."
-    )
-
-
 @styled
-def cells(cells_holding: NDArray[np.int64], per_cell: int, growth: NDArray[np.int64]) -> Figure:
+def cells(cells_holding: NDArray[np.int64], per_cell: int, growth: NDArray[np.int64]) -> Described:
     """Draw how many transitions the cells of the filter's grid hold, and how the cells filled while collecting.
 
     Args:
@@ -120,25 +107,13 @@ def cells(cells_holding: NDArray[np.int64], per_cell: int, growth: NDArray[np.in
         place.set_xlim(0)
         place.set_ylim(0)
         whole_ticks(place, "y")
-    return figure
-
-
-def cells_alt(cells_holding: NDArray[np.int64], per_cell: int, growth: NDArray[np.int64]) -> str:
-    """Say in words what :func:`cells` shows."""
-    occupied = int(cells_holding[1:].sum())
-    if occupied == 0:
-        return "No cell of the grid is occupied."
-    full = int(cells_holding[per_cell:].sum())
-    text = (
-        f"Bars: {occupied:,} cells of the grid are occupied, {full:,} of them ({full / occupied:.0%}) hold at least "
-        f"{per_cell} transitions."
+    occupied, full = int(cells_holding[1:].sum()), int(cells_holding[per_cell:].sum())
+    figure.alt = f"{occupied:,} cells of the grid are occupied" + (
+        f", {full:,} of them ({full / occupied:.0%}) by at least {per_cell} transitions." if occupied else "."
     )
-    if len(growth):
-        text += (
-            f" Curve: {new_share(growth):.1%} of the occupied cells were first reached in the second half "
-            "of the data."
-        )
-    return text
+    if occupied and grown:
+        figure.alt += f" {new_share(growth):.1%} of them were first reached in the second half of the data."
+    return figure
 
 
 def new_share(growth: NDArray[np.int64]) -> float:

@@ -3,19 +3,18 @@
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.report.colours import INK, MIDDLE
-from pneumarm.report.style import key, nothing, of_joint, panels, scatter, styled, whole_ticks
+from pneumarm.report.style import Described, key, nothing, of_joint, panels, scatter, styled, whole_ticks
 from pneumarm.statistics import running_median
 
 Array = NDArray[Any]
 
 
 @styled
-def against_displacement(distance: Array, actions: Array, switches: Array, spec: ArmSpec) -> Figure:
+def against_displacement(distance: Array, actions: Array, switches: Array, spec: ArmSpec) -> Described:
     """Draw actions and switches of episodes against the distance that they had to move, with a running median.
 
     Args:
@@ -43,19 +42,14 @@ def against_displacement(distance: Array, actions: Array, switches: Array, spec:
             place.set_ylim(min(0, float((y + jitter).min())))
             whole_ticks(place, "y")
             place.legend([key(MIDDLE, marker="s", mec=INK, mew=0.5)], ["running median"], loc="upper left")
-    return figure
-
-
-def against_displacement_alt(distance: Array, actions: Array, switches: Array, spec: ArmSpec) -> str:
-    """Say in words what :func:`against_displacement` shows: short against long movements."""
-    if len(actions) == 0:
-        return "There are no successful episodes."
-    far = distance.max(axis=1)
-    third, two_thirds = np.percentile(far, (100 / 3, 200 / 3))
-    parts = []
-    for name, members in (("shortest", far <= third), ("longest", far >= two_thirds)):
-        parts.append(
-            f"the {name} third (median {np.median(far[members]) / spec.counts_per_degree:.0f}°) takes a median of "
+    figure.alt = "There are no successful episodes."
+    if len(actions):
+        far = distance.max(axis=1) / spec.counts_per_degree
+        third, two_thirds = np.percentile(far, (100 / 3, 200 / 3))
+        thirds = "; ".join(
+            f"the {name} third (median {np.median(far[members]):.0f}°) takes a median of "
             f"{np.median(actions[members]):g} actions and {np.median(switches[members]):g} switches"
+            for name, members in (("shortest", far <= third), ("longest", far >= two_thirds))
         )
-    return f"{len(actions):,} successful episodes by displacement: " + "; ".join(parts) + "."
+        figure.alt = f"{len(actions):,} successful episodes by displacement: {thirds}."
+    return figure

@@ -3,17 +3,16 @@
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.report.colours import DARK, INK, LIGHT
-from pneumarm.report.style import nothing, panels, styled, whole_ticks
+from pneumarm.report.style import Described, nothing, panels, styled, whole_ticks
 
 Array = NDArray[Any]
 
 
 @styled
-def distributions(reward: Array, actions: Array, switches: Array, success: NDArray[np.bool_]) -> Figure:
+def distributions(reward: Array, actions: Array, switches: Array, success: NDArray[np.bool_]) -> Described:
     """Draw how reward, actions and switches of the episodes are distributed, successes and failures apart.
 
     Args:
@@ -24,6 +23,9 @@ def distributions(reward: Array, actions: Array, switches: Array, success: NDArr
 
     """
     figure, axes = panels(1, 3, 2.6)
+    words = (
+        [f"Histograms of {len(reward):,} episodes, {np.mean(success):.2%} of them successful."] if len(reward) else []
+    )
     for place, values, label in zip(
         axes[0], (reward, actions, switches), ("reward [-]", "actions [-]", "switches [-]"), strict=True
     ):
@@ -43,25 +45,12 @@ def distributions(reward: Array, actions: Array, switches: Array, success: NDArr
             [seen[success], seen[~success]], edges, weights=[share[success], share[~success]], stacked=True,
             color=[DARK, LIGHT], label=["success", "failure"],
         )  # fmt: skip
-        middle = float(np.median(values))
+        fewest, middle, most = np.percentile(values, (5, 50, 95))
+        name = label.removesuffix(" [-]").capitalize()
+        words.append(f"{name}: median {middle:.4g}, 90% within {fewest:.4g} to {most:.4g}.")
         place.axvline(middle, color=INK, ls="--", lw=1)
         place.set_title(f"median {middle:g}".replace("-", "−"))
     if len(reward):
         axes[0, 1].legend(loc="upper right")
+    figure.alt = " ".join(words) or "No episodes were recorded."
     return figure
-
-
-def distributions_alt(reward: Array, actions: Array, switches: Array, success: NDArray[np.bool_]) -> str:
-    """Say in words what :func:`distributions` shows."""
-    if len(reward) == 0:
-        return "No episodes were recorded."
-
-    def middle(values: Array) -> str:
-        low, median, high = np.percentile(values, (5, 50, 95))
-        return f"median {median:.4g}, 90% within {low:.4g} to {high:.4g}"
-
-    return (
-        f"Histograms of {len(reward):,} episodes, {np.mean(success):.2%} of them successful. Reward: "
-        f"{middle(reward)}. "
-        f"Actions: {middle(actions)}. Switches: {middle(switches)}."
-    )

@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.hand import link_ends
 from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE, PALE
-from pneumarm.report.shown import Shown
-from pneumarm.report.style import key, legend_below, of_joint, styled
+from pneumarm.report.drawn_arm import DrawnArm
+from pneumarm.report.figures.arm import ArmPicture
+from pneumarm.report.moving_arm import Shown
+from pneumarm.report.style import Described, key, legend_below, of_joint, styled
 
 Array = NDArray[np.float64]
 
@@ -19,84 +20,98 @@ FRAMES_A_SECOND = 12.5
 """Of a film; 80 ms a frame, which a GIF can tell exactly."""
 _DPI = 110
 _SIZE = (7.4, 4.0)  # inch
-_GHOSTS = 9  # of the arm, in a figure
+_PAST = 8  # places where the arm was before, in a figure
 _STYLES = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)))  # of the joints' curves
 
 
-def chain(degrees: Array) -> Array:
-    """Return the ends of the links of an arm at ``degrees`` (joints,), the hinge first, shape (joints + 1, 2).
+def movement(shown: Shown, end: float | None = None, *, tolerance: float = 0.0) -> Described:
+    """Draw a stretch of movement: the arm at its end and every now and then before, and what was read.
 
-    The whole arm is 1 long and hangs down at 0 degrees; higher angles turn it to the right.
+    Args:
+        shown: the stretch (thesis figures 5.17 to 5.19).
+        end: when the goal was reached [s] of ``shown.time``, or None.
+        tolerance: around what was asked for, drawn as a band [counts].
+
     """
-    return link_ends(degrees, [1 / len(degrees)] * len(degrees))
-
-
-@styled
-def still(shown: Shown) -> Figure:
-    """Return the whole stretch as a figure: the arm every now and then, and what was read."""
-    figure, arm = _figure(shown)
-    degrees = shown.spec.degrees(shown.angle)
+    figure, arm = _stage(shown)
+    axes = figure.axes[1:]
+    if shown.wanted is not None and tolerance:
+        for wanted in shown.wanted.T:
+            low, high = (shown.spec.degrees(wanted + one) for one in (-tolerance, tolerance))
+            axes[0].fill_between(shown.time, low, high, color=LIGHT, alpha=0.5, linewidth=0)
+    for place in axes:
+        if end is not None:
+            place.axvline(end, color=INK, linestyle=":", linewidth=1)
+    figure.alt = _in_words(shown, end)
+    poses = shown.poses(shown.time - shown.time[0])
+    degrees = poses.degrees
     way = np.cumsum(np.abs(np.diff(degrees, axis=0, prepend=degrees[:1])).sum(axis=1))
-    for share in np.linspace(0, 1, _GHOSTS):
-        index = min(int(np.searchsorted(way, share * way[-1])), len(way) - 1)
-        _draw_arm(arm, degrees[index], DARK, 2.5, alpha=0.12 + 0.6 * share)
-    if shown.wanted is not None and np.isfinite(shown.wanted[-1]).all():
-        _draw_arm(arm, shown.spec.degrees(shown.wanted[-1]), MIDDLE, 1.2, linestyle=(0, (5, 2)))
+    for share in np.linspace(0, 1, _PAST, endpoint=False):
+        arm.add(DrawnArm.of(shown.spec).links_at(degrees[np.searchsorted(way, share * way[-1])], "past"), share + 0.2)
+    goal = None if shown.wanted is None else shown.spec.degrees(shown.wanted[-1])
+    arm.show(poses[-1], goal)
     return figure
+
+
+def _in_words(shown: Shown, end: float | None) -> str:
+    spec, joints, words = shown.spec, shown.spec.joints, []
+    for j, seen in enumerate(spec.degrees(shown.angle).T):
+        text = f"the angle{of_joint(j, joints)} goes from {seen[0]:.1f}° "
+        if shown.wanted is None or not np.isfinite(shown.wanted[-1, j]):
+            text += f"to {seen[-1]:.1f}°"
+        else:
+            goal = float(spec.degrees(shown.wanted[-1, j]))
+            beyond = max(0.0, float(((seen - goal) * np.sign(goal - seen[0])).max()))
+            text += f"to a goal of {goal:.1f}°, at most {beyond:.1f}° beyond it"
+        if shown.pressure is not None:
+            text += f"; the highest {spec.pressure_word} is {spec.bar(shown.pressure[:, j]).max():.2f} bar"
+        words.append(text)
+    reached = "" if end is None else f"; the goal is reached after {end:.2f} s"
+    if shown.command is not None:
+        moving = shown.command[shown.time < (np.inf if end is None else end)]
+        reached += f"; the valves change {int((np.diff(moving, axis=0) != 0).any(axis=(1, 2)).sum())} times"
+    return f"On the way {'; '.join(words)}{reached}."
 
 
 def frames(shown: Shown) -> Iterator[NDArray[np.uint8]]:
     """Yield the frames of a film, FRAMES_A_SECOND of them, each of shape (height, width, 3)."""
-    figure, arm, moving = _stage(shown)
+    figure, arm = _stage(shown, animated=True)
+    place, *curves = figure.axes
+    cursors = [(axes, axes.axvline(0.0, color=INK, linewidth=1.0, animated=True)) for axes in curves]
     canvas: Any = figure.canvas
     canvas.draw()
     background = canvas.copy_from_bbox(figure.bbox)
-    goal, links, cursors = moving
     times = np.arange(0.0, shown.time[-1], 1 / FRAMES_A_SECOND)
-    degrees = _between(times, shown.time, shown.spec.degrees(shown.angle))
-    asked = None if shown.wanted is None else _between(times, shown.time, shown.spec.degrees(shown.wanted))
+    goals = None if shown.wanted is None else shown.at(times, shown.spec.degrees(shown.wanted))
+    poses = shown.poses(times)
     for k, time in enumerate(times):
         canvas.restore_region(background)
-        if asked is not None and np.isfinite(asked[k]).all():
-            goal.set_data(*chain(asked[k]).T)
-            arm.draw_artist(goal)
-        links.set_data(*chain(degrees[k]).T)
-        arm.draw_artist(links)
+        for patch in arm.show(poses[k], None if goals is None else goals[k]):
+            place.draw_artist(patch)
         for axes, cursor in cursors:
             cursor.set_xdata([time, time])
             axes.draw_artist(cursor)
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-@styled
-def _staged(shown: Shown) -> Figure:
-    return _figure(shown)[0]
-
-
-def _stage(shown: Shown) -> tuple[Figure, Any, tuple[Any, Any, list[tuple[Any, Any]]]]:
-    """Return the figure of a film without what moves, the axes of the arm, and what moves."""
-    figure = _staged(shown)
+def _stage(shown: Shown, **style: Any) -> tuple[Described, ArmPicture]:
+    """Return the figure with all curves, and the arm in it."""
+    figure, arm = _figure(shown), DrawnArm.of(shown.spec)
     figure.set_dpi(_DPI)
-    arm, *curves = figure.axes
-    size: Any = {"solid_capstyle": "round", "marker": "o", "animated": True}
-    (goal,) = arm.plot([], [], color=LIGHT, linewidth=9, markersize=9, **size)
-    (links,) = arm.plot([], [], color=DARK, linewidth=5, markersize=7, **size)
-    cursors = [(axes, axes.axvline(0.0, color=INK, linewidth=1.0, animated=True)) for axes in curves]
-    return figure, arm, (goal, links, cursors)
+    ends = link_ends(shown.spec.degrees(shown.angle), arm.links)
+    aside, below = max(float(np.abs(ends[..., 0]).max()), 100.0) + 25, arm.reach + 20
+    return figure, ArmPicture(figure.axes[0], arm, aside, below, **style)
 
 
-def _figure(shown: Shown) -> tuple[Figure, Any]:
-    """Return the figure with all curves, and the axes in which the arm is to be drawn."""
-    figure = Figure(figsize=_SIZE, layout="constrained")
+@styled
+def _figure(shown: Shown) -> Described:
+    """Return the figure with all curves; its first axes are for the arm."""
+    figure = Described(figsize=_SIZE, layout="constrained")
     FigureCanvasAgg(figure)
     rows = [2.2] + [1.0] * (shown.pressure is not None) + [0.8] * (shown.command is not None)
     grid = figure.add_gridspec(len(rows), 2, width_ratios=(1, 1.75), height_ratios=rows)
     arm = figure.add_subplot(grid[:, 0])
-    ends = np.array([chain(one) for one in shown.spec.degrees(shown.angle)])
-    aside, low = max(np.abs(ends[..., 0]).max(), 0.45) + 0.12, min(ends[..., 1].min(), -0.8) - 0.12
-    arm.set(xlim=(-aside, aside), ylim=(low, 0.15), aspect="equal")
     arm.axis("off")
-    arm.plot([-0.35, 0.35], [0.06, 0.06], color=INK, linewidth=3)
     curves = [figure.add_subplot(grid[row, 1]) for row in range(len(rows))]
     _angles(curves[0], shown)
     if shown.pressure is not None:
@@ -104,12 +119,12 @@ def _figure(shown: Shown) -> tuple[Figure, Any]:
     if shown.command is not None:
         _valves(curves[-1], shown)
     for axes in curves:
-        axes.set_xlim(0, shown.time[-1])
+        axes.set_xlim(0, max(shown.time[-1], shown.spec.period))
         axes.tick_params(labelbottom=axes is curves[-1])
     curves[-1].set_xlabel("time [s]")
     figure.align_ylabels(curves)
     legend_below(figure, handles := _keys(shown), [str(one.get_label()) for one in handles])
-    return figure, arm
+    return figure
 
 
 def _keys(shown: Shown) -> list[Any]:
@@ -155,12 +170,3 @@ def _valves(axes: Any, shown: Shown) -> None:
 
 def _muscle(joint: int, muscle: int, joints: int) -> str:
     return f"{joint + 1}.{muscle + 1}" if joints > 1 else f"{muscle + 1}"
-
-
-def _draw_arm(axes: Any, degrees: Array, color: str, width: float, **style: Any) -> None:
-    axes.plot(*chain(degrees).T, color=color, linewidth=width, marker="o", solid_capstyle="round", **style)
-
-
-def _between(times: Array, known: Array, values: Array) -> Array:
-    """Return ``values`` (n, joints) of the ``known`` times (n,) at ``times`` (m,), shape (m, joints)."""
-    return np.stack([np.interp(times, known, column) for column in values.T], axis=1)

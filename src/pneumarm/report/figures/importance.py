@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.report.colours import DARK, INK, MIDDLE
-from pneumarm.report.style import panels, styled
+from pneumarm.report.style import Described, panels, styled
 
 Array = NDArray[np.float64]
 
@@ -16,7 +15,7 @@ _IN_A_ROW = 4  # outputs; of several joints each has a row of its own
 
 
 @styled
-def input_importance(weights: Array, inputs: Sequence[str], outputs: Sequence[str]) -> Figure:
+def input_importance(weights: Array, inputs: Sequence[str], outputs: Sequence[str]) -> Described:
     """Draw the standardised weight of every input on every output as bars.
 
     Args:
@@ -33,28 +32,21 @@ def input_importance(weights: Array, inputs: Sequence[str], outputs: Sequence[st
     figure, axes = panels(rows, columns, rows * (0.9 + 0.19 * len(order)), sharey=True)
     limit = 1.08 * float(np.abs(weights).max(initial=0)) or 1.0
     place = np.arange(len(order))
-    for axis, name, w in zip(axes.flat, outputs, weights[order].T, strict=True):
+    words = []
+    for o, (axis, name, w) in enumerate(zip(axes.flat, outputs, weights[order].T, strict=True)):
         axis.barh(place, w, color=np.where(w >= 0, DARK, MIDDLE), height=0.7)
         axis.axvline(0, color=INK, lw=0.7)
         title = f"change of {readable(name)}"
+        largest = order[np.argsort(-np.abs(w), kind="stable")[:3]]
+        words.append(f"{title}: " + ", ".join(f"{readable(inputs[i])} {weights[i, o]:+.2f}" for i in largest))
         axis.set_title(title.replace(" of joint", "\nof joint") if columns > 1 else title)
         axis.set_xlabel("standardised weight [-]")
         axis.set_xlim(-limit, limit)
     for axis in axes[:, 0]:
         axis.set_yticks(place, [readable(inputs[i]) for i in order])
         axis.set_ylabel("input")
+    figure.alt = f"Standardised weights of a least-squares fit, the largest first. {'; '.join(words)}."
     return figure
-
-
-def input_importance_alt(weights: Array, inputs: Sequence[str], outputs: Sequence[str]) -> str:
-    """Say in words what :func:`input_importance` shows: the three largest weights on each output."""
-    parts = []
-    for name, w in zip(outputs, weights.T, strict=True):
-        largest = np.argsort(-np.abs(w), kind="stable")[:3]
-        parts.append(
-            f"change of {readable(name)}: " + ", ".join(f"{readable(inputs[i])} {w[i]:+.2f}" for i in largest)
-        )
-    return "Standardised weights of a least-squares fit, the largest first. " + "; ".join(parts) + "."
 
 
 def readable(name: str) -> str:

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.report.colours import DARK, GREY, INK
-from pneumarm.report.style import panels, styled
+from pneumarm.report.style import Described, panels, styled
 
 _THINNEST = 0.003  # of the width: a shorter stretch is drawn as long as this, so that it can be seen
 _LINE = 34  # characters of a label in a line
@@ -17,7 +16,7 @@ _LINE = 34  # characters of a label in a line
 def marked_rows(
     spans: NDArray[np.int64], reason: NDArray[np.int64], reasons: Sequence[str], ends: Sequence[int],
     stages: Sequence[str], period: float,
-) -> Figure:  # fmt: skip
+) -> Described:  # fmt: skip
     """Draw a lane a reason, with the stretches of the rows that are marked for it.
 
     Args:
@@ -33,8 +32,12 @@ def marked_rows(
     total = max(ends[-1] if ends else 0, 1) * minutes
     figure, axes = panels(1, 1, 0.9 + 0.42 * max(len(reasons), 1))
     place = axes[0, 0]
-    for lane in range(len(reasons)):
+    words = []
+    for lane, name in enumerate(reasons):
         begin, end = (spans[reason == lane] * minutes).T
+        if len(begin):
+            rows = np.diff(spans[reason == lane]).sum()
+            words.append(f"{name}: {rows:,} rows between {begin.min():.1f} and {end.max():.1f} min")
         width = np.maximum(end - begin, _THINNEST * total)
         place.broken_barh(list(zip(begin, width, strict=True)), (lane - 0.3, 0.6), color=DARK)
     for stage, first, end in zip(stages, [0, *ends], ends, strict=False):
@@ -48,19 +51,8 @@ def marked_rows(
     place.set_xlim(0, total)
     place.grid(visible=False, axis="y")
     place.set_xlabel("recorded until then [min]")
+    figure.alt = f"Marked rows. {'; '.join(words)}." if words else "No rows are marked."
     return figure
-
-
-def marked_rows_alt(
-    spans: NDArray[np.int64], reason: NDArray[np.int64], reasons: Sequence[str], period: float
-) -> str:
-    """Say in words what :func:`marked_rows` shows."""
-    told = []
-    for lane, words in enumerate(reasons):
-        of_it = spans[reason == lane]
-        rows, first, last = (of_it[:, 1] - of_it[:, 0]).sum(), of_it.min(), of_it.max()
-        told.append(f"{words}: {rows:,} rows between {first * period / 60:.1f} and {last * period / 60:.1f} min")
-    return f"Marked rows. {'; '.join(told)}." if told else "No rows are marked."
 
 
 def _folded(words: str) -> str:

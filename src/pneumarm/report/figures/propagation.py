@@ -1,18 +1,17 @@
 """How the simulation's error grows over many steps (thesis section 3.3, eq. 3.7)."""
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.report.colours import DARK, MIDDLE
-from pneumarm.report.style import legend_below, nothing, of_joint, panels, quantities, styled
+from pneumarm.report.style import Described, legend_below, nothing, of_joint, panels, quantities, styled
 
 Array = NDArray[np.float64]
 
 
 @styled
-def error_propagation(measured: Array, spec: ArmSpec) -> Figure:
+def error_propagation(measured: Array, spec: ArmSpec) -> Described:
     """Draw the standard deviation of the error after 1, 2, ... simulated steps beside what eq. 3.7 expects.
 
     Args:
@@ -23,7 +22,7 @@ def error_propagation(measured: Array, spec: ArmSpec) -> Figure:
     steps, joints = measured.shape[:2]
     figure, axes = panels(joints * 2, 2, 4.9 * joints, sharex=True)
     k = np.arange(1, steps + 1)
-    handles = []
+    handles, words = [], []
     for joint in range(joints):
         places = axes[2 * joint : 2 * joint + 2].flat
         for i, (place, kind) in enumerate(zip(places, quantities(spec), strict=True)):
@@ -32,15 +31,20 @@ def error_propagation(measured: Array, spec: ArmSpec) -> Figure:
             if steps == 0:
                 nothing(place, "not measured")
                 continue
-            found = place.plot(k, kind.per_count * measured[:, joint, i], "o-", color=DARK, ms=3)[0]
-            expected = place.plot(k, kind.per_count * expectation(measured)[:, joint, i], "--", color=MIDDLE)[0]
-            handles = [found, expected]
+            std, chance = (kind.per_count * one[:, joint, i] for one in (measured, expectation(measured)))
+            handles = [*place.plot(k, std, "o-", color=DARK, ms=3), *place.plot(k, chance, "--", color=MIDDLE)]
+            words.append(
+                f"{kind.name}{of_joint(joint, joints)} {std[-1]:.3g} {kind.unit} "
+                f"({chance[-1]:.3g} {kind.unit} expected)"
+            )
             place.set_ylim(0)
             place.set_xlim(0, steps + 0.5)
     for place in axes[-1]:
         place.set_xlabel(f"steps simulated freely [-], {1e3 * spec.period:.3g} ms each")
     if handles:
         legend_below(figure, handles, ["measured on sequences not fitted", "expected by √k (eq. 3.7)"])
+    after = f"Standard deviation of the error after {steps} steps ({steps * spec.period:.2g} s)"
+    figure.alt = f"{after}: {'; '.join(words)}." if words else "The propagation of the error was not measured."
     return figure
 
 
@@ -49,21 +53,3 @@ def expectation(measured: Array) -> Array:
     steps = np.arange(1, len(measured) + 1).reshape(-1, 1, 1)
     expected: Array = np.sqrt(steps * measured[:1] ** 2)
     return expected
-
-
-def error_propagation_alt(measured: Array, spec: ArmSpec) -> str:
-    """Say in words what :func:`error_propagation` shows."""
-    if len(measured) == 0:
-        return "The propagation of the error was not measured."
-    expected = expectation(measured)
-    joints = measured.shape[1]
-    parts = [
-        f"{kind.name}{of_joint(j, joints)} {kind.per_count * measured[-1, j, i]:.3g} {kind.unit} measured, "
-        f"{kind.per_count * expected[-1, j, i]:.3g} {kind.unit} expected"
-        for j in range(joints)
-        for i, kind in enumerate(quantities(spec))
-    ]
-    return (
-        f"Standard deviation of the error over {len(measured)} steps. After {len(measured)} steps "
-        f"({len(measured) * spec.period:.2g} s): " + "; ".join(parts) + "."
-    )

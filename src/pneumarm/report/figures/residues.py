@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.report.colours import DARK, INK, MIDDLE
-from pneumarm.report.style import legend_below, nothing, of_joint, panels, scatter, styled
+from pneumarm.report.style import Described, legend_below, nothing, of_joint, panels, scatter, styled
 from pneumarm.statistics import Bins, binned, by_group
 
 Array = NDArray[np.float64]
@@ -20,7 +19,7 @@ IN_A_ROW = 200
 
 
 @styled
-def residue(observed: Array, simulated: Array, spec: ArmSpec) -> Figure:
+def residue(observed: Array, simulated: Array, spec: ArmSpec) -> Described:
     """Draw the observed angle, the simulated one, and their difference, transition after transition.
 
     Args:
@@ -45,20 +44,14 @@ def residue(observed: Array, simulated: Array, spec: ArmSpec) -> Figure:
         if len(o) == 0:
             nothing(above, "no transitions")
     legend_below(figure, [seen, told], ["observed", "simulated"])
-    return figure
-
-
-def residue_alt(observed: Array, simulated: Array, spec: ArmSpec) -> str:
-    """Say in words what :func:`residue` shows."""
-    if len(observed) == 0:
-        return "There are no transitions to compare."
-    shown = min(len(observed), IN_A_ROW)
     error = (simulated - observed)[:IN_A_ROW] / spec.counts_per_degree
-    return (
-        f"Observed and simulated angle of {shown} transitions, and their difference below: its mean is "
-        f"{error.mean():.2f}°, its standard deviation {error.std():.2f}°, the largest "
-        f"{np.abs(error).max():.1f}°."
+    figure.alt = (
+        f"Observed and simulated angle of {len(error)} transitions, and their difference below: its mean is "
+        f"{error.mean():.2f}°, its standard deviation {error.std():.2f}°, the largest {np.abs(error).max():.1f}°."
+        if len(error)
+        else "There are no transitions to compare."
     )
+    return figure
 
 
 @dataclass(frozen=True)
@@ -78,7 +71,7 @@ class Classification:
 
 
 @styled
-def residue_by_class(residue: Array, classes: Sequence[Classification]) -> Figure:
+def residue_by_class(residue: Array, classes: Sequence[Classification]) -> Described:
     """Draw the residue against every classification, with mean and standard deviation in each class.
 
     Args:
@@ -89,6 +82,7 @@ def residue_by_class(residue: Array, classes: Sequence[Classification]) -> Figur
     rows = -(-len(classes) // 2)
     figure, axes = panels(rows, min(2, len(classes)), 2.6 * rows + 0.3, sharey=True)
     limit = 1.05 * float(np.percentile(np.abs(residue), 99.8)) if len(residue) else 1.0
+    words = [f"Residue of {len(residue):,} transitions, with its mean and standard deviation in each class."]
     for place, kind in zip(axes.flat, classes, strict=False):
         place.set_xlabel(kind.label)
         place.set_ylabel("residue [°]")
@@ -108,29 +102,18 @@ def residue_by_class(residue: Array, classes: Sequence[Classification]) -> Figur
         stats = kind.statistics(residue)
         place.errorbar(stats.centre, stats.mean, stats.std, fmt="s-" if not kind.actions else "s", color=MIDDLE,
                        ms=4, capsize=2.5, lw=1.2, mec=INK, mew=0.5)  # fmt: skip
-    for place in list(axes.flat)[len(classes) :]:
-        place.set_visible(False)
-    return figure
-
-
-def residue_by_class_alt(residue: Array, classes: Sequence[Classification]) -> str:
-    """Say in words what :func:`residue_by_class` shows: the trend in every classification."""
-    if len(residue) == 0:
-        return "There are no transitions to classify."
-    sentences = []
-    for kind in classes:
-        stats = kind.statistics(residue)
-        if len(stats.mean) == 0:
+        if len(stats.std) == 0:
             continue
         least, most = int(np.argmin(stats.std)), int(np.argmax(stats.std))
-        sentences.append(
+        words.append(
             f"By {kind.label}: class means from {stats.mean.min():.2f} to {stats.mean.max():.2f}°, standard "
             f"deviation from {stats.std[least]:.2f}° (at {_at(kind, stats, least)}) to {stats.std[most]:.2f}° "
             f"(at {_at(kind, stats, most)})."
         )
-    return f"Residue of {len(residue):,} transitions, with mean and standard deviation a class. " + " ".join(
-        sentences
-    )
+    for place in list(axes.flat)[len(classes) :]:
+        place.set_visible(False)
+    figure.alt = " ".join(words)
+    return figure
 
 
 def _at(kind: Classification, stats: Bins, index: int) -> str:

@@ -4,12 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
-from pneumarm.report.style import key, legend_below, nothing, panels, styled, whole_ticks
+from pneumarm.report.style import Described, key, legend_below, nothing, panels, styled, whole_ticks
 
 Array = NDArray[np.float64]
 
@@ -33,7 +32,7 @@ _WORST = 100.0  # of rewards, below the best: the very first ones wander about
 @styled
 def training_curves(
     curves: Array, columns: Sequence[str], evaluated: NDArray[np.int64], chosen: int, spec: ArmSpec
-) -> Figure:
+) -> Described:
     """Draw every column of training curves over the episodes; the chosen agent stands out.
 
     Args:
@@ -71,6 +70,18 @@ def training_curves(
     _limit(of, evaluated, spec)
     for place in axes[-1]:
         place.set_xlabel("episodes [thousands]")
+    figure.alt = "No agent was trained."
+    if evaluated.any():
+        mine = curves[chosen, : int(evaluated[chosen])]
+        changes = []
+        for name, first, last in zip(columns[1:], mine[0, 1:], mine[-1, 1:], strict=True):
+            label, factor = _label(name, spec)
+            called, unit = label.removesuffix("]").split(" [")
+            changes.append(f"{called} from {factor * first:.4g} to {factor * last:.4g} {unit}".removesuffix(" -"))
+        figure.alt = (
+            f"Learning of {agents} agents. The chosen one made {mine[-1, 0]:,.0f} episodes; meanwhile "
+            f"{'; '.join(changes)}."
+        )
     return figure
 
 
@@ -92,26 +103,8 @@ def _limit(of: Mapping[str, tuple[Any, Array]], evaluated: NDArray[np.int64], sp
             place.set_ylim(max(float(known.min()), best - _WORST), best + 5)
 
 
-def training_curves_alt(
-    curves: Array, columns: Sequence[str], evaluated: NDArray[np.int64], chosen: int, spec: ArmSpec
-) -> str:
-    """Say in words what :func:`training_curves` shows."""
-    if len(evaluated) == 0 or evaluated[chosen] == 0:
-        return "No agent was trained."
-    mine = curves[chosen, : int(evaluated[chosen])]
-    told = []
-    for name, first, last in zip(columns[1:], mine[0, 1:], mine[-1, 1:], strict=True):
-        label, factor = _label(name, spec)
-        words, unit = label.removesuffix("]").split(" [")
-        told.append(f"{words} from {factor * first:.4g} to {factor * last:.4g}{'' if unit == '-' else f' {unit}'}")
-    return (
-        f"Learning of {len(evaluated)} agents. The chosen one made {mine[-1, 0]:,.0f} episodes; meanwhile "
-        f"{'; '.join(told)}."
-    )
-
-
 @styled
-def spread_of_agents(reward: Array, success: Array, chosen: int, *, priced: bool = False) -> Figure:
+def spread_of_agents(reward: Array, success: Array, chosen: int, *, priced: bool = False) -> Described:
     """Draw the validation of all agents, ordered by reward.
 
     Args:
@@ -122,6 +115,7 @@ def spread_of_agents(reward: Array, success: Array, chosen: int, *, priced: bool
 
     """
     figure, axes = panels(1, 2, 2.6)
+    figure.alt = "No agent was trained."
     order = np.argsort(-reward, kind="stable")
     rank = np.arange(1, len(order) + 1)
     picked = order == chosen
@@ -142,21 +136,14 @@ def spread_of_agents(reward: Array, success: Array, chosen: int, *, priced: bool
         place.ticklabel_format(axis="y", useOffset=False)
     if len(order):
         axes[0, 0].legend(loc="lower left")
-    if len(order):
         # There is nothing above 100 %, and marks at the ends are seen whole.
         lowest = 100 * float(success.min())
         axes[0, 1].set_ylim(lowest - 0.05 * max(100.5 - lowest, 1.0), 100.5)
+        sign, paid, won = (-1, "price", "share within tolerance at the end") if priced else (1, "reward", "success")
+        low, middle, high = sorted(sign * np.percentile(reward, (0, 50, 100)))
+        figure.alt = (
+            f"Validation of {len(reward)} agents from different initial weights: {paid} from {low:.2f} to "
+            f"{high:.2f}, median {middle:.2f}; {won} from {success.min():.1%} to {success.max():.1%}. "
+            f"The chosen agent has {paid} {sign * reward[chosen]:.2f} and {won} {success[chosen]:.1%}."
+        )
     return figure
-
-
-def spread_of_agents_alt(reward: Array, success: Array, chosen: int, *, priced: bool = False) -> str:
-    """Say in words what :func:`spread_of_agents` shows."""
-    if len(reward) == 0:
-        return "No agent was trained."
-    sign, paid, won = (-1, "price", "share that ends within tolerance") if priced else (1, "reward", "success")
-    low, middle, high = sorted(sign * np.percentile(reward, (0, 50, 100)))
-    return (
-        f"Validation of {len(reward)} agents from different initial weights: {paid} from {low:.2f} to {high:.2f}, "
-        f"median {middle:.2f}; {won} from {success.min():.1%} to {success.max():.1%}. "
-        f"The chosen agent has {paid} {sign * reward[chosen]:.2f} and {won} {success[chosen]:.1%}."
-    )

@@ -5,12 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
-from pneumarm.report.style import legend_below, nothing, panels, styled
+from pneumarm.report.style import Described, legend_below, nothing, panels, styled
 from pneumarm.statistics import Moving, moving_mean, moving_rate
 
 Array = NDArray[Any]
@@ -48,7 +47,7 @@ _ROWS = (
 
 
 @styled
-def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window: int = WINDOW) -> Figure:
+def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window: int = WINDOW) -> Described:
     """Draw moving averages with 95% bands over the episodes on the arm, phase after phase.
 
     Args:
@@ -62,6 +61,8 @@ def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window:
     begins = np.cumsum([0, *(len(p.reward) for p in phases)])
     total = int(begins[-1])
     handles: list[object] = []
+    words = [_in_words(phase) for phase in phases if len(phase.reward)]
+    known = f" In the simulation's test the reward was {reference['reward']:.2f}." if "reward" in reference else ""
     for place, row in zip(axes[:, 0], _ROWS, strict=True):
         place.set_ylabel(row.label)
         if row.name in reference and np.isfinite(reference[row.name]):
@@ -90,7 +91,18 @@ def transfer_curves(phases: list[Phase], reference: Mapping[str, float], window:
     labels = [f"moving average of {window} episodes", "its 95% confidence band", "in the simulation's test"]
     legend_below(figure, [line, band, *handles], labels[: 2 + len(handles)])
     figure.align_ylabels(axes[:, 0])
+    figure.alt = "No episodes were done on the arm."
+    if words:
+        figure.alt = f"Moving averages of {window} episodes on the arm. {'; '.join(words)}.{known}"
     return figure
+
+
+def _in_words(phase: Phase) -> str:
+    won = phase.success
+    text = f"{phase.name}: {len(won):,} episodes, reward {phase.reward.mean():.2f}, success {won.mean():.1%}"
+    if not won.any():
+        return text
+    return f"{text}, {phase.actions[won].mean():.1f} actions and {phase.switches[won].mean():.2f} switches a success"
 
 
 def _curve(place: Axes, moving: Moving, begin: float, scale: float) -> None:
@@ -114,24 +126,3 @@ def _clock(place: Axes, time_end: Array) -> None:
     above.set_xlabel(f"time on the arm [{most}]")
     above.spines["top"].set_visible(True)
     above.grid(visible=False)
-
-
-def transfer_curves_alt(phases: list[Phase], reference: Mapping[str, float], window: int = WINDOW) -> str:
-    """Say in words what :func:`transfer_curves` shows."""
-    if not any(len(p.reward) for p in phases):
-        return "No episodes were done on the arm."
-    parts = []
-    for phase in phases:
-        if len(phase.reward) == 0:
-            continue
-        won = phase.success
-        text = f"{phase.name}: {len(won):,} episodes, reward {phase.reward.mean():.2f}, success {won.mean():.1%}"
-        if won.any():
-            text += (
-                f", {phase.actions[won].mean():.1f} actions and {phase.switches[won].mean():.2f} switches a success"
-            )
-        parts.append(text)
-    told = ""
-    if "reward" in reference:
-        told = f" In the simulation's test the reward was {reference['reward']:.2f}."
-    return f"Moving averages of {window} episodes on the arm. " + "; ".join(parts) + "." + told

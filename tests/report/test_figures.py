@@ -194,7 +194,7 @@ def test_movement_marks_goal_and_valves():
     assert [t.get_text() for t in valves.texts] == ["muscle 1", "muscle 2"]
     alt = figures.movement_alt(m.time, m.angle, m.pressure, m.valves, m.goal, m.end, SPEC)
     assert "goes from -30.0° to a goal of 40.0°" in alt
-    assert "reached after 0.73 s, with 3 changes of the valves" in alt
+    assert "reached after 0.73 s, with 6 valve changes" in alt
 
 
 def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():

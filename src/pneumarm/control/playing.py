@@ -39,7 +39,7 @@ from pneumarm.simulation.kernel import Places, places, shift
 from pneumarm.task.begin import draw_interval
 from pneumarm.task.movements import Movements, movements
 from pneumarm.task.noting import goes_on, note_action
-from pneumarm.task.reward import RewardParameters, is_near, is_slow, is_switch, paid
+from pneumarm.task.reward import RewardParameters, has_reached, is_switch, paid
 
 Array = NDArray[np.float64]
 _missed, _action, _velocity = part(missed_turns), part(action_of), part(derived_velocity)
@@ -357,7 +357,7 @@ def _judge(watched, rules, goal, velocity, turn, gained):  # type: ignore[no-unt
     """Set what each joint has ``gained`` by its last action, whether it switched and is there; return if all are."""
     is_reached = True
     for j in range(goal.size):
-        is_there = is_near(rules.reward, watched.angle[j], goal[j]) and is_slow(rules.reward, velocity[j])
+        is_there = has_reached(rules.reward, watched.angle[j], velocity[j], goal[j])
         turn.there[j] = is_there
         is_reached = is_reached and is_there
     for j in range(goal.size):

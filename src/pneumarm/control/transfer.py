@@ -22,7 +22,6 @@ from pneumarm.control.versions import ADAPTED, Adapted, save_history, version_ke
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import make_folder
 from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
-from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.settling import settled_at
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
@@ -353,9 +352,8 @@ class Transfer:
 
     def _has_settled(self, recorded: Recorded, goal: NDArray[np.float64]) -> bool:
         """Return whether the arm has settled at the ``goal`` (joints,), as it would have by default."""
-        usual = MoveSettings()
         off = (recorded.angle - goal) / self._arm.spec.counts_per_degree
-        return settled_at(recorded.time, off, usual.tolerance, usual.dwell) is not None
+        return settled_at(recorded.time, off) is not None
 
     def _judge_arm(self, time: float) -> None:
         """Give up, with all movements stored, where what is wrong with the arm is no passing trouble.

@@ -9,6 +9,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
 from pneumarm.report.style import of_joint, panels, styled
 from pneumarm.report.thesis import GOAL_TOLERANCE
+from pneumarm.task.changes import valve_changes
 
 Array = NDArray[np.float64]
 
@@ -91,8 +92,8 @@ def movement_alt(
             f"{spec.pressure_word} is {peak:.2f} bar"
         )
     reached = "the goal is not reached" if end is None else f"the goal is reached after {end - time[0]:.2f} s"
-    changes = int((np.diff(valves[moving], axis=0) != 0).any(axis=(1, 2)).sum()) if moving.any() else 0
-    return f"On the way {'; '.join(parts)}; {reached}, with {changes} changes of the valves."
+    changes = int(valve_changes(valves[moving]).sum())
+    return f"On the way {'; '.join(parts)}; {reached}, with {changes} valve changes."
 
 
 def _overshoot(angle: Array, goal: float) -> float:

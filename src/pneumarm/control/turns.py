@@ -13,8 +13,8 @@ from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import OnlineLearner
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.settings import Exploration
-from pneumarm.random import random_state, uniform
-from pneumarm.task.begin import draw_interval
+from pneumarm.random import random_state
+from pneumarm.task.begin import draw_goal_near
 from pneumarm.task.movements import Movements, of_rows
 
 
@@ -103,9 +103,7 @@ class TurnPlayer:
 
     def _near(self, deviation: float) -> Array:
         """Return a goal near to where the arm stands (joints,) (thesis section 4.3.3)."""
-        angle, goals = self._cycle.arm.read().angle, self.agent.goal_range
-        found = np.empty(len(angle))
-        for joint, (here, span) in enumerate(zip(angle, goals, strict=True)):
-            first, last = draw_interval(span, self._weights, np.clip(here, *span), deviation, self._aim_random)
-            found[joint] = first + (last - first) * uniform(self._aim_random)
-        return found
+        angle = self._cycle.arm.read().angle
+        goal = np.empty(len(angle))
+        draw_goal_near(self.agent.goal_range, self._weights, angle, deviation, self._aim_random, goal)
+        return goal

@@ -23,7 +23,7 @@ from pneumarm.task.changes import valve_changes
 from pneumarm.task.goals import Goal
 from pneumarm.transitions.recorder import Recorder
 from pneumarm.transitions.rows import Recorded
-from pneumarm.transitions.watch import Watch, watched
+from pneumarm.transitions.watch import Watch, act_until
 
 KIND = "movement"
 """Kind of the sequence that a movement is."""
@@ -292,18 +292,17 @@ def played(
     """
     begin: float | None = None
 
-    def decide(reading: Reading) -> NDArray[Any] | None:
+    def is_over(reading: Reading) -> bool:
         nonlocal begin
         begin = reading.time if begin is None else begin
         passed = reading.time - begin
         if seen is not None:
             seen(reading, wanted(passed))
         # The last turn is the one nearest to the end: a late one must not add another period.
-        return None if passed > seconds - cycle.arm.spec.period / 2 else controller.act(reading)
+        return passed > seconds - cycle.arm.spec.period / 2
 
     with nullcontext() if record is None else record.sequence(KIND, info or {}) as keep:
-        steps = watched(cycle.run(decide), watch, at_rest=False, keep=keep)
-    return Recorded.from_steps(steps, cycle.arm.spec, kind=KIND)
+        return act_until(cycle, controller, is_over, kind=KIND, at_rest=False, watch=watch, keep=keep)
 
 
 def check_seconds(seconds: float) -> None:

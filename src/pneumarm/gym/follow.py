@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, Reading
 from pneumarm.arm.reference import Reference, constant
+from pneumarm.arm.valves import Command
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.options import known_options
 from pneumarm.gym.spaces import View, following_space, sensor_ranges
@@ -95,7 +96,7 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._reference = constant(goals.mean(axis=1))
         self._step, self._over = 0, True
         self._begun = 0.0
-        self._applied = np.zeros((arm.spec.joints, 2))
+        self._applied: Command = np.zeros((arm.spec.joints, 2))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -24,7 +24,7 @@ from pneumarm.control.transfer import monitor_of, transfer
 from pneumarm.errors import ArmFailure
 from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
-from pneumarm.learning import AnyAgent, PolicySettings, Tracks, goals_of, train
+from pneumarm.learning import AnyAgent, PolicySettings, goals_of, train
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning import PlanSettings
 from pneumarm.planning.bound import BoundSettings, measure_bound
@@ -243,9 +243,10 @@ def adapted(agent: AnyAgent, name: str, db: Path, seed: int) -> AnyAgent:
 
 def moved_by(agent: AnyAgent, name: str, settings: MoveTrialSettings, seed: int) -> dict[str, Any]:
     """Return what a default ``agent`` does on the arm ``name``, opened anew."""
-    assert isinstance(agent, Tracks)
+    controller = agent.controller()
+    assert controller is not None
     with open_arm(name, seed) as opened:
-        return try_moving(opened, agent.controller(), goals_of(agent), settings, seed=seed).results()
+        return try_moving(opened, controller, goals_of(agent), settings, seed=seed).results()
 
 
 def _collected(arm: Arm, store: Store, seed: int, watch: Watch, transitions: int) -> CollectResult:

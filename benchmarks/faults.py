@@ -60,7 +60,7 @@ from pneumarm.control.monitor import Finding, Monitor, marks_of
 from pneumarm.control.monitor.hypotheses import DRAINS
 from pneumarm.control.movement import BEGIN, draw_movement, move
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import AnyAgent, Tracks, goals_of, load_agent, train
+from pneumarm.learning import AnyAgent, goals_of, load_agent, train
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.movement import move as move_and_hold
 from pneumarm.simulation import Simulation
@@ -564,11 +564,12 @@ def healthy_holding(
     draw: str, arm: int, simulation: Simulation, agent: AnyAgent, hours: float
 ) -> tuple[list[Finding], float]:
     """Return what was found wrong with a healthy arm that is held at goals, and the hours that took."""
-    assert isinstance(agent, Tracks)
+    controller = agent.controller()
+    assert controller is not None
     healthy = opened(draw, arm, 3000 + arm)
     monitor, count = Monitor(healthy.spec, simulation), max(1, round(hours * 3600 / HELD))
     goals = goals_of(agent).draw(np.random.default_rng([arm, 8]), count)
-    for _ in move_and_hold(healthy, agent.controller(), list(goals), MoveSettings(HELD, tries=1), watch=monitor):
+    for _ in move_and_hold(healthy, controller, list(goals), MoveSettings(HELD, tries=1), watch=monitor):
         pass
     return monitor.findings, healthy.time / 3600
 

@@ -37,7 +37,8 @@ from pneumarm.arm.virtual import Fault, Leak, Payload, Push, VirtualArm
 from pneumarm.control import TransferSettings, transfer
 from pneumarm.control.named import open_tracking
 from pneumarm.learning import load_agent
-from pneumarm.moving.movement import played, valve_changes
+from pneumarm.moving.movement import played
+from pneumarm.task.changes import valve_changes
 from pneumarm.task.reference import counts_of
 from pneumarm.transitions import Store
 
@@ -122,7 +123,7 @@ def measured(plan: Plan, name: str, arm: str, seed: int) -> dict[str, Any]:
                     {
                         "mean": float(error[late].mean()),
                         "largest": float(error[late].max()),
-                        "changes": valve_changes(recorded.command[late][:-1], np.zeros((1, 2))) / (seconds - CALM),
+                        "changes": int(valve_changes(recorded.command[late][:-1]).sum()) / (seconds - CALM),
                         "back": times_back(passed, error, what),
                     }
                 )

@@ -39,8 +39,8 @@ from pneumarm.experiments import there_and_back
 from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import train
 from pneumarm.moving import Moved, MoveSettings, move, track
-from pneumarm.moving.movement import valve_changes
 from pneumarm.simulation import FitSettings
+from pneumarm.task.changes import valve_changes
 from pneumarm.task.reference import counts_of, parse_reference
 from pneumarm.transitions import CollectSettings
 
@@ -185,8 +185,7 @@ def settling(made: list[Moved]) -> dict[str, Any]:
         end = passed[-1] if one.time_settled is None else one.time_settled - recorded.time[0]
         there = int(np.searchsorted(passed, end))
         command = recorded.command[:-1]
-        closed = np.zeros_like(command[0])
-        all_changes, first = valve_changes(command, closed), valve_changes(command[:there], closed)
+        all_changes, first = (int(valve_changes(part).sum()) for part in (command, command[:there]))
         moving += (first, end)
         holding += (all_changes - first, passed[-1] - end)
         times.append(None if one.time_settled is None else end)

@@ -38,7 +38,7 @@ from pneumarm.control import AgentController, drawn
 from pneumarm.control.agent import warm_up
 from pneumarm.control.movement import BEGIN, move
 from pneumarm.experiments import there_and_back
-from pneumarm.learning import AnyAgent, PolicySettings, Tracks, goals_of, load_agent, train
+from pneumarm.learning import AnyAgent, PolicySettings, goals_of, load_agent, train
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.movement import move as move_and_hold
 from pneumarm.simulation import FitSettings
@@ -151,9 +151,9 @@ class Made(NamedTuple):
 
 def settle(agent: AnyAgent, arm: str, numbers: range, seed: int) -> Iterator[Made]:
     """Yield movements that are to settle at their goals."""
-    assert isinstance(agent, Tracks)
     goals = goals_of(agent).draw(np.random.default_rng([SEED, seed]), BLOCK)[: len(numbers)]
     once, controller = MoveSettings(tries=1), agent.controller()
+    assert controller is not None
     with open_arm(arm, seed) as opened:
         guard = guarded(opened)
         for number, goal in zip(numbers, goals, strict=True):

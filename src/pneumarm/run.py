@@ -31,7 +31,6 @@ from pneumarm.learning import (
     LOOKING_AHEAD,
     LearnSettings,
     ServoSettings,
-    Tracks,
     goals_of,
     load_agent,
     results_with_lookahead,
@@ -375,12 +374,11 @@ class Run:
         """Say in degrees and seconds how the adapted agent settles, holds and tracks, if it does."""
         wanted, agent = self.settings, load_agent(self.adapted)
         found: dict[str, Any] = {"settle": None, "track": []}
-        if not isinstance(agent, Tracks):
+        controller = agent.controller()
+        if controller is None:
             return found
         with self.progress("moving to goals") as report, self._seen_by(open_arm_checked(wanted)) as arm:
-            tried = try_moving(
-                arm, agent.controller(), goals_of(agent), wanted.moving, seed=wanted.seed, progress=report
-            )
+            tried = try_moving(arm, controller, goals_of(agent), wanted.moving, seed=wanted.seed, progress=report)
         if tried.moved:
             moving_record(tried).save(self.folder)
         return found | tried.results()

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -306,7 +307,8 @@ def test_a_movement_is_worth_more_the_sooner_it_is_there_and_the_nearer_it_stays
     degree, goal = trained.spec.counts_per_degree, trained.goal_range.mean(axis=1)
 
     def worth(*errors: float) -> float:
-        return trained.worth(goal + degree * np.array(errors)[:, None], goal)
+        angle = goal + degree * np.array([0.0, *errors])[:, None]  # the first reading does not count
+        return trained.worth(SimpleNamespace(recorded=SimpleNamespace(angle=angle), goal=goal))
 
     assert worth(0.0, 0.0) == pytest.approx(0)
     assert worth(20, 10, 0.2, 0.2) > worth(20, 10, 5, 0.2) > worth(20, 10, 5, 2)

@@ -197,7 +197,7 @@ def test_movement_marks_goal_and_valves():
     assert high - low == pytest.approx(50 / SPEC.counts_per_degree)
     alt = figure.alt
     assert "goes from -30.0° to a goal of 40.0°" in alt
-    assert "reached after 0.73 s; the valves change 3 times" in alt
+    assert "reached after 0.73 s, with 6 valve changes" in alt
 
 
 def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():

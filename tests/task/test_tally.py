@@ -8,7 +8,7 @@ from pneumarm.arm.valves import to_valves
 from pneumarm.task import Reward, TaskSettings
 from pneumarm.task.movements import movements
 from pneumarm.task.noting import goes_on, note_action
-from pneumarm.task.reward import is_near, is_slow, is_switch, paid
+from pneumarm.task.reward import has_reached, is_switch, paid
 from pneumarm.task.tally import Tally
 
 REWARD = Reward(goal=40.0, action=-2.0, switch=-3.0)
@@ -26,8 +26,7 @@ def test_an_arm_and_a_compiled_loop_count_alike(joints: int) -> None:
             velocity = random.uniform(-1.2, 1.2, joints)
             gained = tally.count(to_valves(actions), angle, velocity, goal)
             parts = REWARD.parameters
-            near = [is_near(parts, *one) for one in zip(angle, goal, strict=True)]
-            reached = all(near) and all(is_slow(parts, one) for one in velocity)
+            reached = all(has_reached(parts, *one) for one in zip(angle, velocity, goal, strict=True))
             switched = np.array([is_switch(*one) for one in zip(last, actions, strict=True)], np.int64)
             note_action(parts, switched, reached, record, 0)
             assert gained.tolist() == [paid(parts, reached, one) for one in switched]
@@ -43,8 +42,8 @@ def test_an_arm_and_a_compiled_loop_count_alike(joints: int) -> None:
 
 def test_what_is_no_number_has_not_reached_a_goal() -> None:
     assert not REWARD.reached([np.nan], [0.0], [500.0])
-    assert not is_near(REWARD.parameters, np.nan, 500.0)
-    assert not is_slow(REWARD.parameters, np.nan)
+    assert not has_reached(REWARD.parameters, np.nan, 0.0, 500.0)
+    assert not has_reached(REWARD.parameters, 500.0, np.nan, 500.0)
 
 
 def test_a_goal_is_reached_within_the_same_degrees_whatever_the_sensor_counts():

@@ -37,7 +37,7 @@ from pneumarm.adaptation.plastic import plastic, with_plastic
 from pneumarm.adaptation.refit import Refit, RefitSettings, refit, refit_to_all
 from pneumarm.adaptation.trial import TrialSettings, verdict
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.agents import Acts, Adapts, Stiffens, Tracks
+from pneumarm.learning.agents import Acts, Adapts, Stiffens
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation import FitSettings
 from pneumarm.task.begin import begin_states
@@ -197,7 +197,7 @@ class Adaptation:
         to be sure finds out in time.
         """
         compared = self.version != self._trusted_version and len(self._new) >= COMPARED <= len(self._old)
-        if compared and isinstance(self._origin, Tracks):
+        if compared and self._origin.settles:
             if np.mean(self._new) < np.mean(self._old):
                 self._put_back()
             else:
@@ -283,7 +283,7 @@ class Adaptation:
         """
         simulation = self.agent.simulation
         two_layers = simulation.networks[0].second_weights is not None
-        return two_layers and self._began == 0 and not isinstance(self._origin, Tracks)
+        return two_layers and self._began == 0 and not self._origin.settles
 
     def _figures(self, found: Refit) -> dict[str, Any]:
         unit = np.sqrt(error_squares(self._origin.simulation))

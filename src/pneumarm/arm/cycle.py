@@ -47,6 +47,10 @@ class ControlCycle:
     """Points of the grid that passed without a turn within half a period."""
     applied: Command = field(init=False)
     """The command of the last turn as applied, shape (joints, 2); what they led to is read in the next turn."""
+    due: float = field(default=0.0, init=False)
+    """When the turn after the last reading is to end on the arm's clock [s]."""
+    _reading: Reading = field(init=False)
+    _asked: float = field(default=0.0, init=False)  # when the last decision was asked for [s]
 
     def __post_init__(self) -> None:
         self.applied = np.zeros_like(self.arm.applied)
@@ -61,21 +65,16 @@ class ControlCycle:
             ControllerFailure: too many decisions in a row had to be replaced, or one did not come at all.
 
         """
-        arm, period, latency = self.arm, self.arm.spec.period, self.arm.spec.latency
+        arm = self.arm
         closed = np.zeros(arm.applied.shape, np.int8)
-        due: float | None = None
         try:
+            reading = self.start()
             while True:
-                reading = arm.read()
-                due = reading.time if due is None else due
-                missed = missed_turns(reading.time - due, period)
-                self.missed_deadlines += missed
-                due += (missed + 1) * period
                 if self.close_while_computing:
                     arm.set_valves(closed)
-                began, raised = monotonic(), None
+                raised = None
                 try:
-                    arm.watchdog.begin(reading, self.patience)
+                    self.ask(self.patience)
                     command = decide(reading)
                 except PneumarmError:
                     raise
@@ -86,19 +85,9 @@ class ControlCycle:
                 if command is None:
                     yield Step(reading, None)
                     break
-                late = arm.lateness(reading) if monotonic() - began > period else 0.0
-                if latency:
-                    arm.wait(latency)
-                if raised is not None:
-                    arm.replace("raised", f"{type(raised).__name__}: {raised}", max(late, 1.0), raised)
-                elif late > 1:
-                    arm.replace("late", f"{late:.1f} periods after its reading", late)
-                else:
-                    arm.decide(command)
-                self.applied = arm.applied
-                arm.end_pulses(due)  # before anybody is given the turn, who may take his time
+                self.act(command, raised)
                 yield Step(reading, arm.applied)
-                arm.wait_until(due)
+                reading = self.finish()
         except Exception:
             with suppress(PneumarmError, OSError):  # the first failure is the one to tell of
                 arm.set_valves(closed)
@@ -108,6 +97,44 @@ class ControlCycle:
             raise
         else:
             arm.set_valves(closed)
+
+    def start(self) -> Reading:
+        """Return a reading, from which on turns are due."""
+        self._reading = reading = self.arm.read()
+        self.due = reading.time + self.arm.spec.period
+        return reading
+
+    def ask(self, patience: float) -> None:
+        """Have the arm looked after from now on until a decision is there, for up to ``patience`` [s]."""
+        self._asked = monotonic()
+        self.arm.watchdog.begin(self._reading, patience)
+
+    def act(self, command: Command, raised: Exception | None = None) -> None:
+        """Let the latency pass and set the valves by ``command`` (joints, 2), or as is safe where one came too late.
+
+        ``raised`` is what a controller raised that has given none.
+        """
+        arm, spec = self.arm, self.arm.spec
+        late = arm.lateness(self._reading) if monotonic() - self._asked > spec.period else 0.0
+        if spec.latency:
+            arm.wait(spec.latency)
+        if raised is not None:
+            arm.replace("raised", f"{type(raised).__name__}: {raised}", max(late, 1.0), raised)
+        elif late > 1:
+            arm.replace("late", f"{late:.1f} periods after its reading", late)
+        else:
+            arm.decide(command)
+        self.applied = arm.applied
+        arm.end_pulses(self.due)  # before anybody is given the turn, who may take his time
+
+    def finish(self) -> Reading:
+        """Let the rest of the turn pass and return the reading after it."""
+        self.arm.wait_until(self.due)
+        self._reading = reading = self.arm.read()
+        missed = missed_turns(reading.time - self.due, self.arm.spec.period)
+        self.missed_deadlines += missed
+        self.due += (missed + 1) * self.arm.spec.period
+        return reading
 
 
 def missed_turns(late: float, period: float) -> int:

@@ -13,7 +13,7 @@ from pneumarm.commands.common import COLUMNS, HEADINGS, AnyStore, Json, Settings
 from pneumarm.console import show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder
-from pneumarm.learning import LearnSettings, Tracks, train
+from pneumarm.learning import LearnSettings, train
 from pneumarm.learning.tensorboard import Scalars
 from pneumarm.learning.training import Progress, Training
 from pneumarm.progress import progress
@@ -88,7 +88,7 @@ def train_(
 
 def _validated(training: Training[Any], spec: ArmSpec) -> Table:
     """Return how the agents move; of those that settle, how well they do, because what they learn from is a price."""
-    if isinstance(training.agent, Tracks):
+    if training.agent.settles:
         rows = [
             (
                 i + 1,

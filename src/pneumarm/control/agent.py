@@ -7,7 +7,7 @@ from pneumarm.arm.controller import Controller
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.arm.valves import Command, to_valves
 from pneumarm.errors import UnusableInput
-from pneumarm.learning import Acts, LearningActor, Tracks
+from pneumarm.learning import Acts, LearningActor
 from pneumarm.task import StateTracker
 from pneumarm.task.acting import LATE, Acting, Hurries
 from pneumarm.transitions.watch import made_up_readings
@@ -75,7 +75,7 @@ class AgentController:
 
 def controller_of(agent: Acts) -> Controller:
     """Return the controller with which ``agent`` acts as well as it can: its own where it has one."""
-    return agent.controller() if isinstance(agent, Tracks) else AgentController(agent)
+    return agent.controller() or AgentController(agent)
 
 
 def warm_up(agent: Acts, actor: Acting | None = None) -> None:

@@ -17,7 +17,7 @@ from pneumarm.task.movements import of_rows
 from pneumarm.task.tally import Tally
 from pneumarm.transitions.goals import Goals
 from pneumarm.transitions.rows import Recorded, broken_off
-from pneumarm.transitions.watch import Watch, watched
+from pneumarm.transitions.watch import Watch, act_until
 
 MOVEMENT = "episode"
 """Kind of the sequence that a movement is."""
@@ -70,8 +70,7 @@ def move(
             broken(recorded)
 
     attempt = _Attempt(cycle, controller, goal, task, velocity == "measured", hold)
-    steps = watched(cycle.run(attempt.decide), watch, at_rest=True, broken=keep)
-    recorded = Recorded.from_steps(steps, cycle.arm.spec, kind=MOVEMENT, at_rest=True)
+    recorded = act_until(cycle, controller, attempt.is_over, kind=MOVEMENT, at_rest=True, watch=watch, broken=keep)
     made = attempt.tally
     return Movement(
         attempt.goal, made.actions, made.switches, made.reward, made.reached, attempt.velocity, recorded, made.actions
@@ -79,7 +78,7 @@ def move(
 
 
 class _Attempt:
-    """Decides turn by turn, and counts what comes of it."""
+    """Counts turn by turn what comes of a movement, and has a controller learn from it."""
 
     def __init__(
         self,
@@ -90,7 +89,7 @@ class _Attempt:
         measures: bool,
         hold: float,
     ) -> None:
-        self.cycle, self.controller, self.measures, self.hold = cycle, controller, measures, hold
+        self.cycle, self.measures, self.hold = cycle, measures, hold
         self.learner = controller if isinstance(controller, LearningController) else None
         self.reference = goal if isinstance(goal, Reference) else constant(goal)
         self.goal = self.reference.at(0.0)
@@ -105,18 +104,16 @@ class _Attempt:
         else:
             raise UnusableInput("a goal that moves needs a controller that follows references, with a method track")
 
-    def decide(self, reading: Reading) -> Command | None:
-        """Count what the last action led to; then return the valves of the next, or None at the end."""
+    def is_over(self, reading: Reading) -> bool:
+        """Count what the last action led to; return whether it was the last one."""
         if self.before is None:
             self.began = reading.time
         elif not self.tally.over:
             gained = self._count(self.before, reading)
             if self.learner is not None:
                 self.learner.observe(reading, self.cycle.applied, gained, self.tally.reached)
-        if self.tally.over and reading.time - self.began > self.hold - self.cycle.arm.spec.period / 2:
-            return None
         self.before = reading
-        return self.controller.act(reading)
+        return self.tally.over and reading.time - self.began > self.hold - self.cycle.arm.spec.period / 2
 
     def _count(self, before: Reading, reading: Reading) -> NDArray[np.float64]:
         """Return what each joint is paid for the action between two readings."""

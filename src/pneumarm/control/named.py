@@ -12,7 +12,7 @@ from pneumarm.control.transfer import check_fit
 from pneumarm.control.versions import agent_file
 from pneumarm.errors import UnusableInput
 from pneumarm.files import kind_of
-from pneumarm.learning import AnyAgent, Tracks
+from pneumarm.learning import AnyAgent
 from pneumarm.learning.agents import goals_of
 from pneumarm.moving import Holding, at_period
 from pneumarm.planning.servo import PlannedServo
@@ -76,7 +76,8 @@ def tracking_for(
             at_period(arm, made.spec.period)
         return made.controller(), arm.spec, Goals.of(made.goal_range)
     check_fit(made, arm)
-    if isinstance(made, PlannedServo | Tracks):
-        return made.controller(), arm.spec, goals_of(made)
+    if (own := made.controller()) is not None:
+        return own, arm.spec, goals_of(made)
+    assert not isinstance(made, PlannedServo)  # which settles
     warm_up(made)
     return Holding(AgentController(made), arm.spec, made.goal_range, tolerance), arm.spec, goals_of(made)

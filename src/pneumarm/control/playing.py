@@ -34,12 +34,12 @@ from pneumarm.learning.online.learner import begin_acting, learn_and_act
 from pneumarm.learning.online.loop import Schedule, Workspace, workspace
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
-from pneumarm.random import random_state, uniform
+from pneumarm.random import random_state
 from pneumarm.simulation.kernel import Places, places, shift
-from pneumarm.task.begin import draw_interval
+from pneumarm.task.begin import draw_goal_near
 from pneumarm.task.movements import Movements, movements
 from pneumarm.task.noting import goes_on, note_action
-from pneumarm.task.reward import RewardParameters, is_near, is_slow, is_switch, paid
+from pneumarm.task.reward import RewardParameters, has_reached, is_switch, paid
 
 Array = NDArray[np.float64]
 _missed, _action, _velocity = part(missed_turns), part(action_of), part(derived_velocity)
@@ -331,15 +331,6 @@ def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
 
 
 @kernel
-def _aim(aims: _Aims, watched: _Guard, deviation: float, goal: Array) -> None:
-    """Put a goal near to where the arm stands into ``goal`` (joints,) (thesis section 4.3.3)."""
-    for j in range(goal.size):
-        here = min(max(watched.angle[j], aims.range[j, 0]), aims.range[j, 1])
-        first, last = draw_interval(aims.range[j], aims.weights, here, deviation, aims.random)
-        goal[j] = first + (last - first) * uniform(aims.random)
-
-
-@kernel
 def _begin(watched, mind, schedule, goal, velocity):  # type: ignore[no-untyped-def]
     """Begin a movement to ``goal`` in the state that was read."""
     place = mind.places
@@ -357,7 +348,7 @@ def _judge(watched, rules, goal, velocity, turn, gained):  # type: ignore[no-unt
     """Set what each joint has ``gained`` by its last action, whether it switched and is there; return if all are."""
     is_reached = True
     for j in range(goal.size):
-        is_there = is_near(rules.reward, watched.angle[j], goal[j]) and is_slow(rules.reward, velocity[j])
+        is_there = has_reached(rules.reward, watched.angle[j], velocity[j], goal[j])
         turn.there[j] = is_there
         is_reached = is_reached and is_there
     for j in range(goal.size):
@@ -428,7 +419,7 @@ def _play(body, watched, mind_schedule, rules, aims, record, performance):  # ty
             goal[j] = aims.goals[e, j]
         if schedule.deviation < np.inf:
             _read(body, watched)
-            _aim(aims, watched, schedule.deviation, goal)
+            draw_goal_near(aims.range, aims.weights, watched.angle, schedule.deviation, aims.random, goal)
         success = _move(body, watched, mind, schedule, rules, goal, record, e)
         performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
         if performance >= schedule.enough:

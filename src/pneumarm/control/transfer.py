@@ -21,8 +21,7 @@ from pneumarm.control.movement import BEGIN, MOVEMENT, draw_movement, move
 from pneumarm.control.versions import ADAPTED, Adapted, save_history, version_keeper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import make_folder
-from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
-from pneumarm.moving.movement import MoveSettings
+from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, fingerprint, goals_of
 from pneumarm.moving.settling import settled_at
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
@@ -304,7 +303,7 @@ class Transfer:
         agent = self._arrived
         draw = draw_movement(goals_of(agent), self._seed, test, number)
         BEGIN.reach(self._cycle.arm, draw.random)
-        velocity, hold = agent.window.velocity, self._settings.hold if isinstance(agent, Tracks) else 0.0
+        velocity, hold = agent.window.velocity, self._settings.hold if agent.settles else 0.0
         return move(
             self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity, hold
         )
@@ -320,7 +319,7 @@ class Transfer:
         if adapting.is_due() or left == 0:
             adapting.prefer()
             self._judge()
-        if not adapting.is_due() or (left < COMPARED and isinstance(self._arrived, Tracks)):
+        if not adapting.is_due() or (left < COMPARED and self._arrived.settles):
             return
         self._keep()  # it learns from what is stored, so that an interruption changes nothing
         made = [entry.number for entry in self._stored()][-adapting.usable :]
@@ -340,12 +339,9 @@ class Transfer:
             judges = self._settings.learning_rate > 0 and phase == "learning"
             recorded = movement.recorded
             sound = not self._watch.marks(recorded)
-            worth, settled = movement.reward, True
-            if isinstance(self._arrived, Tracks):
-                worth = self._arrived.worth(recorded.angle[1:], movement.goal)
-                settled = self._has_settled(recorded, movement.goal)
+            settled = not self._arrived.settles or self._has_settled(recorded, movement.goal)
             info[_SQUARES] = self._adapting.observe(
-                rows_of(recorded), worth, judges=judges, sound=sound, settled=settled
+                rows_of(recorded), self._arrived.worth(movement), judges=judges, sound=sound, settled=settled
             )
             self._judge()
         self._done.append(info)
@@ -353,9 +349,8 @@ class Transfer:
 
     def _has_settled(self, recorded: Recorded, goal: NDArray[np.float64]) -> bool:
         """Return whether the arm has settled at the ``goal`` (joints,), as it would have by default."""
-        usual = MoveSettings()
         off = (recorded.angle - goal) / self._arm.spec.counts_per_degree
-        return settled_at(recorded.time, off, usual.tolerance, usual.dwell) is not None
+        return settled_at(recorded.time, off) is not None
 
     def _judge_arm(self, time: float) -> None:
         """Give up, with all movements stored, where what is wrong with the arm is no passing trouble.

@@ -1,6 +1,6 @@
 """Many movements of a learning agent on any arm, turn by turn: what :mod:`~.playing` does for virtual arms alone."""
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -13,36 +13,9 @@ from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import OnlineLearner
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.settings import Exploration
-from pneumarm.random import random_state, uniform
-from pneumarm.task.begin import draw_interval
+from pneumarm.random import random_state
+from pneumarm.task.begin import draw_goal_near
 from pneumarm.task.movements import Movements, of_rows
-
-
-class Plays(Protocol):
-    """An agent that makes movements on an arm; see :class:`~.playing.Player`, whose arguments it takes."""
-
-    performance: float
-    """Moving average of successes (thesis eq. 4.14)."""
-
-    def play(self, goals: Array, durations: Array, schedule: Schedule | None = None) -> Movements:
-        """Make movements."""
-
-    def visit(self, durations: Array) -> tuple[Array, Array]:
-        """Bring the arm to rest and only look."""
-
-    @property
-    def learned(self) -> Agent:
-        """The agent as it is now."""
-
-    @property
-    def time(self) -> float:
-        """Time on the arm's clock [s]."""
-
-
-def player(agent: Agent, arm: Arm, *settings: Any, **others: Any) -> Plays:
-    """Return what makes movements of ``agent`` on ``arm``: the compiled loop where that can move it."""
-    compiled = isinstance(arm, VirtualArm) and arm.is_plain and arm.spec.angle_limits is None
-    return (Player if compiled else TurnPlayer)(agent, arm, *settings, **others)  # type: ignore[arg-type]
 
 
 class TurnPlayer:
@@ -103,9 +76,13 @@ class TurnPlayer:
 
     def _near(self, deviation: float) -> Array:
         """Return a goal near to where the arm stands (joints,) (thesis section 4.3.3)."""
-        angle, goals = self._cycle.arm.read().angle, self.agent.goal_range
-        found = np.empty(len(angle))
-        for joint, (here, span) in enumerate(zip(angle, goals, strict=True)):
-            first, last = draw_interval(span, self._weights, np.clip(here, *span), deviation, self._aim_random)
-            found[joint] = first + (last - first) * uniform(self._aim_random)
-        return found
+        angle = self._cycle.arm.read().angle
+        goal = np.empty(len(angle))
+        draw_goal_near(self.agent.goal_range, self._weights, angle, deviation, self._aim_random, goal)
+        return goal
+
+
+def player(agent: Agent, arm: Arm, *settings: Any, **others: Any) -> Player | TurnPlayer:
+    """Return what makes movements of ``agent`` on ``arm``: the compiled loop where that can move it."""
+    compiled = isinstance(arm, VirtualArm) and arm.is_plain and arm.spec.angle_limits is None
+    return (Player if compiled else TurnPlayer)(agent, arm, *settings, **others)  # type: ignore[arg-type]

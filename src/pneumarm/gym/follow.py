@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, Reading
 from pneumarm.arm.reference import Reference, constant
+from pneumarm.arm.valves import Command
 from pneumarm.errors import UnusableInput
 from pneumarm.gym.options import known_options
 from pneumarm.gym.spaces import View, following_space, sensor_ranges
 from pneumarm.gym.turns import Turns
 from pneumarm.learning.servo.references import draw_references
 from pneumarm.learning.servo.settings import ServoSettings
-from pneumarm.moving.movement import valve_changes
 from pneumarm.settings import Settings, Valid
+from pneumarm.task.changes import changes
 from pneumarm.task.goals import goal_in_counts
 from pneumarm.task.reference import FORMS, check_reachable, parse_reference
 from pneumarm.task.tracker import StateTracker, scaled_goal
@@ -95,7 +96,7 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._reference = constant(goals.mean(axis=1))
         self._step, self._over = 0, True
         self._begun = 0.0
-        self._applied = np.zeros((arm.spec.joints, 2))
+        self._applied: Command = np.zeros((arm.spec.joints, 2))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -128,8 +129,8 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         both = np.zeros((self._spec.joints, 2))
         both[:, :muscles] = pulses.reshape(-1, muscles)
         reading, applied = self._turns.turn(both)
-        changes = valve_changes(np.asarray(applied, np.float64)[None], self._applied)
-        self._applied = np.asarray(applied, np.float64)
+        changed = int(changes(applied, self._applied).sum())
+        self._applied = applied
         self._tracker.commanded(applied)
         self._step += 1
         self._over = self._step >= self._steps
@@ -139,8 +140,8 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         else:
             self._turns.ask()
         off = np.abs(reading.angle - self._wanted(reading, 0))
-        reward = -float(off.mean()) / self._tolerance - self._change * changes
-        return observation, reward, False, self._over, self._info(reading, changes)
+        reward = -float(off.mean()) / self._tolerance - self._change * changed
+        return observation, reward, False, self._over, self._info(reading, changed)
 
     def close(self) -> None:
         """Close the arm."""
@@ -189,11 +190,11 @@ class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):
         observed = np.concatenate([state, away.ravel()]).astype(np.float32)
         return np.clip(observed, self._low, self._high)
 
-    def _info(self, reading: Reading, changes: int) -> dict[str, Any]:
+    def _info(self, reading: Reading, changed: int) -> dict[str, Any]:
         wanted = self._wanted(reading, 0)
         return {
             "angle_deg": self._spec.degrees(reading.angle),
             "wanted_deg": self._spec.degrees(wanted),
             "error_deg": (reading.angle - wanted) / self._spec.counts_per_degree,
-            "valve_changes": changes,
+            "valve_changes": changed,
         }

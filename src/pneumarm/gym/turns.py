@@ -1,12 +1,10 @@
 """An arm moved turn by turn, as the control cycle does it, by an agent that is asked from outside."""
 
 import math
-from time import monotonic
 
 import numpy as np
 
-from pneumarm.arm import Arm, BeginState, Reading, guarded
-from pneumarm.arm.cycle import missed_turns
+from pneumarm.arm import Arm, BeginState, ControlCycle, Reading, guarded
 from pneumarm.arm.valves import Command
 
 
@@ -23,10 +21,7 @@ class Turns:
         self.arm = guarded(arm)
         self._fresh = self.arm.get_state()
         self._begin = begin
-        self._closed = np.zeros((arm.spec.joints, 2), np.int8)
-        self._reading: Reading
-        self._asked = 0.0  # when the agent was last asked for a command [s]
-        self._due = 0.0
+        self._cycle = ControlCycle(self.arm)
 
     def begin(self, random: np.random.Generator, *, fresh: bool) -> Reading:
         """Bring the arm to a begin state and return the reading there.
@@ -37,37 +32,21 @@ class Turns:
         if fresh and self._fresh is not None:
             self.arm.set_state(self._fresh)
         self._begin.reach(self.arm, random)
-        self._reading = self.arm.read()
-        self._due = self._reading.time
-        return self._reading
+        return self._cycle.start()
 
     def ask(self) -> None:
         """Have the arm looked after until the agent comes with a command: for as long as it takes."""
-        self._asked = monotonic()
-        self.arm.watchdog.begin(self._reading, math.inf)
+        self._cycle.ask(math.inf)
 
     def turn(self, command: Command) -> tuple[Reading, Command]:
         """Let a control period pass with ``command`` (joints, 2); return the next reading and what was applied."""
-        spec = self.arm.spec
         self.arm.watchdog.end()
-        late = self.arm.lateness(self._reading) if monotonic() - self._asked > spec.period else 0.0
-        self._due += spec.period
-        if spec.latency:
-            self.arm.wait(spec.latency)
-        if late > 1:
-            self.arm.replace("late", f"{late:.1f} periods after its reading", late)
-        else:
-            self.arm.decide(command)
-        applied = self.arm.applied
-        self.arm.end_pulses(self._due)
-        self.arm.wait_until(self._due)
-        self._reading = reading = self.arm.read()
-        self._due += missed_turns(reading.time - self._due, spec.period) * spec.period
-        return reading, applied
+        self._cycle.act(command)
+        return self._cycle.finish(), self._cycle.applied
 
     def rest(self) -> None:
         """Close all valves: the movement is over."""
-        self.arm.set_valves(self._closed)
+        self.arm.set_valves(np.zeros((self.arm.spec.joints, 2), np.int8))
 
     def close(self) -> None:
         """Close the arm."""

@@ -11,7 +11,6 @@ from pneumarm.learning.agents import (
     Saved,
     SelfTesting,
     SimulationAgent,
-    Tracks,
     fingerprint,
     goals_of,
 )
@@ -63,7 +62,6 @@ __all__ = [
     "ServoSettings",
     "Shaping",
     "SimulationAgent",
-    "Tracks",
     "TrainSettings",
     "Training",
     "find_method",

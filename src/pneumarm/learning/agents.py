@@ -2,15 +2,15 @@
 
 Whatever kind an agent is of, it is tested, transferred, saved, loaded and used as a controller by the same commands.
 What only some can do is asked for by the class that says so, never by the kind: :class:`Learns`,
-:class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`,
-:class:`Stiffens`, :class:`Tracks`.
+:class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`, :class:`Stiffens`. Whether one settles at its goals, or
+only reaches them, it says itself: ``settles``.
 """
 
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Protocol, Self, runtime_checkable
+from typing import ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.acting import Acting
 from pneumarm.task.begin import BeginStates
-from pneumarm.task.movements import Movements
+from pneumarm.task.movements import Movement, Movements
 from pneumarm.task.settings import TaskSettings
 from pneumarm.transitions.goals import Goals
 from pneumarm.transitions.window import Window
@@ -53,8 +53,17 @@ class OfAnArm(Protocol):
 class Acts(OfAnArm, Protocol):
     """An agent that acts."""
 
+    settles: ClassVar[bool]
+    """Whether it settles at goals, holds them and follows references; otherwise it only reaches goals."""
+
     def actor(self) -> Acting:
         """Return it acting step by step, as well as it can."""
+
+    def controller(self) -> TrackingController | None:
+        """Return what moves the arm if it ``settles``, ready: it waits for nothing to be compiled; otherwise None."""
+
+    def worth(self, movement: Movement) -> float:
+        """Return how good its ``movement`` was: more is better."""
 
 
 class Saved(Protocol):
@@ -121,17 +130,6 @@ class LooksAhead(Protocol):
 
 
 @runtime_checkable
-class Tracks(Protocol):
-    """An agent that settles at goals, holds them and follows references, with a controller of its own."""
-
-    def controller(self) -> TrackingController:
-        """Return what moves the arm, ready: it waits for nothing to be compiled."""
-
-    def worth(self, angle: NDArray[np.float64], goal: NDArray[np.float64]) -> float:
-        """Return how good a movement to ``goal`` (joints,) by ``angle`` (n, joints) [counts] was: more is better."""
-
-
-@runtime_checkable
 class Knows(Protocol):
     """An agent whose controllers learn in which ways the joints of its arm are best treated: their ``ways``."""
 
@@ -180,8 +178,22 @@ class Adapts(Acts, Saved, Protocol):
         """
 
 
+class ReachesGoals:
+    """What every agent that only reaches goals says of itself."""
+
+    settles: ClassVar[bool] = False
+
+    def controller(self) -> TrackingController | None:
+        """Return None: states are made for it, and its actions taken one by one."""
+        return None
+
+    def worth(self, movement: Movement) -> float:
+        """Return the reward of ``movement``."""
+        return movement.reward
+
+
 @dataclass(frozen=True)
-class SimulationAgent:
+class SimulationAgent(ReachesGoals):
     """An agent that keeps the simulation that it was made in: it is for the arm of that."""
 
     simulation: Simulation

@@ -16,6 +16,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import possible_actions
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
+from pneumarm.learning.agents import ReachesGoals
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import QUANTITIES, Window
@@ -39,7 +40,7 @@ class ImportedHeader(msgspec.Struct, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True)
-class ImportedPolicy:
+class ImportedPolicy(ReachesGoals):
     """Dense layers from the scaled state with the goal (thesis eq. 4.12) to a value for each action of each joint."""
 
     spec: ArmSpec

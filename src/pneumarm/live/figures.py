@@ -7,11 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.settling import settled_at
 
-TOLERANCE = MoveSettings.tolerance
-"""A joint is there within so much [degrees]."""
 HELD = 2.0
 """A goal that stayed the same for so long [s] is counted."""
 LEAST = 5.0
@@ -81,7 +78,7 @@ class PlayFigures:
         self._seen.append((time, error))
         if time - self._since >= HELD:
             times, errors = (np.array(values) for values in zip(*self._seen, strict=True))
-            settled = settled_at(times, errors, TOLERANCE, MoveSettings.dwell)
+            settled = settled_at(times, errors)
             kept = self.of(controller)
             kept.settled.append(math.inf if settled is None else settled - self._since)
             kept.rest.append(float(np.abs(errors[times - self._since > HELD - _RESTING]).max(axis=1).mean()))

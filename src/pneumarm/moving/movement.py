@@ -1,9 +1,7 @@
 """Moving to a goal and holding it, and following a reference, on any arm, with figures for people.
 
-A goal is *settled* when all joints are within the tolerance from a moment on until the end of the hold, and for a
-dwell time at least: an arm that happens to pass its goal at the end is not (see :mod:`.settling`). The *rest error*
-is the mean absolute error over the last second of the hold. A *valve change* is a change of the setting of a muscle's
-valves; a pulse within a control period is two.
+When a goal is *settled* at says :mod:`.settling`, what a *valve change* is :mod:`pneumarm.task.changes`. The *rest
+error* is the mean absolute error over the last second of the hold.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -19,12 +17,13 @@ from pneumarm.arm.controller import Controller, TrackingController
 from pneumarm.arm.hand import hand
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
-from pneumarm.moving.settling import settled_at
+from pneumarm.moving.settling import DWELL, TOLERANCE, settled_at
 from pneumarm.settings import Settings, Valid
+from pneumarm.task.changes import valve_changes
 from pneumarm.task.goals import Goal
 from pneumarm.transitions.recorder import Recorder
 from pneumarm.transitions.rows import Recorded
-from pneumarm.transitions.watch import Watch, watched
+from pneumarm.transitions.watch import Watch, act_until
 
 KIND = "movement"
 """Kind of the sequence that a movement is."""
@@ -44,11 +43,11 @@ class MoveSettings(Settings):
     """For how long a goal is held, from when it is given [s]."""
     tries: int = 2
     """How often a movement that has not settled is made (thesis section 5.6.1)."""
-    tolerance: float = 1.0
+    tolerance: float = TOLERANCE
     """A joint is there within so much [degrees]."""
     pause: float = 2.0
     """Time between two tries, with closed valves [s] (thesis section 5.6.1)."""
-    dwell: float = 0.3
+    dwell: float = DWELL
     """For how long it stays there at least, to the end of the hold, to have settled [s]; half of a shorter hold."""
 
     def _valid(self) -> Valid:
@@ -254,7 +253,6 @@ def track(
     check_seconds(seconds)
     cycle = ControlCycle(guarded(arm))
     cycle.arm.make_ready()
-    closed = np.zeros_like(cycle.arm.applied)
     coming = replace(reference, at=lambda time: reference.at(max(time - lead_in, 0.0)))
     controller.reset(reference.at(0.0))
     controller.track(coming)
@@ -270,7 +268,7 @@ def track(
         time_start=start,
         seconds=float(passed[-1]),
         rms_error=np.sqrt((error**2).mean(axis=0)),
-        switches=valve_changes(recorded.command[:-1], closed),
+        switches=int(valve_changes(recorded.command[:-1]).sum()),
         air=_air_since(cycle.arm, air),
         recorded=recorded,
         wanted=wanted,
@@ -294,32 +292,17 @@ def played(
     """
     begin: float | None = None
 
-    def decide(reading: Reading) -> NDArray[Any] | None:
+    def is_over(reading: Reading) -> bool:
         nonlocal begin
         begin = reading.time if begin is None else begin
         passed = reading.time - begin
         if seen is not None:
             seen(reading, wanted(passed))
         # The last turn is the one nearest to the end: a late one must not add another period.
-        return None if passed > seconds - cycle.arm.spec.period / 2 else controller.act(reading)
+        return passed > seconds - cycle.arm.spec.period / 2
 
     with nullcontext() if record is None else record.sequence(KIND, info or {}) as keep:
-        steps = watched(cycle.run(decide), watch, at_rest=False, keep=keep)
-    return Recorded.from_steps(steps, cycle.arm.spec, kind=KIND)
-
-
-def valve_changes(commands: NDArray[Any], before: NDArray[Any]) -> int:
-    """Return how often the setting of a muscle's valves changed.
-
-    Args:
-        commands: as applied, shape (n, joints, 2): -1, 0, +1, or pulses, the share of the period that is open.
-        before: what was applied before the first, of the same kind, shape (joints, 2).
-
-    """
-    opened = np.sign(commands)
-    left = np.where(np.abs(commands) >= 1, opened, 0)
-    found = np.concatenate([np.where(np.abs(before) >= 1, np.sign(before), 0)[None], left])[:-1]
-    return int((opened != found).sum() + (left != opened).sum())
+        return act_until(cycle, controller, is_over, kind=KIND, at_rest=False, watch=watch, keep=keep)
 
 
 def check_seconds(seconds: float) -> None:
@@ -340,14 +323,13 @@ def _move_to(
     arm, spec = cycle.arm, cycle.arm.spec
     if goal.shape != (spec.joints,) or not np.isfinite(goal).all():
         raise UnusableInput(f"a goal needs {spec.joints} finite angle(s) in counts, got {goal}")
-    closed = np.zeros_like(arm.applied)
     switches, air, start = 0, arm.air_used(), arm.read().time
     for number in range(1, settings.tries + 1):
         arm.make_ready()
         controller.reset(goal)
         asked = {"goal": goal.tolist()}
         recorded = played(cycle, controller, settings.hold, lambda time: goal, watch, seen, record, asked)
-        switches += valve_changes(recorded.command[:-1], closed)
+        switches += int(valve_changes(recorded.command[:-1]).sum())
         error = (recorded.angle - goal) / spec.counts_per_degree
         dwell = min(settings.dwell, settings.hold / 2)
         settled = settled_at(recorded.time, error, settings.tolerance, dwell)

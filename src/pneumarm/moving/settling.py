@@ -1,10 +1,10 @@
 """When an arm has settled at its goal, told by readings that scatter.
 
-An arm has *settled* from the moment on from which all of its joints stay within the tolerance until the end, for a
-dwell time at least. Where readings hardly scatter, each of them says whether its joint is there. Where they scatter
-by as much as the tolerance, an arm that stands still at its goal would leave it several times a second; then what
-counts is the mean of a joint and how far it swings, over each stretch of the dwell time, without what the scatter
-alone explains.
+An arm has *settled* from the moment on from which all of its joints stay within the tolerance until the end of the
+hold, for a dwell time at least: one that happens to pass its goal at the end has not. Where readings hardly scatter,
+each of them says whether its joint is there. Where they scatter by as much as the tolerance, an arm that stands still
+at its goal would leave it several times a second; then what counts is the mean of a joint and how far it swings, over
+each stretch of the dwell time, without what the scatter alone explains.
 """
 
 import math
@@ -12,6 +12,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+TOLERANCE = 1.0
+"""Within so much [degrees] a joint is at its goal, unless it is said otherwise."""
+DWELL = 0.3
+"""For how long [s] it stays there at least to have settled."""
 _DIFFERENCES = 4  # of readings, to which motion of up to a few Hz adds little: 1, -4, 6, -4, 1 ...
 _SHARE = math.comb(2 * _DIFFERENCES, _DIFFERENCES)  # ... and independent noise so many times its variance
 _SCATTERED = 0.25  # of the tolerance; with more scatter, single readings are off by all of it now and then
@@ -19,7 +23,9 @@ _FARTHEST = 3.0  # standard deviations by which a single reading may be farther 
 _DOUBT = 1.0  # standard errors by which means and swings of scattered readings may be too large
 
 
-def settled_at(times: NDArray[np.float64], off: NDArray[np.float64], tolerance: float, dwell: float) -> float | None:
+def settled_at(
+    times: NDArray[np.float64], off: NDArray[np.float64], tolerance: float = TOLERANCE, dwell: float = DWELL
+) -> float | None:
     """Return the first of the ``times`` from which on all joints stay within the ``tolerance``.
 
     Args:

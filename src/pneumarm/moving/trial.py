@@ -11,6 +11,7 @@ from pneumarm.arm import Arm, guarded
 from pneumarm.arm.controller import TrackingController
 from pneumarm.arm.reference import Reference
 from pneumarm.moving.movement import Moved, MoveSettings, Tracked, move, track
+from pneumarm.moving.settling import TOLERANCE
 from pneumarm.settings import Settings, Valid
 from pneumarm.statistics import wilson
 from pneumarm.transitions.goals import Goals
@@ -24,7 +25,7 @@ class MoveTrialSettings(Settings):
     """Goals that are moved to, one after the other, drawn uniformly; 0 for none."""
     hold: float = 3.0
     """For how long each is held, from when it is given [s]."""
-    tolerance: float = 1.0
+    tolerance: float = TOLERANCE
     """A joint is there within so much [degrees]."""
     frequencies: tuple[float, ...] = (0.25, 0.5, 1.0)
     """Of the sinusoids that are followed [Hz]."""

@@ -26,7 +26,7 @@ from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
 from pneumarm.learning.agents import goals_of
 from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.commands import shortest_share
-from pneumarm.moving.movement import MoveSettings, played
+from pneumarm.moving.movement import played
 from pneumarm.moving.settling import settled_at
 from pneumarm.planning.refine import Wanted, refined
 from pneumarm.settings import Settings, Valid
@@ -123,7 +123,7 @@ def _settling(errors: list[Array], period: float, last: int, tolerance: float) -
     """Return the figures of movements with ``errors`` (steps, joints) in tolerances, one a period."""
     sizes = [np.abs(error).max(axis=1) for error in errors]
     times = [period * np.arange(1, len(one) + 1, dtype=np.float64) for one in errors]
-    found = [settled_at(*one, 1.0, MoveSettings.dwell) for one in zip(times, errors, strict=True)]
+    found = [settled_at(*one, 1.0) for one in zip(times, errors, strict=True)]
     settled = [time for time in found if time is not None]
     return {
         "settled": len(settled) / len(errors),

@@ -21,6 +21,7 @@ from pneumarm.planning.agent import simulation_of_valves
 class PlannedServo(SimulationAgent):
     """A simulation that is planned in."""
 
+    settles = True
     settings: ServoSettings = field(default_factory=lambda: ServoSettings(coarse=0.0))
     """Tolerances and prices."""
 

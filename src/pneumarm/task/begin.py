@@ -141,6 +141,18 @@ def draw_interval(domain, weights, goal, deviation, random):  # type: ignore[no-
 
 
 @part(entry=True)
+def draw_goal_near(goal_range, weights, angle, deviation, random, goal):  # type: ignore[no-untyped-def]
+    """Put a goal near to where the arm stands, at ``angle`` (joints,), into ``goal`` (joints,) (section 4.3.3).
+
+    It lies in ``goal_range`` (joints, 2) and, if the arm does, within ``deviation``, all in [counts].
+    """
+    for joint in range(goal.shape[0]):
+        here = min(max(angle[joint], goal_range[joint, 0]), goal_range[joint, 1])
+        first, last = draw_interval(goal_range[joint], weights, here, deviation, random)
+        goal[joint] = first + (last - first) * uniform(random)
+
+
+@part(entry=True)
 def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
     """Return the index of a begin state for ``goal`` (joints,) within ``deviation`` [counts].
 

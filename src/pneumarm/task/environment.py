@@ -25,7 +25,7 @@ from pneumarm.simulation.kernel import (
 from pneumarm.simulation.noise import NoiseParameters, noise_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginParameters, BeginStates, begin_parameters, draw_begin
-from pneumarm.task.reward import RewardParameters, is_near, is_slow, is_switch, paid
+from pneumarm.task.reward import RewardParameters, has_reached, is_switch, paid
 from pneumarm.task.settings import TaskSettings
 
 _TRIES = 100  # draws until a goal is taken whatever it is
@@ -208,9 +208,7 @@ def velocity(task, episode, joint):  # type: ignore[no-untyped-def]
 @part
 def at_goal(task, episode, joint):  # type: ignore[no-untyped-def]
     """Return whether ``joint`` is at its goal and slow (thesis eq. 5.1, 5.2)."""
-    if not is_near(task.reward, angle(task, episode, joint), episode.goal[joint]):
-        return False
-    return is_slow(task.reward, velocity(task, episode, joint))
+    return has_reached(task.reward, angle(task, episode, joint), velocity(task, episode, joint), episode.goal[joint])
 
 
 @part(entry=True)

@@ -1,8 +1,7 @@
 """When a goal is reached, what a switch is, and what is paid for an action (thesis sections 4.2.1, 5.1 and 5.4.1).
 
 The rules are the functions at the end of this module. Loops are compiled from them, and Python calls them as they
-are: they take a :class:`Reward` or its :class:`RewardParameters` alike. A goal is reached where all joints are near
-to it and slow.
+are: they take a :class:`Reward` or its :class:`RewardParameters` alike.
 """
 
 import math
@@ -67,8 +66,8 @@ class Reward(Settings):
 
     def reached(self, angle: ArrayLike, velocity: ArrayLike, goal: ArrayLike) -> bool:
         """Return whether all joints are at their goals; all arguments (joints,) in [counts], [counts/ms]."""
-        near = is_near.py_func(self, np.asarray(angle), np.asarray(goal))
-        return bool(near.all() and is_slow.py_func(self, np.asarray(velocity)).all())
+        joints = np.asarray(angle), np.asarray(velocity), np.asarray(goal)
+        return bool(has_reached.py_func(self, *joints).all())
 
     def of(self, reached: bool, switched: ArrayLike) -> NDArray[np.float64]:
         """Return what each joint is paid for an action (joints,), ``switched`` being whether it was a switch."""
@@ -77,15 +76,12 @@ class Reward(Settings):
 
 
 @part(entry=True)
-def is_near(reward, angle, goal):  # type: ignore[no-untyped-def]
-    """Return whether a joint is at its ``goal`` (thesis eq. 5.1)."""
-    return abs(angle - goal) <= reward.angle_tolerance
+def has_reached(reward, angle, velocity, goal):  # type: ignore[no-untyped-def]
+    """Return whether a joint has reached its ``goal``: it is near to it and slow (thesis eq. 5.1, 5.2).
 
-
-@part(entry=True)
-def is_slow(reward, velocity):  # type: ignore[no-untyped-def]
-    """Return whether a joint is slow enough to have reached a goal that it is at (thesis eq. 5.2)."""
-    return abs(velocity) <= reward.velocity_tolerance
+    A movement has when all joints have at a reading after at least one action.
+    """
+    return (abs(angle - goal) <= reward.angle_tolerance) & (abs(velocity) <= reward.velocity_tolerance)
 
 
 @part(entry=True)

@@ -31,8 +31,7 @@ from pneumarm.arm.controller import Controller
 from pneumarm.arm.counts import Counts
 from pneumarm.arm.cycle import BeginState, ControlCycle, Step
 from pneumarm.arm.guard import GuardedArm, Interventions, guarded
-from pneumarm.arm.seam import Arm, ArmSpec, Reading
-from pneumarm.arm.valves import Command
+from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.settings import Settings, Valid
 from pneumarm.transitions.doubtful import with_doubtful_marked
@@ -40,7 +39,7 @@ from pneumarm.transitions.fill_times import FillTimes, find_fill_times
 from pneumarm.transitions.players import Trajectory
 from pneumarm.transitions.rows import Recorded, broken_off, joinable
 from pneumarm.transitions.store import Store
-from pneumarm.transitions.watch import MOST_SPOILED, Patience, Watch, keep_watch, warm_up, watched
+from pneumarm.transitions.watch import MOST_SPOILED, Patience, Watch, act_until, keep_watch, warm_up
 
 KINDS = ("zero-velocity", "velocity", "pulses", "sparse", "controller")
 """Kinds of the sequences made here."""
@@ -362,9 +361,6 @@ class _Collection:
         actions = self._settings.actions or 0
         remaining = iter(range(actions if most is None else min(actions, most)))
 
-        def decide(reading: Reading) -> Command | None:
-            return None if next(remaining, None) is None else actor.act(reading)
-
         def broken(steps: list[Step], why: BaseException) -> None:
             recorded = broken_off(steps, arm.spec, why, kind=kind, at_rest=True, info=info)
             self._tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start if steps else 0.0)
@@ -372,9 +368,18 @@ class _Collection:
                 with suppress(Exception):  # the first failure is the one to tell of
                     self._keep(recorded, whole=False)
 
-        steps = watched(cycle.run(decide), self._watch, at_rest=True, broken=broken)
-        self._tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start)
-        self._keep(Recorded.from_steps(steps, arm.spec, kind=kind, at_rest=True, info=info), whole=True)
+        made = act_until(
+            cycle,
+            actor,
+            lambda reading: next(remaining, None) is None,
+            kind=kind,
+            at_rest=True,
+            info=info,
+            watch=self._watch,
+            broken=broken,
+        )
+        self._tally.add(arm, Counts.now(cycle) - before, float(made.time[-1]) - start)
+        self._keep(made, whole=True)
 
     def _actor(self, random: np.random.Generator, end: "End | None") -> tuple[str, Controller, Mapping[str, object]]:
         """Return the kind of the next sequence, what acts in it, and what else is kept with it."""

@@ -1,13 +1,14 @@
-"""What watches an arm while it is recorded, and marks what nothing may be learned from."""
+"""The loop of a movement, and what watches an arm meanwhile and marks what nothing may be learned from."""
 
 import copy
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Mapping
 from contextlib import closing
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from pneumarm.arm.cycle import Step
+from pneumarm.arm.controller import Controller
+from pneumarm.arm.cycle import ControlCycle, Step
 from pneumarm.arm.seam import ArmSpec, Reading, with_measured
 from pneumarm.arm.valves import Command
 from pneumarm.errors import ArmFailure
@@ -69,34 +70,52 @@ class Patience:
             )
 
 
-def watched(
-    steps: Generator[Step, None, None],
-    watch: Watch | None,
+def act_until(
+    cycle: ControlCycle,
+    controller: Controller,
+    is_over: Callable[[Reading], bool],
     *,
+    kind: str,
     at_rest: bool,
+    info: Mapping[str, Any] | None = None,
+    watch: Watch | None = None,
     keep: Callable[[Step], None] | None = None,
     broken: Callable[[list[Step], BaseException], None] | None = None,
-) -> list[Step]:
-    """Return all ``steps`` of a control cycle, each given to ``keep`` and seen by ``watch`` as it happens.
+) -> Recorded:
+    """Let ``controller`` act, turn by turn, and return all that was read and applied: the loop of every movement.
 
-    ``broken`` is given the steps that there were where the cycle breaks off, and why, before that is raised.
+    Args:
+        cycle: the control cycle of the arm.
+        controller: what acts, after it was given its goal.
+        is_over: told every reading before the controller; where it is, the valves are closed and that was the last.
+        kind: of the sequence that is returned.
+        at_rest: whether the arm stood still with closed valves before.
+        info: kept with the sequence.
+        watch: sees every turn as it happens ...
+        keep: ... after this was given it.
+        broken: given the turns that there were where the cycle breaks off, and why, before that is raised.
+
     """
+
+    def decide(reading: Reading) -> Command | None:
+        return None if is_over(reading) else controller.act(reading)
+
     if watch is not None:
         watch.begin(at_rest=at_rest)
-    seen: list[Step] = []
+    steps: list[Step] = []
     try:
-        with closing(steps):  # the valves are closed now, and not when the traceback is forgotten
-            for step in steps:
+        with closing(cycle.run(decide)) as turns:  # the valves are closed now, not when the traceback is forgotten
+            for step in turns:
                 if keep is not None:
                     keep(step)
                 if watch is not None:
                     watch.see(step.reading, step.valves)
-                seen.append(step)
+                steps.append(step)
     except BaseException as error:
         if broken is not None:
-            broken(seen, error)
+            broken(steps, error)
         raise
-    return seen
+    return Recorded.from_steps(steps, cycle.arm.spec, kind=kind, at_rest=at_rest, info=info)
 
 
 def warm_up(watch: Watch, spec: ArmSpec) -> None:

@@ -33,7 +33,7 @@ from pneumarm.simulation.kernel import INPUT_BLOCK, UNIT_BLOCK, padded, places
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.task.environment import begin_episode, take
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
-from pneumarm.task.reward import RewardParameters, is_near, is_slow, paid
+from pneumarm.task.reward import RewardParameters, has_reached, paid
 from pneumarm.transitions.window import Window
 from pneumarm.vectors import LANES
 
@@ -174,7 +174,7 @@ def arrive(levels, plan, x):  # type: ignore[no-untyped-def]
     for joint in range(plan.aim.shape[0]):
         angle = levels.unit[joint, 0] + levels.unit[joint, 1] * x[4 * joint]
         velocity = levels.unit[joint, 2] + levels.unit[joint, 3] * x[4 * joint + 1]
-        is_there = is_near(levels.reward, angle, plan.aim[joint]) and is_slow(levels.reward, velocity)
+        is_there = has_reached(levels.reward, angle, velocity, plan.aim[joint])
         plan.low.there[joint] = is_there
         are_all = are_all and is_there
     return are_all

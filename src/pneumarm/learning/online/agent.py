@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
+from pneumarm.learning.agents import ReachesGoals
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.learning.online.testing import run_test
 from pneumarm.learning.online.values import Networks, network_shapes, pack, unpack
@@ -36,7 +37,7 @@ class AgentHeader(msgspec.Struct, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True)
-class Agent:
+class Agent(ReachesGoals):
     """Action values by state, goal and action, and how they were learned."""
 
     spec: ArmSpec

@@ -17,7 +17,7 @@ from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import action_values, forget_traces, learner
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import places
-from pneumarm.task.reward import is_near, is_slow
+from pneumarm.task.reward import has_reached
 from pneumarm.task.tracker import scaled_goal
 
 _SAVED = ("weights", "traces", "traced", "random", "x", "chosen", "next_chosen", "next_actions", "next_values", "cut")
@@ -121,8 +121,7 @@ class OnlineLearner:
         seen = window.of_joints(state[: window.observation_size]) * scale + offset
         goal = self._x[self._places.goal : self._places.one] * scale[:, 0] + offset[:, 0]
         reward = self._agent.settings.reward.on(self._agent.spec)
-        near, slow = is_near.py_func(reward, seen[:, 0], goal), is_slow.py_func(reward, seen[:, 1])
-        there: NDArray[np.bool_] = near & slow
+        there: NDArray[np.bool_] = has_reached.py_func(reward, seen[:, 0], seen[:, 1], goal)
         return there
 
     @property

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.actor import ServoActor
@@ -20,7 +19,7 @@ from pneumarm.networks.layers import trainable
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
-from pneumarm.task.movements import Movements
+from pneumarm.task.movements import Movement, Movements
 
 KIND = "pneumarm servo"
 _PAST_THE_LIMIT = 0.2  # share of the gradient, see ServoTask
@@ -32,6 +31,7 @@ class ServoAgent(NetworkAgent):
 
     kind = KIND
     settings_type = ServoSettings
+    settles = True
 
     settings: ServoSettings
 
@@ -53,10 +53,10 @@ class ServoAgent(NetworkAgent):
         """Return the servo with what its controller has learned of the joints of its arm."""
         return replace(self, settings=replace(self.settings, ways=ways))
 
-    def worth(self, angle: NDArray[np.float64], goal: NDArray[np.float64]) -> float:
-        """Return minus the mean price of the errors from ``goal`` (joints,) at ``angle`` (n, joints) [counts]."""
+    def worth(self, movement: Movement) -> float:
+        """Return minus the mean price of the errors after the first reading."""
         tolerance = self.settings.tolerance * self.spec.counts_per_degree
-        paid = prices_of_errors(self.task.prices, (angle - goal) / tolerance)
+        paid = prices_of_errors(self.task.prices, (movement.recorded.angle[1:] - movement.goal) / tolerance)
         return -float(paid.sum(axis=1).mean())
 
     def actor(self) -> ServoActor:

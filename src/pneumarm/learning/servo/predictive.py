@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import kernel, part
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import (
     ServoTask,
@@ -34,7 +34,9 @@ from pneumarm.learning.servo.settings import USUAL_PERIOD
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import step_all
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.changes import changes
 
+_changes = part(changes)
 _HORIZON = 0.55  # s
 PLANS = 8
 """Plans that are made better side by side: as many as go into one vector instruction."""
@@ -114,8 +116,7 @@ def price(task, plans, tape):  # type: ignore[no-untyped-def]
         for c in range(commanded):
             for e in range(cost.shape[0]):
                 now = tape.x[t, first + c, e]
-                opened, found = np.sign(now), np.trunc(tape.x[t, first - lag + c, e]) if lag else _ZERO
-                cost[e] += change * ((opened != found) + (np.trunc(now) != opened))
+                cost[e] += change * _changes(now, tape.x[t, first - lag + c, e] if lag else _ZERO)
 
 
 @kernel(fastmath=FASTMATH)

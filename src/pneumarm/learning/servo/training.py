@@ -22,6 +22,7 @@ from pneumarm.learning.training import Learner, Training, identity_of, train_sid
 from pneumarm.networks.layers import adam, initial_weights, split, trainable
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
+from pneumarm.task.changes import valve_changes
 from pneumarm.task.environment import environment
 from pneumarm.task.movements import Movements, movements
 
@@ -223,11 +224,7 @@ class ServoLearner(Learner[ServoAgent]):
         window = self.simulation.window
         first = window.state_size
         command = self.tape.x[:-1, first : first + window.command_size]
-        opened = np.sign(command)
-        left = np.where(np.abs(command) >= 1, opened, 0)
-        found = np.concatenate([np.zeros_like(left[:1]), left[:-1]])
-        changes = (opened != found).sum(axis=0) + (left != opened).sum(axis=0)
-        return changes.reshape(window.joints, 2, -1).sum(axis=1)
+        return valve_changes(command).reshape(window.joints, 2, -1).sum(axis=1)
 
     def _prepare(self, random: np.random.Generator, fresh: NDArray[np.bool_]) -> None:
         """Put states, noise, references and previews of the next movements on the tape; ``fresh`` begin at rest."""

@@ -13,6 +13,7 @@ from pneumarm.report.drawn_arm import DrawnArm
 from pneumarm.report.figures.arm import ArmPicture
 from pneumarm.report.moving_arm import Shown
 from pneumarm.report.style import Described, key, legend_below, of_joint, styled
+from pneumarm.task.changes import valve_changes
 
 Array = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ def _in_words(shown: Shown, end: float | None) -> str:
     reached = "" if end is None else f"; the goal is reached after {end:.2f} s"
     if shown.command is not None:
         moving = shown.command[shown.time < (np.inf if end is None else end)]
-        reached += f"; the valves change {int((np.diff(moving, axis=0) != 0).any(axis=(1, 2)).sum())} times"
+        reached += f", with {int(valve_changes(moving).sum())} valve changes"
     return f"On the way {'; '.join(words)}{reached}."
 
 

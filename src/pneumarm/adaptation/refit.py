@@ -32,14 +32,16 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.adaptation.change import error_squares
 from pneumarm.arm.valves import VALVES
 from pneumarm.networks import LevenbergMarquardt, Network, gradient_descent, levenberg_marquardt
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, Settings
 from pneumarm.simulation.fit import FitSettings, fitted_on
 from pneumarm.simulation.quality import residue
 from pneumarm.simulation.simulation import Simulation
@@ -58,37 +60,24 @@ _REHEARSED_STEPS = 20  # of a rehearsed movement; the policy's take about ten
 class RefitSettings(Settings):
     """How a simulation is fitted further."""
 
-    newest: int = 400
+    newest: Annotated[int, Meta(ge=2)] = 400
     """Movements that it is fitted to, the newest ones since the arm changed."""
-    folds: int = 4
+    folds: Annotated[int, Meta(ge=2)] = 4
     """Parts of these, each predicted by a fit to the others to judge it."""
-    gain: float = 0.05
+    gain: Annotated[float, Meta(ge=0, lt=1)] = 0.05
     """Part by which the mean squared errors must be lower, as a mean over the quantities predicted."""
-    certainty: float = 2.0
+    certainty: NonNegativeFloat = 2.0
     """Standard errors, over movements, by which they must be lower by more than that."""
-    ridge: float = 10.0
+    ridge: PositiveFloat = 10.0
     """Weight of what the output weights were, in transitions."""
-    anchor: float = 300.0
+    anchor: NonNegativeFloat = 300.0
     """Weight of what all weights were after that, in transitions."""
-    rehearsed: float = 0.5
+    rehearsed: NonNegativeFloat = 0.5
     """Rehearsed transitions for each of the arm's."""
-    fewest_rehearsed: int = 1000
+    fewest_rehearsed: NonNegativeInt = 1000
     """Fewest of these."""
-    epochs: int = 10
+    epochs: PositiveInt = 10
     """Epochs of Levenberg-Marquardt."""
-
-    def _valid(self) -> Valid:
-        return {
-            "newest": self.newest >= 2,
-            "folds": self.folds >= 2,
-            "gain": 0 <= self.gain < 1,
-            "certainty": 0 <= self.certainty < math.inf,
-            "ridge": 0 < self.ridge < math.inf,
-            "anchor": 0 <= self.anchor < math.inf,
-            "rehearsed": 0 <= self.rehearsed < math.inf,
-            "fewest_rehearsed": self.fewest_rehearsed >= 0,
-            "epochs": self.epochs >= 1,
-        }
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from pneumarm.control.movement import drawn, make_movements
 from pneumarm.errors import UnusableInput
 from pneumarm.planning.planner import Planner, physics_planner, simulated_planner
 from pneumarm.planning.search import PlanSettings
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveInt, Settings
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.statistics import FEWEST, mean_estimate
 from pneumarm.task import Reward, TaskSettings
@@ -37,13 +37,10 @@ RANGE_TRANSITIONS = 20_000
 class BoundSettings(Settings):
     """How the bound of an arm is measured."""
 
-    episodes: int = 500
+    episodes: PositiveInt = 500
     """Movements of each planner; at least 500 for figures to be compared."""
     plan: PlanSettings = field(default_factory=PlanSettings)
     """Which plans are considered."""
-
-    def _valid(self) -> Valid:
-        return {"episodes": self.episodes >= 1 or "1 or more movements"}
 
 
 @dataclass(frozen=True)

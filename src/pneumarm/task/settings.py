@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveInt, Settings
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.task.reward import Reward
 
@@ -13,7 +13,7 @@ class TaskSettings(Settings):
 
     reward: Reward = field(default_factory=Reward)
     """What is paid for an action, and when a goal is reached."""
-    cutoff: int = 100
+    cutoff: PositiveInt = 100
     """Actions after which a movement that has not reached its goal is cut off (thesis section 5.4.2: 100)."""
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     """Noise on the predictions of a simulation in which movements are made."""
@@ -22,6 +22,3 @@ class TaskSettings(Settings):
     def begin_weights(self) -> tuple[float, ...]:
         """Weights of the sub-intervals of begin states on each side of the goal, the farthest first."""
         return (1.0,)
-
-    def _valid(self) -> Valid:
-        return {"cutoff": self.cutoff >= 1}

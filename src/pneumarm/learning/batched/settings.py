@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from pneumarm.learning.fleet import FleetSettings
 from pneumarm.learning.online.settings import Exploration, TrainSettings
-from pneumarm.settings import Valid
+from pneumarm.settings import Units
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class BatchedSettings(FleetSettings):
     """lambda (thesis: 0)."""
     largest_gradient: float = 1.0
     """Longer gradients are cut to this length."""
-    hidden: int = 10
+    hidden: Units = 10
     """Hidden units of each network (thesis: 5)."""
     first_exploration: BatchedExploration = field(default_factory=BatchedExploration)
     """At the start; goes linearly to the last."""
@@ -60,6 +60,3 @@ class BatchedSettings(FleetSettings):
             shaping=None,
             noise=self.noise,
         )
-
-    def _valid(self) -> Valid:
-        return {"hidden": 1 <= self.hidden <= 1024}

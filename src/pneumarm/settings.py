@@ -2,7 +2,7 @@
 
 import math
 import operator
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from reprlib import repr as shortened
 from types import NoneType, UnionType
@@ -77,7 +77,7 @@ def validate(settings: object) -> None:
             raise UnusableInput(f"{type(settings).__name__}: {name} cannot be {value}; {expected}")
 
 
-def _found(settings: object) -> Iterator[tuple[str, bool | str]]:
+def _found(settings: Any) -> Iterator[tuple[str, bool | str]]:
     """Yield each field with True or what is expected: first by its type, then by ``_valid``, that of bases first."""
     for name, kind in _types(type(settings)).items():
         yield name, _expected(getattr(settings, name), kind) or True
@@ -87,7 +87,7 @@ def _found(settings: object) -> Iterator[tuple[str, bool | str]]:
 
 
 @cache
-def _types(kind: Hashable) -> Mapping[str, Any]:
+def _types(kind: type) -> Mapping[str, Any]:
     return get_type_hints(kind, include_extras=True)
 
 

@@ -10,9 +10,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from types import TracebackType
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
@@ -34,7 +35,7 @@ class Sensor(Settings):
     """What it measures: tangential acceleration of a joint's link [m/s2], or temperature of a muscle [Celsius]."""
     joint: PositiveInt = 1
     """Joint that it is at, from 1."""
-    muscle: Literal[1, 2] | None = None
+    muscle: Annotated[int, Meta(ge=1, le=2)] | None = None
     """Muscle that a thermometer is at, 1 or 2; None for an accelerometer."""
     channel: PositiveInt | None = None
     """The board's extra channel that it is wired to, from 1; None where there is no board between."""
@@ -105,7 +106,7 @@ class ArmSpec(Settings):
     (thesis sections 5.1 and 7.3)."""
     sensors: tuple[Sensor, ...] = ()
     """Further sensors whose readings it carries, no two in one place or on one channel (thesis appendix A)."""
-    muscles: Literal[1, 2] = 2
+    muscles: Annotated[int, Meta(ge=1, le=2)] = 2
     """Muscles of each joint. 1: a spring or a weight pulls against it, towards lower angles. Valves of the second are
     then never opened, and its pressure is 0 behind the guard, whatever the arm says."""
     latency: NonNegativeFloat = 0.0

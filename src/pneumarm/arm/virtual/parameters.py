@@ -7,7 +7,7 @@ absolute; "free air" is a volume of air at 100 kPa and 20 degrees Celsius (ISO 8
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta
 
@@ -204,7 +204,7 @@ class SensorParameters(Settings):
     """Standard deviation of one conversion of a pressure [counts]."""
     noise_limit: NonNegativeFloat = 4.0
     """The noise never exceeds this [counts] (thesis A.1.3)."""
-    conversions: Literal[1, 5, 7, 9] = 5
+    conversions: int = 5
     """Conversions of which the median is read: 1, 5, 7 or 9 (thesis A.1.3; its default is not said)."""
     wear: NonNegativeFloat = 0.0
     """Height of the highest bump that wear has made in the potentiometer's track [counts] (thesis A.1.2)."""
@@ -212,6 +212,9 @@ class SensorParameters(Settings):
     """Chance that the worn potentiometer loses contact during a reading, which then is 0."""
     wear_seed: NonNegativeInt = 0
     """Where the bumps are."""
+
+    def _valid(self) -> Valid:
+        return {"conversions": self.conversions in (1, 5, 7, 9) or "1, 5, 7 or 9"}
 
     @property
     def highest(self) -> float:

@@ -91,19 +91,23 @@ class RunSettings(LearnSettings):
     arm: str = "virtual"
     """virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable."""
     seed: int = 0
-    """Of everything that is drawn at random."""
+    """Random seed."""
     joints: int | None = None
-    """Joints that the arm has, for an arm that is to be refused with others; the arm knows."""
+    """Expected number of joints; others are refused."""
     transitions: Annotated[int, Meta(ge=FEWEST_TRANSITIONS)] | None = None
-    """How many to collect (thesis section 3.2.2: 200,000, two hours); by default until more would not help."""
+    """How many to collect; by default until enough.
+
+    The thesis collected 200,000, in two hours (section 3.2.2). By default until more would not help."""
     enough: EnoughSettings = field(default_factory=EnoughSettings)
     """When more would not help."""
     test_episodes: PositiveInt = 10_000
     """Movements of the test in simulation (thesis section 5.2)."""
     bound_episodes: NonNegativeInt | None = None
-    """Movements to reach goals that are planned with the true physics, which say what can be achieved; 0 for none. By
-    default 40 for agents that are to reach goals, else none. Virtual arms only; for each joint more an eighth of
-    them, because a plan for two takes ten times as long."""
+    """Movements to goals that are planned, as a bound.
+
+    They are planned with the true physics of a virtual arm and say what can be achieved; 0 for none. By default 40
+    for agents that are to reach goals, else none; for each joint more an eighth of them, because a plan for two takes
+    ten times as long."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     transfer: RunTransferSettings = field(default_factory=RunTransferSettings)

@@ -4,10 +4,12 @@ import math
 import operator
 from collections.abc import Iterator, Mapping
 from functools import cache
+from inspect import get_annotations
 from reprlib import repr as shortened
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin, get_type_hints
 
+from cyclopts import Parameter
 from msgspec import Meta
 
 from pneumarm.errors import UnusableInput
@@ -21,6 +23,8 @@ Units: TypeAlias = Annotated[int, Meta(ge=1, le=1024)]
 """Hidden units of a layer."""
 Layers: TypeAlias = Annotated[tuple[Units, ...], Meta(min_length=1, max_length=8)]
 """Hidden units of each layer of a network."""
+PythonOnly = Parameter(parse=False)
+"""Marks a field that is no option of commands, as ``Annotated[PositiveFloat, PythonOnly]``."""
 
 Valid = Mapping[str, bool | str]
 """By field True where its value is valid; otherwise what is expected in its place, or False."""
@@ -79,7 +83,7 @@ def validate(settings: object) -> None:
 
 def _found(settings: Any) -> Iterator[tuple[str, bool | str]]:
     """Yield each field with True or what is expected: first by its type, then by ``_valid``, that of bases first."""
-    for name, kind in _types(type(settings)).items():
+    for name, kind in _types(type(settings)):  # type: ignore[arg-type]
         yield name, _expected(getattr(settings, name), kind) or True
     for base in reversed(type(settings).__mro__):
         if "_valid" in vars(base):
@@ -87,8 +91,13 @@ def _found(settings: Any) -> Iterator[tuple[str, bool | str]]:
 
 
 @cache
-def _types(kind: type) -> Mapping[str, Any]:
-    return get_type_hints(kind, include_extras=True)
+def _types(kind: type) -> list[tuple[str, Any]]:
+    """Return the fields of ``kind`` with their types, those of its bases first, also where it names them again."""
+    return [
+        (name, get_type_hints(base, include_extras=True)[name])
+        for base in reversed(kind.__mro__)
+        for name in get_annotations(base)
+    ]
 
 
 def _expected(value: Any, kind: Any) -> str | None:

@@ -25,7 +25,7 @@ from pneumarm.files import make_folder
 from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, Tracks, fingerprint, goals_of
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.settling import settled_at
-from pneumarm.settings import NonNegativeInt, PositiveInt, Settings, Share
+from pneumarm.settings import NonNegativeInt, PositiveInt, PythonOnly, Settings, Share
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import KINDS, Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
@@ -62,7 +62,7 @@ class TransferSettings(Settings):
     The movement is counted up to where the goal is reached, and the agent adapts to all of it."""
     adaptation: AdaptationSettings = field(default_factory=AdaptationSettings)
     """How a policy adapts between movements; with a learning rate of 0 it does not."""
-    close_while_computing: bool = False
+    close_while_computing: Annotated[bool, PythonOnly] = False
     """Close the valves between reading and acting (thesis figure 2.8: left as they are)."""
 
     def movements(self, phase: Phase) -> int:

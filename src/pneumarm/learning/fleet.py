@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pneumarm.learning.training import Learner, Progress, Training, identity_of, train_side_by_side
 from pneumarm.networks.layers import Trainable
-from pneumarm.settings import PositiveFloat, PositiveInt, Share
+from pneumarm.settings import PositiveFloat, PositiveInt, PythonOnly, Share
 from pneumarm.task.environment import Environment
 from pneumarm.task.fleet import Fleet
 from pneumarm.task.settings import TaskSettings
@@ -45,11 +45,11 @@ class FleetSettings(TaskSettings):
     """gamma (thesis: 0.98)."""
     trace_decay: Share = 0.95
     """lambda (thesis: 0)."""
-    largest_gradient: PositiveFloat = 0.5
+    largest_gradient: Annotated[PositiveFloat, PythonOnly] = 0.5
     """Longer gradients are cut to this length."""
-    return_scale: PositiveFloat = 50.0
+    return_scale: Annotated[PositiveFloat, PythonOnly] = 50.0
     """Return that a network's output of 1 stands for."""
-    validation_episodes: PositiveInt = 2_000
+    validation_episodes: Annotated[PositiveInt, PythonOnly] = 2_000
     """Greedy episodes, without lookahead, on which the best agent is chosen."""
 
 

@@ -16,7 +16,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.settings import PositiveFloat, Settings, Valid
+from pneumarm.settings import PositiveFloat, PythonOnly, Settings, Valid
 from pneumarm.simulation.fit import SINGLE_STEPS, FitResult, fit
 from pneumarm.transitions.choice import Stretched, choose_held_out
 from pneumarm.transitions.collect import CollectResult
@@ -98,10 +98,10 @@ class Enough:
 class EnoughSettings(Settings):
     """When collecting ends by itself."""
 
-    first: PositiveFloat = FEWEST_JUDGED / 30
+    first: Annotated[PositiveFloat, PythonOnly] = FEWEST_JUDGED / 30
     """Seconds of sequences after which it is first judged whether they are enough, because an arm that is read
     oftener moves no more; no fewer transitions than can be judged."""
-    growth: Annotated[float, Meta(ge=1.1, le=10)] = 1.5
+    growth: Annotated[float, Meta(ge=1.1, le=10), PythonOnly] = 1.5
     """Factor by which the record grows from then on until it is judged again."""
     most: float = 600.0
     """At which collecting ends all the same, for each joint, in seconds on the arm's clock; those between sequences

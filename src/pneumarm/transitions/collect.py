@@ -35,7 +35,7 @@ from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, ArmSpec, Reading
 from pneumarm.arm.valves import Command
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.settings import PositiveInt, Settings, Share
+from pneumarm.settings import PositiveInt, PythonOnly, Settings, Share
 from pneumarm.transitions.doubtful import with_doubtful_marked
 from pneumarm.transitions.fill_times import FillTimes, find_fill_times
 from pneumarm.transitions.players import Trajectory
@@ -120,10 +120,10 @@ class CollectSettings(Settings):
     """Share of the sequences that begin at an end of the range (the thesis: 0): one muscle of each joint is full, the
     other empty. Both lean further than in the others, in turn to stay there and to go over to the other end. With
     0.25 goals lie wherever the arm can be, which takes longer to learn well."""
-    begin: CollectBegin | None = None
+    begin: Annotated[CollectBegin | None, PythonOnly] = None
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5); by
     default by times that this arm's muscles take to fill and to empty."""
-    close_while_computing: bool = False
+    close_while_computing: Annotated[bool, PythonOnly] = False
     """Whether the valves are closed between reading and acting (thesis figure 2.8)."""
 
     def for_period(self, period: float) -> Self:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from pneumarm.settings import NonNegativeFloat, PositiveFloat, PositiveInt, Settings, Share, Units, Valid
+from pneumarm.settings import NonNegativeFloat, PositiveFloat, PositiveInt, PythonOnly, Settings, Share, Units, Valid
 from pneumarm.task.settings import TaskSettings
 
 Method = Literal["sarsa", "q-learning"]
@@ -63,7 +63,7 @@ class Shaping(Settings):
 class TrainSettings(TaskSettings):
     """Everything that decides a training phase, besides the simulation, the begin states and the seed."""
 
-    method: Method = "sarsa"
+    method: Annotated[Method, PythonOnly] = "sarsa"
     """Which action value is the target: the next one taken (eq. 4.9) or the highest (eq. 4.10) (thesis: SARSA)."""
     team: Team = "common"
     """Who acts for several joints: an agent a joint, each paid when all are at their goals (common) or when its own
@@ -78,9 +78,9 @@ class TrainSettings(TaskSettings):
     """gamma (thesis: 0.98)."""
     agents: Annotated[int, Meta(ge=1, le=4096)] = 16
     """Agents trained at once from different weights, of which the best is kept (section 5.4.2: they decide most)."""
-    initial_weight: PositiveFloat = 0.3
+    initial_weight: Annotated[PositiveFloat, PythonOnly] = 0.3
     """Initial weights are uniform between this and its negative (thesis: 0.3)."""
-    return_scale: PositiveFloat = 50.0
+    return_scale: Annotated[PositiveFloat, PythonOnly] = 50.0
     """Return that a network's output of 1 stands for (thesis: outputs are normalised; returns are about -50..50)."""
     max_episodes: PositiveInt = 50_000
     """Episodes after which training ends although the criterion is not met (thesis: the longest is 50,000)."""
@@ -90,7 +90,7 @@ class TrainSettings(TaskSettings):
     """Greedy episodes on which the best agent is chosen."""
     exploration: Exploration = field(default_factory=Exploration)
     """Exploration at the end of shaping, or all the time without shaping."""
-    shaping: Shaping | None = field(default_factory=Shaping)
+    shaping: Annotated[Shaping | None, PythonOnly] = field(default_factory=Shaping)
     """Shaping, or None: then all begin states from the first episode on."""
 
     @property

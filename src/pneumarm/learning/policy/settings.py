@@ -6,7 +6,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from pneumarm.learning.fleet import FleetSettings
-from pneumarm.settings import Layers, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, Share
+from pneumarm.settings import Layers, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, PythonOnly, Share
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,11 @@ class PolicySettings(FleetSettings):
     """Price of being certain, in standard deviations of the advantage."""
     hold: float = 3.0
     """Bonus, on its logit, of the action that is being held: a first guess at what switches cost."""
-    squash: Annotated[tuple[PositiveFloat, ...], Meta(max_length=16)] = (25.0, 100.0)
+    squash: Annotated[tuple[PositiveFloat, ...], Meta(max_length=16), PythonOnly] = (25.0, 100.0)
     """Errors of the angle at which the inputs that tell them bend, finely and coarsely [counts of the thesis']."""
-    still: NonNegativeFloat = 2.5
+    still: Annotated[NonNegativeFloat, PythonOnly] = 2.5
     """Changes of angle and pressures up to this count as none [counts of the thesis' sensors]."""
-    patience: NonNegativeInt = 2
+    patience: Annotated[NonNegativeInt, PythonOnly] = 2
     """Steps without change, off the goal, after which another action must be taken; 0: never."""
     passes: NonNegativeInt = 6
     """Times that a joint may pass its goal in a movement on the arm; then it swings, and its valves stay closed for
@@ -41,9 +41,9 @@ class PolicySettings(FleetSettings):
     long as it may come true; 0: each joint looks ahead for itself."""
     practice: PositiveInt = 2
     """With several joints: there are so many times as many updates for each joint after the first."""
-    noise_share: Share = 0.5
+    noise_share: Annotated[Share, PythonOnly] = 0.5
     """With several joints: the share of the simulation's noise that it learns and looks ahead in."""
-    clear: Annotated[float, Meta(ge=0, lt=1)] = 0.001
+    clear: Annotated[float, Meta(ge=0, lt=1), PythonOnly] = 0.001
     """Actions less probable than this are not looked at; where only one is left the decision is clear."""
     fillings: Annotated[float, Meta(ge=0, le=100)] = 2.0
     """A movement may last for so many times what the muscles take to fill and then to empty, where that is longer

@@ -5,7 +5,7 @@ from typing import Annotated, TypeAlias
 
 from msgspec import Meta
 
-from pneumarm.settings import Layers, NonNegativeFloat, PositiveFloat, PositiveInt, Share, Valid
+from pneumarm.settings import Layers, NonNegativeFloat, PositiveFloat, PositiveInt, PythonOnly, Share, Valid
 from pneumarm.task.settings import TaskSettings
 
 Ahead: TypeAlias = Annotated[float, Meta(gt=0, le=10)]
@@ -29,11 +29,11 @@ class ServoSettings(TaskSettings):
     """How often movements are made and learned from."""
     arms: Annotated[int, Meta(ge=1, le=65_536)] = 64
     """Simulated arms that move at once."""
-    duration: Annotated[float, Meta(gt=0, le=60)] = 1.7
+    duration: Annotated[float, Meta(gt=0, le=60), PythonOnly] = 1.7
     """Length of a movement in simulation, through which the gradient goes [s]."""
     learning_rate: PositiveFloat = 4e-3
     """Of Adam at the start; falls linearly to 0."""
-    largest_gradient: PositiveFloat = 1.0
+    largest_gradient: Annotated[PositiveFloat, PythonOnly] = 1.0
     """Longer gradients are cut to this length."""
     hidden: Layers = (48, 48)
     """Hidden units of each layer."""
@@ -48,11 +48,11 @@ class ServoSettings(TaskSettings):
     """How far ahead the reference is looked at [s]; no nearer than one control period."""
     tolerance: PositiveFloat = 1.0
     """Error that counts as settled [degrees]; the prices of errors are in units of it."""
-    precision: PositiveFloat = 0.3
+    precision: Annotated[PositiveFloat, PythonOnly] = 0.3
     """Error, in tolerances, below which there is little left to gain."""
-    flat: NonNegativeFloat = 0.1
+    flat: Annotated[NonNegativeFloat, PythonOnly] = 0.1
     """Error, in tolerances, that costs nothing but ``far``."""
-    far: NonNegativeFloat = 0.06
+    far: Annotated[NonNegativeFloat, PythonOnly] = 0.06
     """Price of an error for each tolerance, besides the logarithmic one of being out of precision."""
     change: NonNegativeFloat = 0.15
     """Price of opening or closing a valve, at 30 Hz; at other rates as much in errors times seconds."""
@@ -64,31 +64,31 @@ class ServoSettings(TaskSettings):
     default every other agent keeps 0.25, which is fast, and the others 0.45, and the better one in simulation is
     chosen; one that then does not settle on its arm is made anew with the higher one.
     """
-    slack: NonNegativeFloat = 6.0
+    slack: Annotated[NonNegativeFloat, PythonOnly] = 6.0
     """Price of the pressure that a muscle is short of that, by the whole range of pressures."""
-    cocontraction: NonNegativeFloat = 6.0
+    cocontraction: Annotated[NonNegativeFloat, PythonOnly] = 6.0
     """Price of the mean pressure of a joint's muscles while its reference moves, as far as it is below that share or
     above 1.6 times of it, by the whole range of pressures."""
-    dead: Annotated[float, Meta(ge=0, lt=1)] = 0.15
+    dead: Annotated[float, Meta(ge=0, lt=1), PythonOnly] = 0.15
     """Share of the policy's output around 0 that keeps a valve closed."""
     coarse: Annotated[float, Meta(ge=0, le=0.5)] | None = None
     """On the way to a goal that stays a joint gets no shorter pulse, in periods, and a whole period instead of one
     that is short of it by less: that wears valves less. By default as much as costs nothing in simulation."""
-    known: Share = 0.6
+    known: Annotated[Share, PythonOnly] = 0.6
     """Share of movements in which the reference is known ahead; in the others it is forecast from its past."""
-    reading_noise: NonNegativeFloat = 0.6
+    reading_noise: Annotated[NonNegativeFloat, PythonOnly] = 0.6
     """Noise of a reading in standard deviations of the one-step error, most of which is such noise."""
-    quiet: NonNegativeFloat = 0.15
+    quiet: Annotated[NonNegativeFloat, PythonOnly] = 0.15
     """Mean error, in tolerances, below which a still arm with a constant goal is left alone with closed valves."""
-    alert: NonNegativeFloat = 0.25
+    alert: Annotated[NonNegativeFloat, PythonOnly] = 0.25
     """Mean error, in tolerances, from which on it no longer is."""
     planned: Annotated[int, Meta(ge=0, le=10_000)] = 20
     """How often plans for the next half second are made better in the simulation, at every turn, where a moving
     reference is followed more closely by plans than by the policy alone; 0: the policy alone."""
-    ways: tuple[NonNegativeFloat, ...] = ()
+    ways: Annotated[tuple[NonNegativeFloat, ...], PythonOnly] = ()
     """How far off its goals each joint of the arm was on average, in tolerances: swinging and left alone, swinging
     and damped, moved by single pulses, moved in every period. Learned on the arm; by default nothing is known."""
-    validation_movements: PositiveInt = 400
+    validation_movements: Annotated[PositiveInt, PythonOnly] = 400
     """Movements in simulation on which the best agent is chosen."""
 
     def _valid(self) -> Valid:

@@ -53,7 +53,7 @@ from pneumarm.transitions.window import Transitions, Window, transitions
 Floats = NDArray[np.float64]
 _SWITCHES = 0.2  # how often a rehearsed action is another than the one before
 _PASSES, _RATE = 10, 3e-4  # of gradient descent: passes for an epoch, and its learning rate
-_REHEARSED_STEPS = 20  # of a rehearsed movement; the policy's take about ten
+_REHEARSED = 2 / 3  # s; length of a rehearsed movement, twice that of one of the policy
 
 
 @dataclass(frozen=True)
@@ -226,12 +226,13 @@ def rehearse(simulation: Simulation, known: Transitions, count: int, random: np.
     window = simulation.window
     began = known.inputs[known.step == 0]
     sigma = (began if len(began) else known.inputs)[:, : window.state_size]
-    lanes = -(-count // _REHEARSED_STEPS)
+    steps = max(round(_REHEARSED / simulation.spec.period), 1)
+    lanes = -(-count // steps)
     sigma = sigma[random.integers(len(sigma), size=lanes)]
     actions = random.integers(len(VALVES), size=(lanes, window.joints))
     valves = VALVES * (np.arange(2) < simulation.spec.muscles)
     inputs, target = [], []
-    for _ in range(_REHEARSED_STEPS):
+    for _ in range(steps):
         drawn = random.integers(len(VALVES), size=actions.shape)
         actions = np.where(random.random(actions.shape) < _SWITCHES, drawn, actions)
         command = valves[actions].reshape(lanes, window.command_size).astype(np.float32)

@@ -221,4 +221,4 @@ def _angles(reference: Reference, times: Array) -> Array:
 def _wanted(agent: ServoAgent, reference: Array) -> Wanted:
     spec = agent.spec
     tolerance = np.full(spec.joints, agent.settings.tolerance * spec.counts_per_degree)
-    return Wanted(reference, tolerance, agent.task.prices, shortest_share(spec))
+    return Wanted(reference, tolerance, agent.task.prices, shortest_share(spec), spec.period)

@@ -401,11 +401,29 @@ def test_the_commands_and_the_program_of_the_readme_run(tmp_path: Path) -> None:
 def test_help_has_two_levels(capsys: pytest.CaptureFixture[str]) -> None:
     few, everything = (Outcome(capsys, "run", level).out for level in ("--help", "--help-all"))
     assert few.count("--") < 30
+    assert few.count("\n") <= 30
+    assert int(re.findall(r"Show (\d+) more options", few)[0]) <= 100
     assert "--servo.tolerance" not in few
     assert "--help-all" in few
     assert "(thesis" not in few
     assert "--servo.tolerance" in everything
     assert "(thesis" in everything
+    assert all(f"╭─ {part} ─" in everything for part in ("servo", "collect", "own", "fit", "moving"))
+
+
+def test_what_only_programs_turn_is_no_option(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Neither of commands nor in their files; a controller's own findings, for one, are no option of a run."""
+    shown = Outcome(capsys, "run", "--help-all").out
+    file = tmp_path / "run.toml"
+    for option, table in (("ways", "servo"), ("noise.factor", "policy"), ("begin.settle", "collect")):
+        assert f"--{table}.{option}" not in shown
+        assert Outcome(capsys, "run", f"--{table}.{option}", 1).is_refused(f"--{table}.{option}")
+        file.write_text(f"[run.{table}]\n{option} = 1\n")
+        assert Outcome(capsys, "run", "--config", file, "--write-config", tmp_path / "no.toml").is_refused(option)
+    written = tmp_path / "written.toml"
+    assert Outcome(capsys, "run", "--write-config", written).code == 0
+    assert "tolerance = " in written.read_text()
+    assert not {"ways", "noise", "reward"} & set(re.findall(r"\w+", re.sub(r"#.*", "", written.read_text())))
 
 
 def test_every_command_is_in_a_panel_of_the_help(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,16 +1,19 @@
 """Settings: what help says of a default is what is used."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
-from typing import Any, get_args, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_type_hints
 
+import msgspec
 import numpy as np
 import pytest
+from msgspec import Meta
 
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.run import RunSettings
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Layers, PositiveFloat, PositiveInt, Settings, Share, Valid
 
 
 def defaults(kind: type) -> Iterator[tuple[str, Any, Any]]:
@@ -36,25 +39,68 @@ def test_nested_defaults_are_those_of_their_type(name: str, hint: Any, default: 
 
 @dataclass(frozen=True)
 class Parent(Settings):
-    share: float = 0.5
+    share: Share = 0.5
+    least: float = 0.0
 
     def _valid(self) -> Valid:
-        return {"share": 0 <= self.share <= 1 or "0 to 1"}
+        return {"least": self.least <= self.share or "at most share"}
 
 
 @dataclass(frozen=True)
 class Child(Parent):
-    count: int = 1
+    count: PositiveInt = 1
+    largest: float = 1.0
+    length: Annotated[float, Meta(gt=0, lt=10)] | None = None
+    hidden: Layers = (4,)
+    ends: tuple[float, PositiveFloat] = (0.0, 1.0)
+    kind: Literal["straight", "bent", "round"] = "straight"
+    flag: bool = False
 
     def _valid(self) -> Valid:
-        return {"count": self.count >= 1}
+        return {"largest": self.largest >= self.count}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("share", 2, "0 to 1"),
+        ("share", math.nan, "a finite number"),
+        ("least", -math.inf, "a finite number"),
+        ("least", "none", "a finite number"),
+        ("count", 0, "1 or more"),
+        ("count", 1.5, "a whole number"),
+        ("count", True, "a whole number"),
+        ("length", 0, "above 0 and below 10"),
+        ("length", 10, "above 0 and below 10"),
+        ("hidden", (), "1 to 8 values"),
+        ("hidden", (5, 1025), "1 to 1,024, each"),
+        ("hidden", 5, "several values"),
+        ("ends", (1.0, 0.0), "above 0, each"),
+        ("ends", (1.0,), "2 values"),
+        ("kind", "square", "straight, bent or round"),
+        ("flag", 1, "true or false"),
+    ],
+)
+def test_what_a_type_does_not_allow_is_refused_in_python_and_in_files(name: str, value: Any, expected: str) -> None:
+    with pytest.raises(UnusableInput, match=rf"Child: {name} cannot be .*; expected {expected}$"):
+        Child(**{name: value})
+    with pytest.raises((UnusableInput, msgspec.ValidationError), match=name):
+        msgspec.convert({name: value}, Child)
+
+
+def test_what_a_type_allows_is_taken() -> None:
+    taken = Child(share=1, count=3, largest=3, length=9.9, hidden=(1, 1024), ends=(-1, 2), kind="round", flag=True)
+    assert msgspec.convert(msgspec.to_builtins(taken), Child) == taken
+    assert Child(length=None) == Child()
 
 
 def test_what_a_parent_demands_is_demanded_of_its_children() -> None:
     with pytest.raises(UnusableInput, match="Child: share cannot be 2; expected 0 to 1"):
         Child(share=2)
-    with pytest.raises(UnusableInput, match="Child: count cannot be 0; see its documentation"):
-        Child(count=0)
+    with pytest.raises(UnusableInput, match=r"Child: least cannot be 0\.6; expected at most share"):
+        Child(least=0.6)
+    with pytest.raises(UnusableInput, match=r"Child: largest cannot be 1\.0; see its documentation"):
+        Child(count=2)
     with pytest.raises(UnusableInput, match="method 'nonsense'"):
         RunSettings(method="nonsense")
     with pytest.raises(UnusableInput, match="task cannot be 'track'; expected reach, what sarsa"):

@@ -12,9 +12,10 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import msgspec
+from msgspec import Meta
 
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, ArmSpec, open_arm
@@ -48,12 +49,12 @@ from pneumarm.report.beside import ReportBeside
 from pneumarm.report.files import REPORT, TEST, read_results, save_demonstration, save_spec
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
-from pneumarm.settings import Valid
+from pneumarm.settings import NonNegativeInt, PositiveInt
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.simulation.enough import EnoughSettings, collect_enough
 from pneumarm.statistics import FEWEST
 from pneumarm.task import BeginStates, begin_states, read_episodes, write_episodes
-from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, Store, collect, enough
+from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, Store, collect
 
 SETTINGS = "settings.json"
 RECORDED = "recorded.svg"
@@ -89,19 +90,23 @@ class RunSettings(LearnSettings):
     arm: str = "virtual"
     """virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable."""
     seed: int = 0
-    """Of everything that is drawn at random."""
+    """Random seed."""
     joints: int | None = None
-    """Joints that the arm has, for an arm that is to be refused with others; the arm knows."""
-    transitions: int | None = None
-    """How many to collect (thesis section 3.2.2: 200,000, two hours); by default until more would not help."""
+    """Expected number of joints; others are refused."""
+    transitions: Annotated[int, Meta(ge=FEWEST_TRANSITIONS)] | None = None
+    """How many to collect; by default until enough.
+
+    The thesis collected 200,000, in two hours (section 3.2.2). By default until more would not help."""
     enough: EnoughSettings = field(default_factory=EnoughSettings)
     """When more would not help."""
-    test_episodes: int = 10_000
+    test_episodes: PositiveInt = 10_000
     """Movements of the test in simulation (thesis section 5.2)."""
-    bound_episodes: int | None = None
-    """Movements to reach goals that are planned with the true physics, which say what can be achieved; 0 for none. By
-    default 40 for agents that are to reach goals, else none. Virtual arms only; for each joint more an eighth of
-    them, because a plan for two takes ten times as long."""
+    bound_episodes: NonNegativeInt | None = None
+    """Movements to goals that are planned, as a bound.
+
+    They are planned with the true physics of a virtual arm and say what can be achieved; 0 for none. By default 40
+    for agents that are to reach goals, else none; for each joint more an eighth of them, because a plan for two takes
+    ten times as long."""
     collect: CollectSettings = field(default_factory=CollectSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     transfer: RunTransferSettings = field(default_factory=RunTransferSettings)
@@ -113,13 +118,6 @@ class RunSettings(LearnSettings):
         if transfer == usual:
             transfer = replace(transfer, episodes=thesis.episodes, test_episodes=thesis.test_episodes)
         return replace(self, transitions=self.transitions or 200_000, transfer=transfer)
-
-    def _valid(self) -> Valid:
-        return {
-            "transitions": self.transitions is None or enough(self.transitions),
-            "test_episodes": self.test_episodes >= 1 or "1 or more",
-            "bound_episodes": self.bound_episodes is None or self.bound_episodes >= 0 or "0 or more",
-        }
 
     @property
     def settles(self) -> bool:

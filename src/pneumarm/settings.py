@@ -1,21 +1,50 @@
-"""Settings that a person chooses: every class of them says which values are valid, in one way."""
+"""Settings that a person chooses: every field says by its type which values are valid, in one way."""
 
-from collections.abc import Mapping
+import math
+import operator
+from collections.abc import Iterator, Mapping
+from functools import cache
+from inspect import get_annotations
 from reprlib import repr as shortened
-from typing import Any
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin, get_type_hints
+
+from cyclopts import Parameter
+from msgspec import Meta
 
 from pneumarm.errors import UnusableInput
 
+PositiveFloat: TypeAlias = Annotated[float, Meta(gt=0)]
+NonNegativeFloat: TypeAlias = Annotated[float, Meta(ge=0)]
+PositiveInt: TypeAlias = Annotated[int, Meta(ge=1)]
+NonNegativeInt: TypeAlias = Annotated[int, Meta(ge=0)]
+Share: TypeAlias = Annotated[float, Meta(ge=0, le=1)]
+Units: TypeAlias = Annotated[int, Meta(ge=1, le=1024)]
+"""Hidden units of a layer."""
+Layers: TypeAlias = Annotated[tuple[Units, ...], Meta(min_length=1, max_length=8)]
+"""Hidden units of each layer of a network."""
+PythonOnly = Parameter(parse=False)
+"""Marks a field that is no option of commands, as ``Annotated[PositiveFloat, PythonOnly]``."""
+
 Valid = Mapping[str, bool | str]
 """By field True where its value is valid; otherwise what is expected in its place, or False."""
+_LIMITS = {
+    "gt": (operator.gt, "above {:,.8g}"),
+    "ge": (operator.ge, "{:,.8g} or more"),
+    "lt": (operator.lt, "below {:,.8g}"),
+    "le": (operator.le, "at most {:,.8g}"),
+}
+"""By what limits are called in types: what has to hold, and how people are told."""
+_PLAIN = {float: "a finite number", int: "a whole number", bool: "true or false", str: "text"}
 
 
 class Settings:
     """Base of frozen dataclasses whose values are checked when they are made, in Python and on the command line.
 
-    A class says by ``_valid`` which of its own fields are. What the classes that it inherits from say is asked as
-    well, so that none can be forgotten. Lists, and numbers and arrays of NumPy, become tuples and plain numbers
-    first: they are written to files and compared with those of files.
+    Which values a field can have is in its type, such as :data:`PositiveFloat`; all numbers are finite. What relates
+    several fields a class says by ``_valid``. What the classes that it inherits from say is asked as well, so that
+    none can be forgotten. Lists, and numbers and arrays of NumPy, become tuples and plain numbers first: they are
+    written to files and compared with those of files.
     """
 
     def _valid(self) -> Valid:
@@ -44,11 +73,75 @@ def _plain(value: Any) -> Any:
 
 
 def validate(settings: object) -> None:
-    """Raise UnusableInput for the first field that the class of ``settings``, or one of its bases, finds invalid."""
-    for kind in reversed(type(settings).__mro__):
-        if "_valid" in vars(kind):
-            for name, found in vars(kind)["_valid"](settings).items():
-                if found is not True:
-                    expected = f"expected {found}" if found else "see its documentation"
-                    value = shortened(getattr(settings, name))
-                    raise UnusableInput(f"{type(settings).__name__}: {name} cannot be {value}; {expected}")
+    """Raise UnusableInput for the first field of ``settings`` that its type, its class or a base finds invalid."""
+    for name, found in _found(settings):
+        if found is not True:
+            expected = f"expected {found}" if found else "see its documentation"
+            value = shortened(getattr(settings, name))
+            raise UnusableInput(f"{type(settings).__name__}: {name} cannot be {value}; {expected}")
+
+
+def _found(settings: Any) -> Iterator[tuple[str, bool | str]]:
+    """Yield each field with True or what is expected: first by its type, then by ``_valid``, that of bases first."""
+    for name, kind in _types(type(settings)):  # type: ignore[arg-type]
+        yield name, _expected(getattr(settings, name), kind) or True
+    for base in reversed(type(settings).__mro__):
+        if "_valid" in vars(base):
+            yield from vars(base)["_valid"](settings).items()
+
+
+@cache
+def _types(kind: type) -> list[tuple[str, Any]]:
+    """Return the fields of ``kind`` with their types, those of its bases first, also where it names them again."""
+    return [
+        (name, get_type_hints(base, include_extras=True)[name])
+        for base in reversed(kind.__mro__)
+        for name in get_annotations(base)
+    ]
+
+
+def _expected(value: Any, kind: Any) -> str | None:
+    """Return what the type ``kind`` expects in place of ``value``; None where it is valid, or not checked here."""
+    if kind in _PLAIN:
+        fits = isinstance(value, (int, float) if kind is float else kind) and isinstance(value, bool) is (
+            kind is bool
+        )
+        return None if fits and (kind is not float or math.isfinite(value)) else _PLAIN[kind]
+    if kind is NoneType:
+        return None if value is None else "nothing"
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        limits = (_beyond(value, one) for one in inner[1:] if isinstance(one, Meta))
+        return _expected(value, inner[0]) or next(filter(None, limits), None)
+    if origin is Literal:
+        *others, last = map(str, inner)
+        return None if value in inner else " or ".join(filter(None, (", ".join(others), last)))
+    if origin in (Union, UnionType):
+        expected = [_expected(value, one) for one in inner]
+        return None if None in expected else expected[0]
+    return _expected_each(value, inner) if origin is tuple else None
+
+
+def _expected_each(values: Any, kinds: tuple[Any, ...]) -> str | None:
+    """Return what a tuple of ``kinds`` expects in place of ``values``."""
+    if not isinstance(values, tuple):
+        return "several values"
+    if Ellipsis in kinds:
+        kinds = kinds[:1] * len(values)
+    if len(kinds) != len(values):
+        return f"{len(kinds)} values"
+    wrong = filter(None, map(_expected, values, kinds))
+    return next((f"{one}, each" for one in wrong), None)
+
+
+def _beyond(value: Any, limit: Meta) -> str | None:
+    """Return what ``limit`` says, where ``value`` is beyond it."""
+    if limit.min_length is not None or limit.max_length is not None:
+        found = _beyond(len(value), Meta(ge=limit.min_length, le=limit.max_length))
+        return found and f"{found} values"
+    bounds = {name: bound for name in _LIMITS if (bound := getattr(limit, name)) is not None}
+    if all(_LIMITS[name][0](value, bound) for name, bound in bounds.items()):
+        return None
+    if bounds.keys() == {"ge", "le"}:
+        return "{ge:,.8g} to {le:,.8g}".format(**bounds) if limit.ge != limit.le else f"{limit.ge}"
+    return " and ".join(_LIMITS[name][1].format(bound) for name, bound in bounds.items())

@@ -215,7 +215,7 @@ def test_one_after_the_other_is_possible():
         ('kind = "gremlins"', "expected a kind"),
         ('kind = "leak"\nfactor = "three"', "factor"),
         ('kind = "leak"\nfactr = 3', "factr"),
-        ('kind = "leak"\nfactor = -3', "factor cannot be"),
+        ('kind = "leak"\nfactor = -3', r"> 0.0 - at `\$.factor`"),
         ('kind = "leak"\nbegin = 5\nend = 4', "end cannot be"),
     ],
 )

@@ -2,20 +2,38 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from synthetic_arm import synthetic_simulation
 
+from pneumarm.arm import ArmSpec
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.cli import main
 from pneumarm.errors import UnusableInput
-from pneumarm.planning import PlanSettings
+from pneumarm.planning import PlanSettings, bound
 from pneumarm.planning.bound import BoundSettings, known_bound, measure_bound
 from pneumarm.simulation import SimulationArm
 
 GOALS = np.array([[250.0, 780.0]])
 FEW = BoundSettings(episodes=8)
+
+
+@pytest.mark.parametrize(("rate", "transitions"), [(30, 20_000), (60, 40_000), (1, 1_000)])
+def test_the_range_of_goals_is_measured_for_as_long_at_any_rate(
+    rate: int, transitions: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Asked(Exception):  # noqa: N818 - it is no error
+        """For how many transitions."""
+
+    def collect(arm: object, store: object, transitions: int, seed: int, **_: object) -> None:
+        raise Asked(transitions)
+
+    monkeypatch.setattr(bound, "collect", collect)
+    with pytest.raises(Asked) as asked:
+        bound.measured_goal_range(SimpleNamespace(spec=ArmSpec(period=1 / rate)))  # type: ignore[arg-type]
+    assert asked.value.args == (transitions,)
 
 
 @pytest.fixture(scope="module")

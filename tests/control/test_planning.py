@@ -332,6 +332,13 @@ def test_a_patient_planner_gives_up_what_has_no_effect(patience: int) -> None:
     assert (movement.switches[0] == 0) == (patience == 0)
 
 
+def test_a_planner_is_patient_for_as_long_at_any_rate() -> None:
+    simulation = synthetic_simulation()
+    for rate, turns in ((30, 3), (60, 6), (5, 1)):
+        at_rate = replace(simulation, spec=replace(simulation.spec, period=1 / rate))
+        assert simulated_planner(at_rate).patience == turns
+
+
 def test_planners_with_their_defaults() -> None:
     simulation = synthetic_simulation()
     arm = SimulationArm(simulation, seed=1)

@@ -85,6 +85,19 @@ def squares(simulation: Simulation, rows: Rows) -> np.ndarray:
     return (error**2).mean(axis=0)[simulation.outputs] / simulation.scaling.observation_scale[simulation.outputs] ** 2
 
 
+def test_movements_are_rehearsed_for_as_long_at_any_rate() -> None:
+    simulation = synthetic_simulation(1, 1)
+    known = transitions(moved(simulation, 5), simulation.window)
+    lanes = {}
+    for rate in (30, 60):
+        at_rate = replace(simulation, spec=replace(simulation.spec, period=1 / rate))
+        made = rehearse(at_rate, known, 400, np.random.default_rng(1))
+        begins = known.inputs[known.step == 0][:, : simulation.window.state_size]
+        is_begin = (made.inputs[:, None, : simulation.window.state_size] == begins).all(axis=2).any(axis=1)
+        lanes[rate] = int(np.argmin(is_begin))
+    assert lanes == {30: 20, 60: 10}
+
+
 @pytest.mark.parametrize("joints", [1, 2])
 @pytest.mark.parametrize("history", [1, 3])
 def test_what_is_rehearsed_is_what_the_simulation_says_of_movements(joints: int, history: int) -> None:

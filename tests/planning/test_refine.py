@@ -16,6 +16,7 @@ from pneumarm.learning.servo.price import PriceParameters
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.settling import settled_at
 from pneumarm.networks.layers import initial_weights
+from pneumarm.planning import refine
 from pneumarm.planning.moving_bound import WAYS, MovingBoundSettings, _settling, measure_moving_bound
 from pneumarm.planning.refine import Wanted, refined
 
@@ -39,7 +40,7 @@ def test_a_movement_gets_better_and_the_arm_moves_as_planned() -> None:
         states = physics_states(world, STEPS + 2)
         capture(arm, world, states, 0)
         goal = states.angle[0] + 100
-        wanted = Wanted(np.tile(goal, (STEPS, 1)), np.full(1, 11.378), PRICES, 0.09)
+        wanted = Wanted(np.tile(goal, (STEPS, 1)), np.full(1, 11.378), PRICES, 0.09, 1 / 30)
         plan = refined(world, states, wanted, np.zeros((STEPS, 1, 2)), 2, np.random.default_rng(0))
         planned, begin = states.angle[1 : STEPS + 1].copy(), arm.time
         for step, command in enumerate(plan):
@@ -50,6 +51,18 @@ def test_a_movement_gets_better_and_the_arm_moves_as_planned() -> None:
     assert np.abs(planned[-5:] - goal).max() < 25
     assert (np.abs(plan) <= 1).all()
     assert not ((np.abs(plan) > 0) & (np.abs(plan) < 0.09)).any(), "the valve can be no faster"
+
+
+@pytest.mark.parametrize(("period", "widest"), [(1 / 30, 4), (1 / 60, 8), (0.5, 1)])
+def test_as_long_a_part_of_a_movement_is_changed_at_any_rate(
+    period: float, widest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    widths: list[int] = []
+    monkeypatch.setattr(refine, "keep_states", lambda *_: None)
+    monkeypatch.setattr(refine, "best_change", lambda *given: widths.append(given[5].shape[1]))
+    wanted = Wanted(np.zeros((200, 1)), np.ones(1), PRICES, 0.09, period)
+    refined(None, None, wanted, np.zeros((200, 1, 2)), 1, np.random.default_rng(0))
+    assert max(widths) == widest
 
 
 def test_the_bound_takes_for_settled_what_a_move_does() -> None:

@@ -34,6 +34,18 @@ def test_a_sinusoid_goes_on(frequency: float):
     assert worst(wave, 20, 150) < 0.02 * amplitude
 
 
+@pytest.mark.parametrize("rate", [15, 60, 120])
+@pytest.mark.parametrize("frequency", [0.25, 0.5, 1.0])
+def test_a_sinusoid_goes_on_at_any_rate(frequency: float, rate: int):
+    """What is remembered, and how far ahead it is judged, is a time, not a number of control periods."""
+    forecast, steps = Forecast(1 / rate), np.array([rate // 15, rate // 3])
+    for k in range(4 * rate):
+        seen, *wanted = 200 * np.sin(2 * np.pi * frequency * (k + np.array([0, *steps])) / rate)
+        forecast.see([seen], k / rate)
+        if k >= rate:
+            assert forecast.ahead(steps)[:, 0] == pytest.approx(wanted, abs=4.0)
+
+
 @pytest.mark.parametrize("frequency", [0.1, 0.5, 1.0, 2.0])
 def test_it_goes_on_where_readings_come_late(frequency: float):
     """By up to a tenth of a period, as under an operating system."""

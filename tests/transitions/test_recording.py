@@ -165,7 +165,7 @@ def test_missing_columns_are_told(imported, header, message):
         ('commands = "valves"', "", "missing required field `commands`"),
         ('commands = "valves"', 'commands = "hydraulic"', "hydraulic"),
         ("period = 0.1", "", "needs the period"),
-        ("period = 0.1", "period = -1", "period cannot be -1"),
+        ("period = 0.1", "period = -1", r"> 0.0 - at `\$.period`"),
         ("period = 0.1", 'period = "fast"', "fast|float"),
         ("counts_per_bar", "count_per_bar", "has no count_per_bar; it has angle_limits"),
         ("period = 0.1", "period = 0.1\njoints = 2", "has no joints"),

@@ -18,11 +18,11 @@ that is noticed begins this anew.
 """
 
 import json
-import math
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.adaptation.change import (
@@ -38,7 +38,7 @@ from pneumarm.adaptation.refit import Refit, RefitSettings, refit, refit_to_all
 from pneumarm.adaptation.trial import TrialSettings, verdict
 from pneumarm.errors import UnusableInput
 from pneumarm.learning.agents import Acts, Adapts, Stiffens
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeInt, PositiveFloat, PositiveInt, PythonOnly, Settings, Share
 from pneumarm.simulation import FitSettings
 from pneumarm.task.begin import begin_states
 from pneumarm.transitions.rows import Rows
@@ -55,44 +55,31 @@ _GROWTH = 2.0  # from one thorough adaptation to the next: what was learned need
 class AdaptationSettings(Settings):
     """How an agent adapts to an arm between movements."""
 
-    first: int = 10
+    first: Annotated[PositiveInt, PythonOnly] = 10
     """Movements until the first adaptation, on arrival and after a change that was noticed."""
-    growth: float = 1.5
+    growth: Annotated[float, Meta(gt=1), PythonOnly] = 1.5
     """Factor by which their number grows from one adaptation to the next."""
-    every: int = 100
+    every: NonNegativeInt = 100
     """Most movements between two adaptations; 0: never."""
-    updates: int = 30
+    updates: PositiveInt = 30
     """How often the policy collects experience in the new simulation and learns from it."""
-    warm_up: int = 8
+    warm_up: Annotated[NonNegativeInt, PythonOnly] = 8
     """Updates before these that learn the values of states alone, which an agent does not keep."""
-    learning_rate: float = 1e-3
+    learning_rate: PositiveFloat = 1e-3
     """Of the policy, by Adam, at the start; falls linearly to 0."""
-    unsettled: float = 0.05
+    unsettled: Annotated[Share, PythonOnly] = 0.05
     """Share of movements, and two at least, that do not settle above which an agent that is to settle learns more
     thoroughly."""
-    thorough_updates: int = 400
+    thorough_updates: Annotated[NonNegativeInt, PythonOnly] = 400
     """Updates then."""
-    thorough_rate: float = 4e-3
+    thorough_rate: Annotated[PositiveFloat, PythonOnly] = 4e-3
     """Learning rate then."""
-    refit: RefitSettings = field(default_factory=RefitSettings)
+    refit: Annotated[RefitSettings, PythonOnly] = field(default_factory=RefitSettings)
     """How the simulation is fitted further."""
-    watch: WatchSettings = field(default_factory=WatchSettings)
+    watch: Annotated[WatchSettings, PythonOnly] = field(default_factory=WatchSettings)
     """When the arm counts as changed."""
-    trial: TrialSettings = field(default_factory=TrialSettings)
+    trial: Annotated[TrialSettings, PythonOnly] = field(default_factory=TrialSettings)
     """When an adapted agent is taken back."""
-
-    def _valid(self) -> Valid:
-        return {
-            "first": self.first >= 1,
-            "growth": 1 < self.growth < math.inf,
-            "every": self.every >= 0,
-            "updates": self.updates >= 1,
-            "warm_up": self.warm_up >= 0,
-            "learning_rate": 0 < self.learning_rate < math.inf,
-            "unsettled": 0 <= self.unsettled <= 1 or "0 to 1",
-            "thorough_updates": self.thorough_updates >= 0 or "0 or more",
-            "thorough_rate": 0 < self.thorough_rate < math.inf,
-        }
 
 
 class Adaptation:

@@ -32,14 +32,16 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.adaptation.change import error_squares
 from pneumarm.arm.valves import VALVES
 from pneumarm.networks import LevenbergMarquardt, Network, gradient_descent, levenberg_marquardt
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, Settings
 from pneumarm.simulation.fit import FitSettings, fitted_on
 from pneumarm.simulation.quality import residue
 from pneumarm.simulation.simulation import Simulation
@@ -51,44 +53,31 @@ from pneumarm.transitions.window import Transitions, Window, transitions
 Floats = NDArray[np.float64]
 _SWITCHES = 0.2  # how often a rehearsed action is another than the one before
 _PASSES, _RATE = 10, 3e-4  # of gradient descent: passes for an epoch, and its learning rate
-_REHEARSED_STEPS = 20  # of a rehearsed movement; the policy's take about ten
+_REHEARSED = 2 / 3  # s; length of a rehearsed movement, twice that of one of the policy
 
 
 @dataclass(frozen=True)
 class RefitSettings(Settings):
     """How a simulation is fitted further."""
 
-    newest: int = 400
+    newest: Annotated[int, Meta(ge=2)] = 400
     """Movements that it is fitted to, the newest ones since the arm changed."""
-    folds: int = 4
+    folds: Annotated[int, Meta(ge=2)] = 4
     """Parts of these, each predicted by a fit to the others to judge it."""
-    gain: float = 0.05
+    gain: Annotated[float, Meta(ge=0, lt=1)] = 0.05
     """Part by which the mean squared errors must be lower, as a mean over the quantities predicted."""
-    certainty: float = 2.0
+    certainty: NonNegativeFloat = 2.0
     """Standard errors, over movements, by which they must be lower by more than that."""
-    ridge: float = 10.0
+    ridge: PositiveFloat = 10.0
     """Weight of what the output weights were, in transitions."""
-    anchor: float = 300.0
+    anchor: NonNegativeFloat = 300.0
     """Weight of what all weights were after that, in transitions."""
-    rehearsed: float = 0.5
+    rehearsed: NonNegativeFloat = 0.5
     """Rehearsed transitions for each of the arm's."""
-    fewest_rehearsed: int = 1000
+    fewest_rehearsed: NonNegativeInt = 1000
     """Fewest of these."""
-    epochs: int = 10
+    epochs: PositiveInt = 10
     """Epochs of Levenberg-Marquardt."""
-
-    def _valid(self) -> Valid:
-        return {
-            "newest": self.newest >= 2,
-            "folds": self.folds >= 2,
-            "gain": 0 <= self.gain < 1,
-            "certainty": 0 <= self.certainty < math.inf,
-            "ridge": 0 < self.ridge < math.inf,
-            "anchor": 0 <= self.anchor < math.inf,
-            "rehearsed": 0 <= self.rehearsed < math.inf,
-            "fewest_rehearsed": self.fewest_rehearsed >= 0,
-            "epochs": self.epochs >= 1,
-        }
 
 
 @dataclass(frozen=True)
@@ -237,12 +226,13 @@ def rehearse(simulation: Simulation, known: Transitions, count: int, random: np.
     window = simulation.window
     began = known.inputs[known.step == 0]
     sigma = (began if len(began) else known.inputs)[:, : window.state_size]
-    lanes = -(-count // _REHEARSED_STEPS)
+    steps = max(round(_REHEARSED / simulation.spec.period), 1)
+    lanes = -(-count // steps)
     sigma = sigma[random.integers(len(sigma), size=lanes)]
     actions = random.integers(len(VALVES), size=(lanes, window.joints))
     valves = VALVES * (np.arange(2) < simulation.spec.muscles)
     inputs, target = [], []
-    for _ in range(_REHEARSED_STEPS):
+    for _ in range(steps):
         drawn = random.integers(len(VALVES), size=actions.shape)
         actions = np.where(random.random(actions.shape) < _SWITCHES, drawn, actions)
         command = valves[actions].reshape(lanes, window.command_size).astype(np.float32)

@@ -12,12 +12,13 @@ methods in clinical trials", 1958).
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike
 
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveFloat, Settings, Valid
 
 Verdict = Literal["open", "worse", "confirmed"]
 
@@ -26,24 +27,22 @@ Verdict = Literal["open", "worse", "confirmed"]
 class TrialSettings(Settings):
     """When an adapted agent is taken back."""
 
-    looks: tuple[int, ...] = (10, 20, 40, 80)
+    looks: Annotated[tuple[Annotated[int, Meta(ge=2)], ...], Meta(min_length=1)] = (10, 20, 40, 80)
     """Movements of the new agent after which it is compared with the one before it."""
-    limit: float = 3.5
+    limit: PositiveFloat = 3.5
     """Standard errors by which its mean reward must be lower. An agent that is no worse is taken back in 0.1 to 0.5 %
     of trials with it, in 1 to 1.5 % with 3 (rewards of steady agents drawn anew; ``python -m benchmarks
     adaptation``)."""
     remembered: int = 100
     """Movements of the agent before it that it is compared with, the newest at most."""
-    fewest: int = 8
+    fewest: Annotated[int, Meta(ge=2)] = 8
     """Movements that the agent before it must have made; with fewer nothing is taken back."""
 
     def _valid(self) -> Valid:
         rising = all(a < b for a, b in zip(self.looks, self.looks[1:], strict=False))
         return {
-            "looks": len(self.looks) >= 1 and self.looks[0] >= 2 and rising,
-            "limit": 0 < self.limit < math.inf,
-            "remembered": self.remembered >= self.fewest,
-            "fewest": self.fewest >= 2,
+            "looks": rising or "rising numbers",
+            "remembered": self.remembered >= self.fewest or "fewest or more",
         }
 
 

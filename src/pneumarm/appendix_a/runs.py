@@ -8,16 +8,18 @@ import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec, Reading
 from pneumarm.checkup import Checkup, CheckupSettings, diagnose, measure
 from pneumarm.control.monitor import Monitor
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveInt, Settings
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
-from pneumarm.transitions import WHOLE_PERIODS, Store, collect, enough
+from pneumarm.transitions import FEWEST_TRANSITIONS, WHOLE_PERIODS, Store, collect
 from pneumarm.transitions.choice import joined
 from pneumarm.transitions.rows import Rows
 
@@ -31,13 +33,10 @@ CLOSELY = CheckupSettings(step=0.001)
 class RunsSettings(Settings):
     """How much is done for each picture."""
 
-    transitions: int = 10_000
+    transitions: Annotated[int, Meta(ge=FEWEST_TRANSITIONS)] = 10_000
     """Transitions that each run collects: six minutes on the arm."""
-    epochs: int = 20
+    epochs: PositiveInt = 20
     """Epochs of each fit at most."""
-
-    def _valid(self) -> Valid:
-        return {"transitions": enough(self.transitions), "epochs": self.epochs >= 1 or "1 or more"}
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,10 @@ from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from time import monotonic
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm.guard import GuardedArm
@@ -14,7 +15,7 @@ from pneumarm.arm.seam import Reading
 from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import PATIENCE
 from pneumarm.errors import PneumarmError
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Settings
 
 Decide = Callable[[Reading], Command | None]
 
@@ -149,15 +150,12 @@ def missed_turns(late: float, period: float) -> int:
 class BeginState(Settings):
     """How the arm is brought to a random begin state at rest (thesis sections 3.2.2 and 5.5)."""
 
-    deflate: float = 2.0
+    deflate: Annotated[float, Meta(ge=0, le=600)] = 2.0
     """Time that all muscles are vented [s] (thesis section 5.5: two seconds)."""
-    inflate: float = 1.5
+    inflate: Annotated[float, Meta(ge=0, le=600)] = 1.5
     """Longest time that a muscle is inflated again [s] (1.2 while collecting, 1.5 between episodes)."""
-    settle: float = 1.0
+    settle: Annotated[float, Meta(ge=0, le=600)] = 1.0
     """Time in which the oscillations damp out, all valves closed [s]."""
-
-    def _valid(self) -> Valid:
-        return {name: 0 <= value <= 600 or "0 to 600 s" for name, value in vars(self).items()}
 
     def reach(self, arm: GuardedArm, random: np.random.Generator) -> None:
         """Vent, inflate every muscle for a time uniform in 0..``inflate``, and wait."""

@@ -10,13 +10,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from types import TracebackType
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeFloat, PositiveFloat, PositiveInt, Settings, Valid
 
 SensorKind = Literal["velocity", "acceleration", "temperature"]
 """Kinds of further sensors, besides those of angle and pressure that every arm has."""
@@ -32,11 +33,11 @@ class Sensor(Settings):
 
     kind: Literal["acceleration", "temperature"]
     """What it measures: tangential acceleration of a joint's link [m/s2], or temperature of a muscle [Celsius]."""
-    joint: int = 1
+    joint: PositiveInt = 1
     """Joint that it is at, from 1."""
-    muscle: int | None = None
+    muscle: Annotated[int, Meta(ge=1, le=2)] | None = None
     """Muscle that a thermometer is at, 1 or 2; None for an accelerometer."""
-    channel: int | None = None
+    channel: PositiveInt | None = None
     """The board's extra channel that it is wired to, from 1; None where there is no board between."""
     scale: float = 1.0
     """What a count of that channel is worth [m/s2 or Celsius]."""
@@ -44,13 +45,10 @@ class Sensor(Settings):
     """What the count 0 says [m/s2 or Celsius]."""
 
     def _valid(self) -> Valid:
+        muscle = self.muscle is not None if self.kind == "temperature" else self.muscle is None
         return {
-            "kind": self.kind in ("acceleration", "temperature"),
-            "joint": self.joint >= 1,
-            "muscle": self.muscle in (1, 2) if self.kind == "temperature" else self.muscle is None,
-            "channel": self.channel is None or self.channel >= 1,
-            "scale": math.isfinite(self.scale) and self.scale != 0,
-            "offset": math.isfinite(self.offset),
+            "muscle": muscle or "the muscle of a thermometer, and none for an accelerometer",
+            "scale": self.scale != 0 or "another number",
         }
 
     @property
@@ -71,17 +69,17 @@ class Sensor(Settings):
 class ArmSpec(Settings):
     """What pneumarm must know of an arm. All angles and pressures of the seam are in sensor counts."""
 
-    joints: int = 1
+    joints: PositiveInt = 1
     """Number of hinges, each with two antagonistic muscles, or with one."""
-    period: float = 1 / 30
+    period: PositiveFloat = 1 / 30
     """Control period [s] (thesis section 5.1: 30 Hz)."""
-    counts_per_degree: float = 11.378
+    counts_per_degree: PositiveFloat = 11.378
     """Counts of the angle sensor per degree (thesis section 2.3.4)."""
-    counts_per_bar: float = 166.0
+    counts_per_bar: PositiveFloat = 166.0
     """Counts of the pressure sensors per bar (thesis section 2.3.4)."""
     angle_range: tuple[float, float] = (0.0, 1023.0)
     """Lowest and highest count of the angle sensor; its middle is called 0 degrees."""
-    max_pressure: float = 1.05
+    max_pressure: PositiveFloat = 1.05
     """Inlets stay closed while their muscle reads over this [bar]."""
     pressure_sensors: bool = True
     """Whether pressures are measured. Where not, they are estimated from what the valves were told
@@ -89,18 +87,18 @@ class ArmSpec(Settings):
     safe_supply: bool = False
     """That the supply, at its highest, cannot burst a muscle: the guard asks for your word on this where no pressures
     are measured."""
-    fill_times: tuple[float, float] = (1.5, 0.7)
+    fill_times: tuple[PositiveFloat, PositiveFloat] = (1.5, 0.7)
     """Times in which a muscle is filled and emptied [s], about; asked only where no pressures are measured."""
-    max_inflation: float = 10.0
+    max_inflation: PositiveFloat = 10.0
     """An inlet that was open for so long [s] stays closed until its muscle has rested (:mod:`pneumarm.arm.guard`)."""
     angle_limits: tuple[float, float] | None = None
     """At these angles [counts] valves that push further out stay closed; None where the end stops bear that."""
     pulses: bool = True
     """Whether valves may be open for a part of a control period; where not, commands are rounded to whole periods."""
-    shortest_pulse: float = 0.003
+    shortest_pulse: PositiveFloat = 0.003
     """Shortest time that a valve is open [s]; what is shorter is rounded to none or to this (thesis section 2.2:
     valves switch at 330 Hz)."""
-    pulse_step: float = 0.0
+    pulse_step: NonNegativeFloat = 0.0
     """Pulses last for a multiple of this time [s], as where an arm without pulses is controlled at every third of its
     periods; 0: for any time from the shortest on."""
     velocity_sensor: bool = False
@@ -108,14 +106,14 @@ class ArmSpec(Settings):
     (thesis sections 5.1 and 7.3)."""
     sensors: tuple[Sensor, ...] = ()
     """Further sensors whose readings it carries, no two in one place or on one channel (thesis appendix A)."""
-    muscles: int = 2
+    muscles: Annotated[int, Meta(ge=1, le=2)] = 2
     """Muscles of each joint. 1: a spring or a weight pulls against it, towards lower angles. Valves of the second are
     then never opened, and its pressure is 0 behind the guard, whatever the arm says."""
-    latency: float = 0.0
+    latency: NonNegativeFloat = 0.0
     """Time [s] between reading and acting that the control cycle has to let pass on this arm.
 
     An arm whose reading and computing take real time by themselves leaves it 0."""
-    links: tuple[float, ...] = ()
+    links: tuple[PositiveFloat, ...] = ()
     """Lengths of the links, one a joint, from hinge to hinge and from the last hinge to the hand [m]; only goals in x
     and y need them. At 0 degrees they are taken to hang straight down in a line (:mod:`pneumarm.arm.hand`)."""
     name: str = "arm"
@@ -124,30 +122,19 @@ class ArmSpec(Settings):
     def _valid(self) -> Valid:
         low, high = self.angle_range
         lowest, highest = self.angle_limits or (-1.0, 1.0)
+        sensors = self.sensors
         return {
-            "joints": isinstance(self.joints, int) and self.joints >= 1,
-            "muscles": self.muscles in (1, 2) or "1 or 2",
-            "velocity_sensor": isinstance(self.velocity_sensor, bool),
-            "pulses": isinstance(self.pulses, bool),
-            "shortest_pulse": _positive(self.shortest_pulse),
-            "pulse_step": 0 <= self.pulse_step <= self.shortest_pulse or "0 to ``shortest_pulse``",
-            "period": _positive(self.period),
-            "counts_per_degree": _positive(self.counts_per_degree),
-            "counts_per_bar": _positive(self.counts_per_bar),
-            "angle_range": math.isfinite(low) and math.isfinite(high) and low < high,
-            "max_pressure": _positive(self.max_pressure),
-            "max_inflation": _positive(self.max_inflation),
-            "pressure_sensors": isinstance(self.pressure_sensors, bool),
-            "safe_supply": isinstance(self.safe_supply, bool),
-            "fill_times": len(self.fill_times) == 2 and all(map(_positive, self.fill_times)),
-            "angle_limits": math.isfinite(lowest) and math.isfinite(highest) and lowest < highest,
-            "latency": math.isfinite(self.latency) and 0 <= self.latency < self.period,
-            "links": (len(self.links) in (0, self.joints) and all(map(_positive, self.links)))
-            or f"{self.joints} length(s) above 0 m, one a joint, or none",
-            "sensors": all(one.joint <= self.joints for one in self.sensors)
-            and all((one.muscle or 1) <= self.muscles for one in self.sensors)
-            and _unlike(one.name for one in self.sensors)
-            and _unlike(one.channel for one in self.sensors),
+            "pulse_step": self.pulse_step <= self.shortest_pulse or "0 to ``shortest_pulse``",
+            "angle_range": low < high or "a lower and a higher count",
+            "angle_limits": lowest < highest or "a lower and a higher count",
+            "latency": self.latency < self.period or "less than ``period``",
+            "links": len(self.links) in (0, self.joints) or f"{self.joints} length(s), one a joint, or none",
+            "sensors": (
+                all(one.joint <= self.joints and (one.muscle or 1) <= self.muscles for one in sensors)
+                and _unlike(one.name for one in sensors)
+                and _unlike(one.channel for one in sensors)
+            )
+            or "sensors of its joints and muscles, no two in one place or on one channel",
         }
 
     @property
@@ -205,10 +192,6 @@ def _unlike(values: Iterable[object]) -> bool:
     """Return whether no two of ``values`` that are there are equal."""
     there = [value for value in values if value is not None]
     return len(set(there)) == len(there)
-
-
-def _positive(value: float) -> bool:
-    return math.isfinite(value) and value > 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,15 +8,17 @@ residual: a joint whose residual is large is refused, not bent straight.
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from pneumarm.arm.spec_file import ArmFile, Correction, SoundState
 from pneumarm.checkup.diagnose import LOGARITHMIC
 from pneumarm.checkup.figures import ends, halves, joint_figures
 from pneumarm.checkup.measure import Array, Checkup, JointTest
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveFloat, Settings, Valid
 
 POINTS = 17
 """Points of a linearisation table."""
@@ -36,28 +38,22 @@ class Known(Settings):
 
     angles: tuple[tuple[float, float], ...] = ()
     """Angles with muscle 2 full and with muscle 1 full, by a protractor [degrees]; for all joints, or for each."""
-    counts_per_degree: float | None = None
+    counts_per_degree: PositiveFloat | None = None
     """... or what the angle's sensors count, by their data sheet; where both are missing the spec's scale stays."""
-    supply: float | None = None
+    supply: Annotated[float, Meta(ge=0.1, le=10)] | None = None
     """Pressure of the supply by its manometer, which full muscles reach [bar gauge]."""
-    counts_per_bar: float | None = None
+    counts_per_bar: PositiveFloat | None = None
     """... or what the pressure sensors count, by their data sheet; where both are missing the spec's scale stays."""
 
     def _valid(self) -> Valid:
-        pairs = all(all(map(math.isfinite, pair)) and pair[0] < pair[1] for pair in self.angles)
-        return {
-            "angles": pairs or "a lower and a higher one in degrees",
-            "supply": self.supply is None or 0.1 <= self.supply <= 10 or "0.1 to 10 bar gauge",
-            "counts_per_degree": _of_a_sheet(self.counts_per_degree, self.angles, "angles"),
-            "counts_per_bar": _of_a_sheet(self.counts_per_bar, self.supply, "supply"),
+        both = {
+            "counts_per_degree": self.counts_per_degree is not None and self.angles and "angles",
+            "counts_per_bar": self.counts_per_bar is not None and self.supply and "supply",
         }
-
-
-def _of_a_sheet(counts: float | None, measured: object, name: str) -> bool | str:
-    """Return whether ``counts`` are valid, or what is expected in their place."""
-    if counts is not None and measured:
-        return f"{name} or this, not both"
-    return counts is None or 0 < counts < math.inf or "above 0"
+        return {
+            "angles": all(low < high for low, high in self.angles) or "a lower and a higher one in degrees",
+            **{name: not other or f"{other} or this, not both" for name, other in both.items()},
+        }
 
 
 @dataclass(frozen=True)

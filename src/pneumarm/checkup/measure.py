@@ -12,49 +12,50 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
 from pneumarm.checkup.leaks import LeakTest, watch_closed
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Settings
 
 Array = NDArray[np.float64]
+_Duration = Annotated[float, Meta(gt=0, lt=10_000)]
+_Count = Annotated[int, Meta(gt=0, lt=10_000)]
 
 
 @dataclass(frozen=True)
 class CheckupSettings(Settings):
     """How long an arm is looked at, and how closely."""
 
-    step: float = 0.005
+    step: _Duration = 0.005
     """Time between two readings while a muscle fills or exhausts [s]; an arm that is slower gives fewer."""
-    fill: float = 1.5
+    fill: _Duration = 1.5
     """Time that a muscle is filled [s]: at 1 bar it is full then (thesis figure 2.6)."""
-    hold: float = 0.5
+    hold: _Duration = 0.5
     """Time that it is held after that [s]."""
-    exhaust: float = 2.0
+    exhaust: _Duration = 2.0
     """Time that it is vented [s]."""
-    pulse: float = 0.25
+    pulse: _Duration = 0.25
     """Length of the short pulse [s]; shorter on an arm that fills so fast that little air would flow by then."""
-    settle: float = 8.0
+    settle: _Duration = 8.0
     """Time that closed muscles rest before noise and leak are measured [s]."""
-    rest: float = 45.0
+    rest: _Duration = 45.0
     """Time over which noise and leak are measured [s]; a longer one finds smaller leaks."""
-    rest_step: float = 0.02
+    rest_step: _Duration = 0.02
     """Time between two readings then [s]."""
-    sweep_steps: int = 16
+    sweep_steps: _Count = 16
     """Steps of the sweep in one direction."""
-    sweep_pulse: float = 0.05
+    sweep_pulse: _Duration = 0.05
     """Time that the valves are open for a step of the sweep [s]."""
-    sweep_settle: float = 0.6
+    sweep_settle: _Duration = 0.6
     """Time that the arm comes to rest after a step of the sweep [s]."""
-    repeats: int = 200
+    repeats: _Count = 200
     """How often a reading and a setting are timed."""
-
-    def _valid(self) -> Valid:
-        return {name: 0 < value < 1e4 or "above 0 and below 10,000" for name, value in vars(self).items()}
 
 
 @dataclass(frozen=True)

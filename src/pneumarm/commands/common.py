@@ -12,7 +12,7 @@ from pneumarm.arm import ArmSpec
 from pneumarm.control.monitor.settings import Mode
 
 Json = Annotated[
-    bool, Parameter(name="--json", negative="", help="Print one JSON object on stdout and nothing else there.")
+    bool, Parameter(name="--json", negative="", help="Print one JSON object on stdout and nothing else.")
 ]
 """The flag that every command has."""
 
@@ -33,7 +33,8 @@ Monitoring = Annotated[
     Mode,
     Parameter(
         name="--monitor",
-        help="stop: mark what a fault spoils, and give up where it lasts; warn: only tell; off: do not look.",
+        help="What to do about faults of the arm.\n\n"
+        "stop: mark what a fault spoils, and give up where it lasts; warn: only tell; off: do not look.",
     ),
 ]
 """What is done about faults of an arm that are found while it moves."""

@@ -71,24 +71,26 @@ def take_option(arguments: Sequence[str], option: str, expected: str) -> tuple[l
 
 
 def as_config(command: str, settings: Mapping[str, Any], app: App) -> str:
-    """Return ``settings``, by their names in Python, as a file for ``command`` with what each means above it."""
+    """Return the options among ``settings``, by their names in Python, as a file for ``command`` with their words."""
     collection = app[command].assemble_argument_collection(parse_docstring=True)
-    words = {one.name.removeprefix("--"): str(one.parameter.help or "") for one in collection}
+    words = {one.name.removeprefix("--"): str(one.parameter.help or "") if one.parse else None for one in collection}
     lines = ["# Options for pneumarm, to be read by --config; the command line goes before them."]
     return "\n".join([*lines, *_table((command,), settings, words)]) + "\n"
 
 
-def _table(path: tuple[str, ...], settings: Mapping[str, Any], words: Mapping[str, str]) -> Iterator[str]:
+def _table(path: tuple[str, ...], settings: Mapping[str, Any], words: Mapping[str, str | None]) -> Iterator[str]:
     from pneumarm.files import as_toml
 
     yield from ("", f"[{'.'.join(path)}]")
     inner = {}
     for name, value in settings.items():
         key = name.replace("_", "-")
+        said = words.get(".".join((*path[1:], key)), "")
+        if said is None:  # for Python only
+            continue
         if isinstance(value, Mapping):
             inner[key] = value
             continue
-        said = words.get(".".join((*path[1:], key)), "")
         yield from (f"# {line}" for line in textwrap.wrap(" ".join(said.split()), _WIDTH))
         yield f"# {key} =" if value is None else f"{key} = {as_toml(value)}"
     for key, table in inner.items():

@@ -33,18 +33,21 @@ def run_(
 ) -> None:
     """Do the whole job: collect, fit, train, test, transfer, report.
 
-    A second call with the same folder goes on where the first was interrupted.
-
     Parameters
     ----------
     out
-        Folder of the run; created if it does not exist.
+        Folder of the run.
+
+        It is created if it does not exist. A second call goes on where the first was interrupted.
     preset
-        minutes needs some minutes of the arm's time; thesis takes the thesis' sizes, hours of it, for what no other
-        option says.
+        Sizes: minutes of the arm's time, or the thesis', hours.
+
+        The thesis' sizes are taken for what no other option says.
     write_config
-        Write all settings, as they are given, with what each means into this TOML file, which must not exist, and do
-        nothing else; change there what you like and call `pneumarm run --config FILE`.
+        Write all options into this TOML file, and do no more.
+
+        They are those given, with what each means; the file must not exist. Change there what you like and call
+        `pneumarm run --config FILE`.
     """
     if preset == "thesis":
         settings = settings.of_the_thesis()

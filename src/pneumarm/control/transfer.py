@@ -5,9 +5,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.adaptation import COMPARED, AdaptationSettings, adaptation_of
@@ -23,7 +24,7 @@ from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import make_folder
 from pneumarm.learning import AnyAgent, Knows, LearningActor, Learns, SimulationAgent, fingerprint, goals_of
 from pneumarm.moving.settling import settled_at
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeInt, PositiveInt, PythonOnly, Settings, Share
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import KINDS, Store
 from pneumarm.transitions.rows import Recorded, joined, rows_of
@@ -42,35 +43,26 @@ that cannot make them again every one is stored at once."""
 class TransferSettings(Settings):
     """How an agent is tested and adapted on an arm."""
 
-    episodes: int = 1500
+    episodes: NonNegativeInt = 1500
     """Movements while learning (thesis section 5.5.1: progress is seen after some 750)."""
-    learning_rate: float = 0.01
+    learning_rate: Share = 0.01
     """Learning rate on the arm (thesis section 5.5.1: 0, 0.05 and 0.10 were compared)."""
-    test_episodes: int = 500
+    test_episodes: PositiveInt = 500
     """Greedy movements before and again after learning; at least 500 for figures to be compared."""
-    averaged: float = 0.5
+    averaged: Share = 0.5
     """Share of the movements while learning, the last ones, over which the adapted agent's weights are averaged.
 
     A difference from the thesis, which keeps the last weights (0 does): with a constant learning rate they go on
     fluctuating, and where they happen to stand at the end decides how good the agent is (B. T. Polyak and
     A. B. Juditsky, "Acceleration of stochastic approximation by averaging", SIAM J. Control Optim. 30, 1992)."""
-    hold: float = 2.0
+    hold: Annotated[float, Meta(ge=0, le=3600)] = 2.0
     """For how long an agent that settles and holds has each goal, from when it is given [s].
 
     The movement is counted up to where the goal is reached, and the agent adapts to all of it."""
     adaptation: AdaptationSettings = field(default_factory=AdaptationSettings)
     """How a policy adapts between movements; with a learning rate of 0 it does not."""
-    close_while_computing: bool = False
+    close_while_computing: Annotated[bool, PythonOnly] = False
     """Close the valves between reading and acting (thesis figure 2.8: left as they are)."""
-
-    def _valid(self) -> Valid:
-        return {
-            "episodes": self.episodes >= 0 or "0 or more",
-            "learning_rate": 0 <= self.learning_rate <= 1 or "0 to 1",
-            "test_episodes": self.test_episodes >= 1 or "1 or more",
-            "averaged": 0 <= self.averaged <= 1 or "0 to 1",
-            "hold": 0 <= self.hold <= 3600 or "0 to 3600 s",
-        }
 
     def movements(self, phase: Phase) -> int:
         """Number of movements in ``phase``."""

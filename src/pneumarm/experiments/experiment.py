@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.differences import Verdict
 from pneumarm.experiments.words import Words
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeInt, PositiveInt, Settings
 
 if TYPE_CHECKING:
     from pneumarm.report.page import Section
@@ -32,23 +32,16 @@ ARMS = tuple(f"virtual:seed={number}" for number in range(1, 6))
 class LaboratorySettings(Settings):
     """What decides the rows of an experiment, besides the experiment itself. More arms and runs only add rows."""
 
-    seed: int = 0
+    seed: NonNegativeInt = 0
     """Random seed."""
     transitions: int = 200_000
     """How many to collect on each arm (thesis section 3.2.2: 200,000, two hours)."""
-    test_episodes: int = 10_000
+    test_episodes: PositiveInt = 10_000
     """Greedy movements that every agent is tested with (thesis section 5.2)."""
-    max_episodes: int | None = None
+    max_episodes: PositiveInt | None = None
     """Training episodes at most; otherwise as many as the experiment says."""
     exploring: bool = False
     """Test every agent a second time, exploring as when its training ended; that takes as long as training it."""
-
-    def _valid(self) -> Valid:
-        return {
-            "seed": self.seed >= 0,
-            "test_episodes": self.test_episodes >= 1,
-            "max_episodes": self.max_episodes is None or self.max_episodes >= 1,
-        }
 
 
 class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,16 +1,16 @@
 """Following a reference on an arm, holding a goal being the case of one that stays."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from reprlib import repr as shortened
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import gymnasium
 import numpy as np
 from gymnasium import Space
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, BeginState, Reading
@@ -21,8 +21,8 @@ from pneumarm.gym.options import known_options
 from pneumarm.gym.spaces import View, following_space, sensor_ranges
 from pneumarm.gym.turns import Turns
 from pneumarm.learning.servo.references import draw_references
-from pneumarm.learning.servo.settings import ServoSettings
-from pneumarm.settings import Settings, Valid
+from pneumarm.learning.servo.settings import Ahead, ServoSettings
+from pneumarm.settings import NonNegativeFloat, Settings
 from pneumarm.task.changes import changes
 from pneumarm.task.goals import goal_in_counts
 from pneumarm.task.reference import FORMS, check_reachable, parse_reference
@@ -39,22 +39,14 @@ _FASTEST = 4.0
 class FollowSettings(Settings):
     """What is asked in an episode of following."""
 
-    seconds: float = 5.0
+    seconds: Annotated[float, Meta(gt=0, le=3600)] = 5.0
     """Length of an episode [s]."""
-    tolerance: float = 1.0
+    tolerance: Annotated[float, Meta(gt=0, lt=360)] = 1.0
     """What an error is measured in [degrees]."""
-    change: float = 0.05
+    change: NonNegativeFloat = 0.05
     """Price of a valve change."""
-    preview: tuple[float, ...] = ServoSettings().preview
+    preview: tuple[Ahead, ...] = ServoSettings().preview
     """How far ahead the reference is seen [s]."""
-
-    def _valid(self) -> Valid:
-        return {
-            "seconds": 0 < self.seconds <= 3600 or "above 0 and up to 3600",
-            "tolerance": 0 < self.tolerance < 360 or "above 0 and below 360",
-            "change": 0 <= self.change < math.inf or "0 or more",
-            "preview": all(0 < ahead <= 10 for ahead in self.preview) or "times above 0 and up to 10",
-        }
 
 
 class ArmFollow(gymnasium.Env[Observation, NDArray[np.float32]]):

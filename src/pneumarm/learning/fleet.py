@@ -1,19 +1,19 @@
 """Learning in many simulated arms at once, whatever is learned: its settings, and what its learners share."""
 
-import math
 import time
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.learning.training import Learner, Progress, Training, identity_of, train_side_by_side
 from pneumarm.networks.layers import Trainable
-from pneumarm.settings import Valid
+from pneumarm.settings import PositiveFloat, PositiveInt, PythonOnly, Share
 from pneumarm.task.environment import Environment
 from pneumarm.task.fleet import Fleet
 from pneumarm.task.settings import TaskSettings
@@ -29,43 +29,28 @@ SettingsT = TypeVar("SettingsT", bound="FleetSettings")
 class FleetSettings(TaskSettings):
     """What learning in many simulated arms at once needs, whatever is learned."""
 
-    agents: int = 2
+    agents: Annotated[int, Meta(ge=1, le=256)] = 2
     """Agents trained at once from different weights, of which the best is kept; one a core takes no longer."""
-    updates: int = 90
+    updates: PositiveInt = 90
     """How often experience is collected and learned from."""
-    arms: int = 128
+    arms: Annotated[int, Meta(ge=1, le=65_536)] = 128
     """Simulated arms that move at once."""
-    steps: int = 64
+    steps: Annotated[int, Meta(ge=1, le=4096)] = 64
     """Steps of each arm in a batch of experience."""
-    learning_rate: float = 4e-3
+    learning_rate: PositiveFloat = 4e-3
     """Of Adam at the start; falls linearly to 0."""
-    epochs: int = 6
+    epochs: PositiveInt = 6
     """How often each batch is learned from."""
-    discount: float = 0.99
+    discount: Share = 0.99
     """gamma (thesis: 0.98)."""
-    trace_decay: float = 0.95
+    trace_decay: Share = 0.95
     """lambda (thesis: 0)."""
-    largest_gradient: float = 0.5
+    largest_gradient: Annotated[PositiveFloat, PythonOnly] = 0.5
     """Longer gradients are cut to this length."""
-    return_scale: float = 50.0
+    return_scale: Annotated[PositiveFloat, PythonOnly] = 50.0
     """Return that a network's output of 1 stands for."""
-    validation_episodes: int = 2_000
+    validation_episodes: Annotated[PositiveInt, PythonOnly] = 2_000
     """Greedy episodes, without lookahead, on which the best agent is chosen."""
-
-    def _valid(self) -> Valid:
-        return {
-            "agents": 1 <= self.agents <= 256,
-            "updates": self.updates >= 1,
-            "arms": 1 <= self.arms <= 65_536,
-            "steps": 1 <= self.steps <= 4096,
-            "learning_rate": 0 < self.learning_rate < math.inf,
-            "epochs": self.epochs >= 1,
-            "discount": 0 <= self.discount <= 1,
-            "trace_decay": 0 <= self.trace_decay <= 1,
-            "largest_gradient": 0 < self.largest_gradient < math.inf,
-            "return_scale": 0 < self.return_scale < math.inf,
-            "validation_episodes": self.validation_episodes >= 1,
-        }
 
 
 class FleetLearner(Learner[AgentT], Generic[AgentT, SettingsT]):

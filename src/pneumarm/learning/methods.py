@@ -148,12 +148,16 @@ class LearnSettings(Settings):
     """Which method learns, and the settings of each."""
 
     task: TaskName | None = None
-    """What the agent is for: settle, hold and track name one and the same agent, which does all three (the default);
-    reach one that reaches goals as in the thesis, where flying through one slowly enough counts."""
+    """What the agent is for.
+
+    settle, hold and track name one and the same agent, which does all three (the default); reach one that reaches
+    goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
-    """servo, policy, batched (the thesis' networks learned in many arms at once), hierarchy (an upper agent sets
-    subgoals of the thesis' agents), sarsa or q-learning (the thesis'), an installed method, or MODULE:NAME of your
-    own; by default servo, and policy to reach."""
+    """servo, policy, batched, hierarchy, sarsa, q-learning, or MODULE:NAME of your own.
+
+    batched: the thesis' networks learned in many arms at once; hierarchy: an upper agent sets subgoals of the thesis'
+    agents; sarsa and q-learning: the thesis'. An installed method has a name too. By default servo, and policy to
+    reach."""
     servo: ServoSettings = field(default_factory=ServoSettings)
     """Of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)

@@ -7,9 +7,10 @@ error* is the mean absolute error over the last second of the hold.
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarded
@@ -18,7 +19,7 @@ from pneumarm.arm.hand import hand
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
 from pneumarm.moving.settling import DWELL, TOLERANCE, settled_at
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Settings
 from pneumarm.task.changes import valve_changes
 from pneumarm.task.goals import Goal
 from pneumarm.transitions.recorder import Recorder
@@ -39,25 +40,16 @@ Seen = Callable[[Reading, NDArray[np.float64]], None]
 class MoveSettings(Settings):
     """How a goal is moved to."""
 
-    hold: float = 2.0
+    hold: Annotated[float, Meta(gt=0, le=86_400)] = 2.0
     """For how long a goal is held, from when it is given [s]."""
-    tries: int = 2
+    tries: Annotated[int, Meta(ge=1, le=100)] = 2
     """How often a movement that has not settled is made (thesis section 5.6.1)."""
-    tolerance: float = TOLERANCE
+    tolerance: Annotated[float, Meta(gt=0, lt=360)] = TOLERANCE
     """A joint is there within so much [degrees]."""
-    pause: float = 2.0
+    pause: Annotated[float, Meta(ge=0, le=3600)] = 2.0
     """Time between two tries, with closed valves [s] (thesis section 5.6.1)."""
-    dwell: float = DWELL
+    dwell: Annotated[float, Meta(ge=0, le=3600)] = DWELL
     """For how long it stays there at least, to the end of the hold, to have settled [s]; half of a shorter hold."""
-
-    def _valid(self) -> Valid:
-        return {
-            "hold": 0 < self.hold <= 86400 or "above 0 and at most 86400 s",
-            "tries": 1 <= self.tries <= 100 or "1 to 100",
-            "tolerance": 0 < self.tolerance < 360 or "above 0 and below 360 degrees",
-            "pause": 0 <= self.pause <= 3600 or "0 to 3600 s",
-            "dwell": 0 <= self.dwell <= 3600 or "0 to 3600 s",
-        }
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, guarded
@@ -12,7 +13,7 @@ from pneumarm.arm.controller import TrackingController
 from pneumarm.arm.reference import Reference
 from pneumarm.moving.movement import Moved, MoveSettings, Tracked, move, track
 from pneumarm.moving.settling import TOLERANCE
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Settings
 from pneumarm.statistics import wilson
 from pneumarm.transitions.goals import Goals
 
@@ -21,28 +22,18 @@ from pneumarm.transitions.goals import Goals
 class MoveTrialSettings(Settings):
     """What is tried."""
 
-    goals: int = 40
+    goals: Annotated[int, Meta(ge=0, le=1_000_000)] = 40
     """Goals that are moved to, one after the other, drawn uniformly; 0 for none."""
-    hold: float = 3.0
+    hold: Annotated[float, Meta(gt=0, le=3600)] = 3.0
     """For how long each is held, from when it is given [s]."""
-    tolerance: float = TOLERANCE
+    tolerance: Annotated[float, Meta(gt=0, lt=360)] = TOLERANCE
     """A joint is there within so much [degrees]."""
-    frequencies: tuple[float, ...] = (0.25, 0.5, 1.0)
+    frequencies: tuple[Annotated[float, Meta(gt=0, le=100)], ...] = (0.25, 0.5, 1.0)
     """Of the sinusoids that are followed [Hz]."""
-    amplitude: float = 20.0
+    amplitude: Annotated[float, Meta(gt=0, lt=360)] = 20.0
     """Of the sinusoids about the middle of the goals; less where the arm does not go so far [degrees]."""
-    seconds: float = 8.0
+    seconds: Annotated[float, Meta(gt=0, le=3600)] = 8.0
     """For how long each sinusoid is followed [s]."""
-
-    def _valid(self) -> Valid:
-        return {
-            "goals": 0 <= self.goals <= 1_000_000,
-            "hold": 0 < self.hold <= 3600 or "above 0 and at most 3600 s",
-            "tolerance": 0 < self.tolerance < 360 or "above 0 and below 360 degrees",
-            "frequencies": all(0 < one <= 100 for one in self.frequencies) or "above 0 and at most 100 Hz each",
-            "amplitude": 0 < self.amplitude < 360 or "above 0 and below 360 degrees",
-            "seconds": 0 < self.seconds <= 3600 or "above 0 and at most 3600 s",
-        }
 
 
 @dataclass(frozen=True)

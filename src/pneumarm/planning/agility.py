@@ -20,9 +20,10 @@ from pneumarm.planning.search import Agility, advance, copy
 
 _SHARES = 0.9, 0.75
 _ROLLOUTS = 50
-_STEPS = 40
-_CHANGED = 0.05
-"""Probability that the valves of a joint change in a period."""
+_LENGTH = 4 / 3
+"""Of a rollout [s]."""
+_CHANGED = 1.5
+"""How often the valves of a joint change in a second, on average."""
 
 
 def agility_of(world: Any, states: Any, spec: ArmSpec) -> tuple[Agility, Agility]:
@@ -32,12 +33,13 @@ def agility_of(world: Any, states: Any, spec: ArmSpec) -> tuple[Agility, Agility
     """
     joints, period, random = spec.joints, 1e3 * spec.period, np.random.default_rng(0)
     possible = np.flatnonzero(possible_actions(spec.muscles))
-    speeds = np.empty((_ROLLOUTS, _STEPS, joints))
+    steps, changed = max(round(_LENGTH / spec.period), 2), _CHANGED * spec.period
+    speeds = np.empty((_ROLLOUTS, steps, joints))
     for rollout in range(_ROLLOUTS):
         copy(states, 1, 0)
         actions = random.choice(possible, joints)
-        for step in range(_STEPS):
-            actions = np.where(random.random(joints) < _CHANGED, random.choice(possible, joints), actions)
+        for step in range(steps):
+            actions = np.where(random.random(joints) < changed, random.choice(possible, joints), actions)
             valves = VALVES[actions].copy()
             valves[(valves > 0) & (states.pressure[1] > world.limit)] = 0  # as a guard would
             advance(world, states, 1, valves)

@@ -19,31 +19,28 @@ from pneumarm.control.movement import drawn, make_movements
 from pneumarm.errors import UnusableInput
 from pneumarm.planning.planner import Planner, physics_planner, simulated_planner
 from pneumarm.planning.search import PlanSettings
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveInt, Settings
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.statistics import FEWEST, mean_estimate
 from pneumarm.task import Reward, TaskSettings
 from pneumarm.task.movements import Movements, of_rows
-from pneumarm.transitions import WHOLE_PERIODS, Store, collect
+from pneumarm.transitions import FEWEST_TRANSITIONS, WHOLE_PERIODS, Store, collect
 from pneumarm.transitions.goals import Goals
 
 Baseline = Literal["open_loop", "closed_loop", "simulated"]
 """True physics planned once without noise, true physics planned every turn, learned simulation planned every turn."""
-RANGE_TRANSITIONS = 20_000
-"""How many transitions the range of goals is measured from where no simulation tells it (11 min of arm time)."""
+_RANGE = 2000 / 3
+"""For how long an arm is recorded to measure the range of goals where no simulation tells it [s]."""
 
 
 @dataclass(frozen=True)
 class BoundSettings(Settings):
     """How the bound of an arm is measured."""
 
-    episodes: int = 500
+    episodes: PositiveInt = 500
     """Movements of each planner; at least 500 for figures to be compared."""
     plan: PlanSettings = field(default_factory=PlanSettings)
     """Which plans are considered."""
-
-    def _valid(self) -> Valid:
-        return {"episodes": self.episodes >= 1 or "1 or more movements"}
 
 
 @dataclass(frozen=True)
@@ -93,7 +90,8 @@ class Planned:
 def measured_goal_range(arm: Arm, seed: int = 0) -> NDArray[np.float64]:
     """Return the range of goals (joints, 2) [counts] that a short collecting on ``arm`` finds."""
     with TemporaryDirectory() as folder, Store.for_arm(Path(folder) / "range.db", arm.spec) as store:
-        collect(arm, store, RANGE_TRANSITIONS, seed, settings=WHOLE_PERIODS)
+        transitions = max(round(_RANGE / arm.spec.period), FEWEST_TRANSITIONS)
+        collect(arm, store, transitions, seed, settings=WHOLE_PERIODS)
         found: NDArray[np.float64] = store.percentiles()
     return found
 

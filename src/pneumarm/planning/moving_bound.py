@@ -14,9 +14,10 @@ quiet and physics is the error of the model.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm import ControlCycle, guarded
@@ -29,7 +30,7 @@ from pneumarm.learning.servo.commands import shortest_share
 from pneumarm.moving.movement import played
 from pneumarm.moving.settling import settled_at
 from pneumarm.planning.refine import Wanted, refined
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Settings
 from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.rollout import advance_simulated, look_simulated, simulated_states, simulated_world
@@ -44,28 +45,18 @@ WAYS: tuple[Way, ...] = ("arm", "quiet", "physics", "simulation", "simulated")
 class MovingBoundSettings(Settings):
     """Which movements are made, and how long better ones are sought."""
 
-    goals: int = 20
+    goals: Annotated[int, Meta(ge=1, le=100_000)] = 20
     """Goals that are moved to, one after the other."""
-    hold: float = 2.0
+    hold: Annotated[float, Meta(ge=1, le=60)] = 2.0
     """For how long each is held [s]."""
-    frequencies: tuple[float, ...] = (0.1, 0.25, 0.5, 1.0, 2.0)
+    frequencies: tuple[Annotated[float, Meta(gt=0, le=100)], ...] = (0.1, 0.25, 0.5, 1.0, 2.0)
     """Of the sinusoids that are followed [Hz]."""
-    amplitude: float = 20.0
+    amplitude: Annotated[float, Meta(gt=0, lt=360)] = 20.0
     """Of the sinusoids about the middle of the goals; less where the arm does not go so far [degrees]."""
-    seconds: float = 5.0
+    seconds: Annotated[float, Meta(ge=1, le=600)] = 5.0
     """For how long each is followed [s]."""
-    sweeps: int = 3
+    sweeps: Annotated[int, Meta(ge=1, le=1000)] = 3
     """How often each command of a movement is made better."""
-
-    def _valid(self) -> Valid:
-        return {
-            "goals": 1 <= self.goals <= 100_000,
-            "hold": 1 <= self.hold <= 60,
-            "frequencies": all(0 < one <= 100 for one in self.frequencies),
-            "amplitude": 0 < self.amplitude < 360,
-            "seconds": 1 <= self.seconds <= 600,
-            "sweeps": 1 <= self.sweeps <= 1000,
-        }
 
 
 def measure_moving_bound(
@@ -230,4 +221,4 @@ def _angles(reference: Reference, times: Array) -> Array:
 def _wanted(agent: ServoAgent, reference: Array) -> Wanted:
     spec = agent.spec
     tolerance = np.full(spec.joints, agent.settings.tolerance * spec.counts_per_degree)
-    return Wanted(reference, tolerance, agent.task.prices, shortest_share(spec))
+    return Wanted(reference, tolerance, agent.task.prices, shortest_share(spec), spec.period)

@@ -63,8 +63,8 @@ _STILL = 2.0
 """Readings of an arm that stands still differ by so much [counts of the thesis' sensors]."""
 
 
-_PATIENCE = 3
-"""Turns after which a planner with a simulation sees that the arm sticks where the simulation drifts on."""
+_PATIENCE = 0.1
+"""Time [s] after which a planner with a simulation sees that the arm sticks where the simulation drifts on."""
 SIMULATED = PlanSettings(nodes=20_000)
 """Settings with which a decision takes milliseconds at most."""
 
@@ -315,4 +315,5 @@ def simulated_planner(
         UnusableInput: the simulation was fitted to continuous commands.
 
     """
-    return Planner(SimulationModel(simulation, settings), settings, reward, patience=_PATIENCE)
+    patience = max(round(_PATIENCE / simulation.spec.period), 1)
+    return Planner(SimulationModel(simulation, settings), settings, reward, patience=patience)

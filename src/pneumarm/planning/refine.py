@@ -17,8 +17,8 @@ from pneumarm.planning.search import advance, copy
 
 Array = NDArray[np.float64]
 
-_MATTERS = 24  # periods after a change for which the world is rolled out
-_WIDTH = 4  # most periods next to each other that are changed together
+_MATTERS = 0.8  # s after a change for which the world is rolled out
+_WIDTH = 2 / 15  # s; commands of so long that are next to each other are changed together at most
 _TRIED = 48  # changes at a place, before the next place
 _SIZES = 0.1, 0.5  # standard deviations of small changes and of large ones, in periods
 _CLOSED = 0.2  # share of changes in which a valve is closed, or open all along, instead
@@ -35,6 +35,8 @@ class Wanted(NamedTuple):
     """Of errors in tolerances; valves are free."""
     shortest: float
     """Shortest pulse [periods]."""
+    period: float
+    """Control period [s]."""
 
 
 @inner
@@ -83,7 +85,8 @@ def best_change(world, states, wanted, plan, first, changes, command):  # type: 
 
     The last place of ``states`` is workspace.
     """
-    scratch, last = states.angle.shape[0] - 1, min(first + changes.shape[1] + _MATTERS, plan.shape[0])
+    scratch = states.angle.shape[0] - 1
+    last = min(first + changes.shape[1] + round(_MATTERS / wanted.period), plan.shape[0])
     copy(states, scratch, first)
     before = play(world, states, wanted, plan, first, last, scratch, np.inf, command)
     least, best, width = before, -1, min(changes.shape[1], plan.shape[0] - first)
@@ -109,10 +112,11 @@ def refined(world: Any, states: Any, wanted: Wanted, plan: Array, sweeps: int, r
     steps hold the movement.
     """
     plan, command = plan.copy(), np.zeros(plan.shape[1:])
+    widest = max(round(_WIDTH / wanted.period), 1)
     keep_states(world, states, wanted, plan, 0, command)
     for _ in range(sweeps):
         for first in range(len(plan)):
-            width = int(random.integers(1, _WIDTH + 1))
+            width = int(random.integers(1, widest + 1))
             changes = _changes(plan[first : first + width], wanted.shortest, random)
             best_change(world, states, wanted, plan, first, changes, command)
     return plan

@@ -35,7 +35,7 @@ from pneumarm.arm.valves import ACTIONS, VALVES, possible_actions
 from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import PART, kernel, part
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings
 from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
 from pneumarm.task.reward import Reward
 
@@ -78,23 +78,15 @@ def _copy(states, to, source):  # type: ignore[no-untyped-def]
 class PlanSettings(Settings):
     """Which plans are considered, and how long they are sought."""
 
-    switches: int = 3
+    switches: NonNegativeInt = 3
     """Most switches of a plan, the first action being none."""
-    cutoff: int = 100
+    cutoff: PositiveInt = 100
     """Most actions of a plan (thesis section 5.4.2: 100)."""
-    nodes: int = 100_000
+    nodes: PositiveInt = 100_000
     """Most states kept at a time; when they do not suffice, the best plan is not proven to be so."""
-    failure_cost: float = 12.0
+    failure_cost: NonNegativeFloat = 12.0
     """What it costs to miss the goal at the end of a plan and to plan again, in units of reward; where the model is
     uncertain, plans end where the odds are better."""
-
-    def _valid(self) -> Valid:
-        return {
-            "switches": self.switches >= 0,
-            "cutoff": self.cutoff >= 1,
-            "nodes": self.nodes >= 1,
-            "failure_cost": 0 <= self.failure_cost < math.inf,
-        }
 
 
 class Uncertainty(NamedTuple):

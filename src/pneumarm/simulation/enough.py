@@ -9,13 +9,14 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveFloat, PythonOnly, Settings, Valid
 from pneumarm.simulation.fit import SINGLE_STEPS, FitResult, fit
 from pneumarm.transitions.choice import Stretched, choose_held_out
 from pneumarm.transitions.collect import CollectResult
@@ -97,22 +98,17 @@ class Enough:
 class EnoughSettings(Settings):
     """When collecting ends by itself."""
 
-    first: float = FEWEST_JUDGED / 30
+    first: Annotated[PositiveFloat, PythonOnly] = FEWEST_JUDGED / 30
     """Seconds of sequences after which it is first judged whether they are enough, because an arm that is read
     oftener moves no more; no fewer transitions than can be judged."""
-    growth: float = 1.5
+    growth: Annotated[float, Meta(ge=1.1, le=10), PythonOnly] = 1.5
     """Factor by which the record grows from then on until it is judged again."""
     most: float = 600.0
     """At which collecting ends all the same, for each joint, in seconds on the arm's clock; those between sequences
     count, too."""
 
     def _valid(self) -> Valid:
-        return {
-            "first": self.first > 0 or "above 0",
-            "growth": 1.1 <= self.growth <= 10 or "1.1 to 10",
-            "most": self.first <= self.most < math.inf
-            or f"{self.first:.0f} s or more, after which it is judged first",
-        }
+        return {"most": self.first <= self.most or f"{self.first:.0f} s or more, after which it is judged first"}
 
     def first_of(self, spec: ArmSpec) -> int:
         """Return after how many transitions of an arm it is first judged."""

@@ -10,9 +10,10 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec, SensorKind
@@ -29,7 +30,7 @@ from pneumarm.networks import (
     two_layers,
 )
 from pneumarm.networks import importance as importance_of
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings, Valid
 from pneumarm.simulation.ahead import fitted_ahead, stretches
 from pneumarm.simulation.history import LONGEST, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
@@ -52,7 +53,6 @@ _FEWEST_A_WEIGHT = 8
 """Rows for each of its weights without which a network reads no more than the usual observations."""
 _AGAIN = 0.25
 """Share of the epochs in which it is taught what pulses do on average where none were recorded."""
-_LONGEST_AHEAD = 10.0
 _EPOCHS_ON = 20
 """Epochs, or passes, of a fit that goes on from where another ended."""
 HIDDEN, _HIDDEN_OF_TWO = 10, 32
@@ -80,10 +80,10 @@ _MARGIN = 0.05
 class FitSettings(Settings):
     """What a person may choose of a fit."""
 
-    history: int | None = None
+    history: PositiveInt | None = None
     """Observations that the networks read (thesis eq. 3.5: 3); by default 3, or more where more say more of this
     arm."""
-    memory: int | None = None
+    memory: PositiveInt | None = None
     """Observations in the state, for a policy to see; by default 8 where predictions are fitted ahead, for agents
     that settle, and else no more than the networks read (thesis)."""
     approximator: Literal["network", "least-squares"] = "network"
@@ -91,17 +91,17 @@ class FitSettings(Settings):
     layers: Literal[1, 2] | None = None
     """Hidden layers (thesis: 1). With 2, one network has all outputs, and is fitted by gradient descent; by default
     with several joints, where there are 5,000 rows for each."""
-    hidden: int | None = None
+    hidden: Annotated[int, Meta(ge=1, le=1000)] | None = None
     """Hidden units of each layer for each joint of the arm; by default 10 (thesis: 10, one joint), or 32 of two
     layers."""
-    epochs: int = 60
+    epochs: PositiveInt = 60
     """Epochs of Levenberg-Marquardt at most (thesis: 15); with two layers 40 passes each of gradient descent,
     and half of them before a fit ahead."""
-    tolerance: float = 1e-5
+    tolerance: Annotated[float, Meta(ge=0, lt=1)] = 1e-5
     """A fit ends early when three epochs in a row lower its error by less than this part; 0: never."""
-    decay: float = 0.0
+    decay: NonNegativeFloat = 0.0
     """Weight decay (thesis: 0)."""
-    ahead: float = 0.4
+    ahead: Annotated[float, Meta(ge=0, le=10)] = 0.4
     """How far ahead predictions are fitted [s], after those of single steps; 0: not at all (thesis), which suits
     agents that are to reach goals."""
     spread: bool = True
@@ -115,28 +115,14 @@ class FitSettings(Settings):
     sensors: tuple[SensorKind, ...] = ()
     """Further sensors of the arm whose readings belong to the state: velocity in place of the derived one,
     acceleration, temperature (thesis section 7.3 and appendix A; there: none)."""
-    held_out: float = 0.1
+    held_out: Annotated[float, Meta(gt=0, lt=1)] = 0.1
     """Share of the sequences that is kept out of the fit, to measure its errors on; at least one sequence in which
     the arm moves. Where too few do, stretches within sequences are held out."""
-    seed: int = 0
+    seed: NonNegativeInt = 0
     """Of the initial weights and of every other choice by lot."""
 
     def _valid(self) -> Valid:
-        return {
-            "history": self.history is None or self.history >= 1 or "1 or more",
-            "memory": self.memory is None or self.memory >= 1 or "1 or more",
-            "approximator": self.approximator in ("network", "least-squares"),
-            "layers": self.layers in (None, 1, 2) or "1 or 2",
-            "hidden": self.hidden is None or 1 <= self.hidden <= 1000 or "1 to 1000",
-            "epochs": self.epochs >= 1,
-            "tolerance": 0 <= self.tolerance < 1,
-            "decay": 0 <= self.decay < float("inf"),
-            "ahead": 0 <= self.ahead <= _LONGEST_AHEAD or f"0 to {_LONGEST_AHEAD:g} s",
-            "velocity": self.velocity in ("derived", "network"),
-            "sensors": set(self.sensors) <= set(get_args(SensorKind)) and len(set(self.sensors)) == len(self.sensors),
-            "held_out": 0 < self.held_out < 1,
-            "seed": self.seed >= 0,
-        }
+        return {"sensors": len(set(self.sensors)) == len(self.sensors) or "each of them once"}
 
     def of_single_steps(self) -> "FitSettings":
         """Return the settings for agents that are to reach goals, unless something else than usual is asked for."""

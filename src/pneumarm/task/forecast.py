@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 _ORDER = 3
-_MEMORY = 24  # differences that the weights are found from
-_FORGETTING = 0.8  # of a forecaster's error, in a step
-_JUDGED = np.array([1, 5])  # steps ahead at which forecasters are judged: soon, and for longer
+_MEMORY = 0.8  # s of differences that the weights are found from
+_FORGETTING = 0.8  # of a forecaster's error, in a thirtieth of a second
+_JUDGED = 1 / 6  # s ahead at which forecasters are judged, as well as a step ahead
 _SURPRISE = 0.5  # error of all forecasters, in parts of the largest difference seen: a jump or a bend
 _SWING = 0.7  # Hz, of which a reference is expected that has just begun to move
 _DOUBT = 0.02  # in the swing that is expected, in parts of the largest difference squared
@@ -42,9 +42,12 @@ class Forecast:
     def __init__(self, period: float) -> None:
         self._period = period
         self._swing = 2 * np.cos(2 * np.pi * _SWING * period)
-        self._times: deque[float] = deque(maxlen=_MEMORY + _ORDER + 1)
-        self._values: deque[Array] = deque(maxlen=_MEMORY + _ORDER + 1)
-        self._said: deque[tuple[float, Array]] = deque(maxlen=int(_JUDGED.max()))
+        self._kept = _FORGETTING ** (30 * period)
+        self._judged = np.array([1, max(round(_JUDGED / period), 1)])
+        memory = max(round(_MEMORY / period), 2 * _ORDER) + _ORDER + 1  # enough for the weights at any rate
+        self._times: deque[float] = deque(maxlen=memory)
+        self._values: deque[Array] = deque(maxlen=memory)
+        self._said: deque[tuple[float, Array]] = deque(maxlen=int(self._judged.max()))
         self._errors = np.zeros(0)
 
     def see(self, value: ArrayLike, time: float) -> None:
@@ -62,13 +65,13 @@ class Forecast:
         self._values.append(value)
         if self._errors.size == 0:
             self._errors = np.array([[0.0], [1e-3], [2e-3]]) + np.zeros(value.size)  # the plainer, the rather
-        self._errors *= _FORGETTING
-        for place, steps in enumerate(_JUDGED):
+        self._errors *= self._kept
+        for place, steps in enumerate(self._judged):
             if len(self._said) >= steps:
                 then, forecast = self._said[-steps]
                 came = self._at(np.array([then + steps * self._period]))[0]
                 self._errors += np.abs(forecast[:, place] - came) / steps
-        self._said.append((time, self._all(_JUDGED)))
+        self._said.append((time, self._all(self._judged)))
 
     def ahead(self, steps: NDArray[np.int64]) -> Array:
         """Return what will be asked for so many ``steps`` (previews,) from now, shape (previews, joints)."""

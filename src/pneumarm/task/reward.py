@@ -4,7 +4,6 @@ The rules are the functions at the end of this module. Loops are compiled from t
 are: they take a :class:`Reward` or its :class:`RewardParameters` alike.
 """
 
-import math
 from dataclasses import astuple, dataclass, replace
 from typing import NamedTuple, Self
 
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.kernels import part
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveFloat, Settings
 
 
 class RewardParameters(NamedTuple):
@@ -36,20 +35,11 @@ class Reward(Settings):
     """Paid to every other action (thesis: -1)."""
     switch: float = -8.0
     """Paid besides, to an action that differs from the one before it in the episode (thesis: -8)."""
-    angle_tolerance: float = 25.0
+    angle_tolerance: PositiveFloat = 25.0
     """Largest distance from the goal at which it counts as reached [counts of the thesis' sensor, 11.378 a degree]
     (thesis: 25)."""
-    velocity_tolerance: float = 1.0
+    velocity_tolerance: PositiveFloat = 1.0
     """Highest speed at which it counts as reached [such counts/ms] (thesis: 1)."""
-
-    def _valid(self) -> Valid:
-        return {
-            "goal": math.isfinite(self.goal),
-            "action": math.isfinite(self.action),
-            "switch": math.isfinite(self.switch),
-            "angle_tolerance": 0 < self.angle_tolerance < math.inf,
-            "velocity_tolerance": 0 < self.velocity_tolerance < math.inf,
-        }
 
     def on(self, spec: ArmSpec) -> Self:
         """Return the same reward with tolerances in counts of the arm's own sensor."""

@@ -9,7 +9,6 @@ from pneumarm.transitions.collect import (
     CollectResult,
     CollectSettings,
     collect,
-    enough,
     require_enough,
 )
 from pneumarm.transitions.copying import CopyResult, copy_store
@@ -46,7 +45,6 @@ __all__ = [
     "Window",
     "collect",
     "copy_store",
-    "enough",
     "filter_transitions",
     "held_out",
     "import_recording",

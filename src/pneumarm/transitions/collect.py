@@ -22,9 +22,10 @@ import time as wall_clock
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
-from typing import NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.controller import Controller
@@ -33,7 +34,7 @@ from pneumarm.arm.cycle import BeginState, ControlCycle, Step
 from pneumarm.arm.guard import GuardedArm, Interventions, guarded
 from pneumarm.arm.seam import Arm, ArmSpec
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveInt, PythonOnly, Settings, Share
 from pneumarm.transitions.doubtful import with_doubtful_marked
 from pneumarm.transitions.fill_times import FillTimes, find_fill_times
 from pneumarm.transitions.players import Trajectory
@@ -95,46 +96,34 @@ _SPARSE = 0.35  # share of steps in which a muscle's valve opens in a sparse seq
 class CollectSettings(Settings):
     """How transitions are collected."""
 
-    actions: int | None = None
+    actions: Annotated[int, Meta(ge=1, le=50_000)] | None = None
     """Actions of a sequence (thesis section 3.2.2: 200); by default that, or those of 6.7 s
     if the arm is controlled faster than there."""
-    velocity_share: float = 0.5
+    velocity_share: Share = 0.5
     """Share of sequences whose actions are held (the thesis decides "randomly")."""
-    longest_hold: int | None = None
+    longest_hold: PositiveInt | None = None
     """Most control periods that an action is held, the least is 1 (the thesis does not say); by default 10, or
     those of a third of a second if they are more."""
-    pulses: float = 0.55
+    pulses: Share = 0.55
     """Share of the sequences in which valves open for pulses of random length, where the arm can do them; in the
     others they are open for whole periods, as in the thesis. A record of both serves controllers of both kinds."""
-    sparse: float = 0.45
+    sparse: Share = 0.45
     """Share of those in which most steps keep the valves closed and pulses are short, as near to rest."""
-    inlets: float | None = None
+    inlets: Annotated[float, Meta(gt=0, lt=1)] | None = None
     """Share of inlets among the valves that open (the thesis: a half); by default such that the muscles of this arm,
     which may fill more slowly than they empty, are as often full as empty."""
-    lean: float = 1.0
+    lean: Annotated[float, Meta(ge=0, le=10)] = 1.0
     """How far each muscle leans to inlets or to outlets for a whole sequence, drawn up to this in the logarithm of
     their odds (the thesis: 0); so one muscle goes up while the other goes down, as far as they can."""
-    ends: float = 0.0
+    ends: Share = 0.0
     """Share of the sequences that begin at an end of the range (the thesis: 0): one muscle of each joint is full, the
     other empty. Both lean further than in the others, in turn to stay there and to go over to the other end. With
     0.25 goals lie wherever the arm can be, which takes longer to learn well."""
-    begin: CollectBegin | None = None
+    begin: Annotated[CollectBegin | None, PythonOnly] = None
     """How a sequence is begun (thesis: inflations of 0 to 1200 ms; the other times are those of section 5.5); by
     default by times that this arm's muscles take to fill and to empty."""
-    close_while_computing: bool = False
+    close_while_computing: Annotated[bool, PythonOnly] = False
     """Whether the valves are closed between reading and acting (thesis figure 2.8)."""
-
-    def _valid(self) -> Valid:
-        return {
-            "actions": self.actions is None or 1 <= self.actions <= 50_000 or "1 to 50,000",
-            "velocity_share": 0 <= self.velocity_share <= 1,
-            "longest_hold": self.longest_hold is None or self.longest_hold >= 1 or "1 or more",
-            "pulses": 0 <= self.pulses <= 1,
-            "sparse": 0 <= self.sparse <= 1,
-            "lean": 0 <= self.lean <= 10,
-            "ends": 0 <= self.ends <= 1 or "0 to 1",
-            "inlets": self.inlets is None or 0 < self.inlets < 1 or "above 0 and below 1",
-        }
 
     def for_period(self, period: float) -> Self:
         """Return the settings with the numbers of control periods [s] that they stand for where none are given."""
@@ -286,15 +275,12 @@ def collect(
     return collection.result(wall_clock.perf_counter() - begun)
 
 
-def enough(transitions: int) -> bool | str:
-    """Return whether something can be learned from so many ``transitions``, or what is expected in their place."""
-    return transitions >= FEWEST_TRANSITIONS or f"{FEWEST_TRANSITIONS:,} or more"
-
-
 def require_enough(transitions: int) -> None:
     """Raise UnusableInput where so few transitions are asked for that nothing can be learned from them."""
-    if (found := enough(transitions)) is not True:
-        raise UnusableInput(f"{transitions:,} transitions are too few to learn from; expected {found}")
+    if transitions < FEWEST_TRANSITIONS:
+        raise UnusableInput(
+            f"{transitions:,} transitions are too few to learn from; expected {FEWEST_TRANSITIONS:,} or more"
+        )
 
 
 def _check(arm: Arm, store: Store, transitions: int, seed: int) -> None:

@@ -7,14 +7,15 @@ dimensions: 5 dimensions for one joint, 10 for two. Only occupied cells take mem
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.valves import ACTIONS, to_actions
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import PositiveInt, Settings
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.window import Transitions, Window
 
@@ -23,31 +24,26 @@ from pneumarm.transitions.window import Transitions, Window
 class GridSettings(Settings):
     """How finely the grid divides, and how much of each cell is kept."""
 
-    angle_bins: int = 8
+    angle_bins: PositiveInt = 8
     """Divisions of the angle (thesis: 8)."""
-    velocity_bins: int = 8
+    velocity_bins: PositiveInt = 8
     """Divisions of the velocity (thesis: 8)."""
-    pressure_bins: int = 8
+    pressure_bins: PositiveInt = 8
     """Divisions of each pressure (thesis: 8)."""
-    chain_bins: int = 5
+    chain_bins: PositiveInt = 5
     """Divisions of angle, velocity and pressures where an arm has several joints (thesis section 6.1.4: 5)."""
-    command_bins: int = 3
+    command_bins: PositiveInt = 3
     """Divisions of each muscle's command where commands are continuous or pulses (not in the thesis); valves are
     divided into the 9 actions of a joint. Three keeps a grid of as many cells: 3 x 3 = 9."""
-    per_cell: int = 5
+    per_cell: PositiveInt = 5
     """Transitions kept of a cell at most, on average (thesis: n = 5)."""
-    inside: float = 0.998
+    inside: Annotated[float, Meta(ge=0.5, le=1)] = 0.998
     """Share of the data that the grid spans in each dimension, leaving out as much at both ends; what lies beyond
     counts to the outermost cells. The thesis does not say what its grid spans. With 1 it spans everything, and one
     spike of the velocity makes its divisions too coarse for all the rest."""
-    most: int = 500_000
+    most: PositiveInt = 500_000
     """Transitions kept at most, on average; over that the probability to be kept is lowered everywhere alike. It
     bounds memory where there are so many dimensions that nearly every transition has a cell of its own."""
-
-    def _valid(self) -> Valid:
-        whole = ("angle_bins", "velocity_bins", "pressure_bins", "chain_bins", "command_bins", "per_cell", "most")
-        enough = {name: getattr(self, name) >= 1 or "1 or more" for name in whole}
-        return {**enough, "inside": 0.5 <= self.inside <= 1 or "0.5 to 1"}
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """A line that loses, doubles, delays and spoils frames, as real ones do (thesis A.1.4), or is pulled out."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from pneumarm.arm.serial.line import Line
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Settings, Share
 
 CLAIMED_EMPTY = 0.005
 """For so long a driver says that nothing came [s], once it does."""
@@ -16,22 +16,18 @@ CLAIMED_EMPTY = 0.005
 class LineFaults(Settings):
     """How often what happens to a frame, in both directions; shares of 1."""
 
-    dropped: float = 0.0
-    doubled: float = 0.0
+    dropped: Share = 0.0
+    doubled: Share = 0.0
     """The frame comes again at once."""
-    late: float = 0.0
+    late: Share = 0.0
     """The frame comes ``lateness`` later, after newer ones."""
-    corrupted: float = 0.0
+    corrupted: Share = 0.0
     """Some bytes of the frame are changed, cut or inserted."""
-    claims_empty: float = 0.0
+    claims_empty: Share = 0.0
     """Share of reads for which the driver says that nothing came, though something did (thesis A.1.4)."""
     lateness: float = 0.05
     """[s]"""
     seed: int = 0
-
-    def _valid(self) -> Valid:
-        shares = [field.name for field in fields(self)[:5]]
-        return {name: 0 <= getattr(self, name) <= 1 or "a share of 0 to 1" for name in shares}
 
 
 class FaultyLine(Line):

@@ -18,13 +18,14 @@ it cannot play; the virtual arm has no link and refuses the faults of one by nam
 import math
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
+from msgspec import Meta
 
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_toml
-from pneumarm.settings import Valid, validate
+from pneumarm.settings import NonNegativeFloat, Valid, validate
 
 LINK_KINDS = (
     "unplugged",
@@ -46,7 +47,7 @@ Part = tuple[str, ...]
 class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind"):
     """What all faults have."""
 
-    begin: float = 0.0
+    begin: NonNegativeFloat = 0.0
     """When it begins, on the arm's clock [s]."""
     end: float | None = None
     """When it is over [s]; never, where it is None."""
@@ -55,8 +56,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         validate(self)
 
     def _valid(self) -> Valid:
-        end = self.end is None or self.begin < self.end < math.inf
-        return {"begin": 0 <= self.begin < math.inf, "end": end or "later than its begin"}
+        return {"end": self.end is None or self.begin < self.end or "later than its begin"}
 
     @property
     def kind(self) -> str:
@@ -142,11 +142,8 @@ class SwappedMuscles(_MuscleFault, frozen=True, kw_only=True, tag="swapped-muscl
 class Leak(_MuscleFault, frozen=True, kw_only=True, tag="leak"):
     """A muscle or its hose that leaks more than it did."""
 
-    factor: float = 3.0
+    factor: Annotated[float, Meta(gt=0, lt=1_000_000)] = 3.0
     """How many times as much."""
-
-    def _valid(self) -> Valid:
-        return {"factor": 0 < self.factor < 1e6}
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -157,13 +154,10 @@ class Leak(_MuscleFault, frozen=True, kw_only=True, tag="leak"):
 class SupplyLoss(Fault, frozen=True, kw_only=True, tag="supply-loss"):
     """The supply falls: a compressor that is off, a pinched hose (thesis A.1.1: other consumers in the building)."""
 
-    to: float = 0.0
+    to: Annotated[float, Meta(ge=0, le=10)] = 0.0
     """Pressure that it falls to [bar gauge]."""
-    over: float = 0.2
+    over: Annotated[float, Meta(ge=0, le=3600)] = 0.2
     """Time in which it falls, evenly [s]."""
-
-    def _valid(self) -> Valid:
-        return {"to": 0 <= self.to <= 10, "over": 0 <= self.over <= 3600}
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -174,23 +168,15 @@ class SupplyLoss(Fault, frozen=True, kw_only=True, tag="supply-loss"):
 class ReducerLeak(Fault, frozen=True, kw_only=True, tag="reducer-leak"):
     """A reducer that leaks: while little air is consumed the buffer behind it fills up (thesis A.1.1: to 6 bar)."""
 
-    rate: float = 0.005
+    rate: Annotated[float, Meta(gt=0, le=10)] = 0.005
     """Rise of the buffer's pressure while nothing is consumed [bar/s]."""
-    source: float = 6.0
+    source: Annotated[float, Meta(gt=0, le=10)] = 6.0
     """Pressure before the reducer, which the buffer's approaches [bar gauge]."""
-    consumption: float = 0.01
+    consumption: Annotated[float, Meta(ge=0, le=10)] = 0.01
     """Fall of the pressure by each inlet that is open [bar/s]; some 10 litres of buffer (thesis A.1.1)."""
-    safety_valve: float | None = None
+    safety_valve: Annotated[float, Meta(gt=0, le=10)] | None = None
     """Pressure at which a safety valve on the buffer opens [bar gauge]; there is none by default, as before the
     thesis' engineers found out."""
-
-    def _valid(self) -> Valid:
-        return {
-            "rate": 0 < self.rate <= 10,
-            "source": 0 < self.source <= 10,
-            "consumption": 0 <= self.consumption <= 10,
-            "safety_valve": self.safety_valve is None or 0 < self.safety_valve <= 10,
-        }
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -218,44 +204,30 @@ class FrozenPotentiometer(_Potentiometer, frozen=True, kw_only=True, tag="frozen
 class LogarithmicPotentiometer(_Potentiometer, frozen=True, kw_only=True, tag="logarithmic-potentiometer"):
     """A potentiometer for loudness in place of a linear one (thesis A.1.2)."""
 
-    middle: float = 0.15
+    middle: Annotated[float, Meta(ge=0.01, lt=0.5)] = 0.15
     """Reading in the middle of the track as a share of the highest one; 0.5 would be linear."""
-
-    def _valid(self) -> Valid:
-        return {"middle": 0.01 <= self.middle < 0.5}
 
 
 class WornPotentiometer(_Potentiometer, frozen=True, kw_only=True, tag="worn-potentiometer"):
     """A track that is worn around an angle: it reads wrong there, and differently each time (thesis A.1.2)."""
 
-    angle: float = 0.0
+    angle: Annotated[float, Meta(ge=-90, le=90)] = 0.0
     """Middle of the worn zone [degrees]."""
-    width: float = 5.0
+    width: Annotated[float, Meta(gt=0, le=90)] = 5.0
     """Standard deviation of the zone [degrees]."""
-    height: float = 10.0
+    height: Annotated[float, Meta(ge=0, le=1000)] = 10.0
     """Largest lasting error in the zone [counts]."""
-    contact: float = 5.0
+    contact: Annotated[float, Meta(ge=0, le=1000)] = 5.0
     """Standard deviation of what changes from reading to reading in its middle [counts]."""
-
-    def _valid(self) -> Valid:
-        return {
-            "angle": abs(self.angle) <= 90,
-            "width": 0 < self.width <= 90,
-            "height": 0 <= self.height <= 1000,
-            "contact": 0 <= self.contact <= 1000,
-        }
 
 
 class SensorNoise(Fault, frozen=True, kw_only=True, tag="sensor-noise"):
     """More noise on every conversion (thesis A.1.3)."""
 
-    angle: float = 5.0
+    angle: Annotated[float, Meta(ge=0, le=1000)] = 5.0
     """Standard deviation of a conversion of an angle [counts]."""
-    pressure: float = 5.0
+    pressure: Annotated[float, Meta(ge=0, le=1000)] = 5.0
     """Standard deviation of a conversion of a pressure [counts]."""
-
-    def _valid(self) -> Valid:
-        return {"angle": 0 <= self.angle <= 1000, "pressure": 0 <= self.pressure <= 1000}
 
 
 class ValveSideSensor(_MuscleFault, frozen=True, kw_only=True, tag="valve-side-sensor"):
@@ -264,13 +236,10 @@ class ValveSideSensor(_MuscleFault, frozen=True, kw_only=True, tag="valve-side-s
     Thesis A.1.1 and figure A.1: leaps in pressure that are gone 10 ms after a valve closed.
     """
 
-    share: float = 0.3
+    share: Annotated[float, Meta(gt=0, le=1)] = 0.3
     """Part of the pressure drop between supply and muscle, or muscle and surroundings, that the sensor sees."""
-    settling: float = 0.010
+    settling: Annotated[float, Meta(gt=0, le=1)] = 0.010
     """Time in which 95 % of a leap are gone after the valve has closed [s] (thesis: 10 ms)."""
-
-    def _valid(self) -> Valid:
-        return {"share": 0 < self.share <= 1, "settling": 0 < self.settling <= 1}
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -281,21 +250,15 @@ class ValveSideSensor(_MuscleFault, frozen=True, kw_only=True, tag="valve-side-s
 class Cold(Fault, frozen=True, kw_only=True, tag="cold"):
     """Muscles and room are cold from the begin on; work and time warm the muscles again."""
 
-    temperature: float = 5.0
+    temperature: Annotated[float, Meta(gt=0, le=50)] = 5.0
     """Of muscles and room [degrees Celsius]."""
-
-    def _valid(self) -> Valid:
-        return {"temperature": 0 < self.temperature <= 50}
 
 
 class Payload(_JointFault, frozen=True, kw_only=True, tag="payload"):
     """A mass added where the arm's weight is."""
 
-    mass: float = 0.1
+    mass: Annotated[float, Meta(gt=0, le=100)] = 0.1
     """Added mass [kg]."""
-
-    def _valid(self) -> Valid:
-        return {"mass": 0 < self.mass <= 100}
 
     @property
     def parts(self) -> frozenset[Part]:
@@ -306,11 +269,8 @@ class Payload(_JointFault, frozen=True, kw_only=True, tag="payload"):
 class Push(_JointFault, frozen=True, kw_only=True, tag="push"):
     """Something that pushes a joint: a hand, an obstacle that gives way."""
 
-    torque: float = 0.3
+    torque: Annotated[float, Meta(ge=-1000, le=1000)] = 0.3
     """[N m], positive in the direction of growing angles."""
-
-    def _valid(self) -> Valid:
-        return {"torque": -1000 <= self.torque <= 1000}
 
     @property
     def parts(self) -> frozenset[Part]:

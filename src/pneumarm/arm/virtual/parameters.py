@@ -6,13 +6,13 @@ absolute; "free air" is a volume of air at 100 kPa and 20 degrees Celsius (ISO 8
 """
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
-import numpy as np
+from msgspec import Meta
 
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveFloat, Settings, Share, Valid
 
 BAR = 1e5
 """One bar [Pa]."""
@@ -28,100 +28,80 @@ MOST_JOINTS = 4
 """Joints that an arm has at most."""
 ELEMENTS = 4
 """Maxwell-slip elements and creep branches of a muscle."""
-
-
-def _positive(
-    parameters: object, may_be_zero: Collection[str], skipped: Collection[str] = ()
-) -> dict[str, bool | str]:
-    """Return of every number whether it is finite and positive, or 0 where that makes sense."""
-    numbers = {name: np.atleast_1d(value) for name, value in vars(parameters).items() if name not in skipped}
-    return {
-        name: bool(np.isfinite(values).all() and (values >= 0 if name in may_be_zero else values > 0).all())
-        for name, values in numbers.items()
-    }
+_ELEMENTS = Meta(min_length=ELEMENTS, max_length=ELEMENTS)
 
 
 @dataclass(frozen=True)
 class MuscleParameters(Settings):
     """One braided muscle of 30 mm (thesis section 2.2) with its valves and its hose."""
 
-    diameter: float = 0.030
+    diameter: PositiveFloat = 0.030
     """Diameter D0 at rest [m] (thesis section 2.2.3)."""
-    weave_angle: float = math.radians(45)
+    weave_angle: Annotated[float, Meta(gt=0, lt=math.pi / 2)] = math.radians(45)
     """Angle theta0 of the strands with the axis at rest [rad] (thesis section 2.2.3)."""
-    rest_length: float = 0.180
+    rest_length: PositiveFloat = 0.180
     """Length l0 of the braid at rest, without end fittings [m] (thesis section 2.2.3)."""
-    tip: float = 1.0
+    tip: PositiveFloat = 1.0
     """Correction k of the contraction for the conical ends, where contracted (Tondu and Lopez)."""
-    length_at_zero: float = 0.194
+    length_at_zero: PositiveFloat = 0.194
     """Length of the braid with the joint at 0 rad [m] (assumption: both ends of the stroke keep force)."""
-    stop_length: float = 0.246
+    stop_length: PositiveFloat = 0.246
     """Length where the strands jam [m] (computed from the weave: 254.6 mm is the geometric limit)."""
-    stop_stiffness: float = 2.5e4
+    stop_stiffness: NonNegativeFloat = 2.5e4
     """Stiffness of the jammed braid [N/m] (assumption)."""
-    bladder_stiffness: float = 100.0
+    bladder_stiffness: NonNegativeFloat = 100.0
     """Stiffness kb of the bladder [N/m] (order of magnitude from latex tubes)."""
-    bladder_length: float = 0.180
+    bladder_length: PositiveFloat = 0.180
     """Length over which the bladder pulls [m]."""
-    threshold: float = 0.050 * BAR
+    threshold: PositiveFloat = 0.050 * BAR
     """Pressure at which the bladder touches the weave, at the rest length [Pa] (thesis 2.2.3; 0.036 to 0.072
     bar measured in Jiang et al., Actuators 15(1):21, 2026)."""
-    bladder_diameter: float = 0.022
+    bladder_diameter: PositiveFloat = 0.022
     """Diameter of the weave at which the bladder touches it without pressure [m]."""
-    viscosity: float = 8.0
+    viscosity: NonNegativeFloat = 8.0
     """Viscous resistance without pressure [N s/m]."""
-    viscosity_per_pressure: float = 8.0 / BAR
+    viscosity_per_pressure: NonNegativeFloat = 8.0 / BAR
     """Viscous resistance by pressure [N s/m/Pa]."""
-    friction: float = 0.40
+    friction: NonNegativeFloat = 0.40
     """Dry friction between the strands without pressure [N]."""
-    friction_per_pressure: float = 5.5 / BAR
+    friction_per_pressure: NonNegativeFloat = 5.5 / BAR
     """Dry friction by pressure [N/Pa]."""
-    slip_lengths: tuple[float, ...] = (0.3e-3, 0.8e-3, 2.0e-3, 4.0e-3)
+    slip_lengths: Annotated[tuple[PositiveFloat, ...], _ELEMENTS] = (0.3e-3, 0.8e-3, 2.0e-3, 4.0e-3)
     """Stretch after which each Maxwell-slip element slips [m]."""
-    slip_weights: tuple[float, ...] = (0.3, 0.3, 0.25, 0.15)
+    slip_weights: Annotated[tuple[PositiveFloat, ...], _ELEMENTS] = (0.3, 0.3, 0.25, 0.15)
     """Share of each Maxwell-slip element in the dry friction."""
-    creep_times: tuple[float, ...] = (1.5, 60.0, 1800.0, 22000.0)
+    creep_times: Annotated[tuple[PositiveFloat, ...], _ELEMENTS] = (1.5, 60.0, 1800.0, 22000.0)
     """Relaxation times of the rubber, a Prony series [s]."""
-    creep_stiffness: tuple[float, ...] = (30.0, 30.0, 30.0, 35.0)
+    creep_stiffness: Annotated[tuple[NonNegativeFloat, ...], _ELEMENTS] = (30.0, 30.0, 30.0, 35.0)
     """Stiffness of each branch of the Prony series [N/m]."""
-    dead_volume: float = 15e-6
+    dead_volume: NonNegativeFloat = 15e-6
     """Volume of hose and fittings less that of the rubber [m3]."""
-    inlet: float = 8.8e-10
+    inlet: PositiveFloat = 8.8e-10
     """Sonic conductance of everything between supply and muscle [m3/(s Pa)] (ISO 6358)."""
-    outlet: float = 2.5e-9
+    outlet: PositiveFloat = 2.5e-9
     """Sonic conductance of valve and hose on the way out [m3/(s Pa)] (ISO 6358)."""
-    critical_ratio: float = 0.3
+    critical_ratio: PositiveFloat = 0.3
     """Pressure ratio b below which the flow is choked (ISO 6358)."""
-    laminar_ratio: float = 0.999
+    laminar_ratio: Annotated[float, Meta(gt=0, lt=1)] = 0.999
     """Pressure ratio above which the flow is taken as laminar, so that its slope stays finite."""
-    leak: float = 3e-8 / BAR
+    leak: NonNegativeFloat = 3e-8 / BAR
     """Leak to the surroundings, free air [m3/s/Pa] (assumption: 1.5 % of the pressure a minute)."""
-    seat_leak: float = 0.1e-8 / BAR
+    seat_leak: NonNegativeFloat = 0.1e-8 / BAR
     """Leak of the inlet valve's seat, free air [m3/s/Pa] (assumption)."""
-    heat_capacity: float = 144.0
+    heat_capacity: PositiveFloat = 144.0
     """Heat capacity of 80 g of rubber and nylon [J/K]."""
-    heat_transfer: float = 0.2
+    heat_transfer: PositiveFloat = 0.2
     """Heat given to the room [W/K] (estimate: a time constant of 9 to 18 minutes)."""
-    sensor_share: float = 0.0
+    sensor_share: Share = 0.0
     """Where its pressure sensor is: the part of the pressure drop between supply and muscle, or muscle and
     surroundings, that it sees while air flows; 0 at the muscle, more towards the valve (thesis A.1.1)."""
-    sensor_settling: float = 0.010
+    sensor_settling: PositiveFloat = 0.010
     """Time in which 95 % of that are gone after the valve has closed [s] (thesis A.1.1: 10 ms)."""
 
     def _valid(self) -> Valid:
-        per_element = ("slip_lengths", "slip_weights", "creep_times", "creep_stiffness")
-        may_be_zero = {"friction", "friction_per_pressure", "viscosity", "viscosity_per_pressure", "leak"}
-        may_be_zero |= {"seat_leak", "bladder_stiffness", "dead_volume", "creep_stiffness", "stop_stiffness"}
-        may_be_zero |= {"sensor_share"}
-        found = _positive(self, may_be_zero)
-        for name in per_element:
-            found[name] = found[name] and (len(getattr(self, name)) == ELEMENTS or f"{ELEMENTS} values")
         return {
-            **found,
-            "critical_ratio": 0 < self.critical_ratio < self.laminar_ratio < 1,
-            "sensor_share": 0 <= self.sensor_share <= 1 or "0 to 1",
-            "weave_angle": 0 < self.weave_angle < math.pi / 2,
-            "bladder_diameter": 0 < self.bladder_diameter < self.diameter,
+            "critical_ratio": self.critical_ratio < self.laminar_ratio or "below laminar_ratio",
+            "bladder_diameter": self.bladder_diameter < self.diameter or "below diameter",
         }
 
 
@@ -131,35 +111,32 @@ class JointParameters(Settings):
 
     muscles: tuple[MuscleParameters, MuscleParameters] = (MuscleParameters(), MuscleParameters())
     """Muscle 1 turns the joint to positive angles, muscle 2 to negative ones."""
-    radius: float = 0.034
+    radius: PositiveFloat = 0.034
     """Radius of the pulley [m] (computed from a sweep of 90 degrees)."""
     passing: tuple[float, ...] = ()
     """Radii [m] at which the cables of its muscles pass the joints further in, the first at the base; none where the
     muscles sit on the link before this one, and pull on nothing else."""
-    mass: float = 0.37
+    mass: NonNegativeFloat = 0.37
     """Mass of the weight, of a link within an arm all of its mass [kg]."""
-    distance: float = 0.21
+    distance: PositiveFloat = 0.21
     """Distance of the weight from the hinge [m]."""
-    length: float = 0.21
+    length: PositiveFloat = 0.21
     """Distance of the next hinge from this one, where there is one [m]."""
-    link_inertia: float = 0.004
+    link_inertia: NonNegativeFloat = 0.004
     """Moment of inertia of the rest of the link [kg m2]."""
     tilt: float = 0.0
     """Angle of the joint at which the weight would hang freely is ``-tilt`` [rad], the joints further in at 0."""
-    stop_angle: float = math.radians(47)
+    stop_angle: Annotated[float, Meta(gt=0)] = math.radians(47)
     """Angle of the end stops either side [rad] (assumption)."""
-    stop_stiffness: float = 60.0
+    stop_stiffness: NonNegativeFloat = 60.0
     """Stiffness of the end stops [N m/rad] (assumption)."""
-    stop_damping: float = 0.6
+    stop_damping: NonNegativeFloat = 0.6
     """Damping of the end stops [N m s/rad] (assumption)."""
-    viscosity: float = 0.002
+    viscosity: NonNegativeFloat = 0.002
     """Viscous friction of the bearings [N m s/rad] (thesis section 2.3.2: negligible)."""
 
     def _valid(self) -> Valid:
-        may_be_zero = {"mass", "link_inertia", "stop_stiffness", "stop_damping", "viscosity"}
-        found = _positive(self, may_be_zero, {"muscles", "passing", "tilt"})
-        found["mass"] = found["mass"] and (self.inertia > 0 or "above 0 where link_inertia is 0")
-        return {**found, "passing": all(map(math.isfinite, self.passing)), "tilt": math.isfinite(self.tilt)}
+        return {"mass": self.inertia > 0 or "above 0 where link_inertia is 0"}
 
     @property
     def inertia(self) -> float:
@@ -171,85 +148,73 @@ class JointParameters(Settings):
 class AirParameters(Settings):
     """The supply, the pipes and the switching of the valves."""
 
-    supply: float = 1.02 * BAR
+    supply: PositiveFloat = 1.02 * BAR
     """Mean pressure of the supply [Pa] (2 bar absolute: the muscles saturate at 1 bar by themselves)."""
-    fluctuation: float = 0.02 * BAR
+    fluctuation: NonNegativeFloat = 0.02 * BAR
     """Standard deviation of the supply's fluctuation [Pa] (thesis A.1.1: other consumers; size assumed)."""
-    fluctuation_time: float = 5.0
+    fluctuation_time: PositiveFloat = 5.0
     """Correlation time of the fluctuation [s] (assumption)."""
-    compressor: float = 0.01 * BAR
+    compressor: NonNegativeFloat = 0.01 * BAR
     """Amplitude of the compressor's saw-tooth behind the reducer [Pa] (assumption)."""
-    compressor_period: float = 120.0
+    compressor_period: PositiveFloat = 120.0
     """Period of the saw-tooth [s] (assumption)."""
-    safety_valve: float = 2.0 * BAR
+    safety_valve: PositiveFloat = 2.0 * BAR
     """The supply never exceeds this [Pa] (thesis A.1.1)."""
-    polytropic: float = 1.2
+    polytropic: PositiveFloat = 1.2
     """Polytropic exponent n of the air in the muscles, between isothermal 1 and adiabatic 1.4."""
-    pipe_delay: float = 0.010
+    pipe_delay: NonNegativeFloat = 0.010
     """Time in which a pressure wave passes the hose [s] (thesis section 5.1: about 10 ms)."""
-    opening_time: float = 0.002
+    opening_time: NonNegativeFloat = 0.002
     """Time in which a valve opens [s]."""
-    closing_time: float = 0.002
+    closing_time: NonNegativeFloat = 0.002
     """Time in which a valve closes [s]."""
-    droop: float = 0.0
+    droop: NonNegativeFloat = 0.0
     """Fall of the supply by the free air that all inlets take [Pa s/m3]; 0 for a reducer that knows no load."""
-    droop_time: float = 0.1
+    droop_time: PositiveFloat = 0.1
     """Time constant with which it falls and recovers [s]."""
-
-    def _valid(self) -> Valid:
-        return _positive(self, {"fluctuation", "compressor", "pipe_delay", "opening_time", "closing_time", "droop"})
 
 
 @dataclass(frozen=True)
 class RoomParameters(Settings):
     """The temperature around the arm: heated in the day, cold after the night."""
 
-    cold: float = 17.0
+    cold: NonNegativeFloat = 17.0
     """What the room cools down to at night; the arm's clock starts in the morning [degrees Celsius]."""
-    warm: float = 21.0
+    warm: NonNegativeFloat = 21.0
     """What the room warms up to in the day [degrees Celsius]."""
-    time: float = 5400.0
+    time: PositiveFloat = 5400.0
     """Time constant of the room [s]."""
-    day: float = 36000.0
+    day: NonNegativeFloat = 36000.0
     """Seconds of each 24 hours, from the start of the arm's clock, in which the room is heated [s]."""
-
-    def _valid(self) -> Valid:
-        return _positive(self, {"cold", "warm", "day"})
 
 
 @dataclass(frozen=True)
 class SensorParameters(Settings):
     """A potentiometer at the hinge, a pressure sensor at each muscle, and the converter."""
 
-    counts_per_degree: float = 11.378
+    counts_per_degree: PositiveFloat = 11.378
     """Counts of the angle sensor per degree (thesis section 2.3.4: 1024/90)."""
-    counts_per_bar: float = 166.0
+    counts_per_bar: PositiveFloat = 166.0
     """Counts of the pressure sensors per bar (thesis section 2.3.4)."""
-    bits: int = 10
+    bits: Annotated[int, Meta(ge=1, le=24)] = 10
     """Bits of the converter (thesis section 2.3.3: 10)."""
-    angle_noise: float = 1.6
+    angle_noise: NonNegativeFloat = 1.6
     """Standard deviation of one conversion of the angle [counts] (thesis A.1.3: at most 4 counts)."""
-    pressure_noise: float = 1.6
+    pressure_noise: NonNegativeFloat = 1.6
     """Standard deviation of one conversion of a pressure [counts]."""
-    noise_limit: float = 4.0
+    noise_limit: NonNegativeFloat = 4.0
     """The noise never exceeds this [counts] (thesis A.1.3)."""
     conversions: int = 5
     """Conversions of which the median is read: 1, 5, 7 or 9 (thesis A.1.3; its default is not said)."""
-    wear: float = 0.0
+    wear: NonNegativeFloat = 0.0
     """Height of the highest bump that wear has made in the potentiometer's track [counts] (thesis A.1.2)."""
-    dropout: float = 0.0
+    dropout: Share = 0.0
     """Chance that the worn potentiometer loses contact during a reading, which then is 0."""
-    wear_seed: int = 0
+    wear_seed: NonNegativeInt = 0
     """Where the bumps are."""
 
     def _valid(self) -> Valid:
-        may_be_zero = {"angle_noise", "pressure_noise", "noise_limit", "wear", "dropout", "wear_seed"}
-        return {
-            **_positive(self, may_be_zero),
-            "bits": self.bits in range(1, 25) or "1 to 24",
-            "conversions": self.conversions in (1, 5, 7, 9) or "1, 5, 7 or 9",
-            "dropout": 0 <= self.dropout <= 1 or "0 to 1",
-        }
+        return {"conversions": self.conversions in (1, 5, 7, 9) or "1, 5, 7 or 9"}
 
     @property
     def highest(self) -> float:
@@ -261,19 +226,19 @@ class SensorParameters(Settings):
 class ArmParameters(Settings):
     """A whole virtual arm; the defaults are the nominal one."""
 
-    joints: tuple[JointParameters, ...] = (JointParameters(),)
+    joints: Annotated[tuple[JointParameters, ...], Meta(min_length=1, max_length=MOST_JOINTS)] = (JointParameters(),)
     """From the base outwards: each hangs on the link of the one before."""
-    coupling: float = 1.0
+    coupling: Share = 1.0
     """How strongly the joints of a chain act on each other, by inertia, gravity and cables: 1 as in nature, 0 each as
     if alone (:mod:`pneumarm.arm.virtual.chain`). All have one supply and one board in any case."""
     air: AirParameters = field(default_factory=AirParameters)
     room: RoomParameters = field(default_factory=RoomParameters)
     sensors: SensorParameters = field(default_factory=SensorParameters)
-    jitter: float = 1.5e-3
+    jitter: NonNegativeFloat = 1.5e-3
     """Standard deviation of the control interval [s] (thesis section 5.1: the operating system)."""
-    max_pressure: float = 1.05 * BAR
+    max_pressure: PositiveFloat = 1.05 * BAR
     """The limit of ``ArmSpec.max_pressure`` [Pa]; presets A and C need it, B saturates below by itself."""
-    period: float = PERIOD
+    period: PositiveFloat = PERIOD
     """Control period that it is made for [s]."""
 
     @property
@@ -284,11 +249,7 @@ class ArmParameters(Settings):
 
     def _valid(self) -> Valid:
         passed = all(len(joint.passing) in (0, j) for j, joint in enumerate(self.joints))
-        return {
-            **_positive(self, {"jitter"}, {"joints", "air", "room", "sensors"}),
-            "joints": 1 <= len(self.joints) <= MOST_JOINTS and (passed or "a radius for each joint that cables pass"),
-            "coupling": 0 <= self.coupling <= 1 or "0 to 1",
-        }
+        return {"joints": passed or "a radius for each joint that cables pass"}
 
 
 def without_noise(parameters: ArmParameters) -> ArmParameters:

@@ -1,10 +1,11 @@
 """What a user can choose about learning the thesis' networks in many simulated arms at once."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from pneumarm.learning.fleet import FleetSettings
 from pneumarm.learning.online.settings import Exploration, TrainSettings
-from pneumarm.settings import Valid
+from pneumarm.settings import PythonOnly, Units
 
 
 @dataclass(frozen=True)
@@ -35,13 +36,13 @@ class BatchedSettings(FleetSettings):
     """gamma (thesis: 0.98)."""
     trace_decay: float = 0.8
     """lambda (thesis: 0)."""
-    largest_gradient: float = 1.0
+    largest_gradient: Annotated[float, PythonOnly] = 1.0
     """Longer gradients are cut to this length."""
-    hidden: int = 10
+    hidden: Units = 10
     """Hidden units of each network (thesis: 5)."""
-    first_exploration: BatchedExploration = field(default_factory=BatchedExploration)
+    first_exploration: Annotated[BatchedExploration, PythonOnly] = field(default_factory=BatchedExploration)
     """At the start; goes linearly to the last."""
-    last_exploration: Exploration = field(default_factory=Exploration)
+    last_exploration: Annotated[Exploration, PythonOnly] = field(default_factory=Exploration)
     """At the end, and when going on to learn on an arm."""
 
     @property
@@ -60,6 +61,3 @@ class BatchedSettings(FleetSettings):
             shaping=None,
             noise=self.noise,
         )
-
-    def _valid(self) -> Valid:
-        return {"hidden": 1 <= self.hidden <= 1024}

@@ -28,7 +28,7 @@ from pneumarm.task.fleet import gained_by, take_alive
 from pneumarm.task.reward import Reward
 
 _POLICY = -1  # in a course: what the policy says
-_HELD = (1, 3, 6, 12)  # periods for which the last actions may go on
+_HELD = 1 / 30, 0.1, 0.2, 0.4  # s for which the last actions may go on
 _MOST = 3 + len(_HELD)  # courses: that of the policy, the plan, the last one, and these
 _MOST_ACTIONS = 1_000  # of the whole arm, among which a plan can be sought in time
 
@@ -50,6 +50,7 @@ class Courses:
         joints = simulation.window.joints
         actions = int(possible_actions(simulation.spec.muscles).sum()) ** joints
         self._search = _Search(simulation, settings) if actions <= _MOST_ACTIONS else None
+        self._held = [max(round(seconds / simulation.spec.period), 1) for seconds in _HELD]
         self._horizon, self._patience, self._reward = settings.horizon, settings.patience, settings.reward
         self._courses = np.empty((_MOST, self._horizon, joints), np.int64)
         self._plan = self._last = self._courses[0, :0]
@@ -109,7 +110,7 @@ class Courses:
                 courses[count, : len(course)] = course
                 count += 1
         if before[0] >= 0 and allowed[joints, before].all():
-            for periods in _HELD:
+            for periods in self._held:
                 courses[count, : min(periods, self._horizon)] = before
                 count += 1
         best = courses[compare(mind, single, lanes, samples, courses[:count], self._horizon)]

@@ -21,7 +21,16 @@ TIMES = ("seconds", "steps_per_second", "time [s]", "memory", "compil", "decisio
 """Parts of the names of figures that differ from run to run, whatever is computed."""
 LEARNERS = {
     "settle": ["--servo.updates", "20", "--servo.agents", "1"],
-    "reach": ["--task", "reach", "--policy.updates", "5", "--policy.agents", "1", "--policy.validation-episodes", "50"],
+    "reach": [
+        "--task",
+        "reach",
+        "--policy.updates",
+        "5",
+        "--policy.agents",
+        "1",
+        "--policy.validation-episodes",
+        "50",
+    ],
     "sarsa": ["--method", "sarsa", "--thesis.max-episodes", "300", "--agents", "1"],
     "q-learning": ["--method", "q-learning", "--thesis.max-episodes", "300", "--agents", "1"],
     "batched": ["--method", "batched", "--batched.updates", "10", "--batched.agents", "1"],
@@ -40,7 +49,11 @@ def commands(arm: str, joints: int) -> Iterator[tuple[str, list[str], list[str]]
         agent = f"{name}.agent"
         yield f"train {name}", ["train", "arm.sim", "arm.db", "--out", agent, *options], [agent]
         yield f"test {name}", ["test", agent, "arm.sim", "arm.db", "--episodes", "200"], []
-        yield f"move {name}", ["move", agent, "--arm", arm, ",".join(["20deg"] * joints), ",".join(["-5deg"] * joints)], []
+        yield (
+            f"move {name}",
+            ["move", agent, "--arm", arm, ",".join(["20deg"] * joints), ",".join(["-5deg"] * joints)],
+            [],
+        )
     yield (
         "transfer",
         ["transfer", "reach.agent", "--arm", arm, "--episodes", "5", "--test-episodes", "5", "--out", "adapted"],

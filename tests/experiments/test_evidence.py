@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import spearmanr
 
+from pneumarm.experiments.analysis import filled, number, shown
 from pneumarm.experiments.differences import Interval, interval, within
 from pneumarm.experiments.experiment import Axis, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import rank_correlation
@@ -27,6 +28,7 @@ from pneumarm.experiments.means import (
 )
 from pneumarm.experiments.overnight.analysis import answer
 from pneumarm.experiments.pictures import Curve, against, courses, dots
+from pneumarm.experiments.registry import PLACES, experiment
 from pneumarm.experiments.words import ClaimWords, Column, Quantity, Words
 
 TRIALS = {1: "one", 2: "the second of them"}
@@ -161,3 +163,35 @@ def test_the_answer_about_the_night() -> None:
     assert answer(much, by_chance) == "The night costs an agent that learns reward."
     assert "one that never learns reward" in answer(nothing, much)
     assert answer(nothing, by_chance).startswith("No drop is shown")
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_words_name_trials_and_columns_that_there_are(name: str) -> None:
+    made = experiment(name)
+    for one in made.words.estimates.values():
+        assert number(made, one.trial) in made.trials
+        assert one.base is None or number(made, one.base) in made.trials
+    for section in made.words.sections:
+        assert shown(made, section)
+        assert len(section.drawn) == len(section.dots)
+
+
+def test_trials_are_named_or_counted_and_called_by_what_differs() -> None:
+    made = experiment("coupling")
+    assert [number(made, trial) for trial in ("policy, all goals, 0.5", 2, -1, None)] == [2, 2, 6, None]
+    assert list(shown(made, made.words.sections[1]).values()) == [f"coupling\u00a0{x:g}" for x in (0, 0.5, 1)]
+    assert list(shown(made, made.words.sections[1], called=False)) == [1, 2, 3]
+    with pytest.raises(KeyError, match="no such trial"):
+        number(made, "no such trial")
+
+
+def test_what_programs_get_of_all_trials_is_said_too() -> None:
+    made = experiment("transferability")
+    rows = sorted_rows(
+        Row(arm, trial, 1, {"simulation: reward": 9.0 + arm_ * trial, "reward": 1.0 * trial, "switches": 1.0}, 0.0)
+        for arm_, arm in enumerate(("a", "b"))
+        for trial in made.trials
+    )
+    words, found = filled(made, rows)
+    assert found["lost"]["without shaping"] == estimate(rows, Quantity(figure="simulation: reward", less="reward"), 2)
+    assert f"without shaping: {found['lost']['without shaping']:.1f};" in words.summary[0]

@@ -44,7 +44,7 @@ def filled(experiment: Experiment, rows: TrialRows, **own: Any) -> tuple[Words, 
 def number(experiment: Experiment, trial: str | int | None) -> Any:
     """Return the number of a trial that is given by name, or by number, negative from the last; None of None."""
     if isinstance(trial, str):
-        return next(number for number, name in experiment.trials.items() if name == trial)
+        return {name: number for number, name in experiment.trials.items()}[trial]
     return trial if trial is None or trial > 0 else list(experiment.trials)[trial]
 
 

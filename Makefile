@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 PYTHON311 ?= python3.11
 LOWEST := .venv-lowest
 
-.PHONY: setup run test lint bench held-out baselines soak mutants walk lowest site clean
+.PHONY: setup run test lint figures same bench held-out baselines soak mutants walk lowest site clean
 
 setup: $(READY)
 
@@ -32,6 +32,12 @@ lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+figures: setup  ## counts that describe the code: lines, names, numbers, settings, options
+	$(BIN)/python tools/figures.py
+
+same: setup  ## whether results are those of another revision, byte for byte: make same BASE=main
+	$(BIN)/python tools/same_results.py $(BASE)
 
 bench: setup
 	$(BIN)/python -m benchmarks

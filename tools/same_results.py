@@ -1,4 +1,4 @@
-"""Compare what two versions of pneumarm compute: ``python tools/same_results.py REVISION`` (``make same BASE=REVISION``).
+"""Compare what two versions compute: ``python tools/same_results.py REVISION`` (``make same BASE=REVISION``).
 
 Runs the same commands with the sources of a git revision and with those here, and compares files and figures byte for
 byte. Times are left out. Says ``same`` or ``differs`` for each, and exits with 1 if anything differs.

@@ -218,7 +218,7 @@ def _same(value):  # type: ignore[no-untyped-def]
     return value
 
 
-borrowed = _lent if EXTENDED else inner(_same)
+borrowed: Any = _lent if EXTENDED else inner(_same)
 """Return, in a kernel, its argument, arrays or tuples of arrays, without counting references to them.
 
 A loop that passes named tuples of arrays from part to part would count references all the time, which takes longer

@@ -419,7 +419,9 @@ def test_what_only_programs_turn_is_no_option(capsys: pytest.CaptureFixture[str]
         assert f"--{table}.{option}" not in shown
         assert Outcome(capsys, "run", f"--{table}.{option}", 1).is_refused(f"--{table}.{option}")
         file.write_text(f"[run.{table}]\n{option} = 1\n")
-        assert Outcome(capsys, "run", "--config", file, "--write-config", tmp_path / "no.toml").is_refused(option)
+        assert Outcome(capsys, "run", "--config", file, "--write-config", tmp_path / "no.toml").is_refused(
+            *option.split(".")
+        )
     written = tmp_path / "written.toml"
     assert Outcome(capsys, "run", "--write-config", written).code == 0
     assert "tolerance = " in written.read_text()

@@ -123,7 +123,7 @@ def test_a_file_that_is_damaged_is_told_of_as_ever(bare: Path) -> None:
     (bare / "results.json").write_text("{")
     with ReportBeside(bare) as page:
         page.begin()
-        with pytest.raises(UnusableInput, match="expected a JSON file"):
+        with pytest.raises(UnusableInput, match="expected the results of a finished run"):
             page.write()
 
 

@@ -13,7 +13,15 @@ from pneumarm.errors import UnusableInput
 positive = st.floats(1e-3, 1e5)
 
 
-@given(st.integers(1, 9), st.floats(1e-3, 10), positive, positive, st.floats(-1e4, 0), positive, st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=30))
+@given(
+    st.integers(1, 9),
+    st.floats(1e-3, 10),
+    positive,
+    positive,
+    st.floats(-1e4, 0),
+    positive,
+    st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=30),
+)
 def test_a_spec_comes_back_as_it_was(tmp_path_factory, joints, period, per_degree, per_bar, low, span, name):
     spec = ArmSpec(
         joints, period, per_degree, per_bar, (low, low + span), latency=period / 3, links=(0.2,) * joints, name=name

@@ -19,6 +19,7 @@ from children import LIMIT, child, python, wait_until
 from pneumarm import progress as module
 from pneumarm.cli import main
 from pneumarm.commands.run_ import _write_config
+from pneumarm.learning import Shaping
 from pneumarm.progress import Stage, compiling, progress
 from pneumarm.run import Run
 from small import SMALL
@@ -163,6 +164,9 @@ def test_stages_of_a_run_are_numbered_and_its_time_is_the_true_one(small_run: Pa
     del results["bound"]
     results["wall_seconds"]["collect"] = 1e6
     (again / "results.json").write_text(json.dumps(results))
+    settings = json.loads((again / "settings.json").read_text())
+    settings["thesis"]["shaping"] = msgspec.to_builtins(Shaping())  # shaping is no option
+    (again / "settings.json").write_text(json.dumps(settings))
     _write_config(tmp_path / "run.toml", {"out": str(again), **msgspec.to_builtins(SMALL)})
     began = monotonic()
     done = python("-m", "pneumarm", "run", "--config", tmp_path / "run.toml")

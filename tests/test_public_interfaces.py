@@ -19,7 +19,14 @@ DOCUMENTED = {
     *("h5py", "llvmlite", "minari", "msgspec", "numba", "numba.experimental", "numba.extending"),
     "numba.core",  # for numba.core.event
     *("matplotlib", "matplotlib.axes", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg"),
-    *("matplotlib.colors", "matplotlib.figure", "matplotlib.lines", "matplotlib.ticker"),
+    *(
+        "matplotlib.colors",
+        "matplotlib.figure",
+        "matplotlib.lines",
+        "matplotlib.patches",
+        "matplotlib.path",
+        "matplotlib.ticker",
+    ),
     *("numpy", "numpy.typing", "numpy.lib.stride_tricks", "onnx", "onnx.helper", "onnx.numpy_helper"),
     *("platformdirs", "psutil", "pyarrow", "pyarrow.parquet", "pygame", "rerun", "tensorboardX", "uvicorn"),
     *("rich.console", "rich.logging", "rich.markdown", "rich.progress", "rich.status", "rich.table", "rich.text"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pneumarm.arm import Arm, ArmSpec, Reading, guarded, open_arm
-from pneumarm.arm.virtual import SwappedMuscles, SwappedValves, VirtualArm, draw_wide
+from pneumarm.arm.virtual import StuckValve, SwappedMuscles, SwappedValves, VirtualArm, draw_wide
 from pneumarm.control import Monitor
 from pneumarm.control.monitor.hypotheses import TORN, hypotheses, time_open, times_opened
 from pneumarm.errors import ArmFailure
@@ -100,7 +100,7 @@ def test_a_fault_of_any_arm_is_what_differs_from_this_arm(name, tmp_path):
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: Broken(open_arm(PLAIN[0]), 0.0, pressures=dead), "stays the same"),
+        (lambda: Broken(open_arm(PLAIN[0]), 0.0, pressures=dead), "reads one constant while valves act"),
         (lambda: VirtualArm(draw_wide(2), seed=3, faults=[SwappedValves()]), "outlet are swapped"),
         (lambda: VirtualArm(draw_wide(2), seed=3, faults=[SwappedMuscles()]), "valves are those of"),
     ],
@@ -144,7 +144,7 @@ def test_evidence_of_torn_hoses_fades_where_nothing_adds_to_it():
 
 @pytest.mark.parametrize("mode", ["warn", "off"])
 def test_a_monitor_that_only_warns_or_is_off_stops_nothing_and_marks_nothing(mode, tmp_path):
-    arm = Broken(open_arm(PLAIN[0]), 60.0, valves=stuck)
+    arm = VirtualArm(draw_wide(2), seed=3, faults=[StuckValve(begin=60.0)])
     watch = Monitor(arm.spec, mode=mode)
     with Store.for_arm(tmp_path / "db", arm.spec) as store:
         result = collect(guarded(arm), store, 4_000, 1, watch=watch)

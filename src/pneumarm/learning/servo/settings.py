@@ -48,7 +48,7 @@ class ServoSettings(TaskSettings):
     """How far ahead the reference is looked at [s]; no nearer than one control period."""
     tolerance: PositiveFloat = 1.0
     """Error that counts as settled [degrees]; the prices of errors are in units of it."""
-    precision: Annotated[PositiveFloat, PythonOnly] = 0.3
+    precision: PositiveFloat = 0.3
     """Error, in tolerances, below which there is little left to gain."""
     flat: Annotated[NonNegativeFloat, PythonOnly] = 0.1
     """Error, in tolerances, that costs nothing but ``far``."""

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import FunctionType
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numba
 import numpy as np
@@ -168,7 +168,7 @@ def without_owner(builder: Any, kind: Any, value: Any) -> Any:
         for place in (_OWNER, _PARENT):
             value = builder.insert_value(value, ir.Constant(value.type.elements[place], None), place)
     elif isinstance(kind, numba.types.BaseTuple):
-        for place, item in enumerate(cast("Any", kind)):
+        for place, item in enumerate(kind):
             lent = without_owner(builder, item, builder.extract_value(value, place))
             value = builder.insert_value(value, lent, place)
     return value
@@ -199,7 +199,7 @@ def _last(_: Any, array: Any) -> Any:
 
 @kernel
 def _tried(value):  # type: ignore[no-untyped-def]
-    lent: Any = _lent(value)  # type: ignore[call-arg]
+    lent = _lent(value)
     return _last(lent[0]) + lent[1].sum()
 
 

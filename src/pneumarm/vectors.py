@@ -28,6 +28,7 @@ ROWS = 4
 
 _Floats = NDArray[float32]
 _CONTRACT = ("contract",)  # a product and a sum may become one instruction, which rounds once
+_IN_ORDER = {"fastmath": {"contract"}}
 
 
 def weighted_sums(x: _Floats, weights: _Floats, first: int, sums: _Floats) -> None:
@@ -46,7 +47,7 @@ def weighted_sums(x: _Floats, weights: _Floats, first: int, sums: _Floats) -> No
             sums[u] += x[i] * weights[i, first + u]
 
 
-@part(fastmath={"contract"})
+@part(**_IN_ORDER)
 def add_products(table: _Floats, first: int, x: _Floats, factors: _Floats) -> None:
     """Add ``x[i] factors[u]`` to ``table[i, first + u]``.
 
@@ -62,7 +63,7 @@ def add_products(table: _Floats, first: int, x: _Floats, factors: _Floats) -> No
             table[i, np.uint64(first + u)] += x[i] * factors[u]  # an unsigned index needs no test for wrapping around
 
 
-@part(fastmath={"contract"})
+@part(**_IN_ORDER)
 def follow(table: _Floats, traces: _Floats, first: int, units: int, factor: float32, decay: float32) -> None:
     """Add ``factor`` times ``traces`` to ``table`` and multiply ``traces`` by ``decay``, in some columns of both.
 
@@ -82,7 +83,7 @@ def follow(table: _Floats, traces: _Floats, first: int, units: int, factor: floa
             traces[i, np.uint64(u)] = trace * decay
 
 
-def add_sums(weights: Any, x: Any, out: Any) -> None:
+def add_sums(weights: _Floats, x: _Floats, out: _Floats) -> None:
     """Add W^T x to ``out``: to each row of it the rows of ``x``, weighted, in their order.
 
     Args:
@@ -181,13 +182,13 @@ def _weighted_in_tiles(x: _Floats, weights: _Floats, first: int, sums: _Floats) 
 
 
 @overload(add_sums, jit_options=INNER)
-def _add_sums(weights: Any, x: Any, out: Any) -> Any:
+def _add_sums(weights: _Floats, x: _Floats, out: _Floats) -> Any:
     if not weights.dtype == x.dtype == out.dtype == types.float32 or not x.layout == out.layout == "C":
         return None
     return _added_in_tiles if EXTENDED else add_sums
 
 
-def _added_in_tiles(weights: Any, x: Any, out: Any) -> Any:
+def _added_in_tiles(weights: _Floats, x: _Floats, out: _Floats) -> Any:
     inputs, samples, outputs = x.shape[0], x.shape[1], out.shape[0]
     down, across = weights.strides[0] // 4, weights.strides[1] // 4
     e = 0

@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 PYTHON311 ?= python3.11
 LOWEST := .venv-lowest
 
-.PHONY: setup run test lint figures same bench held-out baselines soak mutants walk lowest site clean
+.PHONY: setup run test test-all lint figures same bench held-out baselines soak mutants walk lowest site clean
 
 setup: $(READY)
 
@@ -25,7 +25,10 @@ run: $(INSTALLED)  ## the whole job on the virtual arm, into runs/first
 	mkdir -p runs
 	$(BIN)/pneumarm run --out runs/first
 
-test: setup
+test: setup  ## what proves the whole in some minutes
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m 'not soak and not walk and not thorough'
+
+test-all: setup  ## all tests but soak and walk
 	$(BIN)/python -m pytest -n 3 --dist worksteal
 
 lint: setup

@@ -17,6 +17,44 @@ hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")
 
 
+THOROUGH = (
+    "appendix_a/",  # each error of the thesis' appendix A, played
+    "arm/test_emulated_port.py",  # an emulated board in real time
+    "checkup/test_checkup.py",
+    "control/test_any_sound_arm.py",
+    "control/test_hardware.py",
+    "experiments/test_claims.py",
+    "experiments/test_on_the_arm.py",
+    "experiments/test_several_joints.py",
+    "experiments/test_there_and_back.py",
+    "firmware/test_driver.py",  # the firmware behind the driver, and on a second simulated chip
+    "firmware/test_second_machine.py",
+    "hostile/",
+    "learning/test_adaptation.py",
+    "learning/test_courses.py",
+    "live/test_page.py",  # pages in a browser
+    "live/test_server.py",
+    "planning/test_refine.py",
+    "report/test_beside.py",
+    "report/test_page.py",
+    "report/test_screens.py",
+    "simulation/test_history.py",
+    "simulation/test_spread.py",
+    "test_angle_alone.py",  # arms with less hardware, whole jobs
+    "test_cli.py",  # every command; test_run.py and test_moving_commands.py have the main ones
+    "test_examples.py",
+    "test_further_sensors.py",
+    "test_kernels.py",  # compiles from an empty cache
+    "test_leaving.py",
+    "test_notebooks.py",
+    "test_one_muscle.py",
+    "test_progress.py",
+    "test_rehearsal.py",
+    "transitions/test_server.py",  # stores on PostgreSQL and MySQL
+)
+"""What takes three quarters of the time: ``make test`` leaves it out, ``make test-all`` does not."""
+
+
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a finished small run, the same for all workers of pytest; tests must not change it."""
@@ -34,7 +72,11 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes minutes, or the last worker works alone on it in the end."""
+    """Mark what is thorough, and begin with what takes minutes: or the last worker works alone on it in the end."""
+    here = Path(__file__).parent
+    for item in items:
+        if item.path.relative_to(here).as_posix().startswith(THOROUGH):
+            item.add_marker("thorough")
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
 
 

@@ -1,6 +1,6 @@
 """The pages in a real browser: on a phone, on a tablet and on a desk, light, dark and in print.
 
-``PNEUMARM_SCREENSHOTS=folder make test`` keeps what is seen, for people to look at.
+``PNEUMARM_SCREENSHOTS=folder make test-all`` keeps what is seen, for people to look at.
 """
 
 import io

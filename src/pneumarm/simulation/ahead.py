@@ -24,7 +24,7 @@ from pneumarm.networks.layers import Trainable, adam, add_slopes, trainable
 from pneumarm.networks.network import Network
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
-from pneumarm.simulation.kernel import SimulationParameters, places, simulation_parameters
+from pneumarm.simulation.kernel import SimulationParameters, simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.choice import hashed_uniform, held_out
 from pneumarm.transitions.rows import Rows
@@ -183,7 +183,7 @@ def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: St
         later=zeros(size),
         sooner=zeros(size),
     )
-    tape.x[:, places(simulation.window).one] = 1
+    tape.x[:, parameters.layout.one] = 1
     return tape
 
 
@@ -209,8 +209,7 @@ def _weigh(parameters: SimulationParameters, tape: Tape, recorded: Stretches, ra
 @kernel(fastmath=FASTMATH)
 def move_ahead(simulation, tape):  # type: ignore[no-untyped-def]
     """Let the simulation make all steps of the stretches on the tape."""
-    commanded = 2 * simulation.joints
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    first, commanded = simulation.layout.command, simulation.layout.commanded
     for t in range(tape.command.shape[0]):
         tape.x[t, first : first + commanded] = tape.command[t]
         step_all(simulation, tape.x[t], tape.x[t + 1], tape.work)
@@ -226,8 +225,7 @@ def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
         for u in range(simulation.output.shape[1]):
             simulation.output[o, u] = net.layers[last][u, o]
     move_ahead(simulation, tape)
-    commanded, clip = 2 * simulation.joints, np.float32(_CLIP)
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    first, commanded, clip = simulation.layout.command, simulation.layout.commanded, np.float32(_CLIP)
     steps, outputs, n = tape.observed.shape
     share = np.float32(1.0 / (steps * n))
     later, sooner, work = tape.later, tape.sooner, tape.work
@@ -252,7 +250,7 @@ def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
 
 def _networks(simulation: Simulation, parameters: SimulationParameters) -> tuple[Network, ...]:
     """Return the networks of which ``parameters`` are made."""
-    inputs, one = simulation.window.input_size, places(simulation.window).one
+    inputs, one = simulation.window.input_size, parameters.layout.one
     networks, u, s, o = [], 0, 0, 0
     for network in simulation.networks:
         units = last = slice(u, u + network.hidden_bias.size)

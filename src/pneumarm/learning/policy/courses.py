@@ -78,7 +78,7 @@ class Courses:
             return False
         before = single.fleet.actions[0]
         sticks = self._patience > 0 and bool((single.fleet.still[0] >= self._patience).all())
-        state = single.fleet.x[: mind.inputs.state_size, 0]
+        state = single.fleet.x[: mind.inputs.layout.command, 0]
         begins = before[0] < 0
         if not begins:
             self._spent -= self._reward.action + self._reward.switch * int(single.fleet.switched[0].sum())

@@ -16,14 +16,6 @@ from pneumarm.learning.methods import TEST
 from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import learn_once
-from pneumarm.learning.servo.price import (
-    PriceParameters,
-    price_of_changes,
-    price_of_cocontraction,
-    price_of_error,
-    price_of_slack,
-    prices_of_errors,
-)
 from pneumarm.learning.servo.references import draw_references, write_previews
 from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.moving import MoveSettings, move, track
@@ -32,6 +24,14 @@ from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.acting import test_acting
 from pneumarm.task.environment import environment
+from pneumarm.task.price import (
+    PriceParameters,
+    price_of_changes,
+    price_of_cocontraction,
+    price_of_error,
+    price_of_slack,
+    prices_of_errors,
+)
 
 SMALL = ServoSettings(arms=8, updates=4, agents=1, duration=0.3, hidden=(8, 8), validation_movements=8)
 

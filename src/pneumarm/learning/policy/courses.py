@@ -23,6 +23,8 @@ from pneumarm.kernels import inner, kernel
 from pneumarm.learning.policy.acting import Lanes, Mind, best_of, copy_all, judge_all
 from pneumarm.learning.policy.proximal import FORBIDDEN
 from pneumarm.learning.policy.settings import PolicySettings
+from pneumarm.planning.planner import SimulationModel
+from pneumarm.planning.search import PlanSettings, find, halved, problem, tree
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.fleet import gained_by, take_alive
 from pneumarm.task.reward import Reward
@@ -122,9 +124,6 @@ class _Search:
     """Seeks plans in the simulation, by the states that an actor sees."""
 
     def __init__(self, simulation: Simulation, settings: PolicySettings) -> None:
-        from pneumarm.planning.planner import SimulationModel  # planning stands above agents
-        from pneumarm.planning.search import PlanSettings, find, halved, problem, tree
-
         joints = simulation.window.joints
         plan = PlanSettings(nodes=settings.nodes, failure_cost=missed(settings.reward))
         self._model = SimulationModel(simulation, plan)
@@ -135,7 +134,7 @@ class _Search:
         self._problem = problem(np.zeros(joints), reward, plan, uncertainty, muscles, agility)
         self.goal = self._problem.goal
         """Shape (joints,) [counts]."""
-        self._tree, self._find, self._halved = tree(plan, joints), find, halved
+        self._tree = tree(plan, joints)
         self._actions = to_actions(self._problem.commands)
         """Actions of each joint by those of the whole arm, shape (9**joints, joints)."""
 
@@ -150,12 +149,12 @@ class _Search:
         self._model.put(state)
         same = np.flatnonzero((self._actions == before).all(axis=1))
         last = int(same[0]) if same.size else -1  # none before the first
-        found = self._find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
+        found = find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
         return self._actions[found.actions], found.cost
 
     def hurry(self) -> None:
         """Keep half as many states from now on."""
-        self._tree = self._halved(self._tree, len(self._problem.commands))
+        self._tree = halved(self._tree, len(self._problem.commands))
 
 
 @kernel

@@ -12,7 +12,6 @@ from pneumarm.learning.servo.controller import ServoController, ready_controller
 from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.inputs import input_size, seen_parameters
 from pneumarm.learning.servo.predictive import PLANS, PredictiveControl
-from pneumarm.learning.servo.price import PriceParameters, prices_of_errors
 from pneumarm.learning.servo.settings import SOFT, STIFF, USUAL_PERIOD, ServoSettings
 from pneumarm.learning.servo.testing import run_servo
 from pneumarm.networks.layers import trainable
@@ -20,6 +19,7 @@ from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.movements import Movement, Movements
+from pneumarm.task.price import PriceParameters, prices_of_errors
 
 KIND = "pneumarm servo"
 _PAST_THE_LIMIT = 0.2  # share of the gradient, see ServoTask

@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 from pneumarm.kernels import kernel
 from pneumarm.learning.servo.commands import CommandParameters, write_commands
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, inputs_back, write_inputs
-from pneumarm.learning.servo.price import (
+from pneumarm.networks.layers import Trainable, backward, forward, through_weights
+from pneumarm.networks.tansig import FASTMATH
+from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
+from pneumarm.simulation.kernel import SimulationParameters
+from pneumarm.simulation.layout import angle_at, command_at, pressure_at
+from pneumarm.task.price import (
     PriceParameters,
     price_of_changes,
     price_of_cocontraction,
     price_of_error,
     price_of_slack,
 )
-from pneumarm.networks.layers import Trainable, backward, forward, through_weights
-from pneumarm.networks.tansig import FASTMATH
-from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
-from pneumarm.simulation.kernel import SimulationParameters
-from pneumarm.simulation.layout import angle_at, command_at, pressure_at
 
 _ZERO = np.float32(0.0)
 

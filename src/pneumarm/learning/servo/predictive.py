@@ -29,13 +29,13 @@ from pneumarm.learning.servo.gradient import (
     prices_of_pressures,
     tape,
 )
-from pneumarm.learning.servo.price import price_of_one_error
 from pneumarm.learning.servo.settings import USUAL_PERIOD
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import step_all
 from pneumarm.simulation.layout import angle_at, command_at, pressure_at
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.changes import changes
+from pneumarm.task.price import price_of_one_error
 
 _changes = part(changes)
 _HORIZON = 0.55  # s

@@ -15,7 +15,6 @@ from pneumarm.learning.servo.gradient import (
     move_forward,
     tape,
 )
-from pneumarm.learning.servo.price import prices_of_errors
 from pneumarm.learning.servo.references import draw_references, write_previews
 from pneumarm.learning.servo.settings import SOFT, STIFF, USUAL_PERIOD, ServoSettings
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
@@ -25,6 +24,7 @@ from pneumarm.task.begin import BeginStates
 from pneumarm.task.changes import valve_changes
 from pneumarm.task.environment import environment
 from pneumarm.task.movements import Movements, movements
+from pneumarm.task.price import prices_of_errors
 
 _WEIGHTS, _MOVEMENTS, _VALIDATION = 0, 1, 2  # streams of random numbers
 _ROW = 25  # updates between two rows of the curves

@@ -32,7 +32,7 @@ from pneumarm.networks import (
 from pneumarm.networks import importance as importance_of
 from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings, Valid
 from pneumarm.simulation.ahead import fitted_ahead, stretches
-from pneumarm.simulation.history import LONGEST, USUAL, chosen_history, columns
+from pneumarm.simulation.history import LONGEST, SEEN, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
 from pneumarm.simulation.spread import spread_over_periods
@@ -84,8 +84,8 @@ class FitSettings(Settings):
     """Observations that the networks read (thesis eq. 3.5: 3); by default 3, or more where more say more of this
     arm."""
     memory: PositiveInt | None = None
-    """Observations in the state, for a policy to see; by default 8 where predictions are fitted ahead, for agents
-    that settle, and else no more than the networks read (thesis)."""
+    """Observations in the state, for a policy to see; by default 8 or more where predictions are fitted ahead, for
+    agents that settle, and else no more than the networks read (thesis)."""
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
     layers: Literal[1, 2] | None = None
@@ -133,7 +133,7 @@ class FitSettings(Settings):
         """Return the settings with the history and memory that suit the arm of ``store`` where none is asked for."""
         history = self.history or min(chosen_history(store, store.spec, self.sensors), self._longest(store))
         settles = self.ahead > 0 and self.approximator == "network"
-        return replace(self, history=history, memory=self.memory or (LONGEST if settles else history))
+        return replace(self, history=history, memory=self.memory or max(history, SEEN if settles else 1))
 
     def with_layers(self, joints: int, rows: int) -> "FitSettings":
         """Return the settings with what suits ``joints`` and ``rows`` where no layers or hidden units are chosen."""

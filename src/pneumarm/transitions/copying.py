@@ -9,7 +9,7 @@ import numpy as np
 
 from pneumarm.address import StoreAddress
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.transitions.database import PAGE, Line, pages
+from pneumarm.transitions.database import PAGE, Line
 from pneumarm.transitions.rows import values_of
 from pneumarm.transitions.store import SEQUENCE, Store
 
@@ -88,7 +88,7 @@ def _fill(made: Store, original: Store) -> int:
 def _lines(store: Store, table: _Table) -> Iterator[Line]:
     if table.name == "marks" and not store.keeps_marks:
         return iter(())
-    found = pages(store.database, table.name, table.columns, table.key, page=table.page)
+    found = store.database.pages(table.name, table.columns, table.key, page=table.page)
     return (tuple(line[1:]) for line in found)
 
 

@@ -31,7 +31,7 @@ from pneumarm.console import peak_memory
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.kernels import CACHE_FOLDER
 from pneumarm.learning import ServoSettings, test, train
-from pneumarm.learning.servo.training import ServoLearner
+from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.leaving import leave_by_exceptions
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning.bound import BoundSettings, measure_bound

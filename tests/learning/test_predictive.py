@@ -9,6 +9,7 @@ from learning.synthetic_arm import KINDS_OF_SIMULATION, synthetic_begin_states, 
 from pneumarm.arm import Reading
 from pneumarm.arm.reference import Reference
 from pneumarm.learning.servo import ServoAgent, ServoSettings
+from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.learning.servo.gradient import ServoTask, Tape, tape
 from pneumarm.learning.servo.predictive import (
     PLANS,
@@ -20,7 +21,6 @@ from pneumarm.learning.servo.predictive import (
     price,
     slopes_by_commands,
 )
-from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.planning import PlannedServo
 from pneumarm.simulation.arm import SimulationArm

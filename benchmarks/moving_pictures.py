@@ -17,11 +17,11 @@ from benchmarks.moving import AMPLITUDES, FREQUENCIES, Plan, arm_for, asked_for,
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control.named import open_tracking
+from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE
 from pneumarm.learning import load_agent
 from pneumarm.learning.servo import ServoAgent
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.planning.moving_bound import MovingBoundSettings, measure_moving_bound
-from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
 from pneumarm.report.style import styled
 from pneumarm.task.reference import counts_of, parse_reference
 

@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.colours import DARK, INK
+from pneumarm.drawing.colours import DARK, INK
 
 WIDTH = 7.4
 """Width of every figure [inch]."""

@@ -23,6 +23,8 @@ from pneumarm.kernels import inner, kernel
 from pneumarm.learning.policy.acting import Lanes, Mind, best_of, copy_all, judge_all
 from pneumarm.learning.policy.proximal import FORBIDDEN
 from pneumarm.learning.policy.settings import PolicySettings
+from pneumarm.planning.planner import SimulationModel
+from pneumarm.planning.search import PlanSettings, find, halved, problem, tree
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.fleet import gained_by, take_alive
 from pneumarm.task.reward import Reward
@@ -122,9 +124,6 @@ class _Search:
     """Seeks plans in the simulation, by the states that an actor sees."""
 
     def __init__(self, simulation: Simulation, settings: PolicySettings) -> None:
-        from pneumarm.planning.planner import SimulationModel  # planning stands above agents
-        from pneumarm.planning.search import PlanSettings, find, halved, problem, tree
-
         joints = simulation.window.joints
         plan = PlanSettings(nodes=settings.nodes, failure_cost=missed(settings.reward))
         self._model = SimulationModel(simulation, plan)

@@ -10,7 +10,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import LearnSettings, find_method, load_agent, test, train
 from pneumarm.learning.hierarchy import HIERARCHY, HierarchicalAgent, HierarchySettings
-from pneumarm.learning.hierarchy.loop import begin_levels, go_on, hierarchy, memory, upper_shape
+from pneumarm.learning.hierarchy.loop import begin_levels, go_on, hierarchy, level_memory, upper_shape
 from pneumarm.learning.online.loop import Schedule, remember
 from pneumarm.learning.online.values import draw_networks, pack
 from pneumarm.random import random_state
@@ -70,7 +70,7 @@ def test_what_both_levels_learn_from_a_step() -> None:
     agent = an_agent(simulation, settings)
     lower = np.zeros_like(agent.lower)
     levels = hierarchy((upper, lower), simulation.spec, window, scaling, settings)
-    thinks, place = memory(levels), places(window)
+    thinks, place = level_memory(levels), places(window)
     x = np.zeros(place.size, np.float32)
     x[place.one] = 1
     x[: place.command] = begin.states[0]

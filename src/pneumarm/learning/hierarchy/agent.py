@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning.agents import SimulationAgent
-from pneumarm.learning.hierarchy.loop import begin_levels, go_on, hierarchy, memory, test_levels, upper_shape
+from pneumarm.learning.hierarchy.loop import begin_levels, go_on, hierarchy, level_memory, test_levels, upper_shape
 from pneumarm.learning.hierarchy.settings import HierarchySettings
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.values import network_shapes, pack
@@ -50,7 +50,7 @@ class HierarchicalAgent(SimulationAgent):
         record = movements(episodes, one.goal.size)
         levels = hierarchy((self.upper, self.lower), self.spec, self.window, self.scaling, self.settings, 0.0)
         randoms = random_state(seed), random_state(0)
-        test_levels(env, levels, GREEDY, one, memory(levels), randoms, record)
+        test_levels(env, levels, GREEDY, one, level_memory(levels), randoms, record)
         return record
 
     def save(self, path: Path) -> None:
@@ -95,7 +95,7 @@ class HierarchicalActor:
     def __init__(self, agent: HierarchicalAgent) -> None:
         window = agent.window
         self._levels = hierarchy((agent.upper, agent.lower), agent.spec, window, agent.scaling, agent.settings, 0.0)
-        self._memory, self._random, self._size = memory(self._levels), random_state(0), window.state_size
+        self._memory, self._random, self._size = level_memory(self._levels), random_state(0), window.state_size
         self._x = np.zeros(places(window).size, np.float32)
         self._x[places(window).one] = 1
 

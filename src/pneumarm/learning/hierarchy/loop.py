@@ -59,8 +59,8 @@ class Hierarchy(NamedTuple):
     """Whether the upper agent sees all of it."""
 
 
-class Memory(NamedTuple):
-    """What both levels remember within an episode. Made by :func:`memory`."""
+class LevelMemory(NamedTuple):
+    """What both levels remember within an episode. Made by :func:`level_memory`."""
 
     low: Workspace
     high: Workspace
@@ -110,10 +110,10 @@ def hierarchy(
     )
 
 
-def memory(levels: Hierarchy) -> Memory:
+def level_memory(levels: Hierarchy) -> LevelMemory:
     """Return workspace for both levels."""
     joints = len(levels.unit)
-    return Memory(
+    return LevelMemory(
         low=workspace(levels.lower, joints),
         high=workspace(levels.upper, joints),
         seen=np.zeros(levels.upper.weights.shape[1] - 2, np.float32),

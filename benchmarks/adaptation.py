@@ -46,9 +46,9 @@ from pneumarm.arm import guarded
 from pneumarm.arm.virtual import ArmParameters, VirtualArm, draw_parameters
 from pneumarm.arm.virtual.parameters import JointParameters, MuscleParameters
 from pneumarm.control import BEGIN, TransferSettings, transfer
+from pneumarm.drawing.colours import DARK, GREY, LIGHT, MIDDLE
 from pneumarm.files import write_json
 from pneumarm.learning import PolicyAgent, PolicySettings, train
-from pneumarm.report.colours import DARK, GREY, LIGHT, MIDDLE
 from pneumarm.report.style import key, legend_below, panels, styled
 from pneumarm.simulation import SINGLE_STEPS, fit_store
 from pneumarm.statistics import moving_mean

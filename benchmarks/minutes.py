@@ -30,8 +30,8 @@ from scipy.stats import t as student
 
 from benchmarks import _environment as environment
 from benchmarks._trials import HELD_OUT, Rows, collected, fitted, greedy_movements
+from pneumarm.drawing.colours import DARK, GREY, MIDDLE
 from pneumarm.learning import PolicySettings, test, train
-from pneumarm.report.colours import DARK, GREY, MIDDLE
 from pneumarm.report.style import key, legend_below, panels, styled
 from pneumarm.statistics import rate_estimate
 from pneumarm.transitions import Store

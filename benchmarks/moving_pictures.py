@@ -18,10 +18,10 @@ from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.bound.moving import MovingBoundSettings, measure_moving_bound
 from pneumarm.control.named import open_tracking
+from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE
 from pneumarm.learning import load_agent
 from pneumarm.learning.servo import ServoAgent
 from pneumarm.moving import MoveSettings, move, track
-from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
 from pneumarm.report.style import styled
 from pneumarm.task.reference import counts_of, parse_reference
 

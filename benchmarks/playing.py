@@ -18,7 +18,7 @@ from pneumarm.control.agent import AgentController
 from pneumarm.control.movement import BEGIN, drawn, evaluate
 from pneumarm.control.playing import Player
 from pneumarm.learning import Agent, Exploration, TrainSettings
-from pneumarm.learning.online.learner import OnlineLearner
+from pneumarm.learning.online.agent import OnlineLearner
 from pneumarm.learning.online.values import draw_networks
 
 MOVEMENTS, REPEATS, SEED = 100, 3, 7

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.environment import thesis_simulation
 from pneumarm.learning.servo import ServoAgent, ServoSettings
-from pneumarm.learning.servo.training import ServoLearner
+from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.networks.layers import weighted_sums
 
 SIZES = (44, 48, 64), (44, 48, 8), (19, 32, 8)

@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
+from pneumarm.drawing.moving_arm import moving_arm
 from pneumarm.report.figures import movement
-from pneumarm.report.moving_arm import moving_arm
 from pneumarm.report.run_report import read_run
 from pneumarm.report.shown import read_shown
 from pneumarm.report.style import svg

@@ -274,7 +274,7 @@ import hashlib
 import numpy as np
 from pneumarm.learning import PolicySettings
 from pneumarm.learning.policy.proximal import batch, improve
-from pneumarm.learning.policy.training import rule
+from pneumarm.learning.policy.agent import rule
 from pneumarm.networks.layers import initial_weights, trainable
 from pneumarm.random import random_state
 

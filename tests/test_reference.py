@@ -82,7 +82,7 @@ def test_derivatives_are_those_of_the_function_known_ahead_or_not() -> None:
 
     for known in (True, False):
         asked.clear()
-        wanted = Reference(at, known_ahead=known).wanted(1.0, ahead=0.1)
+        wanted = Reference(at, known_ahead=known).point(1.0, ahead=0.1)
         assert known or max(asked) <= 1.0
         np.testing.assert_allclose(wanted.angle, [3 + 2.2 + 5 * 1.21])
         np.testing.assert_allclose(wanted.velocity, [2 + 11])
@@ -90,7 +90,7 @@ def test_derivatives_are_those_of_the_function_known_ahead_or_not() -> None:
 
 
 def test_a_goal_stays_and_a_minimum_jerk_move_begins_and_ends_gently() -> None:
-    assert constant([5.0]).wanted(3.0).velocity == [0.0]
+    assert constant([5.0]).point(3.0).velocity == [0.0]
     shares = [minimum_jerk(share) for share in np.linspace(-0.5, 1.5, 41)]
     assert (shares[0], shares[-1], shares[20]) == (0, 1, 0.5)
     assert (np.diff(shares) >= 0).all()

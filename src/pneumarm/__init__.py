@@ -13,7 +13,6 @@ From nothing to an arm that moves where you say; ``serial:/dev/ttyACM0`` in the 
 """
 
 from pneumarm.api import collect, fit, load_controller, move, open_arm, test, track, train, tune
+from pneumarm.version import __version__ as __version__
 
 __all__ = ["collect", "fit", "load_controller", "move", "open_arm", "test", "track", "train", "tune"]
-
-__version__ = "0.1.0"

@@ -13,13 +13,13 @@ from typing import Any
 
 from cyclopts import App, CycloptsError, Group, Parameter, UnusedCliTokensError
 
-from pneumarm import __version__
 from pneumarm.commands.config_file import take_config, take_option
 from pneumarm.commands.help_pages import HELP, HELP_ALL, LOG, AllOptions, FewOptions
 from pneumarm.console import complain, open_closed_streams
 from pneumarm.errors import PneumarmError
 from pneumarm.leaving import leave_by_exceptions
 from pneumarm.progress import LEVELS, checked_level, print_lines
+from pneumarm.version import __version__
 
 COMMANDS = {
     "run": (

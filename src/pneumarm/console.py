@@ -1,62 +1,30 @@
-"""What the command line shows: readings while an arm moves, tables, and one JSON object for programs."""
+"""What the command line shows: lines and tables for people, and one JSON object for programs."""
 
 import json
 import math
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
-from time import monotonic
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from rich.console import Console
-from rich.status import Status
 from rich.table import Table
 
 from pneumarm.address import masked
 from pneumarm.errors import shortened
 
-if TYPE_CHECKING:  # the command line answers before these are imported
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from pneumarm.arm.seam import ArmSpec, Reading
-
-_LOOK = 0.1  # s between two looks of a person
-
 _NARROWEST = 20  # columns in which tables and helps can be laid out; terminals that cannot tell say 0
 _columns = os.environ.get("COLUMNS", "")
 if not re.fullmatch("[0-9]{2,6}", _columns) or int(_columns) < _NARROWEST:
     os.environ.pop("COLUMNS", None)
-_errors = Console(stderr=True, highlight=False)
-
-
-@contextmanager
-def live(spec: "ArmSpec") -> "Iterator[Callable[[Reading, NDArray[np.float64]], None]]":
-    """Show where an arm is and where it is wanted on stderr while the block runs; nothing where that is no terminal.
-
-    Gives what is to be called with every reading and the angles (joints,) wanted [counts].
-    """
-    with Status("", console=_errors) if _errors.is_terminal else nullcontext() as status:
-        shown = -math.inf
-
-        def seen(reading: "Reading", wanted: "NDArray[np.float64]") -> None:
-            nonlocal shown
-            now = monotonic()
-            if status is None or now - shown < _LOOK:
-                return
-            shown = now
-            joints = zip(spec.degrees(reading.angle), spec.degrees(wanted), spec.bar(reading.pressure), strict=True)
-            said = [f"{at:6.1f}° of {goal:6.1f}°  {p[0]:.2f} {p[1]:.2f} bar" for at, goal, p in joints]
-            status.update(f"{reading.time:8.1f} s  {'   '.join(said)}")
-
-        yield seen
+ERRORS = Console(stderr=True, highlight=False)
+"""Prints for people on stderr."""
 
 
 def say(text: str) -> None:
     """Print a line for people on stderr."""
-    _errors.print(text, markup=False, soft_wrap=True)
+    ERRORS.print(text, markup=False, soft_wrap=True)
 
 
 def complain(error: BaseException | str) -> None:

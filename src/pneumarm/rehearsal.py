@@ -23,13 +23,13 @@ import numpy as np
 
 from pneumarm.arm import ArmSpec, open_arm
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.bound.reaching import BoundSettings, measure_bound
 from pneumarm.console import peak_memory
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.kernels import CACHE_FOLDER
 from pneumarm.learning import ServoSettings, test, train
 from pneumarm.leaving import leave_by_exceptions
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
-from pneumarm.bound.reaching import BoundSettings, measure_bound
 from pneumarm.simulation import FitSettings, SimulationArm, fit_store
 from pneumarm.task import begin_states
 from pneumarm.transitions import Store

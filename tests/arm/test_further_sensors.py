@@ -13,7 +13,7 @@ from pneumarm.arm.corrected import CorrectedArm
 from pneumarm.arm.seam import checked, measured, with_measured
 from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
 from pneumarm.arm.serial.arm import VELOCITY_MS as OF_THE_CONTROLLER
-from pneumarm.arm.spec_file import ArmFile, Correction, load_spec, save_spec
+from pneumarm.arm.spec_file import ArmFile, SensorCorrection, load_spec, save_spec
 from pneumarm.arm.virtual import FrozenPotentiometer, VirtualArm, usual_sensors, without_noise
 from pneumarm.arm.virtual.further import ACCELEROMETER, GRAVITY, THERMOMETER, VELOCITY_MS
 from pneumarm.arm.virtual.parameters import ArmParameters
@@ -258,7 +258,7 @@ def test_a_controller_without_a_channel_for_a_sensor_refuses_it():
 
 def test_a_linearised_angle_has_a_linearised_velocity():
     """Twice the slope above 500 counts, half of it below."""
-    bent = Correction(angle_raw=((0.0, 500.0, 1000.0),), angle_true=((0.0, 250.0, 1250.0),))
+    bent = SensorCorrection(angle_raw=((0.0, 500.0, 1000.0),), angle_true=((0.0, 250.0, 1250.0),))
     with VirtualArm(velocity_sensor=True) as arm:
         raw = [Reading(0.0, np.array([a]), np.zeros((1, 2)), np.array([0.5])) for a in (300.0, 700.0)]
         arm.read = iter(raw).__next__

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pneumarm.arm import ArmSpec, open_arm
 from pneumarm.arm.corrected import CorrectedArm
-from pneumarm.arm.spec_file import ArmFile, Correction, load_arm_file, load_spec, save_arm_file, save_spec
+from pneumarm.arm.spec_file import ArmFile, SensorCorrection, load_arm_file, load_spec, save_arm_file, save_spec
 from pneumarm.errors import UnusableInput
 
 positive = st.floats(1e-3, 1e5)
@@ -33,7 +33,7 @@ def test_a_spec_comes_back_as_it_was(tmp_path_factory, joints, period, per_degre
 
 def test_corrections_come_back_and_correct(tmp_path, smallest_arm):
     table = ((0.0, 100.0, 300.0), (10.0, 60.0, 400.0))
-    correction = Correction(((40.0, 42.0),), ((1.0, 0.5),), (table[0],), (table[1],))
+    correction = SensorCorrection(((40.0, 42.0),), ((1.0, 0.5),), (table[0],), (table[1],))
     path = tmp_path / "arm.toml"
     save_arm_file(ArmFile(ArmSpec(), correction), path)
     assert load_arm_file(path) == ArmFile(ArmSpec(), correction)
@@ -45,7 +45,7 @@ def test_corrections_come_back_and_correct(tmp_path, smallest_arm):
         reading = corrected.read()
         assert reading.angle == pytest.approx([true])
         assert reading.pressure.tolist() == [[100, 50]]
-    assert Correction().is_none
+    assert SensorCorrection().is_none
     assert not correction.is_none
 
 
@@ -85,7 +85,9 @@ def test_a_missing_file_and_a_missing_folder_are_refused(tmp_path):
 def test_an_arm_is_opened_with_its_file(tmp_path):
     path = tmp_path / "arm.toml"
     with open_arm("virtual:seed=4") as plain:
-        known = ArmFile(replace(plain.spec, period=0.05, name="mine"), Correction(pressure_zero=((10.0, 20.0),)))
+        known = ArmFile(
+            replace(plain.spec, period=0.05, name="mine"), SensorCorrection(pressure_zero=((10.0, 20.0),))
+        )
         expected = plain.read()
     save_arm_file(known, path)
     for arm in (open_arm("virtual:seed=4", spec=path), open_arm(f"virtual:seed=4,spec={path}")):

@@ -12,7 +12,7 @@ from pneumarm.arm import ArmSpec, guarded, open_arm
 from pneumarm.arm.reference import Reference
 from pneumarm.classical import KINDS, Tuned, TuneSettings, load_tuned, tune
 from pneumarm.classical.cascade import Cascade, CascadeGains
-from pneumarm.classical.following import Wish, _Way
+from pneumarm.classical.following import Setpoint, _QuinticProfile
 from pneumarm.classical.pressure_loop import PressureLoop, Rates
 from pneumarm.classical.ranges import RANGES
 from pneumarm.classical.search import Evolution
@@ -87,12 +87,12 @@ def test_the_integral_does_not_wind_up_where_the_joint_cannot_go() -> None:
     law.muscles.begin(500.0, (0.5, 0.5))
     for _ in range(300):  # a stop holds it back, 30 degrees from its goal, with all pressure that there is
         law.muscles.read(560.0, (0.96, 0.04), 0.0)
-        law.act(Wish(900.0, 900.0, 0.0, 0.0, 0.0), 560.0, 0.0)
+        law.act(Setpoint(900.0, 900.0, 0.0, 0.0, 0.0), 560.0, 0.0)
     error = static_map.angle(0.96, 0.04) - 560.0
     assert law.muscles.error == pytest.approx(error, rel=0.01)
     assert law.muscles.rest_angle(0.96, 0.04) == pytest.approx(560.0, abs=5)
     law.muscles.read(560.0, (0.96, 0.04), 0.0)  # the way back is taken at once
-    assert law.act(Wish(400.0, 400.0, 0.0, 0.0, 0.0), 560.0, 0.0) == (-1, 1)
+    assert law.act(Setpoint(400.0, 400.0, 0.0, 0.0, 0.0), 560.0, 0.0) == (-1, 1)
 
 
 def test_a_moving_joint_teaches_nothing_of_the_map() -> None:
@@ -104,7 +104,7 @@ def test_a_moving_joint_teaches_nothing_of_the_map() -> None:
 
 
 def test_a_way_meets_both_of_its_ends() -> None:
-    way = _Way(1.0, 0.5, 10.0, 20.0, -30.0, 100.0)
+    way = _QuinticProfile(1.0, 0.5, 10.0, 20.0, -30.0, 100.0)
     np.testing.assert_allclose(way.at(1.0), (10.0, 20.0, -30.0))
     np.testing.assert_allclose(way.at(1.5 - 1e-9), (100.0, 0.0, 0.0), atol=1e-4)
     assert way.at(2.0) == (100.0, 0.0, 0.0)

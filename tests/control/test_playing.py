@@ -13,7 +13,7 @@ from pneumarm.control.movement import drawn, move
 from pneumarm.control.playing import Player
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Agent, Exploration, TrainSettings
-from pneumarm.learning.online.learner import OnlineLearner
+from pneumarm.learning.online.agent import OnlineLearner
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.values import draw_networks
 from pneumarm.task.movements import joined

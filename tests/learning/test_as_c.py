@@ -10,9 +10,10 @@ import pytest
 from synthetic_arm import in_steps, synthetic_simulation
 
 from pneumarm.learning.servo.actor import ServoActor
-from pneumarm.learning.servo.agent import ServoAgent, servo_sizes
+from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.as_c import as_c
 from pneumarm.learning.servo.settings import ServoSettings
+from pneumarm.learning.servo.task import servo_sizes
 from pneumarm.networks.layers import initial_weights
 
 STATES = 10_000

@@ -13,8 +13,9 @@ from pneumarm.learning.policy.acting import judge_all, lanes
 from pneumarm.learning.policy.agent import PolicyAgent, policy_sizes
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.servo.actor import ServoActor
-from pneumarm.learning.servo.agent import ServoAgent, servo_sizes
+from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.settings import ServoSettings
+from pneumarm.learning.servo.task import servo_sizes
 from pneumarm.networks.layers import initial_weights
 from pneumarm.random import random_states
 

@@ -14,9 +14,8 @@ from pneumarm.control import AgentController
 from pneumarm.learning import PolicyAgent, PolicySettings
 from pneumarm.learning.policy import courses
 from pneumarm.learning.policy.acting import lanes
-from pneumarm.learning.policy.agent import policy_sizes
+from pneumarm.learning.policy.agent import policy_sizes, practised
 from pneumarm.learning.policy.courses import compare
-from pneumarm.learning.policy.training import practised
 from pneumarm.networks.layers import weight_count
 from pneumarm.planning import search
 from pneumarm.random import random_states

@@ -25,8 +25,7 @@ from pneumarm.learning import (
     test_ahead,
     train,
 )
-from pneumarm.learning.policy.agent import KIND
-from pneumarm.learning.policy.training import PolicyLearner, patient
+from pneumarm.learning.policy.agent import KIND, PolicyLearner, patient
 from pneumarm.learning.training import CHECKPOINT
 from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.simulation import Simulation

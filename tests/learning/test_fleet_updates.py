@@ -7,8 +7,8 @@ from synthetic_arm import synthetic_simulation
 from pneumarm.learning import PolicySettings, TrainSettings
 from pneumarm.learning.batched.values import connections, lambda_returns, network_sizes, to_networks
 from pneumarm.learning.online.values import draw_networks
+from pneumarm.learning.policy.agent import rule
 from pneumarm.learning.policy.proximal import advantages, batch, policy_errors
-from pneumarm.learning.policy.training import rule
 from pneumarm.networks.layers import initial_weights, trainable, workspace
 
 

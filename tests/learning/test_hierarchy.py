@@ -10,7 +10,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import LearnSettings, find_method, load_agent, test, train
 from pneumarm.learning.hierarchy import HIERARCHY, HierarchicalAgent, HierarchySettings
-from pneumarm.learning.hierarchy.loop import begin_plan, go_on, hierarchy, plan, upper_shape
+from pneumarm.learning.hierarchy.loop import begin_levels, go_on, hierarchy, level_memory, upper_shape
 from pneumarm.learning.online.loop import Schedule, remember
 from pneumarm.learning.online.values import draw_networks, pack
 from pneumarm.random import random_state
@@ -70,12 +70,12 @@ def test_what_both_levels_learn_from_a_step() -> None:
     agent = an_agent(simulation, settings)
     lower = np.zeros_like(agent.lower)
     levels = hierarchy((upper, lower), simulation.spec, window, scaling, settings)
-    thinks, place = plan(levels), layout_of(window)
+    thinks, place = level_memory(levels), layout_of(window)
     x = np.zeros(place.size, np.float32)
     x[place.one] = 1
     x[: place.command] = begin.states[0]
     random = random_state(0)
-    begin_plan(levels, GREEDY, thinks, x, begin.angle[0] + 300.0, random)
+    begin_levels(levels, GREEDY, thinks, x, begin.angle[0] + 300.0, random)
     np.testing.assert_allclose(thinks.aim, begin.angle[0], atol=1e-2)
     remember(thinks.low, x)
     x[0] += 100 / levels.unit[0, 1]  # joint 1 leaves its subgoal, joint 2 stays at its own

@@ -10,6 +10,7 @@ from pneumarm.arm import Reading
 from pneumarm.arm.reference import Reference
 from pneumarm.learning.planned.servo import PlannedServo
 from pneumarm.learning.servo import ServoAgent, ServoSettings
+from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.learning.servo.gradient import ServoTask, Tape, tape
 from pneumarm.learning.servo.predictive import (
     PLANS,
@@ -21,7 +22,6 @@ from pneumarm.learning.servo.predictive import (
     price,
     slopes_by_commands,
 )
-from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.simulation import Simulation

@@ -14,10 +14,10 @@ from pneumarm.errors import UnusableInput
 from pneumarm.learning import test as simulated_test
 from pneumarm.learning.methods import TEST
 from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
+from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import learn_once
 from pneumarm.learning.servo.references import draw_references, write_previews
-from pneumarm.learning.servo.training import ServoLearner
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.noise import NoiseSettings

@@ -10,7 +10,7 @@ from live.serving import ARM, served
 from pneumarm.arm import open_arm
 from pneumarm.classical import TuneSettings, tune
 from pneumarm.live.rig import Rig
-from pneumarm.live.server import Server
+from pneumarm.live.server import LiveServer
 from pneumarm.run import RunSettings
 
 
@@ -24,7 +24,7 @@ def pid(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def server(pid: Path) -> Iterator[Server]:
+def server(pid: Path) -> Iterator[LiveServer]:
     """Return a server of the arm with its controller."""
     with served(Rig(RunSettings(arm=ARM), [str(pid)], None)) as server:
         yield server

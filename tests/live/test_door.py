@@ -14,7 +14,7 @@ from children import wait_until
 from live.test_server import joined, order, status, told
 from pneumarm.live import door as door_module
 from pneumarm.live.door import Door
-from pneumarm.live.server import Server
+from pneumarm.live.server import LiveServer
 
 MANY = 150
 
@@ -43,11 +43,11 @@ def is_closed(one: socket.socket) -> bool:
         return True
 
 
-def port_of(server: Server) -> int:
+def port_of(server: LiveServer) -> int:
     return int(server.url.split(":")[2].partition("/")[0])
 
 
-def test_idle_connections_delay_no_stop_and_no_page(server: Server, capfd: pytest.CaptureFixture[str]) -> None:
+def test_idle_connections_delay_no_stop_and_no_page(server: LiveServer, capfd: pytest.CaptureFixture[str]) -> None:
     with joined(server) as page, idle(port_of(server), MANY) as others:
         wait_until("most are closed again", lambda: sum(map(is_closed, others)) >= MANY - door_module._MOST)
         assert status(server.url) == 200
@@ -60,7 +60,7 @@ def test_idle_connections_delay_no_stop_and_no_page(server: Server, capfd: pytes
     assert capfd.readouterr().err == ""
 
 
-def test_who_is_silent_is_closed_and_a_page_is_not(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_is_silent_is_closed_and_a_page_is_not(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(door_module, "_SILENT", 0.2)
     with joined(server) as page, idle(port_of(server), 3) as others:
         wait_until("all are closed", lambda: all(map(is_closed, others)))

@@ -5,13 +5,15 @@ import json
 import pytest
 
 from pneumarm.errors import UnusableInput
-from pneumarm.live.orders import Draw, Goal, Stop, read_order
+from pneumarm.live.orders import FollowCurve, GoTo, Stop, read_order
 
 
 def test_orders_are_read() -> None:
     assert read_order('{"do": "stop"}', 1) == Stop()
-    assert read_order('{"do": "goal", "degrees": [20, -5.5]}', 2) == Goal([20.0, -5.5])
-    assert read_order('{"do": "draw", "seconds": [0, 1], "degrees": [[3], [4]]}', 1) == Draw([0, 1], [[3.0], [4.0]])
+    assert read_order('{"do": "goal", "degrees": [20, -5.5]}', 2) == GoTo([20.0, -5.5])
+    assert read_order('{"do": "draw", "seconds": [0, 1], "degrees": [[3], [4]]}', 1) == FollowCurve(
+        [0, 1], [[3.0], [4.0]]
+    )
 
 
 @pytest.mark.parametrize(

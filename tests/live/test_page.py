@@ -14,7 +14,7 @@ from live.chromium import missing
 from live.noted_arm import board, vented_after
 from live.serving import ARM, served
 from pneumarm.live.rig import Rig
-from pneumarm.live.server import Server
+from pneumarm.live.server import LiveServer
 from pneumarm.run import RunSettings
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
@@ -30,14 +30,14 @@ def browser() -> Iterator[Browser]:
 
 
 @contextmanager
-def on_board(pid: Path, folder: Path) -> Iterator[tuple[Server, Path]]:
+def on_board(pid: Path, folder: Path) -> Iterator[tuple[LiveServer, Path]]:
     """Serve the page of an arm behind an emulated board and a serial port; give the notes of the board too."""
     with board(folder) as (link, notes), served(Rig(RunSettings(arm=f"serial:{link}"), [str(pid)], None)) as server:
         yield server, notes
 
 
 @contextmanager
-def page_of(browser: Browser, server: Server, width: int = 800, **options: object) -> Iterator[Page]:
+def page_of(browser: Browser, server: LiveServer, width: int = 800, **options: object) -> Iterator[Page]:
     """Give a page in a window of its own; an error in it fails the test."""
     context = window(browser, width, **options)
     page, errors = context.new_page(), []
@@ -108,7 +108,7 @@ def comes(page: Page, what: str, is_so: Callable[[], bool]) -> None:
         page.wait_for_timeout(20)
 
 
-def test_a_dragged_goal_is_moved_to_and_a_curve_followed(browser: Browser, server: Server) -> None:
+def test_a_dragged_goal_is_moved_to_and_a_curve_followed(browser: Browser, server: LiveServer) -> None:
     with page_of(browser, server) as page:
         page.locator("body[data-role=writer]").wait_for()
         arrive(page, 20.0)
@@ -128,14 +128,14 @@ def test_a_dragged_goal_is_moved_to_and_a_curve_followed(browser: Browser, serve
         page.locator("body[data-mode=relaxed]").wait_for()
 
 
-def test_a_fault_is_switched_on_and_told_to_all(browser: Browser, server: Server) -> None:
+def test_a_fault_is_switched_on_and_told_to_all(browser: Browser, server: LiveServer) -> None:
     with page_of(browser, server) as page, page_of(browser, server, 400) as other:
         page.get_by_text("supply falls to 0.5 bar").click()
         other.locator("button[aria-pressed=true]", has_text="supply falls").wait_for()
         assert other.locator("#hold").is_disabled()
 
 
-def test_a_slow_press_counts_while_figures_change(browser: Browser, server: Server) -> None:
+def test_a_slow_press_counts_while_figures_change(browser: Browser, server: LiveServer) -> None:
     with page_of(browser, server) as page:
         drag_to(page, 20.0)
         page.locator("body[data-mode=moving]").wait_for()
@@ -161,7 +161,7 @@ def test_a_stop_on_any_page_vents_an_arm_on_a_board(browser: Browser, pid: Path,
         comes(page, "it is released", lambda: mode(page) == "relaxed")
 
 
-def test_a_stop_without_a_connection_is_sent_once_there_is_one(browser: Browser, server: Server) -> None:
+def test_a_stop_without_a_connection_is_sent_once_there_is_one(browser: Browser, server: LiveServer) -> None:
     with page_of(browser, server) as page:
         down = True
 
@@ -188,7 +188,7 @@ def test_an_arm_whose_page_is_killed_is_vented(browser: Browser, pid: Path, tmp_
         wait_until("everything is vented", lambda: vented_after(notes, begun) is not None)
 
 
-def test_ten_watch_while_one_moves_the_arm(browser: Browser, server: Server) -> None:
+def test_ten_watch_while_one_moves_the_arm(browser: Browser, server: LiveServer) -> None:
     with page_of(browser, server) as page:
         context = window(browser, 400)
         watchers = [context.new_page() for _ in range(10)]
@@ -201,7 +201,7 @@ def test_ten_watch_while_one_moves_the_arm(browser: Browser, server: Server) -> 
         context.close()
 
 
-def test_muscle_1_is_on_the_side_to_which_it_pulls(browser: Browser, server: Server) -> None:
+def test_muscle_1_is_on_the_side_to_which_it_pulls(browser: Browser, server: LiveServer) -> None:
     with page_of(browser, server) as page:
         arrive(page, 20.0)
         first, second = (page.locator(f"#arm .of-{muscle}") for muscle in (1, 2))
@@ -217,7 +217,7 @@ def test_muscle_1_is_on_the_side_to_which_it_pulls(browser: Browser, server: Ser
         assert drawn == ink
 
 
-def test_what_can_be_done_and_what_is_done_is_said(browser: Browser, server: Server) -> None:
+def test_what_can_be_done_and_what_is_done_is_said(browser: Browser, server: LiveServer) -> None:
     with page_of(browser, server) as page:
         assert "Drag the orange ring" in page.locator("#hint").inner_text()
         assert page.locator("#arm .handle path").first.is_visible()
@@ -272,7 +272,7 @@ def test_an_arm_with_one_muscle_is_drawn_with_a_spring_also_while_it_learns(brow
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_page_fits_and_can_be_read(browser: Browser, server: Server, width: int, scheme: str) -> None:
+def test_the_page_fits_and_can_be_read(browser: Browser, server: LiveServer, width: int, scheme: str) -> None:
     with page_of(browser, server, width, color_scheme=scheme) as page:
         drag_to(page, 10.0)
         comes(page, "the arm moves", lambda: abs(angle(page)) > 3)

@@ -17,11 +17,11 @@ from children import wait_until
 from live.serving import ARM, served
 from pneumarm.errors import UnusableInput
 from pneumarm.live.rig import Rig
-from pneumarm.live.server import MOST_PAGES, Server
+from pneumarm.live.server import MOST_PAGES, LiveServer
 from pneumarm.run import RunSettings
 
 
-def joined(server: Server, query: str = "", **options: Any) -> ClientConnection:
+def joined(server: LiveServer, query: str = "", **options: Any) -> ClientConnection:
     """Return a connection as a page opens it."""
     return connect(server.url.replace("http", "ws").partition("?")[0] + "connection" + query, **options)
 
@@ -51,7 +51,7 @@ def status(url: str, **headers: str) -> int:
         return error.code
 
 
-def test_one_page_moves_the_arm_and_the_others_watch(server: Server) -> None:
+def test_one_page_moves_the_arm_and_the_others_watch(server: LiveServer) -> None:
     with joined(server) as first, joined(server) as second:
         order(first, "take")
         mine = told(first, "state", lambda state: state["writer"] == state["you"])
@@ -68,7 +68,7 @@ def test_one_page_moves_the_arm_and_the_others_watch(server: Server) -> None:
         told(second, "state", lambda state: state["mode"] == "stopped")
 
 
-def test_ten_go_on_watching_when_the_page_that_moves_the_arm_is_killed(server: Server) -> None:
+def test_ten_go_on_watching_when_the_page_that_moves_the_arm_is_killed(server: LiveServer) -> None:
     with ExitStack() as stack:
         writer = stack.enter_context(joined(server))
         watchers = [stack.enter_context(joined(server)) for _ in range(10)]
@@ -85,7 +85,7 @@ def test_ten_go_on_watching_when_the_page_that_moves_the_arm_is_killed(server: S
         told(watchers[0], "frame", lambda frame: abs(frame["angle"][0] + 10) < 2)
 
 
-def test_nonsense_is_refused_and_harms_nobody(server: Server) -> None:
+def test_nonsense_is_refused_and_harms_nobody(server: LiveServer) -> None:
     with joined(server) as page:
         for text in ("", "{}", "[" * 10_000, '{"do": "goal", "degrees": []}'):
             page.send(text)
@@ -97,7 +97,7 @@ def test_nonsense_is_refused_and_harms_nobody(server: Server) -> None:
         assert told(page, "frame")["pressure"]
 
 
-def test_only_this_machine_and_this_page_may_come_without_a_token(server: Server) -> None:
+def test_only_this_machine_and_this_page_may_come_without_a_token(server: LiveServer) -> None:
     assert status(server.url) == 200
     assert status(server.url + "uplot/LICENSE") == 200
     assert status(server.url + "../pyproject.toml") == 404
@@ -119,7 +119,7 @@ def test_with_a_token_nobody_comes_without_it(pid: Path) -> None:
             assert told(page, "frame")
 
 
-def test_only_so_many_pages_are_open_at_a_time(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_so_many_pages_are_open_at_a_time(server: LiveServer, monkeypatch: pytest.MonkeyPatch) -> None:
     assert MOST_PAGES == 50
     monkeypatch.setattr("pneumarm.live.server.MOST_PAGES", 3)
     with ExitStack() as stack:
@@ -134,10 +134,10 @@ def test_only_so_many_pages_are_open_at_a_time(server: Server, monkeypatch: pyte
             assert told(page, "frame")
 
 
-def test_a_port_that_is_taken_is_said(server: Server) -> None:
+def test_a_port_that_is_taken_is_said(server: LiveServer) -> None:
     port = int(server.url.rstrip("/").rpartition(":")[2])
     with pytest.raises(UnusableInput, match="another --host or --port"):
-        Server(server.rig, "127.0.0.1", port, None)
+        LiveServer(server.rig, "127.0.0.1", port, None)
 
 
 def test_hosts_and_tokens_of_any_letters_are_answered(pid: Path) -> None:

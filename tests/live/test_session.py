@@ -16,7 +16,7 @@ from pneumarm.control import Monitor
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.live.choices import Choice, opened
 from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
-from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop, Take
+from pneumarm.live.orders import Faults, FollowCurve, GoTo, Hold, Order, Relax, Release, Stop, Take
 from pneumarm.live.rig import Rig
 from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
@@ -108,8 +108,8 @@ def test_only_the_page_that_controls_the_arm_moves_it_and_any_page_stops_it(pid:
     rig = Rig(RunSettings(arm="virtual:seed=3"), [str(pid)], None)  # nothing moves yet
     writer, watcher = rig.desk.enter(), rig.desk.enter()
     rig.order(writer, Take())
-    rig.order(writer, Goal([10.0]))
-    for order in (Goal([10.0]), Hold(), Relax(), Release(), Draw([0.0, 1.0], [[0.0], [0.0]])):
+    rig.order(writer, GoTo([10.0]))
+    for order in (GoTo([10.0]), Hold(), Relax(), Release(), FollowCurve([0.0, 1.0], [[0.0], [0.0]])):
         with pytest.raises(UnusableInput, match="another page controls the arm"):
             rig.order(watcher, order)
     rig.order(watcher, Stop())
@@ -124,7 +124,7 @@ def test_of_an_arm_with_one_muscle_nothing_else_is_shown() -> None:
 
 
 def test_goals_are_moved_to_held_and_counted(played: Played) -> None:
-    played.run((0.1, Goal([15.0])), (4.0, Goal([-10.0])), (8.0, Goal([1e6])), until=12.0)
+    played.run((0.1, GoTo([15.0])), (4.0, GoTo([-10.0])), (8.0, GoTo([1e6])), until=12.0)
     assert played.arm.at(3.9) == pytest.approx(15, abs=2)
     assert played.arm.at(7.9) == pytest.approx(-10, abs=2)
     assert 20 < played.arm.at(11.9) < 60  # as far as it has been seen to go
@@ -135,8 +135,8 @@ def test_goals_are_moved_to_held_and_counted(played: Played) -> None:
 
 def test_a_curve_is_followed_and_its_end_held(played: Played) -> None:
     times = np.linspace(0, 3, 31)
-    curve = Draw(times.tolist(), (10 * np.sin(np.pi * times))[:, None].tolist())
-    played.run((0.1, Goal([5.0])), (3.0, curve), until=9.0)
+    curve = FollowCurve(times.tolist(), (10 * np.sin(np.pi * times))[:, None].tolist())
+    played.run((0.1, GoTo([5.0])), (3.0, curve), until=9.0)
     begin = 3.0 + 1.0
     off = [played.arm.at(begin + time) - 10 * np.sin(np.pi * time) for time in times]
     assert np.sqrt(np.mean(np.square(off))) < 3
@@ -145,8 +145,8 @@ def test_a_curve_is_followed_and_its_end_held(played: Played) -> None:
 
 
 def test_a_curve_that_has_ended_is_no_longer_followed(played: Played) -> None:
-    curve = Draw([0.0, 1.0], [[10.0], [10.0]])
-    played.run((0.1, curve), (3.0, lambda: None), (4.0, Goal([-10.0])), until=7.0)
+    curve = FollowCurve([0.0, 1.0], [[10.0], [10.0]])
+    played.run((0.1, curve), (3.0, lambda: None), (4.0, GoTo([-10.0])), until=7.0)
     assert [mode for _, mode, _ in played.modes] == ["following", "holding", "moving"]
     assert played.arm.at(3.9) == pytest.approx(10, abs=2)
     assert played.arm.at(6.9) == pytest.approx(-10, abs=2)
@@ -154,7 +154,7 @@ def test_a_curve_that_has_ended_is_no_longer_followed(played: Played) -> None:
 
 def test_a_stop_vents_and_stays_until_it_is_released(played: Played) -> None:
     played.run(
-        (0.1, Goal([15.0])), (3.0, Stop()), (4.0, Goal([0.0])), (5.0, Release()), (6.0, Goal([0.0])), until=9.0
+        (0.1, GoTo([15.0])), (3.0, Stop()), (4.0, GoTo([0.0])), (5.0, Release()), (6.0, GoTo([0.0])), until=9.0
     )
     assert [mode for _, mode, _ in played.modes] == ["moving", "stopped", "stopped", "relaxed", "moving"]
     assert played.arm.at(8.9) == pytest.approx(0, abs=2)
@@ -162,7 +162,7 @@ def test_a_stop_vents_and_stays_until_it_is_released(played: Played) -> None:
 
 
 def test_only_a_release_ends_a_stop(played: Played) -> None:
-    played.run((0.1, Goal([15.0])), (1.0, Stop()), (2.0, Relax()), (3.0, Goal([15.0])), until=4.0)
+    played.run((0.1, GoTo([15.0])), (1.0, Stop()), (2.0, Relax()), (3.0, GoTo([15.0])), until=4.0)
     assert [mode for _, mode, _ in played.modes] == ["moving", "stopped", "stopped", "stopped"]
     assert played.virtual.pressure.max() < 5e3
 
@@ -173,12 +173,12 @@ def test_a_stop_outlasts_a_board_that_has_vented_by_itself(played: Played, monke
     def not_heard() -> None:
         raise ArmFailure("this computer was too busy")
 
-    played.run((0.1, Goal([15.0])), (1.0, not_heard), (2.0, Stop()), (3.0, not_heard), (4.0, Goal([0.0])), until=5.0)
+    played.run((0.1, GoTo([15.0])), (1.0, not_heard), (2.0, Stop()), (3.0, not_heard), (4.0, GoTo([0.0])), until=5.0)
     assert [mode for _, mode, _ in played.modes][1:] == ["relaxed", "stopped", "stopped", "stopped"]
 
 
 def test_hold_stays_where_the_arm_is_and_relax_lets_the_air_out(played: Played) -> None:
-    played.run((0.1, Goal([20.0])), (0.4, Hold()), (4.0, Relax()), until=7.0)
+    played.run((0.1, GoTo([20.0])), (0.4, Hold()), (4.0, Relax()), until=7.0)
     assert played.arm.at(3.9) == pytest.approx(played.arm.at(0.45), abs=6)
     assert played.virtual.pressure.max() < 5e3
     assert played.modes[-1][1] == "relaxed"
@@ -186,7 +186,7 @@ def test_hold_stays_where_the_arm_is_and_relax_lets_the_air_out(played: Played) 
 
 def test_an_arm_whose_page_is_silent_holds_then_is_vented(played: Played) -> None:
     played.run(
-        (0.1, Goal([15.0])),
+        (0.1, GoTo([15.0])),
         (3.0, played.be_silent(HOLD_AFTER)),
         (5.0, played.be_silent(VENT_AFTER)),
         until=7.0,
@@ -200,8 +200,8 @@ def test_an_arm_whose_page_is_silent_holds_then_is_vented(played: Played) -> Non
 
 def test_an_arm_on_its_way_stops_where_it_is_when_its_page_falls_silent(played: Played) -> None:
     played.run(
-        (0.1, Goal([20.0])),
-        (4.0, Goal([-20.0])),
+        (0.1, GoTo([20.0])),
+        (4.0, GoTo([-20.0])),
         (4.2, played.be_silent(HOLD_AFTER)),
         until=6.5,
     )
@@ -212,7 +212,7 @@ def test_an_arm_on_its_way_stops_where_it_is_when_its_page_falls_silent(played: 
 
 
 def test_a_fault_is_switched_on_found_and_switched_off(played: Played) -> None:
-    goals = [(1.0 + k, Goal([15.0 if k % 2 else -15.0])) for k in range(50)]
+    goals = [(1.0 + k, GoTo([15.0 if k % 2 else -15.0])) for k in range(50)]
     on, off = Faults("inlet-closed", 1, 1, True), Faults("inlet-closed", 1, 1, False)
     played.run(*goals, (25.05, on), (48.0, off), until=51.0)  # after 20 s it knows the arm
     kinds = {one.kind for one in played.session._watch.findings if one.since > 24}
@@ -242,6 +242,6 @@ def test_a_failure_waits_for_a_release(played: Played) -> None:
     shown: list[object] = []
     tell = played.screen.tell
     played.screen.tell = lambda **state: (shown.append(state.get("mode")), tell(**state))[1]  # type: ignore[method-assign]
-    played.run((0.1, Goal([15.0])), (2.0, fail), (3.0, Goal([5.0])), until=5.0)
+    played.run((0.1, GoTo([15.0])), (2.0, fail), (3.0, GoTo([5.0])), until=5.0)
     assert Mode.FAILED in shown
     assert played.arm.at(4.9) == pytest.approx(5, abs=2)

@@ -12,7 +12,7 @@ from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
 from pneumarm.bound.moving import WAYS, MovingBoundSettings, _settling, measure_moving_bound
 from pneumarm.cli import main
 from pneumarm.learning.servo import ServoAgent, ServoSettings
-from pneumarm.learning.servo.agent import servo_sizes
+from pneumarm.learning.servo.task import servo_sizes
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.settling import settled_at
 from pneumarm.networks.layers import initial_weights

@@ -9,10 +9,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from pneumarm.arm import ArmSpec
+from pneumarm.drawing.arm_picture import ArmPicture
+from pneumarm.drawing.drawn_arm import DrawnArm, Pose, faded
+from pneumarm.drawing.moving_arm import Shown, moving_arm
 from pneumarm.report.data import MovingData
-from pneumarm.report.drawn_arm import DrawnArm, Pose, faded
-from pneumarm.report.figures.arm import ArmPicture
-from pneumarm.report.moving_arm import Shown, moving_arm
 from pneumarm.report.page import Picture
 
 ONE = ArmSpec()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pneumarm.arm import ArmSpec
+from pneumarm.drawing.colours import DARK, LIGHT, MIDDLE
 from pneumarm.report import figures
-from pneumarm.report.colours import DARK, LIGHT, MIDDLE
 from pneumarm.report.figures import Classification
 from pneumarm.report.sections import RunData, all_sections, classifications, levels, phases_of
 from pneumarm.report.style import svg

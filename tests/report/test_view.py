@@ -9,10 +9,10 @@ import pytest
 from PIL import Image
 
 from pneumarm.arm import ArmSpec
+from pneumarm.drawing.drawn_arm import DrawnArm, Pose
+from pneumarm.drawing.moving_arm import Shown, moving_arm
 from pneumarm.errors import UnusableInput
-from pneumarm.report.drawn_arm import DrawnArm, Pose
 from pneumarm.report.figures.film import movement
-from pneumarm.report.moving_arm import Shown, moving_arm
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
 from pneumarm.transitions import Store

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pneumarm.appendix_a.runs import Case
 from pneumarm.checkup import Checkup
 from pneumarm.checkup.figures import LAGS, detrended
+from pneumarm.drawing.colours import DARK, GREY, INK, MIDDLE, PALE
 from pneumarm.report.checkup import draw_sweep, spectrum
-from pneumarm.report.colours import DARK, GREY, INK, MIDDLE, PALE
 from pneumarm.report.style import key, legend_below, panels, quantities, scatter, styled
 from pneumarm.statistics import binned
 

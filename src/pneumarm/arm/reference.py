@@ -11,7 +11,7 @@ _HALF = 0.015
 """Time between the points that velocities and accelerations are derived from [s]."""
 
 
-class Wanted(NamedTuple):
+class ReferencePoint(NamedTuple):
     """What a reference asks for at a moment, each of shape (joints,)."""
 
     angle: NDArray[np.float64]
@@ -37,17 +37,17 @@ class Reference:
     stays: bool = False
     """Whether it asks for the same at all times."""
 
-    def wanted(self, time: float, ahead: float = 0.0) -> Wanted:
-        """Return what is wanted ``ahead`` [s] of ``time``, extrapolated where the future is not known."""
+    def point(self, time: float, ahead: float = 0.0) -> ReferencePoint:
+        """Return what is asked for ``ahead`` [s] of ``time``, extrapolated where the future is not known."""
         if self.known_ahead:
             middle = time + ahead
             before, now, after = self.at(middle - _HALF), self.at(middle), self.at(middle + _HALF)
-            return Wanted(now, (after - before) / (2 * _HALF), (after - 2 * now + before) / _HALF**2)
+            return ReferencePoint(now, (after - before) / (2 * _HALF), (after - 2 * now + before) / _HALF**2)
         first, second, now = self.at(time - 2 * _HALF), self.at(time - _HALF), self.at(time)
         acceleration = (now - 2 * second + first) / _HALF**2
         velocity = (3 * now - 4 * second + first) / (2 * _HALF)
         angle = now + ahead * (velocity + ahead * acceleration / 2)
-        return Wanted(angle, velocity + ahead * acceleration, acceleration)
+        return ReferencePoint(angle, velocity + ahead * acceleration, acceleration)
 
 
 def constant(goal: ArrayLike) -> Reference:

@@ -1,7 +1,7 @@
 """What is known of an arm, in a file of its own: its spec, and what its sensors need to be put right.
 
 An ``arm.toml`` holds a table ``[spec]`` with the fields of :class:`~pneumarm.arm.ArmSpec`, and, where a calibration
-found that readings must be corrected, a table ``[correction]`` with those of :class:`Correction`, and a table
+found that readings must be corrected, a table ``[correction]`` with those of :class:`SensorCorrection`, and a table
 ``[sound]`` with what the arm did then, those of :class:`SoundState`::
 
     [spec]
@@ -46,7 +46,7 @@ _LARGEST = 1 << 18
 
 
 @dataclass(frozen=True)
-class Correction:
+class SensorCorrection:
     """What is done to the raw counts of an arm's sensors, before anybody else sees them."""
 
     pressure_zero: tuple[tuple[float, float], ...] = ()
@@ -132,7 +132,7 @@ class ArmFile:
     """The content of an ``arm.toml``."""
 
     spec: ArmSpec
-    correction: Correction = Correction()
+    correction: SensorCorrection = SensorCorrection()
     sound: SoundState | None = None
 
     def __post_init__(self) -> None:
@@ -173,7 +173,7 @@ def load_arm_file(path: Path | str) -> ArmFile:
     found = read_toml(path, expected, _LARGEST)
     try:
         _refuse_unknown(found, ArmFile, "")
-        for part, kind in (("spec", ArmSpec), ("correction", Correction), ("sound", SoundState)):
+        for part, kind in (("spec", ArmSpec), ("correction", SensorCorrection), ("sound", SoundState)):
             if isinstance(found.get(part), dict):
                 _refuse_unknown(found[part], kind, f"[{part}] ")
         for sensor in _tables(found.get("spec"), "sensors"):

@@ -9,12 +9,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from threading import Lock, Thread, get_ident, main_thread
 from time import monotonic, sleep
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from pneumarm.arm.seam import Reading
-
-if TYPE_CHECKING:
-    from pneumarm.arm.guard import GuardedArm
+from pneumarm.arm.seam import ArmSpec, Reading
+from pneumarm.errors import ControllerFailure
 
 PATIENCE = 60.0
 """After so long [s] without a decision a controller is stopped, even where an arm's clock stands still meanwhile."""
@@ -26,11 +24,26 @@ _SELDOM = 1.0
 """An arm that has not to be seen to is looked at this often [s]."""
 
 
+class WatchedArm(Protocol):
+    """The arm of a watchdog: a :class:`~pneumarm.arm.guard.GuardedArm`."""
+
+    spec: ArmSpec
+
+    def get_state(self) -> bytes | None:
+        """Return the state of the arm, None where it has none and time passes while we compute."""
+
+    def stand_in(self, reading: Reading) -> bool:
+        """Do what is safe while there is no decision on ``reading`` yet; return whether that is needed."""
+
+    def give_up(self, patience: float) -> ControllerFailure:
+        """Vent everything and return the error for a controller that had not decided for ``patience`` [s]."""
+
+
 class Watchdog:
     """Looks after one decision at a time, from a thread of its own.
 
     A decision is out from :meth:`begin` to :meth:`end`. Once it is out for longer than a control period, the arm is
-    seen to every period by :meth:`GuardedArm.stand_in`; one that is out for too long is interrupted where it is. A
+    seen to every period by :meth:`WatchedArm.stand_in`; one that is out for too long is interrupted where it is. A
     decision in time costs what two assignments under a lock cost: nothing is told to the thread, which looks once a
     period by itself and ends when there is nothing to look at.
 
@@ -38,7 +51,7 @@ class Watchdog:
     watchdog too, and is left to the dead-man of the arm's own controller.
     """
 
-    def __init__(self, arm: "GuardedArm") -> None:
+    def __init__(self, arm: WatchedArm) -> None:
         self._arm = arm
         self._lock = Lock()  # held while the arm is seen to, so that the decider has to wait with moving it
         self._thread: Thread | None = None
@@ -52,8 +65,8 @@ class Watchdog:
         self._interrupted: float | None = None  # when the decider was [s]
         self._failure: Exception | None = None  # of the arm, while it was seen to
 
-    def __reduce__(self) -> tuple[type["Watchdog"], tuple["GuardedArm"]]:
-        """Have the copy of an arm looked after anew: of its controller nobody is asked for a decision yet."""
+    def __reduce__(self) -> tuple[type["Watchdog"], tuple[WatchedArm]]:
+        """Give the copy of an arm a watchdog of its own: no decision of its controller is out yet."""
         return Watchdog, (self._arm,)
 
     def begin(self, reading: Reading, patience: float = PATIENCE) -> None:

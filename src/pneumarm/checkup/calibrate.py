@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
-from pneumarm.arm.spec_file import ArmFile, Correction, SoundState
+from pneumarm.arm.spec_file import ArmFile, SensorCorrection, SoundState
 from pneumarm.checkup.diagnose import LOGARITHMIC
 from pneumarm.checkup.figures import ends, halves, joint_figures
 from pneumarm.checkup.measure import Array, Checkup, JointTest
@@ -100,7 +100,7 @@ def calibrate(checkup: Checkup, known: Known = Known()) -> ArmCalibration:
         for line, (zero, middle, stretch) in zip(lines, scales, strict=True)
     ]
     straight = np.allclose(true, raw, atol=_ROUNDING)
-    correction = Correction(
+    correction = SensorCorrection(
         pressure_zero=_pairs(at_rest),
         pressure_gain=_pairs(mean_per_bar / per_bar),
         angle_raw=() if straight else (tuple(raw.tolist()),) * len(lines),
@@ -115,7 +115,7 @@ def calibrate(checkup: Checkup, known: Known = Known()) -> ArmCalibration:
     return ArmCalibration(file, tuple(line.residual for line in lines))
 
 
-def _sound_state(checkup: Checkup, correction: Correction) -> SoundState | None:
+def _sound_state(checkup: Checkup, correction: SensorCorrection) -> SoundState | None:
     """Return what the arm did, with its sensors corrected; None where its muscles hold no air to lose."""
     muscles = [joint_figures(checkup, j).muscles for j in range(len(checkup.joints))]
     leak, error = (np.array([[getattr(m, name) / 100 for m in pair] for pair in muscles]) for name in _LEAKS)

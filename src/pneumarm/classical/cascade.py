@@ -12,7 +12,7 @@ the error of the map, see :mod:`pneumarm.classical.muscles`.
 from dataclasses import dataclass
 
 from pneumarm.arm import ArmSpec
-from pneumarm.classical.following import CommonGains, Wish
+from pneumarm.classical.following import CommonGains, Setpoint
 from pneumarm.classical.muscles import muscles_of
 from pneumarm.classical.pressure_loop import Rates
 from pneumarm.classical.static_map import StaticMap
@@ -77,12 +77,12 @@ class Cascade:
     def begin(self) -> None:
         """Begin a movement: there is nothing to forget."""
 
-    def act(self, wish: Wish, angle: float, velocity: float) -> tuple[float, float]:
+    def act(self, setpoint: Setpoint, angle: float, velocity: float) -> tuple[float, float]:
         """Return the commands of both muscles."""
         gains, muscles = self.gains, self.muscles
-        proportional, derivative, velocity_gain, total = self._scheduled(wish.angle)
-        asked = wish.ahead + velocity_gain * wish.velocity + gains.acceleration * wish.acceleration
-        asked += proportional * (wish.angle - angle) + derivative * (wish.velocity_now - velocity)
+        proportional, derivative, velocity_gain, total = self._scheduled(setpoint.angle)
+        asked = setpoint.ahead + velocity_gain * setpoint.velocity + gains.acceleration * setpoint.acceleration
+        asked += proportional * (setpoint.angle - angle) + derivative * (setpoint.velocity_now - velocity)
         first, second = self.map.pressures(asked + muscles.error, total * self.map.highest)
         return (
             muscles.loops[0].command(first, muscles.expected[0]),

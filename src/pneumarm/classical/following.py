@@ -29,7 +29,7 @@ _FAST = 60.0
 
 
 @dataclass(frozen=True)
-class Wish:
+class Setpoint:
     """What one joint is to do now; angles in counts, times in seconds."""
 
     angle: float
@@ -52,7 +52,7 @@ class Law(Protocol):
     def begin(self) -> None:
         """Begin a movement."""
 
-    def act(self, wish: Wish, angle: float, velocity: float) -> tuple[float, float]:
+    def act(self, setpoint: Setpoint, angle: float, velocity: float) -> tuple[float, float]:
         """Return the commands of both muscles, -1 to 1, for a joint at ``angle`` [counts] and ``velocity``."""
 
 
@@ -80,7 +80,7 @@ class CommonGains:
     """Share of the map's error, as it is where a movement begins, that is taken for true there."""
 
 
-class Following:
+class ClassicalController:
     """A controller of all joints: one :class:`Law` each."""
 
     def __init__(
@@ -88,7 +88,7 @@ class Following:
     ) -> None:
         self.spec, self.goal_range = spec, goal_range
         self._pulses = pulses
-        self._joints = [_Joint(spec, gains, law) for law in laws]
+        self._joints = [_JointController(spec, gains, law) for law in laws]
         self._reference = constant(goal_range.mean(axis=1))
         self._begin: float | None = None
         self._fresh = True
@@ -111,14 +111,14 @@ class Following:
             self._begin = reading.time
         time = reading.time - self._begin
         pressures = (reading.pressure / self.spec.counts_per_bar).tolist()
-        wishes = self._wishes(time, reading, begins)
+        setpoints = self._setpoints(time, reading, begins)
         commands = [
-            joint.act(reading.time, float(angle), (p[0], p[1]), wish)
-            for joint, angle, p, wish in zip(self._joints, reading.angle, pressures, wishes, strict=True)
+            joint.act(reading.time, float(angle), (p[0], p[1]), setpoint)
+            for joint, angle, p, setpoint in zip(self._joints, reading.angle, pressures, setpoints, strict=True)
         ]
         return np.array(commands, np.float64 if self._pulses else np.int8)
 
-    def _wishes(self, time: float, reading: Reading, begins: bool) -> list[Wish]:
+    def _setpoints(self, time: float, reading: Reading, begins: bool) -> list[Setpoint]:
         """Return what each joint is to do at the ``time`` [s] since the reference began."""
         reference = self._reference
         if begins:
@@ -127,12 +127,12 @@ class Following:
         if not reference.smooth:
             goals = reference.at(time).tolist()
             return [joint.on_the_way(time, goal) for joint, goal in zip(self._joints, goals, strict=True)]
-        now = reference.wanted(time)
+        now = reference.point(time)
         found = []
         for j, joint in enumerate(self._joints):
-            ahead = reference.wanted(time, joint.gains.lead)
+            ahead = reference.point(time, joint.gains.lead)
             found.append(
-                Wish(
+                Setpoint(
                     float(now.angle[j]),
                     float(ahead.angle[j]),
                     float(ahead.velocity[j]),
@@ -143,7 +143,7 @@ class Following:
         return found
 
 
-class _Joint:
+class _JointController:
     """One joint on its way."""
 
     def __init__(self, spec: ArmSpec, gains: CommonGains, law: Law) -> None:
@@ -152,28 +152,30 @@ class _Joint:
         self._rest = gains.rest * spec.counts_per_degree
         self._time, self._angle, self._velocity, self._smooth = 0.0, 0.0, 0.0, 0.0
         self._resting = False
-        self._way: _Way | None = None
+        self._profile: _QuinticProfile | None = None
 
     def begin(self, time: float, angle: float, pressures: tuple[float, float]) -> None:
         """Begin where the joint is."""
         self._time, self._angle, self._velocity, self._smooth = time, angle, 0.0, angle
         self._resting = False
-        self._way = _Way(0.0, 0.0, angle, 0.0, 0.0, angle)
+        self._profile = _QuinticProfile(0.0, 0.0, angle, 0.0, 0.0, angle)
         self.law.muscles.begin(angle, pressures)
         self.law.begin()
 
-    def on_the_way(self, time: float, goal: float) -> Wish:
+    def on_the_way(self, time: float, goal: float) -> Setpoint:
         """Return where the joint is to be at ``time`` [s] on its way to ``goal``, which may be a new one."""
-        assert self._way is not None
-        if abs(goal - self._way.goal) > _JUMP:
-            angle, velocity, acceleration = self._way.at(time)
+        assert self._profile is not None
+        if abs(goal - self._profile.goal) > _JUMP:
+            angle, velocity, acceleration = self._profile.at(time)
             duration = self.gains.move_time + abs(goal - angle) / self._counts / self.gains.move_speed
-            self._way = _Way(time, duration, angle, velocity, acceleration, goal)
-        angle, velocity, _ = self._way.at(time)
-        ahead, its_velocity, its_acceleration = self._way.at(time + self.gains.lead)
-        return Wish(angle, ahead, its_velocity, its_acceleration, velocity)
+            self._profile = _QuinticProfile(time, duration, angle, velocity, acceleration, goal)
+        angle, velocity, _ = self._profile.at(time)
+        ahead, its_velocity, its_acceleration = self._profile.at(time + self.gains.lead)
+        return Setpoint(angle, ahead, its_velocity, its_acceleration, velocity)
 
-    def act(self, time: float, angle: float, pressures: tuple[float, float], wish: Wish) -> tuple[float, float]:
+    def act(
+        self, time: float, angle: float, pressures: tuple[float, float], setpoint: Setpoint
+    ) -> tuple[float, float]:
         """Return the commands of both muscles after a reading."""
         if time > self._time:
             passed = time - self._time
@@ -183,13 +185,13 @@ class _Joint:
         self._time, self._angle = time, angle
         muscles = self.law.muscles
         muscles.read(angle, pressures, min(abs(self._velocity) / (_FAST * self._counts), 1.0))
-        commands = (0.0, 0.0) if self._rests(wish) else self.law.act(wish, angle, self._velocity)
+        commands = (0.0, 0.0) if self._rests(setpoint) else self.law.act(setpoint, angle, self._velocity)
         muscles.commanded(commands)
         return commands
 
-    def _rests(self, wish: Wish) -> bool:
-        off = abs(self._smooth - wish.angle)
-        if wish.velocity or wish.velocity_now or wish.acceleration:
+    def _rests(self, setpoint: Setpoint) -> bool:
+        off = abs(self._smooth - setpoint.angle)
+        if setpoint.velocity or setpoint.velocity_now or setpoint.acceleration:
             self._resting = False
         elif self._resting:
             self._resting = off < _LEAVING * self._rest
@@ -198,7 +200,7 @@ class _Joint:
         return self._resting
 
 
-class _Way:
+class _QuinticProfile:
     """The polynomial of fifth degree from an angle, a velocity and an acceleration to rest at a goal."""
 
     def __init__(

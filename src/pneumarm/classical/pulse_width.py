@@ -12,7 +12,7 @@ map and ``I`` its error, see :mod:`pneumarm.classical.muscles`.
 from dataclasses import dataclass
 
 from pneumarm.arm import ArmSpec
-from pneumarm.classical.following import CommonGains, Wish
+from pneumarm.classical.following import CommonGains, Setpoint
 from pneumarm.classical.muscles import muscles_of
 from pneumarm.classical.pressure_loop import Rates
 from pneumarm.classical.static_map import StaticMap
@@ -63,11 +63,11 @@ class PulseWidth:
         """Begin a movement."""
         self._left = [0.0, 0.0]
 
-    def act(self, wish: Wish, angle: float, velocity: float) -> tuple[float, float]:
+    def act(self, setpoint: Setpoint, angle: float, velocity: float) -> tuple[float, float]:
         """Return the commands of both muscles."""
         gains, expected = self.gains, self.muscles.expected
-        rate = gains.proportional * (wish.ahead - angle)
-        rate += gains.derivative * (wish.velocity_now - velocity) + gains.velocity * wish.velocity
+        rate = gains.proportional * (setpoint.ahead - angle)
+        rate += gains.derivative * (setpoint.velocity_now - velocity) + gains.velocity * setpoint.velocity
         rate -= gains.balance * (self.muscles.rest_angle(*expected) - angle)
         rate /= self._counts
         common = gains.stiffening * (self._total - expected[0] - expected[1])

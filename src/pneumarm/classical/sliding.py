@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import CLOSED, VALVES
-from pneumarm.classical.following import CommonGains, Wish
+from pneumarm.classical.following import CommonGains, Setpoint
 from pneumarm.classical.muscles import muscles_of
 from pneumarm.classical.pressure_loop import Rates
 from pneumarm.classical.static_map import StaticMap
@@ -65,10 +65,10 @@ class Sliding:
         """Begin a movement with closed valves."""
         self._last = CLOSED
 
-    def act(self, wish: Wish, angle: float, velocity: float) -> tuple[float, float]:
+    def act(self, setpoint: Setpoint, angle: float, velocity: float) -> tuple[float, float]:
         """Return the commands of both muscles."""
         gains = self.gains
-        surface = wish.ahead - angle + (wish.velocity - velocity) / gains.slope + gains.balance * angle
+        surface = setpoint.ahead - angle + (setpoint.velocity - velocity) / gains.slope + gains.balance * angle
         missed = [self._missed(surface, valves) for valves in _ACTIONS]
         if missed[CLOSED] <= gains.layer:
             missed[CLOSED] = 0.0

@@ -13,7 +13,7 @@ from pneumarm.arm import Arm, ArmSpec
 from pneumarm.arm.seam import check_pressures
 from pneumarm.classical.calibration import Calibration
 from pneumarm.classical.cascade import Cascade, CascadeGains, Scheduled, ScheduledGains
-from pneumarm.classical.following import CommonGains, Following, Law
+from pneumarm.classical.following import ClassicalController, CommonGains, Law
 from pneumarm.classical.pulse_width import PulseWidth, PulseWidthGains
 from pneumarm.classical.sliding import Sliding, SlidingGains
 from pneumarm.errors import UnusableInput
@@ -69,12 +69,14 @@ class Tuned:
         """Angles that the arm was seen to rest at, shape (joints, 2) [counts]."""
         return np.array(self.calibration.goal_range)
 
-    def controller(self) -> Following:
+    def controller(self) -> ClassicalController:
         """Return it as a controller."""
         law = KINDS[self.kind].law
         pairs = zip(self.calibration.maps, self.calibration.rates, strict=True)
         laws = [law(self.spec, static_map, rates, self.gains, self.shortest_pulse) for static_map, rates in pairs]
-        return Following(self.spec, self.gains, laws, self.goal_range, pulses=self.shortest_pulse is not None)
+        return ClassicalController(
+            self.spec, self.gains, laws, self.goal_range, pulses=self.shortest_pulse is not None
+        )
 
     def check_fit(self, arm: Arm) -> None:
         """Raise UnusableInput where it was tuned for an arm of another kind; of the period it is not asked."""

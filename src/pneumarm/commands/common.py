@@ -1,15 +1,23 @@
 """What the commands share."""
 
+import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from time import monotonic
 from typing import Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter, Token
+from numpy.typing import NDArray
+from rich.status import Status
 
 from pneumarm.address import Address, address_of
-from pneumarm.arm import ArmSpec
+from pneumarm.arm import ArmSpec, Reading
+from pneumarm.console import ERRORS
 from pneumarm.control.monitor.settings import Mode
+from pneumarm.moving.movement import Seen
 
 Json = Annotated[
     bool, Parameter(name="--json", negative="", help="Print one JSON object on stdout and nothing else.")
@@ -43,6 +51,7 @@ COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
 HEADINGS = ("movements", *(name.replace("_", " ") for name in COLUMNS[1:]))
 """What they are called there."""
 _EXAMPLE = 10.0  # degrees
+_LOOK = 0.1  # s between two lines that a person can read
 
 
 def move_command(controller: Path, arm: str, spec: ArmSpec, goal_range: Any) -> str:
@@ -50,3 +59,25 @@ def move_command(controller: Path, arm: str, spec: ArmSpec, goal_range: Any) -> 
     angles = (_EXAMPLE if low <= _EXAMPLE <= high else (low + high) / 2 for low, high in spec.degrees(goal_range))
     goal = ",".join(f"{angle:.3g}deg" for angle in angles)
     return f"`{shlex.join(['pneumarm', 'move', str(controller), '--arm', arm, goal])}`"
+
+
+@contextmanager
+def live(spec: ArmSpec) -> Iterator[Seen]:
+    """Show on stderr where an arm is and where it should be while the block runs; nothing where that is no terminal.
+
+    Gives what is to be called with every reading.
+    """
+    with Status("", console=ERRORS) if ERRORS.is_terminal else nullcontext() as status:
+        shown = -math.inf
+
+        def see(reading: Reading, goal: NDArray[np.float64]) -> None:
+            nonlocal shown
+            now = monotonic()
+            if status is None or now - shown < _LOOK:
+                return
+            shown = now
+            joints = zip(spec.degrees(reading.angle), spec.degrees(goal), spec.bar(reading.pressure), strict=True)
+            angles = [f"{at:6.1f}° of {to:6.1f}°  {p[0]:.2f} {p[1]:.2f} bar" for at, to, p in joints]
+            status.update(f"{reading.time:8.1f} s  {'   '.join(angles)}")
+
+        yield see

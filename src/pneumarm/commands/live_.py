@@ -12,7 +12,7 @@ from pneumarm.console import say, show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.live.learning import TRANSFER, TRANSITIONS
 from pneumarm.live.rig import Rig
-from pneumarm.live.server import Server
+from pneumarm.live.server import LiveServer
 from pneumarm.progress import progress
 from pneumarm.run import SETTINGS, RunSettings, settings_in
 
@@ -75,7 +75,7 @@ def live_(
         token = None if host in _LOCAL else secrets.token_urlsafe(12)
     with progress(f"opening {settings.arm}"):
         rig = Rig(settings, named, folder, method)
-    server = Server(rig, host, port, token)
+    server = LiveServer(rig, host, port, token)
 
     def opened() -> None:
         say(f"open {server.url}")

@@ -5,9 +5,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import AnyStore, Json, OwnMethod, Settings
+from pneumarm.commands.common import AnyStore, Json, OwnMethod, Settings, live
 from pneumarm.commands.goals import read_goals
-from pneumarm.console import live, say, show, table
+from pneumarm.console import say, show, table
 from pneumarm.control.named import open_tracking
 from pneumarm.errors import MovementFailed, UnusableInput
 from pneumarm.moving import Moved, MoveSettings, move

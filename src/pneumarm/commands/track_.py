@@ -1,8 +1,8 @@
 """``pneumarm track``."""
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import AnyStore, Json, OwnMethod
-from pneumarm.console import live, show
+from pneumarm.commands.common import AnyStore, Json, OwnMethod, live
+from pneumarm.console import show
 from pneumarm.control.named import open_tracking
 from pneumarm.moving import SECONDS, Tracked, check_seconds, track
 from pneumarm.task.reference import check_reachable, parse_reference

@@ -29,8 +29,7 @@ from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel, part
-from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.learner import begin_acting, learn_and_act
+from pneumarm.learning.online.agent import Agent, begin_acting, learn_and_act
 from pneumarm.learning.online.loop import Schedule, Workspace, workspace
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner

@@ -33,7 +33,7 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Multiplies the values."""
 
 
-class Estimate(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class TrialQuantity(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A quantity in one trial."""
 
     trial: str | int
@@ -120,7 +120,7 @@ class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where in the thesis."""
     summary: tuple[str, ...] = ()
     """Paragraphs after the question."""
-    estimates: Mapping[str, Estimate] = {}
+    estimates: Mapping[str, TrialQuantity] = {}
     """What texts name and claims are judged by."""
     results: Mapping[str, Quantity] = {}
     """What programs get of every trial, in place of the columns."""

@@ -79,9 +79,9 @@ class _Figure:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        from pneumarm.report.colours import INK
-        from pneumarm.report.drawn_arm import DrawnArm
-        from pneumarm.report.figures.arm import ArmPicture
+        from pneumarm.drawing.arm_picture import ArmPicture
+        from pneumarm.drawing.colours import INK
+        from pneumarm.drawing.drawn_arm import DrawnArm
 
         self._spec, arm = spec, DrawnArm.of(spec)
         figure = Figure(figsize=(_INCHES, _INCHES), dpi=_DOTS)
@@ -91,7 +91,7 @@ class _Figure:
         self._words = figure.text(0.5, 0.03, "", ha="center", color=INK, fontsize=12)
 
     def draw(self, angle: Counts, wanted: Counts, pressure: Counts) -> NDArray[np.uint8]:
-        from pneumarm.report.drawn_arm import Pose
+        from pneumarm.drawing.drawn_arm import Pose
 
         degrees, goal = self._spec.degrees(angle), self._spec.degrees(wanted)
         full = self._spec.bar(pressure) / self._spec.max_pressure

@@ -27,8 +27,7 @@ from pneumarm.learning.methods import (
     test_ahead,
     train,
 )
-from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.learner import OnlineLearner
+from pneumarm.learning.online.agent import Agent, OnlineLearner
 from pneumarm.learning.online.settings import Exploration, Shaping, TrainSettings
 from pneumarm.learning.online.training import CURVES
 from pneumarm.learning.policy.agent import PolicyAgent

@@ -82,7 +82,7 @@ class AnyAgent(Acts, Saved, Protocol):
 
 @runtime_checkable
 class LearningActor(Acting, Protocol):
-    """An agent that acts and learns step by step, see :class:`~pneumarm.learning.online.learner.OnlineLearner`."""
+    """An agent that acts and learns step by step, see :class:`~pneumarm.learning.online.agent.OnlineLearner`."""
 
     def observe(self, reward: ArrayLike, next_state: ArrayLike, terminal: bool) -> None:
         """Go on in ``next_state`` and learn from it; ``reward`` is a number or one a joint (joints,)."""

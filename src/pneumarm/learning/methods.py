@@ -38,13 +38,11 @@ from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.learning.online.training import train as train_online
 from pneumarm.learning.policy.agent import KIND as POLICY
-from pneumarm.learning.policy.agent import PolicyAgent
+from pneumarm.learning.policy.agent import PolicyAgent, train_policy
 from pneumarm.learning.policy.settings import PolicySettings
-from pneumarm.learning.policy.training import train_policy
 from pneumarm.learning.servo.agent import KIND as SERVO
-from pneumarm.learning.servo.agent import ServoAgent
+from pneumarm.learning.servo.agent import ServoAgent, train_servo
 from pneumarm.learning.servo.settings import ServoSettings
-from pneumarm.learning.servo.training import train_servo
 from pneumarm.learning.training import Progress, Training
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation

@@ -18,7 +18,7 @@ _KEPT = 100  # goals, of each controller
 
 
 @dataclass
-class Goals:
+class ControllerFigures:
     """What came of the last goals and curves of one controller."""
 
     settled: deque[float]
@@ -44,14 +44,14 @@ class PlayFigures:
     """Sees every error of the arm and makes figures of the goals that were given and then left alone."""
 
     def __init__(self) -> None:
-        self.by_controller: dict[str, Goals] = {}
+        self.by_controller: dict[str, ControllerFigures] = {}
         self._since: float | None = None  # when the goal was given that is counted; None while none is
         self._seen: list[tuple[float, NDArray[np.float64]]] = []  # times [s], errors (joints,) [degrees]
         self._curve: tuple[float, int] | None = None  # sum of squares, number
 
-    def of(self, controller: str) -> Goals:
+    def of(self, controller: str) -> ControllerFigures:
         """Return the figures of ``controller``."""
-        return self.by_controller.setdefault(controller, Goals(deque(maxlen=_KEPT), deque(maxlen=_KEPT)))
+        return self.by_controller.setdefault(controller, ControllerFigures(deque(maxlen=_KEPT), deque(maxlen=_KEPT)))
 
     def new_goal(self, time: float, error: NDArray[np.float64]) -> None:
         """Begin to count a goal that is given at ``time`` [s] and is ``error`` (joints,) [degrees] away."""

@@ -47,13 +47,13 @@ class Hold(Order, frozen=True, tag="hold"):
     """Stay where the arm is now."""
 
 
-class Goal(Order, frozen=True, tag="goal"):
+class GoTo(Order, frozen=True, tag="goal"):
     """Go to these angles [degrees] and hold them."""
 
     degrees: list[float]
 
 
-class Draw(Order, frozen=True, tag="draw"):
+class FollowCurve(Order, frozen=True, tag="draw"):
     """Follow a curve: times [s], rising from 0, and a row of angles [degrees] for each."""
 
     seconds: list[float]
@@ -85,7 +85,9 @@ class Learn(Order, frozen=True, tag="learn"):
     """Do the whole job, from collecting to adapting, and move with what comes of it."""
 
 
-AnyOrder = Beat | Take | HandOver | Stop | Release | Relax | Hold | Goal | Draw | Choose | PutBack | Faults | Learn
+AnyOrder = (
+    Beat | Take | HandOver | Stop | Release | Relax | Hold | GoTo | FollowCurve | Choose | PutBack | Faults | Learn
+)
 _decoder: msgspec.json.Decoder[AnyOrder] = msgspec.json.Decoder(AnyOrder)
 
 
@@ -100,9 +102,9 @@ def read_order(text: str | bytes, joints: int) -> AnyOrder:
         order = _decoder.decode(text)
     except (msgspec.DecodeError, RecursionError) as error:
         raise UnusableInput(f"expected an order of the page, got something else ({error})") from error
-    if isinstance(order, Goal):
+    if isinstance(order, GoTo):
         _check(order.degrees, joints)
-    elif isinstance(order, Draw):
+    elif isinstance(order, FollowCurve):
         _check_curve(order, joints)
     return order
 
@@ -112,7 +114,7 @@ def _check(degrees: list[float], joints: int) -> None:
         raise UnusableInput(f"a goal needs {joints} finite angle(s), got {degrees}")
 
 
-def _check_curve(order: Draw, joints: int) -> None:
+def _check_curve(order: FollowCurve, joints: int) -> None:
     times, number = order.seconds, len(order.seconds)
     rising = all(a < b for a, b in pairwise(times))
     if not (2 <= number <= MOST_POINTS and number == len(order.degrees) and times[0] == 0 and rising):

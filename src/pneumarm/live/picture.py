@@ -4,7 +4,7 @@ from typing import TypeVar
 
 from pneumarm.arm.seam import Arm
 from pneumarm.arm.virtual import VirtualArm
-from pneumarm.report.drawn_arm import DrawnArm, Measures
+from pneumarm.drawing.drawn_arm import DrawnArm, Measures
 
 _Kind = TypeVar("_Kind", bound=Arm)
 

@@ -44,7 +44,7 @@ _QUEUE = 128  # of connections that the system keeps until they are taken in
 _REFUSED, _FULL = 4403, 4429  # codes that a refused connection is closed with
 
 
-class Server:
+class LiveServer:
     """Serves ``rig`` on ``host`` and ``port``; 0 takes any port that is free.
 
     Raises:

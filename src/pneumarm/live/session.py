@@ -31,7 +31,7 @@ from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
 from pneumarm.live.faults import Switches
 from pneumarm.live.figures import PlayFigures
 from pneumarm.live.hand import Dragged, drawn
-from pneumarm.live.orders import Draw, Faults, Goal, Hold, Order, Relax, Release, Stop
+from pneumarm.live.orders import Faults, FollowCurve, GoTo, Hold, Order, Relax, Release, Stop
 from pneumarm.live.picture import behind
 from pneumarm.live.screen import Screen
 from pneumarm.live.words import prevented, sentence
@@ -212,11 +212,11 @@ class Session:
             raise UnusableInput("the arm is stopped; release it first")
         elif self._mover is None:
             raise UnusableInput("nothing can move the arm yet; let it learn first")
-        elif isinstance(order, Goal):
+        elif isinstance(order, GoTo):
             self._go(counts_of(order.degrees, self.arm.spec))
         elif isinstance(order, Hold):
             self._go(self._now)
-        elif isinstance(order, Draw):
+        elif isinstance(order, FollowCurve):
             self._follow(order, self._mover)
 
     def _go(self, goal: NDArray[np.float64]) -> None:
@@ -232,7 +232,7 @@ class Session:
         self._dragged.goal = goal
         self.figures.new_goal(self._time, (self._now - goal) / self.arm.spec.counts_per_degree)
 
-    def _follow(self, order: Draw, mover: Mover) -> None:
+    def _follow(self, order: FollowCurve, mover: Mover) -> None:
         angles = self._within(counts_of(order.degrees, self.arm.spec), mover)
         self._curve = drawn(order.seconds, angles, self._now)
         self.mode, self._why = Mode.FOLLOWING, ""

@@ -17,6 +17,7 @@ from pneumarm.arm import Arm, ArmSpec, ControlCycle, GuardedArm, Reading, guarde
 from pneumarm.arm.controller import Controller, TrackingController
 from pneumarm.arm.hand import hand
 from pneumarm.arm.reference import Reference
+from pneumarm.drawing.moving_arm import Shown, moving_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.moving.settling import DWELL, TOLERANCE, settled_at
 from pneumarm.settings import Settings
@@ -358,7 +359,5 @@ def _listed(values: NDArray[np.float64], form: str) -> str:
 
 def _picture(recorded: Recorded, wanted: NDArray[np.float64], spec: ArmSpec) -> str:
     """Return an SVG that plays what was ``recorded``, for a notebook."""
-    from pneumarm.report.moving_arm import Shown, moving_arm
-
     command = np.nan_to_num(recorded.command)
     return moving_arm(Shown(spec, recorded.time, recorded.angle, wanted, recorded.pressure, command))

@@ -25,8 +25,8 @@ from pneumarm.checkup.figures import (
     muscle_row,
 )
 from pneumarm.checkup.measure import Checkup, Trace
-from pneumarm.report.colours import DARK, GREY, LIGHT, MIDDLE
-from pneumarm.report.moving_arm import Shown
+from pneumarm.drawing.colours import DARK, GREY, LIGHT, MIDDLE
+from pneumarm.drawing.moving_arm import Shown
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.playing import playing
 from pneumarm.report.style import panels, styled

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.drawing.moving_arm import Shown
 from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
-from pneumarm.report.moving_arm import Shown
 from pneumarm.task.movements import Movements
 
 Array = NDArray[np.float64]

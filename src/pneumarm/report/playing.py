@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pneumarm.report.moving_arm import Shown, moving_arm
+from pneumarm.drawing.moving_arm import Shown, moving_arm
 from pneumarm.report.page import Picture
 
 

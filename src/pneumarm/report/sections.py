@@ -12,6 +12,7 @@ from pneumarm.adaptation import WatchSettings
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
 from pneumarm.control.versions import Adapted
+from pneumarm.drawing.moving_arm import Shown
 from pneumarm.report import figures
 from pneumarm.report.data import (
     CoverageData,
@@ -27,7 +28,6 @@ from pneumarm.report.figures.residues import IN_A_ROW
 from pneumarm.report.figures.training import PRICE
 from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger, written
-from pneumarm.report.moving_arm import Shown
 from pneumarm.report.page import Picture, Section, Table
 from pneumarm.report.playing import playing
 from pneumarm.report.style import of_joint, quantities

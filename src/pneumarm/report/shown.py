@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from pneumarm.address import Address
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.drawing.moving_arm import Shown
 from pneumarm.errors import UnusableInput
 from pneumarm.report.data import Demonstration, MovingData
 from pneumarm.report.files import DEMONSTRATIONS, SPEC, read_spec
-from pneumarm.report.moving_arm import Shown
 from pneumarm.task.reference import parse_reference
 from pneumarm.transitions.rows import Rows, joined
 from pneumarm.transitions.store import SequenceEntry, Store

@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.colours import DARK, INK
+from pneumarm.drawing.colours import DARK, INK
 
 WIDTH = 7.4
 """Width of every figure [inch]."""
@@ -132,7 +132,7 @@ def _freeze(figure: Figure) -> None:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ObservedQuantity:
     """One of the four quantities of an observation, and how people read it."""
 
     name: str
@@ -147,14 +147,14 @@ class Quantity:
         return f"{prefix}{self.name} [{self.unit}]"
 
 
-def quantities(spec: ArmSpec) -> tuple[Quantity, ...]:
+def quantities(spec: ArmSpec) -> tuple[ObservedQuantity, ...]:
     """Return angle, velocity, pressure 1 and pressure 2 for the sensors of ``spec``."""
     angle, pressure = 1 / spec.counts_per_degree, 1 / spec.counts_per_bar
     return (
-        Quantity("angle", r"\theta", "°", angle),
-        Quantity("velocity", r"\omega", "°/s", 1e3 * angle),
-        Quantity(f"{spec.pressure_word} 1", r"p_1", "bar", pressure),
-        Quantity(f"{spec.pressure_word} 2", r"p_2", "bar", pressure),
+        ObservedQuantity("angle", r"\theta", "°", angle),
+        ObservedQuantity("velocity", r"\omega", "°/s", 1e3 * angle),
+        ObservedQuantity(f"{spec.pressure_word} 1", r"p_1", "bar", pressure),
+        ObservedQuantity(f"{spec.pressure_word} 2", r"p_2", "bar", pressure),
     )
 
 

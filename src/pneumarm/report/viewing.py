@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.drawing.moving_arm import Shown, moving_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder, write_text, written_whole
-from pneumarm.report.moving_arm import Shown, moving_arm
 
 _COLORS = 64  # of a GIF: lines on white
 _DPI = 160

@@ -17,7 +17,7 @@ Differences from the thesis, where it is silent:
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,7 @@ from numpy.typing import NDArray
 from pneumarm.kernels import part
 from pneumarm.random import normal
 from pneumarm.settings import NonNegativeFloat, PositiveInt, Settings, Share, Valid
-
-if TYPE_CHECKING:
-    from pneumarm.simulation.simulation import Simulation
+from pneumarm.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class NoiseParameters(NamedTuple):
     """Share of a slow arm, slow speed, slope of the share above it, shape (3,)."""
 
 
-def noise_parameters(settings: NoiseSettings, simulation: "Simulation") -> NoiseParameters:
+def noise_parameters(settings: NoiseSettings, simulation: Simulation) -> NoiseParameters:
     """Return the noise of ``simulation`` as arrays, scaled as its state is."""
     joints = simulation.window.joints
     window, scaling = simulation.window, simulation.scaling

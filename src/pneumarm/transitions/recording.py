@@ -52,7 +52,7 @@ from pneumarm.transitions.lerobot import MAPPING
 from pneumarm.transitions.parquet import files_of
 from pneumarm.transitions.rows import Recorded, steps_of
 from pneumarm.transitions.store import Store
-from pneumarm.transitions.table import Row, Table, read_table
+from pneumarm.transitions.table import OpenTable, TableRow, open_table
 
 _LONGEST_SEQUENCE = 10_000  # rows; a longer one is stored in parts, which costs a window's length of each
 
@@ -374,7 +374,7 @@ class _Read(NamedTuple):
     values: list[float]
 
 
-class _Part:
+class _SequenceRows:
     """Rows of a sequence, until they are stored."""
 
     def __init__(self, sequence: str | None) -> None:
@@ -414,7 +414,7 @@ class _Reader:
         return self._used + self.skipped.total()
 
     def __iter__(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]]:
-        table, part, early = read_table(self._path, self._names), _Part(None), None
+        table, part, early = open_table(self._path, self._names), _SequenceRows(None), None
         for row in table.rows:
             try:
                 read = self._read(row, table, part)
@@ -425,7 +425,7 @@ class _Reader:
                 continue
             if read.sequence != part.sequence:
                 yield from self._whole(part)
-                part = _Part(read.sequence)
+                part = _SequenceRows(read.sequence)
             part.passed += 1
             if part.rows and read.time - part.rows[-1][0] < self._period / 2:
                 if early is None or not 0.5 <= (read.time - early.time) / self._period < 1.5:
@@ -436,7 +436,7 @@ class _Reader:
                     part.broken |= read.fields != part.last  # a copy of the row before cuts nothing
                     continue
                 yield from self._whole(part)  # it goes on from the row left out before: the clock began anew there
-                part = _Part(read.sequence)
+                part = _SequenceRows(read.sequence)
                 part.add(early)
                 self.skipped[_NOT_RISING] -= 1
                 self.restarts += 1
@@ -444,7 +444,7 @@ class _Reader:
             early = None
             if len(part.rows) == _LONGEST_SEQUENCE:
                 yield from self._whole(part)
-                part = _Part(part.sequence)
+                part = _SequenceRows(part.sequence)
         yield from self._whole(part)
 
     def check(self) -> None:
@@ -469,7 +469,9 @@ class _Reader:
                 f"{_MOST_SKIPPED:.0%} may"
             )
 
-    def _whole(self, part: _Part) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]]:
+    def _whole(
+        self, part: _SequenceRows
+    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]]:
         self._used += len(part.rows)
         if len(part.rows) >= 2:
             times, cut, values = zip(*part.rows, strict=True)
@@ -477,11 +479,11 @@ class _Reader:
         else:
             self.single += len(part.rows)
 
-    def _skip(self, row: Row, reason: str, what: str) -> None:
+    def _skip(self, row: TableRow, reason: str, what: str) -> None:
         self.skipped[_TORN if row.torn and reason != _NOT_RISING else reason] += row.lines
         self._wrong = self._wrong or f"line {row.line}: {what}"
 
-    def _read(self, row: Row, table: Table, part: _Part) -> _Read:
+    def _read(self, row: TableRow, table: OpenTable, part: _SequenceRows) -> _Read:
         """Return the ``row`` of a ``table``, the next one of ``part`` or of a new sequence; or raise _Unusable."""
         fields_, width = row.fields, table.width
         if len(fields_) != width and (len(fields_) < width or any(map(str.strip, fields_[width:]))):
@@ -504,7 +506,7 @@ class _Reader:
         ]
         return _Read(fields_, sequence, time, values)
 
-    def _value(self, text: str, column: _Column, table: Table) -> float:
+    def _value(self, text: str, column: _Column, table: OpenTable) -> float:
         """Return what a field holds, in sensor units; or raise _Unusable."""
         value = self._number(text, column.name, table)
         if not column.low <= value <= column.high or (column.whole and value != round(value)):
@@ -513,7 +515,7 @@ class _Reader:
             raise _Unusable("out of range", what)
         return column.factor * value + column.offset
 
-    def _number(self, text: str, name: str, table: Table) -> float:
+    def _number(self, text: str, name: str, table: OpenTable) -> float:
         given, marks = text, {mark for mark in text if mark in ",."}
         if marks and table.separator != ",":
             # Decimals may have a comma, for all of the file: what groups thousands is not taken for one.

@@ -21,7 +21,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import pneumarm
 from pneumarm.address import Address, ServerAddress, StoreAddress, address_of
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
@@ -41,6 +40,7 @@ from pneumarm.transitions.possible import row_values
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.rows import Mark, Recorded, Rows, joinable, unmarked
 from pneumarm.transitions.schema import SqliteFile
+from pneumarm.version import __version__
 
 BLOCK = 200_000
 """Rows of a block, about; with one joint a block takes 20 MB."""
@@ -346,7 +346,7 @@ class Store:
         metadata = {
             "settings": dict(settings),
             "arm": asdict(self.spec),
-            "version": pneumarm.__version__,
+            "version": __version__,
             "started": wall_clock.strftime("%Y-%m-%dT%H:%M:%SZ", wall_clock.gmtime()),
         }
         with self.writing() as database:

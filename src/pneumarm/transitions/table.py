@@ -19,7 +19,7 @@ _PREAMBLE = 100  # lines in which a header is looked for: more than any logger w
 _SEPARATORS = ",;\t| "
 
 
-class Row(NamedTuple):
+class TableRow(NamedTuple):
     """A row of a table."""
 
     line: int
@@ -31,17 +31,17 @@ class Row(NamedTuple):
     """Whether the file ends in it, without an end of the line."""
 
 
-class Table(NamedTuple):
+class OpenTable(NamedTuple):
     """A table whose header was read: where the columns asked for are, and what comes below it, once."""
 
     places: list[int]
     width: int
     """Fields of a row; a row may have empty ones behind them."""
     separator: str
-    rows: Iterator[Row]
+    rows: Iterator[TableRow]
 
 
-def read_table(path: Path, wanted: Sequence[str | None]) -> Table:
+def open_table(path: Path, wanted: Sequence[str | None]) -> OpenTable:
     """Return the table in the file or dataset ``path``, and where in its rows the columns ``wanted`` are.
 
     A column that is None is not wanted; its place is -1.
@@ -65,10 +65,10 @@ def read_table(path: Path, wanted: Sequence[str | None]) -> Table:
                 raise UnusableInput(f"{path}: the columns of its parts differ")
             yield from batch
 
-    return Table(places, len(names), ",", (Row(number, row) for number, row in enumerate(rows(), start=1)))
+    return OpenTable(places, len(names), ",", (TableRow(number, row) for number, row in enumerate(rows(), start=1)))
 
 
-def _csv(path: Path, wanted: Sequence[str | None]) -> Table:
+def _csv(path: Path, wanted: Sequence[str | None]) -> OpenTable:
     lines = _lines(path)
     head = list(islice(lines, _PREAMBLE))
     best, nearest = (0, 0), f"line 1: {_places([], wanted)[1]}"  # what is wrong with what is most like the header
@@ -82,7 +82,7 @@ def _csv(path: Path, wanted: Sequence[str | None]) -> Table:
                 places, wrong = _places(names, wanted)
                 if not wrong:
                     rows = _rows(path, chain(head[begin:], lines), separator, begin)
-                    return Table(places, len(names), separator, rows)
+                    return OpenTable(places, len(names), separator, rows)
                 if (len(places), len(names)) > best and not head[begin - 1].startswith("#"):
                     best, nearest = (len(places), len(names)), f"line {begin}: {wrong}"
         except csv.Error:
@@ -131,7 +131,7 @@ def _lines(path: Path) -> Iterator[str]:
         raise UnusableInput(f"{path}: cannot be read ({error.strerror})") from error
 
 
-def _rows(path: Path, lines: Iterator[str], separator: str, begin: int) -> Iterator[Row]:
+def _rows(path: Path, lines: Iterator[str], separator: str, begin: int) -> Iterator[TableRow]:
     """Give the rows in ``lines``, which come after the first ``begin`` of the file."""
     last = ""
 
@@ -144,7 +144,7 @@ def _rows(path: Path, lines: Iterator[str], separator: str, begin: int) -> Itera
     try:
         for fields in reader:
             if fields and fields != [""]:
-                yield Row(begin + before + 1, fields, reader.line_num - before, not last.endswith(("\n", "\r")))
+                yield TableRow(begin + before + 1, fields, reader.line_num - before, not last.endswith(("\n", "\r")))
             before = reader.line_num
     except csv.Error as error:
         raise UnusableInput(f"{path}: line {begin + reader.line_num}: not CSV ({error})") from error

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE, PALE
 from pneumarm.experiments.design.analysis import TableAnalysis
 from pneumarm.experiments.design.effects import Effects
 from pneumarm.experiments.design.half_normal import percentages, positions
-from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE, PALE
 from pneumarm.report.style import panels, styled
 
 _STYLES = tuple((colour, line) for line in ("-", "--", ":", "-.") for colour in (DARK, MIDDLE, LIGHT, GREY))

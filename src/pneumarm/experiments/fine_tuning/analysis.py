@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.figure import Figure
 
+from pneumarm.drawing.colours import DARK, GREY, MIDDLE
 from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.differences import above, interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
@@ -13,7 +14,6 @@ from pneumarm.experiments.fine_tuning.levels import FineTuning
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.trainings import CRITERIA
 from pneumarm.learning import TrainSettings
-from pneumarm.report.colours import DARK, GREY, MIDDLE
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import panels, styled
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
+from pneumarm.drawing.colours import DARK, GREY, LIGHT, MIDDLE
 from pneumarm.experiments.means import from_series
-from pneumarm.report.colours import DARK, GREY, LIGHT, MIDDLE
 from pneumarm.report.style import panels, styled
 
 _STYLES = ((DARK, "-"), (MIDDLE, "--"), (GREY, "-."), (LIGHT, "-"), (DARK, ":"))

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
+from pneumarm.drawing.colours import DARK, GREY, MIDDLE
 from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
@@ -20,7 +21,6 @@ from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
 from pneumarm.experiments.trainings import CRITERIA, LEARNING
 from pneumarm.learning import TrainSettings
 from pneumarm.learning.online.shaping import initial_deviation, stage
-from pneumarm.report.colours import DARK, GREY, MIDDLE
 from pneumarm.report.page import Picture, Table
 from pneumarm.report.style import panels, styled
 

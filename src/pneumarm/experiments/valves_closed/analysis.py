@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pneumarm.drawing.colours import DARK, MIDDLE
 from pneumarm.experiments.analysis import analysed, filled
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array, mean, samples
 from pneumarm.experiments.valves_closed.inflation import CLOSED, OPEN, ValvesClosed
-from pneumarm.report.colours import DARK, MIDDLE
 from pneumarm.report.page import Picture
 from pneumarm.report.style import panels, styled
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning.agents import SimulationAgent
-from pneumarm.learning.hierarchy.loop import begin_plan, go_on, hierarchy, plan, test_levels, upper_shape
+from pneumarm.learning.hierarchy.loop import begin_levels, go_on, hierarchy, level_memory, test_levels, upper_shape
 from pneumarm.learning.hierarchy.settings import HierarchySettings
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.values import network_shapes, pack
@@ -50,7 +50,7 @@ class HierarchicalAgent(SimulationAgent):
         record = movements(episodes, one.goal.size)
         levels = hierarchy((self.upper, self.lower), self.spec, self.window, self.scaling, self.settings, 0.0)
         randoms = random_state(seed), random_state(0)
-        test_levels(env, levels, GREEDY, one, plan(levels), randoms, record)
+        test_levels(env, levels, GREEDY, one, level_memory(levels), randoms, record)
         return record
 
     def save(self, path: Path) -> None:
@@ -95,33 +95,32 @@ class HierarchicalActor:
     def __init__(self, agent: HierarchicalAgent) -> None:
         window = agent.window
         self._levels = hierarchy((agent.upper, agent.lower), agent.spec, window, agent.scaling, agent.settings, 0.0)
-        self._plan, self._random, self._size = plan(self._levels), random_state(0), window.state_size
-        layout = layout_of(window)
-        self._x = np.zeros(layout.size, np.float32)
-        self._x[layout.one] = 1
+        self._memory, self._random, self._size = level_memory(self._levels), random_state(0), window.state_size
+        self._x = np.zeros(layout_of(window).size, np.float32)
+        self._x[layout_of(window).one] = 1
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
         self._x[: self._size] = self._checked(state)
         goal = np.asarray(goal, np.float64).reshape(len(self._levels.unit))
-        begin_plan(self._levels, GREEDY, self._plan, self._x, goal, self._random)
+        begin_levels(self._levels, GREEDY, self._memory, self._x, goal, self._random)
 
     @property
     def subgoal(self) -> NDArray[np.float64]:
         """What joints are heading for, shape (joints,) [counts]."""
-        return self._plan.aim.copy()
+        return self._memory.aim.copy()
 
     def act(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of the current state; they stay the same until the next state."""
-        if self._plan.low.next_actions[0] < 0:
+        if self._memory.low.next_actions[0] < 0:
             raise PneumarmError("begin an episode before acting")
-        return self._plan.low.next_actions.copy()
+        return self._memory.low.next_actions.copy()
 
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in the scaled ``next_state`` (state_size,), to which the actions of :meth:`act` led."""
         self.act()
         self._x[: self._size] = self._checked(next_state)
-        go_on(self._levels, GREEDY, self._plan, self._x, self._random, False)
+        go_on(self._levels, GREEDY, self._memory, self._x, self._random, False)
 
     def _checked(self, state: ArrayLike) -> NDArray[np.float32]:
         checked = np.asarray(state, np.float32)

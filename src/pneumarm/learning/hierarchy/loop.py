@@ -60,8 +60,8 @@ class Hierarchy(NamedTuple):
     """Whether the upper agent sees all of it."""
 
 
-class Plan(NamedTuple):
-    """What both levels remember within an episode. Made by :func:`plan`."""
+class LevelMemory(NamedTuple):
+    """What both levels remember within an episode. Made by :func:`level_memory`."""
 
     low: Workspace
     high: Workspace
@@ -111,10 +111,10 @@ def hierarchy(
     )
 
 
-def plan(levels: Hierarchy) -> Plan:
+def level_memory(levels: Hierarchy) -> LevelMemory:
     """Return workspace for both levels."""
     joints = len(levels.unit)
-    return Plan(
+    return LevelMemory(
         low=workspace(levels.lower, joints),
         high=workspace(levels.upper, joints),
         seen=np.zeros(levels.upper.weights.shape[1] - 2, np.float32),
@@ -125,109 +125,109 @@ def plan(levels: Hierarchy) -> Plan:
 
 
 @part
-def see(levels, plan, x):  # type: ignore[no-untyped-def]
+def see(levels, memory, x):  # type: ignore[no-untyped-def]
     """Set what the upper agent sees in the state ``x`` (inputs,)."""
-    joints = plan.goal.shape[0]
+    joints = memory.goal.shape[0]
     if levels.is_whole:
         for i in range(x.shape[0]):
-            plan.seen[i] = x[i]
+            memory.seen[i] = x[i]
     first = levels.layout.goal if levels.is_whole else joints
     for joint in range(joints):
-        plan.seen[first + joint] = np.float32((plan.goal[joint] - levels.unit[joint, 0]) / levels.unit[joint, 1])
+        memory.seen[first + joint] = np.float32((memory.goal[joint] - levels.unit[joint, 0]) / levels.unit[joint, 1])
         if not levels.is_whole:
-            plan.seen[joint] = x[angle_at(levels.layout, 0, joint)]
+            memory.seen[joint] = x[angle_at(levels.layout, 0, joint)]
     if not levels.is_whole:
-        plan.seen[2 * joints] = np.float32(1.0)
+        memory.seen[2 * joints] = np.float32(1.0)
 
 
 @part
-def set_subgoals(levels, schedule, plan, x, random):  # type: ignore[no-untyped-def]
+def set_subgoals(levels, schedule, memory, x, random):  # type: ignore[no-untyped-def]
     """Let the upper agent choose subgoals in the state ``x`` (inputs,), and the lower ones what to do for these."""
-    see(levels, plan, x)
-    decide(levels.upper, schedule, plan.seen, plan.high, random)
-    left = plan.high.next_chosen[0]
-    for joint in range(plan.goal.shape[0]):
+    see(levels, memory, x)
+    decide(levels.upper, schedule, memory.seen, memory.high, random)
+    left = memory.high.next_chosen[0]
+    for joint in range(memory.goal.shape[0]):
         way = levels.ways[left % levels.ways.shape[0]]
         left //= levels.ways.shape[0]
         here = levels.unit[joint, 0] + levels.unit[joint, 1] * x[angle_at(levels.layout, 0, joint)]
-        plan.aim[joint] = here + way * (plan.goal[joint] - here)
-        scaled = (plan.aim[joint] - levels.unit[joint, 0]) / levels.unit[joint, 1]
+        memory.aim[joint] = here + way * (memory.goal[joint] - here)
+        scaled = (memory.aim[joint] - levels.unit[joint, 0]) / levels.unit[joint, 1]
         x[levels.layout.goal + joint] = np.float32(scaled)
-    for agent in range(plan.low.chosen.shape[0]):
+    for agent in range(memory.low.chosen.shape[0]):
         forget_traces(levels.lower, agent)
-    look_ahead(levels.lower, schedule, x, plan.low, random)
-    plan.course[_TAKEN], plan.course[_GAINED], plan.course[_DISCOUNT] = 0.0, 0.0, 1.0
+    look_ahead(levels.lower, schedule, x, memory.low, random)
+    memory.course[_TAKEN], memory.course[_GAINED], memory.course[_DISCOUNT] = 0.0, 0.0, 1.0
 
 
 @kernel
-def begin_plan(levels, schedule, plan, x, goal, random):  # type: ignore[no-untyped-def]
+def begin_levels(levels, schedule, memory, x, goal, random):  # type: ignore[no-untyped-def]
     """Begin an episode in the state ``x`` (inputs,) towards ``goal`` (joints,) [counts]."""
     for joint in range(goal.shape[0]):
-        plan.goal[joint] = goal[joint]
+        memory.goal[joint] = goal[joint]
     forget_traces(levels.upper, 0)
-    set_subgoals(levels, schedule, plan, x, random)
+    set_subgoals(levels, schedule, memory, x, random)
 
 
 @part
-def arrive(levels, plan, x):  # type: ignore[no-untyped-def]
+def arrive(levels, memory, x):  # type: ignore[no-untyped-def]
     """Note which joints are at their subgoals in the state ``x`` (inputs,); return whether all are."""
     are_all = True
-    for joint in range(plan.aim.shape[0]):
+    for joint in range(memory.aim.shape[0]):
         angle = levels.unit[joint, 0] + levels.unit[joint, 1] * x[angle_at(levels.layout, 0, joint)]
         velocity = levels.unit[joint, 2] + levels.unit[joint, 3] * x[velocity_at(levels.layout, 0, joint)]
-        is_there = has_reached(levels.reward, angle, velocity, plan.aim[joint])
-        plan.low.there[joint] = is_there
+        is_there = has_reached(levels.reward, angle, velocity, memory.aim[joint])
+        memory.low.there[joint] = is_there
         are_all = are_all and is_there
     return are_all
 
 
 @kernel
-def go_on(levels, schedule, plan, x, random, is_reached):  # type: ignore[no-untyped-def]
-    """Learn from the step to ``x`` (inputs,), for which ``plan.low.paid`` was paid, and choose what to do next."""
-    course, joints = plan.course, plan.goal.shape[0]
+def go_on(levels, schedule, memory, x, random, is_reached):  # type: ignore[no-untyped-def]
+    """Learn from the step to ``x`` (inputs,), for which ``memory.low.paid`` was paid, and choose what to do next."""
+    course, joints = memory.course, memory.goal.shape[0]
     usual = levels.reward.goal if is_reached else levels.reward.action
     total = -(joints - 1) * usual  # the goal is paid for once, switches of all joints
     for joint in range(joints):
-        total += plan.low.paid[joint]
+        total += memory.low.paid[joint]
     course[_TAKEN] += 1.0
     course[_GAINED] += course[_DISCOUNT] * total
     course[_DISCOUNT] *= levels.upper.discount
-    is_over = arrive(levels, plan, x) or is_reached or course[_TAKEN] >= levels.period
+    is_over = arrive(levels, memory, x) or is_reached or course[_TAKEN] >= levels.period
     if not is_reached:
-        look_ahead(levels.lower, schedule, x, plan.low, random)
+        look_ahead(levels.lower, schedule, x, memory.low, random)
     if levels.lower.rate > 0.0:
         for joint in range(joints):
-            if is_reached and plan.low.there[joint]:
-                plan.low.paid[joint] += levels.lower.reward.goal
-        learn(levels.lower, plan.low, is_reached)
+            if is_reached and memory.low.there[joint]:
+                memory.low.paid[joint] += levels.lower.reward.goal
+        learn(levels.lower, memory.low, is_reached)
     if not is_over:
         return
-    remember(plan.high, plan.seen)
+    remember(memory.high, memory.seen)
     earned, discount = course[_GAINED], course[_DISCOUNT]
     if not is_reached:
-        set_subgoals(levels, schedule, plan, x, random)
+        set_subgoals(levels, schedule, memory, x, random)
     if levels.upper.rate > 0.0:
-        target = td_target(earned, discount, plan.high.next_values[0], is_reached)
-        update(levels.upper, 0, plan.high.before, plan.high.chosen[0], target)
-        if plan.high.cut[0]:
+        target = td_target(earned, discount, memory.high.next_values[0], is_reached)
+        update(levels.upper, 0, memory.high.before, memory.high.chosen[0], target)
+        if memory.high.cut[0]:
             forget_traces(levels.upper, 0)
 
 
 @kernel
-def train_levels(environment, levels, schedule, episode, plan, count, performance):  # type: ignore[no-untyped-def]
+def train_levels(environment, levels, schedule, episode, memory, count, performance):  # type: ignore[no-untyped-def]
     """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes."""
     x, random, steps = episode.state.x, episode.state.random, 0
     for e in range(count):
         begin_episode(environment, episode, schedule.deviation, random)
-        begin_plan(levels, schedule, plan, x, episode.goal, random)
+        begin_levels(levels, schedule, memory, x, episode.goal, random)
         is_reached = False
         for _ in range(environment.task.cutoff):
-            remember(plan.low, x)
-            is_reached = take(environment, episode, plan.low.next_actions)
+            remember(memory.low, x)
+            is_reached = take(environment, episode, memory.low.next_actions)
             steps += 1
             for joint in range(episode.goal.shape[0]):
-                plan.low.paid[joint] = paid(environment.task.reward, is_reached, episode.switched[joint])
-            go_on(levels, schedule, plan, x, random, is_reached)
+                memory.low.paid[joint] = paid(environment.task.reward, is_reached, episode.switched[joint])
+            go_on(levels, schedule, memory, x, random, is_reached)
             if is_reached:
                 break
         performance += schedule.performance_rate * ((1.0 if is_reached else 0.0) - performance)
@@ -237,7 +237,7 @@ def train_levels(environment, levels, schedule, episode, plan, count, performanc
 
 
 @kernel
-def test_levels(environment, levels, schedule, episode, plan, randoms, record):  # type: ignore[no-untyped-def]
+def test_levels(environment, levels, schedule, episode, memory, randoms, record):  # type: ignore[no-untyped-def]
     """Fill ``record`` with episodes over all begin states and goals; nothing is learned.
 
     ``randoms`` decide begin states and goals, and what is chosen: noise is that of the episode alone, whoever acts.
@@ -247,12 +247,12 @@ def test_levels(environment, levels, schedule, episode, plan, randoms, record): 
     for e in range(record.actions.shape[0]):
         begin_episode(environment, episode, np.inf, random)
         note_begin(task, episode, record, e)
-        begin_plan(levels, schedule, plan, x, episode.goal, choices)
+        begin_levels(levels, schedule, memory, x, episode.goal, choices)
         is_reached = False
         while goes_on(task, is_reached, record, e):
-            is_reached = take(environment, episode, plan.low.next_actions)
+            is_reached = take(environment, episode, memory.low.next_actions)
             note_action(task.reward, episode.switched, is_reached, record, e)
-            go_on(levels, schedule, plan, x, choices, is_reached)
+            go_on(levels, schedule, memory, x, choices, is_reached)
         note_end(task, episode, is_reached, record, e)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.learning.hierarchy.agent import HierarchicalAgent
-from pneumarm.learning.hierarchy.loop import hierarchy, plan, train_levels, upper_shape
+from pneumarm.learning.hierarchy.loop import hierarchy, level_memory, train_levels, upper_shape
 from pneumarm.learning.hierarchy.settings import HierarchySettings
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.training import ShapedLearner
@@ -62,7 +62,7 @@ class HierarchicalLearner(ShapedLearner[HierarchicalAgent, HierarchySettings]):
         window, scaling = self._simulation.window, self._simulation.scaling
         levels = hierarchy((self._upper, self._weights), self._simulation.spec, window, scaling, self._settings)
         found: tuple[float, int, int] = train_levels(
-            self._env, levels, schedule, one, plan(levels), count, float(self._shaping[1])
+            self._env, levels, schedule, one, level_memory(levels), count, float(self._shaping[1])
         )
         return found
 

@@ -20,7 +20,7 @@ from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.settings import TrainSettings
 
 
-class Stage(NamedTuple):
+class ShapingStage(NamedTuple):
     """Where shaping stands."""
 
     schedule: Schedule
@@ -38,13 +38,15 @@ def initial_deviation(settings: TrainSettings, spec: ArmSpec) -> float:
     return min(settings.shaping.initial_deviation * spec.counts_per_degree, high - low)
 
 
-def stage(deviation: float, settings: TrainSettings, spec: ArmSpec) -> Stage:
+def stage(deviation: float, settings: TrainSettings, spec: ArmSpec) -> ShapingStage:
     """Return what holds at ``deviation`` [counts]."""
     shaping, last = settings.shaping, settings.exploration
     if shaping is None:
         rate, demanded = _NO_SHAPING
         enough = demanded if settings.stops else np.inf
-        return Stage(Schedule(np.inf, float(last.epsilon), float(last.temperature), rate, enough), demanded, True)
+        return ShapingStage(
+            Schedule(np.inf, float(last.epsilon), float(last.temperature), rate, enough), demanded, True
+        )
     low, high = spec.angle_range
     first, whole = initial_deviation(settings, spec), high - low
     share = (deviation - first) / (whole - first) if whole > first else 1.0
@@ -55,7 +57,7 @@ def stage(deviation: float, settings: TrainSettings, spec: ArmSpec) -> Stage:
     epsilon = between(shaping.exploration.epsilon, last.epsilon)
     temperature = between(shaping.exploration.temperature, last.temperature)
     criterion = between(shaping.initial_criterion, shaping.criterion)
-    return Stage(
+    return ShapingStage(
         Schedule(float(deviation), epsilon, temperature, shaping.performance_rate), criterion, deviation >= whole
     )
 

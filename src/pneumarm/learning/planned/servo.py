@@ -11,10 +11,10 @@ from typing import Self
 from pneumarm.learning.agents import SimulationAgent
 from pneumarm.learning.planned.agent import simulation_of_valves
 from pneumarm.learning.servo import ServoSettings
-from pneumarm.learning.servo.agent import servo_task
 from pneumarm.learning.servo.controller import ServoController, ready_controller
 from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.predictive import PredictiveControl
+from pneumarm.learning.servo.task import servo_task
 
 
 @dataclass(frozen=True, repr=False)

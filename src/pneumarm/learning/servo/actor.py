@@ -1,26 +1,21 @@
 """A servo that acts state by state: the policy's network, once, on one arm."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.commands import write_commands
 from pneumarm.learning.servo.inputs import input_size, write_inputs
+from pneumarm.learning.servo.task import servo_task
 from pneumarm.networks.layers import forward, split
 from pneumarm.networks.layers import workspace as layers_workspace
-
-if TYPE_CHECKING:
-    from pneumarm.learning.servo.agent import ServoAgent
 
 
 class ServoNetwork:
     """The policy's network and its workspace, for the commands of ``n`` arms at once."""
 
-    def __init__(self, agent: ServoAgent, n: int) -> None:
-        window, self.task = agent.window, agent.task
+    def __init__(self, agent: NetworkAgent, n: int) -> None:
+        window, self.task = agent.window, servo_task(agent.simulation, agent.settings)
         self._layers, self._units = split(agent.policy, agent.sizes), layers_workspace(agent.sizes, n)
         self._inputs = np.zeros((input_size(self.task.inputs), n), np.float32)
         self._command, self._slope = (np.zeros((2 * window.joints, n), np.float32) for _ in range(2))
@@ -43,7 +38,7 @@ class ServoNetwork:
 class ServoActor:
     """Gives commands for scaled states (state_size,), with a goal that stays or with previews of a reference."""
 
-    def __init__(self, agent: ServoAgent) -> None:
+    def __init__(self, agent: NetworkAgent) -> None:
         window = agent.window
         self._network = ServoNetwork(agent, 1)
         self.task = self._network.task

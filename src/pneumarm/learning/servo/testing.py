@@ -1,13 +1,10 @@
 """A servo's test in the simulation, to reach goals: those of every baseline, many movements side by side."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel
+from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.actor import ServoNetwork
 from pneumarm.random import random_state, random_states
 from pneumarm.simulation.simulation import Simulation
@@ -17,15 +14,12 @@ from pneumarm.task.fleet import advance_alive, fleet, one
 from pneumarm.task.movements import NOISE, Movements, movements
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
 
-if TYPE_CHECKING:
-    from pneumarm.learning.servo.agent import ServoAgent
-
 _TOGETHER = 64
 """Arms that move at once; where one has ended a movement it begins the next."""
 
 
 def run_servo(
-    agent: ServoAgent, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]
+    agent: NetworkAgent, simulation: Simulation, begin: BeginStates, episodes: int, seed: tuple[int, ...]
 ) -> Movements:
     """Return ``episodes`` greedy movements of ``agent`` in ``simulation``.
 

@@ -1,5 +1,5 @@
 // The arm as a drawing, with the goal to be dragged. What its shapes are comes with the state, from
-// report/drawn_arm.py, which reports and films are drawn by too; here they are moved. Lengths are millimetres. Angles are
+// drawing/drawn_arm.py, which reports and films are drawn by too; here they are moved. Lengths are millimetres. Angles are
 // degrees from the middle of the range; higher ones turn the link to the right, where muscle 1 pulls.
 
 const SVG = "http://www.w3.org/2000/svg";

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.report.colours import DARK, GREY, INK, MIDDLE
+from pneumarm.drawing.colours import DARK, GREY, INK, MIDDLE
 from pneumarm.report.style import Described, key, legend_below, nothing, panels, styled
 from pneumarm.statistics import moving_mean
 

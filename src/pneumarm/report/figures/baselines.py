@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
+from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE
 from pneumarm.report.style import Described, key, legend_below, nothing, panels, styled
 from pneumarm.statistics import Estimate
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.colours import DARK, INK, MIDDLE
+from pneumarm.drawing.colours import DARK, INK, MIDDLE
 from pneumarm.report.style import (
     DENSITY,
     Described,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.colours import INK, MIDDLE
+from pneumarm.drawing.colours import INK, MIDDLE
 from pneumarm.report.style import Described, key, nothing, of_joint, panels, scatter, styled, whole_ticks
 from pneumarm.statistics import running_median
 

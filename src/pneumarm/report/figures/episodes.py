@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.report.colours import DARK, INK, LIGHT
+from pneumarm.drawing.colours import DARK, INK, LIGHT
 from pneumarm.report.style import Described, nothing, panels, styled, whole_ticks
 
 Array = NDArray[Any]

@@ -8,10 +8,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from numpy.typing import NDArray
 
 from pneumarm.arm.hand import link_ends
-from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE, PALE
-from pneumarm.report.drawn_arm import DrawnArm
-from pneumarm.report.figures.arm import ArmPicture
-from pneumarm.report.moving_arm import Shown
+from pneumarm.drawing.arm_picture import ArmPicture
+from pneumarm.drawing.colours import DARK, INK, LIGHT, MIDDLE, PALE
+from pneumarm.drawing.drawn_arm import DrawnArm
+from pneumarm.drawing.moving_arm import Shown
 from pneumarm.report.style import Described, key, legend_below, of_joint, styled
 from pneumarm.task.changes import valve_changes
 

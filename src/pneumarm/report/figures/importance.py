@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.report.colours import DARK, INK, MIDDLE
+from pneumarm.drawing.colours import DARK, INK, MIDDLE
 from pneumarm.report.style import Described, panels, styled
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.report.colours import DARK, GREY, INK
+from pneumarm.drawing.colours import DARK, GREY, INK
 from pneumarm.report.style import Described, panels, styled
 
 _THINNEST = 0.003  # of the width: a shorter stretch is drawn as long as this, so that it can be seen

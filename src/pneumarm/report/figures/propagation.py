@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.colours import DARK, MIDDLE
+from pneumarm.drawing.colours import DARK, MIDDLE
 from pneumarm.report.style import Described, legend_below, nothing, of_joint, panels, quantities, styled
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import ACTIONS, VALVES
-from pneumarm.report.colours import DARK, INK, MIDDLE
+from pneumarm.drawing.colours import DARK, INK, MIDDLE
 from pneumarm.report.style import Described, legend_below, nothing, of_joint, panels, scatter, styled
 from pneumarm.statistics import Bins, binned, by_group
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.colours import DARK, GREY, INK, LIGHT, MIDDLE
+from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE
 from pneumarm.report.style import Described, key, legend_below, nothing, panels, styled, whole_ticks
 
 Array = NDArray[np.float64]

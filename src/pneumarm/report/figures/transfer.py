@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
+from pneumarm.drawing.colours import DARK, INK, LIGHT, MIDDLE
 from pneumarm.report.style import Described, legend_below, nothing, panels, styled
 from pneumarm.statistics import Moving, moving_mean, moving_rate
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.hand import link_ends
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.drawn_arm import LOOKS, DrawnArm, Look, Muscle, Pose, Shape, air, faded, style
+from pneumarm.drawing.drawn_arm import LOOKS, DrawnArm, Look, Muscle, Pose, Shape, air, faded, style
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.report.colours import DARK, INK, LIGHT, MIDDLE
+from pneumarm.drawing.colours import DARK, INK, LIGHT, MIDDLE
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from pneumarm.report.drawn_arm import COLOURS, LOOKS, DrawnArm, Pose, Shape
+from pneumarm.drawing.drawn_arm import COLOURS, LOOKS, DrawnArm, Pose, Shape
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,10 @@ import numpy as np
 from benchmarks import _environment as environment
 from benchmarks._trials import Rows, on_arrival, seconds_of
 
-HEADER = f"{'late [ms]':>9}{'arm':>5}{'refused':>9}{'history':>9}{'settled':>9}{'median':>8}{'rest':>7}{'1/4, 1/2, 1 Hz':>19}"
+HEADER = (
+    f"{'late [ms]':>9}{'arm':>5}{'refused':>9}{'history':>9}{'settled':>9}{'median':>8}{'rest':>7}"
+    f"{'1/4, 1/2, 1 Hz':>19}"
+)
 
 
 def measure() -> Iterator[str]:

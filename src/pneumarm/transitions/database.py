@@ -52,6 +52,8 @@ class Database(ABC):
     """Whether the commands are valves -1, 0, +1 or pulses in between; imported ones may be continuous."""
     begin_transaction = begin_snapshot = "BEGIN"
     """Statements that begin a transaction which writes, and one that sees the moment of its first reading."""
+    place: str
+    """What stands for a value in a statement for many lines."""
     _is_writing = False
 
     @classmethod
@@ -89,8 +91,8 @@ class Database(ABC):
         """Execute a query and return the lines of its answer."""
 
     @abstractmethod
-    def insert(self, table: str, columns: Sequence[str], lines: Sequence[Line]) -> None:
-        """Add ``lines`` to a ``table``; None is NULL."""
+    def execute_many(self, statement: str, lines: Sequence[Line]) -> None:
+        """Execute a statement with the values of each of the ``lines`` in its places."""
 
     @abstractmethod
     def translated(self) -> AbstractContextManager[None]:
@@ -148,6 +150,16 @@ class Database(ABC):
                     self.execute("ROLLBACK")
                 raise
 
+    def columns(self, table: str) -> list[str]:
+        """Return the names of a table's columns."""
+        return list(tables(self.spec, self.version)[table].columns)
+
+    def insert(self, table: str, lines: Sequence[Line]) -> None:
+        """Add ``lines`` to a ``table``, their values in the order of its columns; None is NULL."""
+        columns = self.columns(table)
+        values = ", ".join([self.place] * len(columns))
+        self.execute_many(f'INSERT INTO "{table}" ({_quoted(columns)}) VALUES ({values})', lines)
+
     def query(self, query: str, values: Values | None = None) -> list[Line]:
         """Return all lines of the answer to a query."""
         with self.translated():
@@ -171,7 +183,7 @@ class Database(ABC):
         found: list[Line] = [()] * page
         while len(found) == page:
             chosen = f" WHERE {' AND '.join(conditions)}" if conditions else ""
-            query = f'SELECT {", ".join([key, *columns])} FROM "{table}"{chosen} ORDER BY {key} LIMIT {page}'
+            query = f'SELECT {_quoted([key, *columns])} FROM "{table}"{chosen} ORDER BY {key} LIMIT {page}'
             found = self.query(query, known)
             yield from found
             if found:
@@ -181,6 +193,10 @@ class Database(ABC):
     def further(self) -> tuple[str, ...]:
         """Names of the further sensors whose readings it holds; in tables of an older version, none."""
         return further_columns(self.spec, self.version)
+
+
+def _quoted(columns: Sequence[str]) -> str:
+    return ", ".join(f'"{column}"' for column in columns)
 
 
 class Table(NamedTuple):

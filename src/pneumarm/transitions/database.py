@@ -33,8 +33,6 @@ Values = Mapping[str, Any]
 """Values of a query by their names."""
 Line = Sequence[Any]
 """A line of a table."""
-
-
 PAGE = 10_000
 """Lines of a table that are held at once."""
 
@@ -199,30 +197,32 @@ def _quoted(columns: Sequence[str]) -> str:
     return ", ".join(f'"{column}"' for column in columns)
 
 
-class Table(NamedTuple):
+class StoreTable(NamedTuple):
     """A table: its columns, with their types, and how its statement ends; in the words of SQLite."""
 
     columns: Mapping[str, str]
     end: str = ")"
 
 
-def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, Table]:
+def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, StoreTable]:
     """Return the tables of a store by name; servers translate the types."""
     number, text, key = "INTEGER NOT NULL", "TEXT NOT NULL", {"number": "INTEGER PRIMARY KEY"}
     named, of_sequence = {"name": "TEXT PRIMARY KEY"}, {"sequence": "INTEGER NOT NULL REFERENCES sequences"}
     columns = row_columns(spec.joints, further_columns(spec, version))
     values = {name: "REAL" if "_command_" in name else "REAL NOT NULL" for name in columns}
     made = {
-        "store": Table({**named, "value": text}, ") WITHOUT ROWID"),
-        "runs": Table({**key, "purpose": text, "metadata": text}),
-        "sequences": Table(
+        "store": StoreTable({**named, "value": text}, ") WITHOUT ROWID"),
+        "runs": StoreTable({**key, "purpose": text, "metadata": text}),
+        "sequences": StoreTable(
             {**key, "run": "INTEGER REFERENCES runs", "kind": text}
             | {"at_rest": number, "rows": number, "transitions": number, "info": text}
         ),
-        "rows": Table({**of_sequence, "step": number, **values}, ", PRIMARY KEY (sequence, step)) WITHOUT ROWID"),
-        "state": Table({**named, "value": "BLOB NOT NULL"}, ") WITHOUT ROWID"),
+        "rows": StoreTable(
+            {**of_sequence, "step": number, **values}, ", PRIMARY KEY (sequence, step)) WITHOUT ROWID"
+        ),
+        "state": StoreTable({**named, "value": "BLOB NOT NULL"}, ") WITHOUT ROWID"),
     }
-    marks = Table({**of_sequence, "first": number, "last": number, "reason": text})
+    marks = StoreTable({**of_sequence, "first": number, "last": number, "reason": text})
     return made if version == 1 else made | {"marks": marks}
 
 

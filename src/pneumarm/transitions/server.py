@@ -30,7 +30,7 @@ from pneumarm.transitions.database import (
     VERSION,
     Database,
     Line,
-    Table,
+    StoreTable,
     Values,
     as_settings,
     check_version,
@@ -347,13 +347,13 @@ def _engine(address: ServerAddress, system: System) -> sqlalchemy.Engine:
     )
 
 
-def _tables(spec: ArmSpec) -> dict[str, Table]:
+def _tables(spec: ArmSpec) -> dict[str, StoreTable]:
     """Return the tables of a store; lines of marks are counted, which SQLite does by itself."""
     found = tables(spec)
-    return found | {"marks": Table({"rowid": "", **found["marks"].columns})}
+    return found | {"marks": StoreTable({"rowid": "", **found["marks"].columns})}
 
 
-def _statement(name: str, table: Table, system: System) -> str:
+def _statement(name: str, table: StoreTable, system: System) -> str:
     """Return the statement that creates a ``table``."""
     columns = [f'"{column}" {_type(words, system)}' for column, words in table.columns.items()]
     return f'CREATE TABLE "{name}" ({", ".join(columns)}{table.end.removesuffix(" WITHOUT ROWID")}{system.options}'

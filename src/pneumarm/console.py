@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from rich.console import Console
@@ -51,7 +52,8 @@ def open_closed_streams() -> None:
         if getattr(sys, name) is None:
             setattr(sys, name, open(number, mode, closefd=False))  # noqa: SIM115 - as long as the program runs
     if isinstance(sys.stdin, io.TextIOWrapper):
-        sys.stdin.reconfigure(errors="replace")  # what is no text is told of like any other wrong line
+        with suppress(io.UnsupportedOperation):  # it has been read from
+            sys.stdin.reconfigure(errors="replace")  # what is no text is told of like any other wrong line
 
 
 def show(result: Mapping[str, Any], as_json: bool, table: Callable[[], Sequence[Table | str]]) -> None:

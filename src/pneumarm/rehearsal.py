@@ -39,7 +39,7 @@ from pneumarm.simulation import FitSettings, Simulation, SimulationArm, fit_stor
 from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded
-from pneumarm.transitions.watch import warm_up
+from pneumarm.transitions.watch import warm_up_watch
 
 _ROWS, _SEQUENCE = 4_000, 100  # made up, and of a sequence of them
 _PLANNED = 4  # movements
@@ -203,7 +203,9 @@ def _learn(piece: Piece, simulation: Simulation, begin: BeginStates, _: Store) -
 def _move(piece: Piece, simulation: Simulation, begin: BeginStates, store: Store) -> Iterator[str]:
     agent = ServoLearner(simulation, begin, replace(piece.servo, coarse=0.0), 0, 0).agent()  # it has learned nothing
     monitor = Monitor(piece.spec, simulation, mode="warn")
-    warm_up(monitor, piece.spec)  # first, for what an agent needs besides is compiled by those who learn meanwhile
+    warm_up_watch(
+        monitor, piece.spec
+    )  # first, for what an agent needs besides is compiled by those who learn meanwhile
     with SimulationArm(simulation) as arm:
         transfer(agent, arm, store, TransferSettings(episodes=1, test_episodes=1), watch=monitor)
         yield "transfer"

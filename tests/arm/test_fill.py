@@ -7,7 +7,7 @@ import pytest
 from tests.plain_arms import angle_alone
 
 from pneumarm.arm import Arm, ArmSpec, GuardedArm, Reading, guarded, open_arm
-from pneumarm.arm.fill import Fill, filled
+from pneumarm.arm.fill import Fill, estimated_pressures
 from pneumarm.arm.seam import check_pressures
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import UnusableInput
@@ -136,7 +136,7 @@ def test_a_recording_of_commands_gives_the_estimates_of_the_arm_that_made_it(tmp
         collect(arm, store, 2000, seed=3)
         rows = next(iter(store.blocks()))
     one = rows.where(rows.sequence == 1)
-    again = filled(arm.spec, one.time, one.command)
+    again = estimated_pressures(arm.spec, one.time, one.command)
     # It began with some air, which a muscle that was full or vented once has forgotten.
     forgotten = ((one.pressure == 0) | (one.pressure > 0.999 * arm.spec.max_pressure_counts)).cumsum(axis=0) > 0
     assert forgotten.any(axis=(0, 1)).any()

@@ -162,7 +162,9 @@ class EstimatedArm(PassedOn):
         self._fill.set_state(state[:size])
 
 
-def filled(spec: ArmSpec, times: NDArray[np.float64], command: NDArray[np.float64]) -> NDArray[np.float64]:
+def estimated_pressures(
+    spec: ArmSpec, times: NDArray[np.float64], command: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the pressures (n, joints, 2) [counts] of muscles that were vented at first, as they are estimated.
 
     ``command`` (n, joints, 2) was applied at ``times`` (n,) [s], and none, NaN, after the last.

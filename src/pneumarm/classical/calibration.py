@@ -16,6 +16,7 @@ from pneumarm.arm import ArmSpec, GuardedArm, Reading
 from pneumarm.classical.pressure_loop import PressureLoop, Rates
 from pneumarm.classical.static_map import StaticMap, fit_map
 from pneumarm.errors import ArmFailure
+from pneumarm.progress import Report
 
 _VENT, _FILL, _PAUSE = 2.0, 2.5, 0.3
 """Times that all muscles are vented, filled, and left closed in between [s]."""
@@ -30,9 +31,6 @@ _NODES = 13
 
 _Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Times [s] and pressures [bar], each of shape (n,)."""
-
-Report = Callable[[float, float], None]
-"""Called with the arm time that has passed and all there is [s]."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ class _Watched:
     """Shape (n, joints, 2) [bar]."""
 
 
-def calibrate(arm: GuardedArm, report: Report | None = None) -> Calibration:
+def measure_calibration(arm: GuardedArm, report: Report | None = None) -> Calibration:
     """Measure ``arm``, which is free to move all the way.
 
     Raises:

@@ -301,7 +301,7 @@ def air(full: Array) -> Array:
     return PROPORTIONS["pale"] + PROPORTIONS["air"] * np.clip(full, 0, 1)
 
 
-def faded(valves: Array) -> Array:
+def brightness(valves: Array) -> Array:
     """Return how bright the lights of ``valves`` (n, ...) are, -1 to 1 as they are, from picture to picture."""
     lights = np.sign(valves) * np.sqrt(np.abs(valves))
     for k in range(1, len(lights)):

@@ -36,7 +36,7 @@ from pneumarm.learning.method import Method, TaskName
 from pneumarm.learning.online.agent import KIND as ACTION_VALUES
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.settings import TrainSettings
-from pneumarm.learning.online.training import train as train_online
+from pneumarm.learning.online.training import train_online
 from pneumarm.learning.policy.agent import KIND as POLICY
 from pneumarm.learning.policy.agent import PolicyAgent, train_policy
 from pneumarm.learning.policy.settings import PolicySettings

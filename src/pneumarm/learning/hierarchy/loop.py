@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.kernels import kernel, part
 from pneumarm.learning.hierarchy.settings import HierarchySettings
-from pneumarm.learning.online.loop import Workspace, decide, learn, look_ahead, remember, workspace
+from pneumarm.learning.online.loop import Workspace, decide, learn, look_ahead, loop_workspace, remember
 from pneumarm.learning.online.values import ActionValues, forget_traces, learner, td_target, update
 from pneumarm.simulation.kernel import INPUT_BLOCK, UNIT_BLOCK, padded, places
 from pneumarm.simulation.simulation import Scaling
@@ -114,8 +114,8 @@ def level_memory(levels: Hierarchy) -> LevelMemory:
     """Return workspace for both levels."""
     joints = len(levels.unit)
     return LevelMemory(
-        low=workspace(levels.lower, joints),
-        high=workspace(levels.upper, joints),
+        low=loop_workspace(levels.lower, joints),
+        high=loop_workspace(levels.upper, joints),
         seen=np.zeros(levels.upper.weights.shape[1] - 2, np.float32),
         goal=np.zeros(joints),
         aim=np.zeros(joints),

@@ -15,8 +15,8 @@ from pneumarm.learning.fleet import FleetLearner, train_fleet
 from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.policy.acting import Mind
 from pneumarm.learning.policy.actor import PolicyActor
-from pneumarm.learning.policy.inputs import input_parameters, input_size
-from pneumarm.learning.policy.proximal import Rule, batch, collect, improve
+from pneumarm.learning.policy.inputs import input_parameters, policy_input_size
+from pneumarm.learning.policy.proximal import Rule, batch, collect_batch, improve_policy
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.policy.testing import run_policy
 from pneumarm.learning.possible import leave_out
@@ -92,7 +92,7 @@ class PolicyAgent(NetworkAgent):
 
 def policy_sizes(window: Window, settings: PolicySettings) -> tuple[int, ...]:
     """Return the units of each layer of a policy, inputs first."""
-    return (input_size(window, settings.squash), *settings.hidden, ACTIONS * window.joints)
+    return (policy_input_size(window, settings.squash), *settings.hidden, ACTIONS * window.joints)
 
 
 def mind(
@@ -178,8 +178,8 @@ class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):
         """Act for a batch of steps and learn from them."""
         now, counts, (_, limits, inputs) = self._rule, self.counts, self.mind[:3]
         world = self._eased()
-        seen: tuple[int, int, float] = collect(world, limits, inputs, now, self.policy, self.fleet, self._batch)
-        counts[1] = improve(now, self.policy, self.value, self._batch, self.rates(), counts[1], self.random)
+        seen: tuple[int, int, float] = collect_batch(world, limits, inputs, now, self.policy, self.fleet, self._batch)
+        counts[1] = improve_policy(now, self.policy, self.value, self._batch, self.rates(), counts[1], self.random)
         return seen
 
     def _eased(self) -> Environment:

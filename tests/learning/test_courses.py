@@ -124,7 +124,7 @@ def sought(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return find(world, states, problem, workspace, *last)
 
     find = search.find
-    monkeypatch.setattr(search, "find", noted)
+    monkeypatch.setattr(courses, "find", noted)
     return seen
 
 

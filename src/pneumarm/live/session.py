@@ -27,10 +27,10 @@ from pneumarm.control import Monitor
 from pneumarm.control.monitor.findings import Finding
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.live.choices import Mover
-from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
 from pneumarm.live.faults import Switches
 from pneumarm.live.figures import PlayFigures
 from pneumarm.live.hand import Dragged, curve_reference
+from pneumarm.live.lease import HOLD_AFTER, VENT_AFTER
 from pneumarm.live.orders import Faults, FollowCurve, GoTo, Hold, Order, Relax, Release, Stop
 from pneumarm.live.picture import unwrapped
 from pneumarm.live.screen import Screen

@@ -11,7 +11,7 @@ import pytest
 from pneumarm import rehearsal
 from pneumarm.arm import open_arm
 from pneumarm.learning import ServoSettings
-from pneumarm.rehearsal import PARTS, Piece, Rehearsal, installed, rehearse
+from pneumarm.rehearsal import PARTS, Rehearsal, WarmUpJob, installed, warm_up_stages
 from pneumarm.run import Run, RunSettings
 from pneumarm.simulation import FitSettings
 
@@ -46,18 +46,18 @@ def test_the_same_sources_elsewhere_or_newer_are_rehearsed_anew(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["virtual:seed=2", "virtual:wide,seed=3", "virtual:joints=2,seed=1"])
 def test_every_stage_is_rehearsed(name: str, marker: Path, tmp_path: Path) -> None:
     with open_arm(name) as arm:
-        piece = Piece(arm.spec, FitSettings(), SMALL, None)
+        job = WarmUpJob(arm.spec, FitSettings(), SMALL, None)
     for part, stages in PARTS.items():
         (tmp_path / part).mkdir()
-        assert tuple(rehearse(piece, part, tmp_path / part)) == stages
+        assert tuple(warm_up_stages(job, part, tmp_path / part)) == stages
         assert rehearsed(marker) == {part} | ({"learning"} if part == "moving" else set())
 
 
 def test_a_rehearsal_is_waited_for_and_ended(marker: Path) -> None:
     with open_arm("virtual:seed=2") as arm:
-        piece = Piece(arm.spec, FitSettings(), SMALL, "virtual:seed=2")
+        job = WarmUpJob(arm.spec, FitSettings(), SMALL, "virtual:seed=2")
     with Rehearsal() as beside:
-        beside.begin(piece)
+        beside.begin(job)
         beside.wait_for("simulation")
         beside.wait_for("bound")
         assert not beside._coming - {"test"}
@@ -74,10 +74,10 @@ def test_a_rehearsal_that_hangs_is_ended_and_not_begun_again(
     hanging.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(hanging))
     with open_arm("virtual:seed=2") as arm:
-        piece = Piece(arm.spec, FitSettings(), SMALL, None)
+        job = WarmUpJob(arm.spec, FitSettings(), SMALL, None)
     began = monotonic()
     with Rehearsal(patience=1.0) as beside:
-        beside.begin(piece)
+        beside.begin(job)
         process = beside._processes["learning"]
         beside.wait_for("simulation")
         assert (process.returncode is None) == (says != "true")
@@ -98,7 +98,7 @@ def test_what_learns_is_waited_for_also_where_what_moves_has_ended_before(
     quick.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(quick))
     with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
         began = monotonic()
         beside.wait_for("test")
         assert monotonic() - began >= 1.5
@@ -112,7 +112,7 @@ def test_a_rehearsal_that_fails_is_not_waited_for(
     failing.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(failing))
     with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
         beside.wait_for("simulation")
         beside.wait_for("bound")
     assert not rehearsed(marker)
@@ -123,7 +123,7 @@ def test_a_rehearsal_that_cannot_begin_is_not_waited_for(
 ) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "missing"))
     with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
         beside.wait_for("simulation")
         beside.wait_for("bound")
     assert not rehearsed(marker)
@@ -133,7 +133,7 @@ def test_a_second_run_needs_none(marker: Path) -> None:
     for part in PARTS:
         marker.with_name(f"{marker.name}-{part}").touch()
     with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
         beside.wait_for("simulation")
         assert not beside._processes
 
@@ -141,7 +141,7 @@ def test_a_second_run_needs_none(marker: Path) -> None:
 def test_a_part_that_has_been_is_not_rehearsed_again(marker: Path) -> None:
     marker.with_name(f"{marker.name}-learning").touch()
     with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(Piece(arm.spec, FitSettings(), SMALL, None))
+        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
         beside.wait_for("training")
         beside.wait_for("settle")
         assert list(beside._processes) == ["moving"]

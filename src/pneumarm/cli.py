@@ -17,7 +17,7 @@ from pneumarm.commands.config_file import take_config, take_option
 from pneumarm.commands.help_pages import HELP, HELP_ALL, LOG, AllOptions, FewOptions
 from pneumarm.console import complain, open_closed_streams
 from pneumarm.errors import PneumarmError
-from pneumarm.leaving import leave_by_exceptions
+from pneumarm.leaving import signals_as_exceptions
 from pneumarm.progress import LEVELS, checked_level, print_lines
 from pneumarm.version import __version__
 
@@ -227,7 +227,7 @@ def _run(arguments: list[str]) -> int:
         open_closed_streams()
         if not sys.warnoptions and "PNEUMARM_DEBUG" not in os.environ:
             warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's, which are not for whoever calls a command
-        leave_by_exceptions()
+        signals_as_exceptions()
         arguments, level = take_option(arguments, LOG, "one of " + ", ".join(LEVELS))
         print_lines(checked_level(level))
         arguments, config = take_config(arguments, app)

@@ -32,7 +32,7 @@ from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.kernels import CACHE_FOLDER
 from pneumarm.learning import ServoSettings, test, train
 from pneumarm.learning.servo.agent import ServoLearner
-from pneumarm.leaving import leave_by_exceptions
+from pneumarm.leaving import signals_as_exceptions
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning.bound import BoundSettings, measure_bound
 from pneumarm.simulation import FitSettings, Simulation, SimulationArm, fit_store
@@ -72,7 +72,7 @@ _REHEARSED = CACHE_FOLDER / f"rehearsed-{installed(Path(__file__).parent)}"
 
 
 @dataclass(frozen=True)
-class Piece:
+class WarmUpJob:
     """What is rehearsed."""
 
     spec: ArmSpec
@@ -100,7 +100,7 @@ class Rehearsal:
         self.memory = 0.0
         """The most that a process has held [MB]; told when it has ended."""
 
-    def begin(self, piece: Piece) -> None:
+    def begin(self, job: WarmUpJob) -> None:
         """Begin, unless all of it is in the kernel cache."""
         if self._processes:
             return
@@ -108,9 +108,9 @@ class Rehearsal:
         coming = [part for part in PARTS if not _marker(part).exists()]
         self._coming = {stage for part in coming for stage in PARTS[part]}
         if coming:
-            self._start(coming[0], piece)
+            self._start(coming[0], job)
 
-    def _start(self, part: str, piece: Piece) -> None:
+    def _start(self, part: str, job: WarmUpJob) -> None:
         command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", part]
         errors = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # it is no part of the run
         with self._starting, suppress(OSError):
@@ -121,16 +121,16 @@ class Rehearsal:
             )
             self._processes[part] = process
             # Daemonic, for a pipe may stay open where its process has gone.
-            Thread(target=self._listen, args=(part, piece), name=f"rehearsal, {part}", daemon=True).start()
+            Thread(target=self._listen, args=(part, job), name=f"rehearsal, {part}", daemon=True).start()
             assert process.stdin is not None
-            process.stdin.write(json.dumps(asdict(piece)))
+            process.stdin.write(json.dumps(asdict(job)))
             process.stdin.close()
             return
         for ended in PARTS:  # what is not running will not
             if ended == part or ended not in self._processes:
                 self._said.put((ended, "", monotonic()))
 
-    def _listen(self, part: str, piece: Piece) -> None:
+    def _listen(self, part: str, job: WarmUpJob) -> None:
         """Put what the process of ``part`` says, with its time, and at the end nothing, where it is waited for."""
         lines = self._processes[part].stdout
         assert lines is not None
@@ -139,7 +139,7 @@ class Rehearsal:
             for line in lines:
                 self._said.put((part, line.strip(), monotonic()))
                 if rest:
-                    self._start(rest.pop(), piece)
+                    self._start(rest.pop(), job)
         for ended in (part, *rest):
             self._said.put((ended, "", monotonic()))
 
@@ -179,20 +179,20 @@ def _marker(part: str) -> Path:
     return _REHEARSED.with_name(f"{_REHEARSED.name}-{part}")
 
 
-def rehearse(piece: Piece, part: str, folder: Path) -> Iterator[str]:
+def warm_up_stages(job: WarmUpJob, part: str, folder: Path) -> Iterator[str]:
     """Do the stages of ``part`` with as little as possible in ``folder``; name those whose kernels are compiled."""
-    with Store.create(folder / "made-up.db", piece.spec) as store:
-        store.append_all(_made_up(piece.spec))
-        layers = piece.fit.layers or (1 if piece.spec.joints == 1 else 2)  # as a longer recording will have
-        simulation = fit_store(store, replace(piece.fit, epochs=1, layers=layers)).simulation
+    with Store.create(folder / "made-up.db", job.spec) as store:
+        store.append_all(_made_up(job.spec))
+        layers = job.fit.layers or (1 if job.spec.joints == 1 else 2)  # as a longer recording will have
+        simulation = fit_store(store, replace(job.fit, epochs=1, layers=layers)).simulation
         begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
-        yield from (_learn if part == "learning" else _move)(piece, simulation, begin, store)
+        yield from (_learn if part == "learning" else _move)(job, simulation, begin, store)
     _marker(part).touch()
 
 
-def _learn(piece: Piece, simulation: Simulation, begin: BeginStates, _: Store) -> Iterator[str]:
+def _learn(job: WarmUpJob, simulation: Simulation, begin: BeginStates, _: Store) -> Iterator[str]:
     yield "simulation"
-    settings = replace(piece.servo, agents=1, updates=1, validation_movements=8)
+    settings = replace(job.servo, agents=1, updates=1, validation_movements=8)
     ServoLearner(simulation, begin, settings, 0, 0).validate(8)  # first what those who move need, too
     agent = train(simulation, begin, settings).agent
     yield "training"
@@ -200,20 +200,19 @@ def _learn(piece: Piece, simulation: Simulation, begin: BeginStates, _: Store) -
     yield "test"
 
 
-def _move(piece: Piece, simulation: Simulation, begin: BeginStates, store: Store) -> Iterator[str]:
-    agent = ServoLearner(simulation, begin, replace(piece.servo, coarse=0.0), 0, 0).agent()  # it has learned nothing
-    monitor = Monitor(piece.spec, simulation, mode="warn")
-    warm_up_watch(
-        monitor, piece.spec
-    )  # first, for what an agent needs besides is compiled by those who learn meanwhile
+def _move(job: WarmUpJob, simulation: Simulation, begin: BeginStates, store: Store) -> Iterator[str]:
+    agent = ServoLearner(simulation, begin, replace(job.servo, coarse=0.0), 0, 0).agent()  # it has learned nothing
+    monitor = Monitor(job.spec, simulation, mode="warn")
+    # First the watch, because what an agent needs besides is compiled by those who learn meanwhile.
+    warm_up_watch(monitor, job.spec)
     with SimulationArm(simulation) as arm:
         transfer(agent, arm, store, TransferSettings(episodes=1, test_episodes=1), watch=monitor)
         yield "transfer"
         moves = MoveTrialSettings(goals=1, hold=0.2, frequencies=(1.0,), seconds=0.5)
         try_moving(arm, agent.controller(), simulation.goal_range, moves)
         yield "settle"
-    if piece.physics is not None:
-        with open_arm(piece.physics) as arm:
+    if job.physics is not None:
+        with open_arm(job.physics) as arm:
             assert isinstance(arm, VirtualArm)
             low, high = simulation.goal_range.T
             # To a goal that cannot be reached no plan is sought.
@@ -242,13 +241,13 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
 
 
 def main() -> None:
-    """Rehearse a part of the piece on the standard input, and write the stages that are done."""
-    leave_by_exceptions()  # also when the run that it is for has ended
+    """Rehearse a part of the job on the standard input, and write the stages that are done."""
+    signals_as_exceptions()  # also when the run that it is for has ended
     if hasattr(os, "nice"):
         os.nice(_NICE)
-    piece = msgspec.convert(json.load(sys.stdin), Piece)
+    job = msgspec.convert(json.load(sys.stdin), WarmUpJob)
     with TemporaryDirectory() as folder:
-        for stage in rehearse(piece, sys.argv[1], Path(folder)):
+        for stage in warm_up_stages(job, sys.argv[1], Path(folder)):
             print(stage, flush=True)
 
 

@@ -44,7 +44,7 @@ from pneumarm.planning import PlanSettings
 from pneumarm.planning.bound import BoundSettings, known_bound
 from pneumarm.progress import Display, compiling, silent
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
-from pneumarm.rehearsal import Piece, Rehearsal
+from pneumarm.rehearsal import Rehearsal, WarmUpJob
 from pneumarm.report.beside import ReportBeside
 from pneumarm.report.files import REPORT, TEST, read_results, save_demonstration, write_spec
 from pneumarm.report.shown import read_shown
@@ -293,7 +293,7 @@ class Run:
         wanted = self.settings
         if isinstance(wanted.chosen, ServoSettings):
             physics = wanted.arm if wanted.planned and shape_of(wanted.arm) is not None else None
-            self._rehearsal.begin(Piece(spec, wanted.fit, wanted.chosen, physics))
+            self._rehearsal.begin(WarmUpJob(spec, wanted.fit, wanted.chosen, physics))
 
     def _fit(self) -> dict[str, Any]:
         with Store.open(self.store) as store:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from children import wait_until
 from pneumarm.arm import Reading, open_arm
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.control import Monitor
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.live.choices import Choice, opened
@@ -23,7 +23,7 @@ from pneumarm.live.session import Mode, Session
 from pneumarm.run import RunSettings
 
 
-class Scripted(PassedOn):
+class Scripted(ArmWrapper):
     """A virtual arm whose reads are told: what happens at which of its times is laid down."""
 
     def __init__(self, arm: VirtualArm) -> None:

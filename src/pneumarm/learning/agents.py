@@ -2,7 +2,7 @@
 
 Whatever kind an agent is of, it is tested, transferred, saved, loaded and used as a controller by the same commands.
 What only some can do is asked for by the class that says so, never by the kind: :class:`Learns`,
-:class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`, :class:`Stiffens`. Whether one settles at its goals, or
+:class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`, :class:`Retrainable`. Whether one settles at its goals, or
 only reaches them, it says itself: ``settles``.
 """
 
@@ -138,13 +138,13 @@ class Knows(Protocol):
 
 
 @runtime_checkable
-class Stiffens(Protocol):
+class Retrainable(Protocol):
     """An agent that can be made anew for joints that are kept stiffer, which swing less and are slower."""
 
     def stiffer(self) -> Self:
         """Return the agent with joints to be kept stiffer wherever it learns from now on."""
 
-    def anew(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
+    def retrained(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
         """Return the agent trained from the beginning in ``simulation``, from states ``begin``."""
 
 

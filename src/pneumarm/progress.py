@@ -33,7 +33,7 @@ Display = Callable[[str], AbstractContextManager[Report]]
 """Shows how far a stage of this title is while the block runs: :func:`progress`, or :func:`silent`."""
 
 LEVELS = ("debug", "info", "warning")
-"""Of what is said about long work: every kernel that is compiled; where a stage is; nothing."""
+"""Levels of what is said about long work: every kernel that is compiled; where a stage is; nothing."""
 _BEGAN = monotonic()
 _EVERY = 10.0  # s between two plain lines of a stage
 _TITLE = 34  # letters, so that bars stand below each other
@@ -99,7 +99,7 @@ class Compiling:
 
 
 compiling = Compiling()
-"""Of this process."""
+"""Compiling of this process."""
 
 
 class Stage:

@@ -66,7 +66,7 @@ class AdaptationSettings(Settings):
     warm_up: Annotated[NonNegativeInt, PythonOnly] = 8
     """Updates before these that learn the values of states alone, which an agent does not keep."""
     learning_rate: PositiveFloat = 1e-3
-    """Of the policy, by Adam, at the start; falls linearly to 0."""
+    """Learning rate of the policy, by Adam, at the start; falls linearly to 0."""
     unsettled: Annotated[Share, PythonOnly] = 0.05
     """Share of movements, and two at least, that do not settle above which an agent that is to settle learns more
     thoroughly."""
@@ -178,7 +178,7 @@ class Adaptation:
             self._tried = self.movements
 
     def prefer(self) -> None:
-        """Of a version of an agent that settles and the one before it, go on with what was better on average.
+        """Go on with the version of an agent that settles, or the one before it, whichever was better on average.
 
         What it learned in a simulation changes how it comes to rest for better or worse, by more than a trial that is
         to be sure finds out in time.

@@ -102,7 +102,7 @@ class PressureEstimate:
 
 
 _ESTIMATES: "WeakKeyDictionary[Arm, PressureEstimate]" = WeakKeyDictionary()
-"""Of the arms that are open: a guard that comes later goes on with the estimates of the one before."""
+"""Estimates of the arms that are open: a guard that comes later goes on with those of the one before."""
 
 
 class EstimatedArm(ArmWrapper):

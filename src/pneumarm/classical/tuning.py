@@ -33,14 +33,14 @@ _STEP = 0.05
 _HOLD = 1.2
 """For how long a goal is held while tuning [s]."""
 _PLACES = (0.1, 0.62, 0.33, 0.9, 0.45, 0.5)
-"""Of the goals within the range, in order; each is moved a little for every generation."""
+"""Places of the goals within the range, in order; each is moved a little for every generation."""
 _SINES = (0.5, 1.0)
 """Frequencies that are followed [Hz]."""
 _SINE_SECONDS = 2.0
 _TRIAL = len(_PLACES) * _HOLD + len(_SINES) * _SINE_SECONDS
 """Arm time of one trial [s]."""
 _AMPLITUDE = 20.0
-"""Of the sinusoids, as far as the arm reaches [degrees]."""
+"""Amplitude of the sinusoids, as far as the arm reaches [degrees]."""
 _SETTLED = ((1.0, 1.0), (2.2, 0.5))
 """Within how many degrees a movement is to settle, and what a second until then counts as."""
 _REST = 0.6

@@ -83,7 +83,7 @@ class _Mind(NamedTuple):
     random: NDArray[np.uint64]
     places: Places
     offset: Array
-    """Of the observations, shape (joints, 4) [sensor units]."""
+    """Offset of the observations, shape (joints, 4) [sensor units]."""
     scale: Array
     """Shape (joints, 4) [sensor units]."""
     command_scale: Array

@@ -60,7 +60,7 @@ class _Layout:
     arm: tuple[int, int, int]
     """Middle, upper and lower end of the arm."""
     left: int
-    """Of the curve, as are the next three."""
+    """Left end of the curve; the next three are its other ends."""
     right: int
     top: int
     bottom: int

@@ -35,11 +35,11 @@ class OfAnArm(Protocol):
 
     @property
     def window(self) -> Window:
-        """Of its state."""
+        """Window of its state."""
 
     @property
     def scaling(self) -> Scaling:
-        """Of its state."""
+        """Scaling of its state."""
 
     @property
     def goal_range(self) -> NDArray[np.float64]:
@@ -154,7 +154,7 @@ class Adapts(Acts, Saved, Protocol):
 
     @property
     def simulation(self) -> Simulation:
-        """Of its arm."""
+        """Simulation of its arm."""
 
     def weights(self) -> NDArray[np.float32]:
         """Return a copy of what it has learned."""
@@ -208,12 +208,12 @@ class SimulationAgent(ReachesGoals):
 
     @property
     def window(self) -> Window:
-        """Of its state."""
+        """Window of its state."""
         return self.simulation.window
 
     @property
     def scaling(self) -> Scaling:
-        """Of its state."""
+        """Scaling of its state."""
         return self.simulation.scaling
 
     @property

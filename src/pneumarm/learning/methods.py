@@ -157,13 +157,13 @@ class LearnSettings(Settings):
     agents; sarsa and q-learning: the thesis'. An installed method has a name too. By default servo, and policy to
     reach."""
     servo: ServoSettings = field(default_factory=ServoSettings)
-    """Of the method servo."""
+    """Settings of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)
-    """Of the method policy."""
+    """Settings of the method policy."""
     batched: BatchedSettings = field(default_factory=BatchedSettings)
-    """Of the method batched."""
+    """Settings of the method batched."""
     thesis: TrainSettings = field(default_factory=TrainSettings)
-    """Of the methods sarsa and q-learning."""
+    """Settings of the methods sarsa and q-learning."""
     own: dict[str, Any] = field(default_factory=dict)
     """Settings of hierarchy, or of a method of your own, as --own.NAME VALUE."""
 

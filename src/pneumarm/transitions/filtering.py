@@ -137,9 +137,9 @@ class NewCells:
     """Which cells only the second half of the data reached (thesis section 3.2.3)."""
 
     half: Coverage
-    """Of the first half."""
+    """Coverage of the first half."""
     whole: Coverage
-    """Of everything."""
+    """Coverage of everything."""
 
     @property
     def count(self) -> int:

@@ -50,7 +50,7 @@ class Hierarchy(NamedTuple):
     """Shape (m,); the upper agent chooses among m^joints."""
     period: int
     reward: RewardParameters
-    """Of the task."""
+    """Reward of the task."""
     unit: NDArray[np.float64]
     """Offset and scale of angle and velocity, shape (joints, 4): angle, angle, velocity, velocity."""
     goal_place: int
@@ -67,7 +67,7 @@ class LevelMemory(NamedTuple):
     seen: NDArray[np.float32]
     """What the upper agent saw when it chose, shape (its inputs,) [scaled]."""
     goal: NDArray[np.float64]
-    """Of all joints, shape (joints,) [counts]."""
+    """Goals of all joints, shape (joints,) [counts]."""
     aim: NDArray[np.float64]
     """Subgoals, shape (joints,) [counts]."""
     course: NDArray[np.float64]

@@ -32,10 +32,10 @@ class Mind(NamedTuple):
     limits: Limits
     inputs: InputParameters
     layers: Layers
-    """Of the policy."""
+    """Layers of the policy."""
     hold: float
     seeds: RandomState
-    """Of the noise in which it looks ahead, the same in every decision, shape (lanes, 4)."""
+    """Seeds of the noise in which it looks ahead, the same in every decision, shape (lanes, 4)."""
 
 
 class Lanes(NamedTuple):

@@ -117,11 +117,11 @@ def train_policy(
     simulation: Simulation, begin_states: BeginStates, settings: PolicySettings, seed: int = 0, **how: Any
 ) -> Training[PolicyAgent]:
     """Train policies and return the best; ``how`` as of :func:`~pneumarm.learning.fleet.train_fleet`."""
-    settings = practised(patient(settings, simulation), simulation)
+    settings = scaled_for_joints(with_longer_cutoff(settings, simulation), simulation)
     return train_fleet(lambda n: PolicyLearner(simulation, begin_states, settings, seed, n), settings, seed, **how)
 
 
-def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
+def with_longer_cutoff(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     """Return ``settings`` with as many actions until a movement is cut off as this arm may need.
 
     Valves can be so small that the joint is still on its way after 100 actions; how slow muscles are is found by
@@ -134,7 +134,7 @@ def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     return replace(settings, cutoff=max(settings.cutoff, round(longest / simulation.spec.period)))
 
 
-def practised(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
+def scaled_for_joints(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     """Return ``settings`` with as many updates, and as little noise, as suit the joints of this arm."""
     joints = simulation.spec.joints
     if joints == 1:

@@ -51,7 +51,7 @@ class Experience(NamedTuple):
     actions: NDArray[np.int64]
     """Shape (steps, n, joints)."""
     log_probability: NDArray[np.float32]
-    """Of the actions as they were chosen, shape (steps, n)."""
+    """Log probabilities of the actions as they were chosen, shape (steps, n)."""
     reward: NDArray[np.float32]
     """Shape (steps, n), in units of the scale of returns."""
     ended: NDArray[np.int64]
@@ -61,7 +61,7 @@ class Experience(NamedTuple):
     advantage: NDArray[np.float32]
     """Shape (steps, n)."""
     target: NDArray[np.float32]
-    """Of the values, shape (steps, n)."""
+    """Targets of the values, shape (steps, n)."""
     is_reached: NDArray[np.bool_]
     """Workspace, shape (n,)."""
     order: NDArray[np.int64]

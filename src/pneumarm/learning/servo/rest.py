@@ -115,7 +115,7 @@ class Rest:
         self._spec, self._unit = spec, wanted.tolerance * spec.counts_per_degree
         tolerance = self._unit * (1.0 if spec.pulses else _COARSE)
         self.tolerance = tolerance
-        """Of a joint that comes to rest [counts]."""
+        """Tolerance of a joint that comes to rest [counts]."""
         self._near, self._still, self._most = NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
         noise = float((wanted.reading_noise * simulation.error_std[:, 0]).max())
         least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)

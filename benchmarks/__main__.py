@@ -15,6 +15,7 @@ LONG = (
     "agents",
     "bound",
     "chosen",
+    "dead_time",
     "faults",
     "few_sensors",
     "held_out",

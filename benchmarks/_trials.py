@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from benchmarks import _environment as environment
 from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.bound.reaching import BoundSettings, measure_bound
 from pneumarm.control import AgentController, Monitor
 from pneumarm.control.agent import warm_up
 from pneumarm.control.monitor import Mode
@@ -27,7 +28,6 @@ from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent, PolicySettings, goals_of, train
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning import PlanSettings
-from pneumarm.planning.bound import BoundSettings, measure_bound
 from pneumarm.run import RunTransferSettings
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, StoreFit
 from pneumarm.simulation.enough import collect_enough

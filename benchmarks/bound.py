@@ -11,7 +11,7 @@ from time import perf_counter
 import numpy as np
 
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
-from pneumarm.planning.bound import BoundSettings, measure_bound
+from pneumarm.bound.reaching import BoundSettings, measure_bound
 
 ARMS = (1, 2, 3)
 EPISODES = 200

@@ -4,7 +4,7 @@ python -m benchmarks moving_pictures
 
 Draws ``docs/moving.svg`` and ``docs/following.svg``. Controllers and rows are those of ``python -m benchmarks
 moving``, and so are the settings from the environment; movements are made on the first of its arms, the bound is that
-of the first three (:mod:`pneumarm.planning.moving_bound`).
+of the first three (:mod:`pneumarm.bound.moving`).
 """
 
 from collections.abc import Iterator
@@ -16,12 +16,12 @@ from matplotlib.figure import Figure
 from benchmarks.moving import AMPLITUDES, FREQUENCIES, Plan, arm_for, asked_for, key, prepared
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.bound.moving import MovingBoundSettings, measure_moving_bound
 from pneumarm.control.named import open_tracking
 from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE
 from pneumarm.learning import load_agent
 from pneumarm.learning.servo import ServoAgent
 from pneumarm.moving import MoveSettings, move, track
-from pneumarm.planning.moving_bound import MovingBoundSettings, measure_moving_bound
 from pneumarm.report.style import styled
 from pneumarm.task.reference import counts_of, parse_reference
 

@@ -28,8 +28,8 @@ from benchmarks._trials import Rows, names_of
 from benchmarks.agents import prepared, store_of
 from benchmarks.baselines import greedy_movements
 from pneumarm.learning import AnyAgent, PolicyAgent, PolicySettings, test, train
+from pneumarm.learning.planned.agent import PlanAgent
 from pneumarm.learning.policy.courses import missed
-from pneumarm.planning import PlanAgent
 from pneumarm.planning.search import PlanSettings
 from pneumarm.simulation import SINGLE_STEPS
 from pneumarm.task.movements import of_rows

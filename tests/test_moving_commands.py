@@ -100,13 +100,15 @@ def test_the_command_to_move_by_is_ready_to_be_called() -> None:
         ("# first\n\nten\n5deg\n", 0, "line 3 of standard input: goal 'ten'"),
         ("5deg\nten\n0deg\n", 1, "line 2 of standard input: goal 'ten'"),
         ("5deg\n90deg\n", 1, "line 2 of standard input: goal '90deg': goals of joint 1 lie from"),
+        ("5deg\n\udca9\udc9a\n", 1, "line 2 of standard input: goal '"),
     ],
 )
 def test_a_line_that_is_no_goal_is_named_and_what_was_done_is_told(
     controller: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, lines: str, moved: int,
     words: str,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("sys.stdin", io.StringIO(lines))
+    given = io.BytesIO(lines.encode("utf-8", "surrogateescape"))  # not all of it is text
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(given, "utf-8"))
     code, out, err = called(capsys, "move", controller, *ARM, "--hold", 1, "--tries", 1, "-", "--json")
     assert code == 2
     assert words in err.splitlines()[-1]

@@ -3,6 +3,8 @@
 import os
 import signal
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
@@ -11,7 +13,7 @@ import pytest
 from pneumarm import rehearsal
 from pneumarm.arm import open_arm
 from pneumarm.learning import ServoSettings
-from pneumarm.rehearsal import PARTS, Rehearsal, WarmUpJob, installed, warm_up_stages
+from pneumarm.rehearsal import STAGES, Rehearsal, WarmUpJob, installed, warm_up_stages
 from pneumarm.run import Run, RunSettings
 from pneumarm.simulation import FitSettings
 
@@ -20,13 +22,27 @@ SMALL = ServoSettings(arms=4, hidden=(8, 8))
 
 @pytest.fixture
 def marker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(rehearsal, "_REHEARSED", tmp_path / "rehearsed")
+    monkeypatch.setattr(rehearsal, "_MARKER", tmp_path / "rehearsed")
     return tmp_path / "rehearsed"
 
 
-def rehearsed(marker: Path) -> set[str]:
-    """Return the parts that are noted as rehearsed."""
-    return {found.name.removeprefix(f"{marker.name}-") for found in marker.parent.glob(f"{marker.name}-*")}
+@pytest.fixture
+def job() -> WarmUpJob:
+    with open_arm("virtual:seed=2") as arm:
+        return WarmUpJob(arm.spec, FitSettings(), SMALL, None)
+
+
+@pytest.fixture
+def run_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Return what has a script of the shell warm_up_stages in place of Python."""
+
+    def run_by(script: str) -> None:
+        python = tmp_path / "python"
+        python.write_text(f"#!/bin/sh\n{script}\n")
+        python.chmod(0o755)
+        monkeypatch.setattr(sys, "executable", str(python))
+
+    return run_by
 
 
 def test_the_same_sources_elsewhere_or_newer_are_rehearsed_anew(tmp_path: Path) -> None:
@@ -44,111 +60,97 @@ def test_the_same_sources_elsewhere_or_newer_are_rehearsed_anew(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", ["virtual:seed=2", "virtual:wide,seed=3", "virtual:joints=2,seed=1"])
-def test_every_stage_is_rehearsed(name: str, marker: Path, tmp_path: Path) -> None:
+def test_every_stage_is_rehearsed(name: str, tmp_path: Path) -> None:
     with open_arm(name) as arm:
-        job = WarmUpJob(arm.spec, FitSettings(), SMALL, None)
-    for part, stages in PARTS.items():
-        (tmp_path / part).mkdir()
-        assert tuple(warm_up_stages(job, part, tmp_path / part)) == stages
-        assert rehearsed(marker) == {part} | ({"learning"} if part == "moving" else set())
+        assert tuple(warm_up_stages(WarmUpJob(arm.spec, FitSettings(), SMALL, None), tmp_path)) == STAGES
 
 
-def test_a_rehearsal_is_waited_for_and_ended(marker: Path) -> None:
-    with open_arm("virtual:seed=2") as arm:
-        job = WarmUpJob(arm.spec, FitSettings(), SMALL, "virtual:seed=2")
+def test_a_rehearsal_is_waited_for_and_ended(job: WarmUpJob) -> None:
+    rehearsal._MARKER.unlink(missing_ok=True)
+    with Rehearsal() as beside:
+        beside.begin(replace(job, physics="virtual:seed=2"))
+        beside.wait_for("simulation")
+        beside.wait_for("bound")
+        assert rehearsal._rehearsed() == {*STAGES}
+    assert beside.memory > 100
+
+
+def test_a_stage_is_waited_for_until_it_is_noted(job: WarmUpJob, marker: Path, run_by: Callable[[str], None]) -> None:
+    run_by(f"sleep 1; echo simulation >> {marker}; sleep 1; echo training >> {marker}; sleep 20 & wait")
+    with Rehearsal() as beside:
+        beside.begin(job)
+        began = monotonic()
+        beside.wait_for("training")
+        assert 1.5 <= monotonic() - began < 15.0
+
+
+@pytest.mark.parametrize("notes", ["echo simulation >> {}", "true"])
+def test_a_rehearsal_that_hangs_is_ended_and_not_begun_again(
+    notes: str, job: WarmUpJob, marker: Path, run_by: Callable[[str], None]
+) -> None:
+    """It does after it has noted a stage, or before."""
+    run_by(f"{notes.format(marker)}\ntrap '' TERM\nsleep 20 & wait")
+    began = monotonic()
+    with Rehearsal(patience=1.0) as beside:
+        beside.begin(job)
+        process = beside._process
+        assert process is not None
+        beside.wait_for("simulation")
+        assert (process.returncode is None) == (notes != "true")
+        beside.wait_for("training")
+        assert process.returncode == -signal.SIGKILL
+        beside.wait_for("test")  # nothing is waited for any more
+        assert 1.0 <= monotonic() - began < 10.0
+    with Rehearsal() as another:
+        another.begin(job)
+        assert another._process is None
+
+
+@pytest.mark.parametrize("fails", ["exit 1", "kill -9 $$"])
+def test_a_rehearsal_that_fails_is_not_waited_for(
+    fails: str, job: WarmUpJob, marker: Path, run_by: Callable[[str], None]
+) -> None:
+    run_by(fails)
     with Rehearsal() as beside:
         beside.begin(job)
         beside.wait_for("simulation")
         beside.wait_for("bound")
-        assert not beside._coming - {"test"}
-    assert beside.memory > 100
-
-
-@pytest.mark.parametrize("says", ["echo simulation", "true"])
-def test_a_rehearsal_that_hangs_is_ended_and_not_begun_again(
-    says: str, marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It does after it has named a stage, or before."""
-    hanging = tmp_path / "python"
-    hanging.write_text(f"#!/bin/sh\n{says}\ntrap '' TERM\nsleep 20 & wait\n")  # sleep keeps the pipe open
-    hanging.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(hanging))
-    with open_arm("virtual:seed=2") as arm:
-        job = WarmUpJob(arm.spec, FitSettings(), SMALL, None)
-    began = monotonic()
-    with Rehearsal(patience=1.0) as beside:
-        beside.begin(job)
-        process = beside._processes["learning"]
-        beside.wait_for("simulation")
-        assert (process.returncode is None) == (says != "true")
-        beside.wait_for("training")
-        assert process.returncode == -signal.SIGKILL
-        beside.wait_for("test")  # nothing is waited for any more
-    assert 1.0 <= monotonic() - began < 10.0
-    assert "learning" in rehearsed(marker)
-
-
-def test_what_learns_is_waited_for_also_where_what_moves_has_ended_before(
-    marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    quick = tmp_path / "python"
-    quick.write_text(
-        '#!/bin/sh\n[ "$3" = moving ] && exit 0\necho simulation; sleep 1; echo training; sleep 1; echo test\n'
-    )
-    quick.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(quick))
-    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
-        began = monotonic()
-        beside.wait_for("test")
-        assert monotonic() - began >= 1.5
-
-
-def test_a_rehearsal_that_fails_is_not_waited_for(
-    marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    failing = tmp_path / "python"
-    failing.write_text("#!/bin/sh\nexit 1\n")
-    failing.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(failing))
-    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
-        beside.wait_for("simulation")
-        beside.wait_for("bound")
-    assert not rehearsed(marker)
+    assert not marker.exists()
 
 
 def test_a_rehearsal_that_cannot_begin_is_not_waited_for(
-    marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: WarmUpJob, marker: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "missing"))
-    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
+    with Rehearsal() as beside:
+        beside.begin(job)
         beside.wait_for("simulation")
         beside.wait_for("bound")
-    assert not rehearsed(marker)
+    assert not marker.exists()
 
 
-def test_a_second_run_needs_none(marker: Path) -> None:
-    for part in PARTS:
-        marker.with_name(f"{marker.name}-{part}").touch()
-    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
-        beside.wait_for("simulation")
-        assert not beside._processes
-
-
-def test_a_part_that_has_been_is_not_rehearsed_again(marker: Path) -> None:
-    marker.with_name(f"{marker.name}-learning").touch()
-    with open_arm("virtual:seed=2") as arm, Rehearsal() as beside:
-        beside.begin(WarmUpJob(arm.spec, FitSettings(), SMALL, None))
+def test_a_stage_that_has_been_is_not_waited_for_again(
+    job: WarmUpJob, marker: Path, run_by: Callable[[str], None]
+) -> None:
+    run_by("sleep 20 & wait")
+    marker.write_text("simulation\ntraining\n")
+    with Rehearsal() as beside:
+        beside.begin(job)
+        began = monotonic()
         beside.wait_for("training")
-        beside.wait_for("settle")
-        assert list(beside._processes) == ["moving"]
+        assert monotonic() - began < 10.0
+
+
+def test_a_second_run_needs_none(job: WarmUpJob, marker: Path) -> None:
+    marker.write_text("\n".join(STAGES))
+    with Rehearsal() as beside:
+        beside.begin(job)
+        beside.wait_for("simulation")
+        assert beside._process is None
 
 
 def test_a_run_of_another_method_begins_none(marker: Path, tmp_path: Path) -> None:
     run = Run(tmp_path / "run", RunSettings(arm="virtual:seed=2", method="sarsa"))
     with open_arm("virtual:seed=2") as arm:
         run._rehearse(arm.spec)
-    assert not run._rehearsal._processes
+    assert run._rehearsal._process is None

@@ -63,22 +63,24 @@ class Child(Parent):
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("share", 2, "0 to 1"),
-        ("share", math.nan, "a finite number"),
-        ("least", -math.inf, "a finite number"),
-        ("least", "none", "a finite number"),
-        ("count", 0, "1 or more"),
-        ("count", 1.5, "a whole number"),
-        ("count", True, "a whole number"),
-        ("length", 0, "above 0 and below 10"),
-        ("length", 10, "above 0 and below 10"),
-        ("hidden", (), "1 to 8 values"),
-        ("hidden", (5, 1025), "1 to 1,024, each"),
-        ("hidden", 5, "several values"),
-        ("ends", (1.0, 0.0), "above 0, each"),
-        ("ends", (1.0,), "2 values"),
-        ("kind", "square", "straight, bent or round"),
-        ("flag", 1, "true or false"),
+        ("share", 2, "`float` <= 1.0"),
+        ("share", math.nan, "`float` >= 0.0"),
+        ("least", -math.inf, "finite numbers"),
+        ("least", math.nan, "finite numbers"),
+        ("least", "none", "`float`, got `str`"),
+        ("count", 0, "`int` >= 1"),
+        ("count", 1.5, "`int`, got `float`"),
+        ("count", True, "`int`, got `bool`"),
+        ("length", 0, "`float` > 0.0"),
+        ("length", 10, "`float` < 10.0"),
+        ("hidden", (), "`array` of length >= 1"),
+        ("hidden", (5, 1025), r"`int` <= 1024 - at `\$\[1\]`"),
+        ("hidden", 5, "`array`, got `int`"),
+        ("ends", (1.0, 0.0), r"`float` > 0.0 - at `\$\[1\]`"),
+        ("ends", (math.inf, 1.0), "finite numbers"),
+        ("ends", (1.0,), "`array` of length 2, got 1"),
+        ("kind", "square", "straight, bent, round"),
+        ("flag", 1, "`bool`, got `int`"),
     ],
 )
 def test_what_a_type_does_not_allow_is_refused_in_python_and_in_files(name: str, value: Any, expected: str) -> None:
@@ -95,7 +97,7 @@ def test_what_a_type_allows_is_taken() -> None:
 
 
 def test_what_a_parent_demands_is_demanded_of_its_children() -> None:
-    with pytest.raises(UnusableInput, match="Child: share cannot be 2; expected 0 to 1"):
+    with pytest.raises(UnusableInput, match=r"Child: share cannot be 2; expected `float` <= 1\.0"):
         Child(share=2)
     with pytest.raises(UnusableInput, match=r"Child: least cannot be 0\.6; expected at most share"):
         Child(least=0.6)

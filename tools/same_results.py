@@ -21,16 +21,7 @@ TIMES = ("seconds", "steps_per_second", "time [s]", "memory", "compil", "decisio
 """Parts of the names of figures that differ from run to run, whatever is computed."""
 LEARNERS = {
     "settle": ["--servo.updates", "20", "--servo.agents", "1"],
-    "reach": [
-        "--task",
-        "reach",
-        "--policy.updates",
-        "5",
-        "--policy.agents",
-        "1",
-        "--policy.validation-episodes",
-        "50",
-    ],
+    "reach": ["--task", "reach", "--policy.updates", "5", "--policy.agents", "1"],
     "sarsa": ["--method", "sarsa", "--thesis.max-episodes", "300", "--agents", "1"],
     "q-learning": ["--method", "q-learning", "--thesis.max-episodes", "300", "--agents", "1"],
     "batched": ["--method", "batched", "--batched.updates", "10", "--batched.agents", "1"],

@@ -50,12 +50,12 @@ from benchmarks.baselines.learning import OURS, PLANNING, STABLE, TEAMS, learn
 from benchmarks.baselines.table import HEADER, Row, and_adapted, curves, floor, line, pooled, write_page
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.bound.reaching import Baseline, BoundSettings, Planned, measure_bound
 from pneumarm.console import jsonable, peak_memory
 from pneumarm.control import TransferSettings, drawn, make_movements, transfer
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Adapts, AnyAgent, Learns, load_agent, test, test_ahead
-from pneumarm.planning import PlanAgent
-from pneumarm.planning.bound import Baseline, BoundSettings, Planned, measure_bound
+from pneumarm.learning.planned.agent import PlanAgent
 from pneumarm.simulation import Simulation
 from pneumarm.task import BeginStates, Movement
 from pneumarm.task.movements import Movements, of_rows

@@ -9,7 +9,7 @@ import numpy as np
 
 from pneumarm.learning import AnyAgent, LearnSettings, TrainSettings, test, train
 from pneumarm.learning.online.settings import Team
-from pneumarm.planning import PlanAgent
+from pneumarm.learning.planned.agent import PlanAgent
 from pneumarm.simulation import Simulation
 from pneumarm.task import BeginStates
 

@@ -1,5 +1,6 @@
 """What the command line shows: lines and tables for people, and one JSON object for programs."""
 
+import io
 import json
 import math
 import os
@@ -32,13 +33,16 @@ def complain(error: BaseException | str) -> None:
 
     Nothing in it is too long for a screen or moves the cursor there, whatever it repeats of what was given.
     """
-    line = shortened(masked(" ".join(str(error).split())))
+    line = masked(" ".join(str(error).split()))
     shown = (one if one.isprintable() else one.encode("unicode_escape").decode() for one in line)
-    print(f"pneumarm: {''.join(shown)}", file=sys.stderr)
+    print(f"pneumarm: {shortened(''.join(shown))}", file=sys.stderr)
 
 
 def open_closed_streams() -> None:
-    """Open what of stdin, stdout and stderr the caller has closed, so that no file of ours gets their numbers."""
+    """Open what of stdin, stdout and stderr the caller has closed, so that no file of ours gets their numbers.
+
+    On stdin any bytes can be read as text.
+    """
     for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         try:
             os.fstat(number)
@@ -46,6 +50,8 @@ def open_closed_streams() -> None:
             os.open(os.devnull, os.O_RDWR)  # which takes the lowest number that is free
         if getattr(sys, name) is None:
             setattr(sys, name, open(number, mode, closefd=False))  # noqa: SIM115 - as long as the program runs
+    if isinstance(sys.stdin, io.TextIOWrapper):
+        sys.stdin.reconfigure(errors="replace")  # what is no text is told of like any other wrong line
 
 
 def show(result: Mapping[str, Any], as_json: bool, table: Callable[[], Sequence[Table | str]]) -> None:

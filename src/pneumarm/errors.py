@@ -5,8 +5,8 @@ Every message says what was expected, what came, and what to do; the command lin
 
 import re
 
-_LONG_WORD = re.compile(r"(?<!\S)(\S{150})\S{100,}(\S{50})")
-_LONGEST = 1000  # characters of a message: what a file holds may be repeated in it, and can be of any length
+_LONG_WORD = re.compile(r"(?<!\S)(\S{60})\S{40,}(\S{30})")
+_LONGEST = 480  # characters of a message: what a file holds may be repeated in it, and can be of any length
 
 
 class PneumarmError(Exception):
@@ -21,7 +21,7 @@ class PneumarmError(Exception):
 def shortened(message: str) -> str:
     """Return ``message`` without what is in the middle of its long words, and of itself if it is long."""
     message = _LONG_WORD.sub(r"\1...\2", message)
-    return message if len(message) <= _LONGEST else f"{message[: _LONGEST - 305]} ... {message[-300:]}"
+    return message if len(message) <= _LONGEST else f"{message[: _LONGEST - 205]} ... {message[-200:]}"
 
 
 class UnusableInput(PneumarmError):  # noqa: N818 - reads as a sentence where it is raised

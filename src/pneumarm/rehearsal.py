@@ -1,10 +1,8 @@
-"""The later stages of a run, rehearsed on made-up data in processes beside it, so that their kernels are compiled.
+"""The later stages of a run, rehearsed on made-up data in a process beside it, so that their kernels are compiled.
 
 On a fresh machine most of a first run is compiling. The arm's moving compiles kernels of its own meanwhile; what is
 compiled here goes to the same cache on the disk (:mod:`pneumarm.kernels`), and the run takes it from there. Nothing
 else comes of a rehearsal: a run without one gives the same results, later.
-
-What learns and what moves the arm afterwards are rehearsed beside each other, once there is a simulation for both.
 """
 
 import hashlib
@@ -16,10 +14,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
-from threading import Lock, Thread
-from time import monotonic
+from time import monotonic, sleep
 from typing import Self
 
 import msgspec
@@ -27,16 +23,15 @@ import numpy as np
 
 from pneumarm.arm import ArmSpec, open_arm
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.bound.reaching import BoundSettings, measure_bound
 from pneumarm.console import peak_memory
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.kernels import CACHE_FOLDER
 from pneumarm.learning import ServoSettings, test, train
-from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.leaving import signals_as_exceptions
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
-from pneumarm.planning.bound import BoundSettings, measure_bound
-from pneumarm.simulation import FitSettings, Simulation, SimulationArm, fit_store
-from pneumarm.task import BeginStates, begin_states
+from pneumarm.simulation import FitSettings, SimulationArm, fit_store
+from pneumarm.task import begin_states
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded
 from pneumarm.transitions.watch import warm_up_watch
@@ -44,18 +39,18 @@ from pneumarm.transitions.watch import warm_up_watch
 _ROWS, _SEQUENCE = 4_000, 100  # made up, and of a sequence of them
 _PLANNED = 4  # movements
 _NICE = 4
-"""So that the run, which moves an arm in time, has one of two cores for itself with two processes beside it.
-
-More would starve them on a computer that has other things to do, while the run waits for them."""
+"""So that the run, which moves an arm in time, comes first. More would starve the rehearsal on a computer that has
+other things to do, while the run waits for it."""
 _PATIENCE = 600.0
-"""For so long [s] a stage may be rehearsed before it is taken to hang: eight times what the longest takes (80 s on a
-machine of 2 cores)."""
+"""For so long [s] a stage is waited for before its rehearsal is taken to hang: eight times what the longest takes (80
+s on a machine of 2 cores)."""
+_LOOK = 0.1
+"""Every so often [s] the run looks whether the stage that it waits for has been rehearsed."""
 _ENDING = 10.0
 """For so long [s] a process that was killed is waited for; the system keeps one that hangs in a disk."""
 
-
-PARTS = {"learning": ("simulation", "training", "test"), "moving": ("transfer", "settle", "bound")}
-"""The stages that a process rehearses, in their order; ``moving`` begins when ``simulation`` has been."""
+STAGES = ("simulation", "training", "test", "transfer", "settle", "bound")
+"""What is rehearsed, in this order."""
 
 
 def installed(package: Path) -> str:
@@ -67,8 +62,8 @@ def installed(package: Path) -> str:
     return hashlib.sha256(f"{package.resolve()} {newest}".encode()).hexdigest()[:16]
 
 
-_REHEARSED = CACHE_FOLDER / f"rehearsed-{installed(Path(__file__).parent)}"
-"""How the names of files begin that say which parts have been."""
+_MARKER = CACHE_FOLDER / f"rehearsed-{installed(Path(__file__).parent)}"
+"""The file that names the stages whose kernels are in the cache."""
 
 
 @dataclass(frozen=True)
@@ -83,78 +78,36 @@ class WarmUpJob:
 
 
 class Rehearsal:
-    """A rehearsal of the parts that have not been before, in a process each; ended with the block it is in.
+    """A rehearsal in a process of its own, unless all stages have been before; ended with the block it is in.
 
-    Processes that are silent for ``patience`` [s] are ended when they are waited for; the run compiles for itself.
+    It is ended when a stage is waited for in vain for ``patience`` [s]; the run compiles for itself then.
     """
 
     def __init__(self, patience: float = _PATIENCE) -> None:
         self._patience = patience
-        self._processes: dict[str, subprocess.Popen[str]] = {}
-        self._starting = Lock()
-        self._ended = False
-        self._said = SimpleQueue[tuple[str, str, float]]()
-        self._heard = 0.0
-        self._coming: set[str] = set()
-        """Stages that are not rehearsed yet, but will be."""
+        self._process: subprocess.Popen[bytes] | None = None
         self.memory = 0.0
-        """The most that a process has held [MB]; told when it has ended."""
+        """The most that the process has held [MB]; told when it has ended."""
 
     def begin(self, job: WarmUpJob) -> None:
         """Begin, unless all of it is in the kernel cache."""
-        if self._processes:
+        if self._process is not None or _rehearsed() >= {*STAGES}:
             return
-        self._heard = monotonic()
-        coming = [part for part in PARTS if not _marker(part).exists()]
-        self._coming = {stage for part in coming for stage in PARTS[part]}
-        if coming:
-            self._start(coming[0], job)
-
-    def _start(self, part: str, job: WarmUpJob) -> None:
-        command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", part]
-        errors = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # it is no part of the run
-        with self._starting, suppress(OSError):
-            if self._ended:
-                return
-            process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True
-            )
-            self._processes[part] = process
-            # Daemonic, for a pipe may stay open where its process has gone.
-            Thread(target=self._listen, args=(part, job), name=f"rehearsal, {part}", daemon=True).start()
-            assert process.stdin is not None
-            process.stdin.write(json.dumps(asdict(job)))
-            process.stdin.close()
-            return
-        for ended in PARTS:  # what is not running will not
-            if ended == part or ended not in self._processes:
-                self._said.put((ended, "", monotonic()))
-
-    def _listen(self, part: str, job: WarmUpJob) -> None:
-        """Put what the process of ``part`` says, with its time, and at the end nothing, where it is waited for."""
-        lines = self._processes[part].stdout
-        assert lines is not None
-        rest = ["moving"] if part == "learning" and not _marker("moving").exists() else []
-        with lines:
-            for line in lines:
-                self._said.put((part, line.strip(), monotonic()))
-                if rest:
-                    self._start(rest.pop(), job)
-        for ended in (part, *rest):
-            self._said.put((ended, "", monotonic()))
+        command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", json.dumps(asdict(job))]
+        quiet = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # it is no part of the run
+        with suppress(OSError):
+            self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=quiet, stderr=quiet)
 
     def wait_for(self, stage: str) -> None:
         """Return when the kernels of ``stage`` are in the cache, or will not be."""
-        while stage in self._coming:
-            try:
-                part, line, self._heard = self._said.get(timeout=max(self._heard + self._patience - monotonic(), 0.0))
-            except Empty:
-                for part in self._processes:
-                    with suppress(OSError):
-                        _marker(part).touch()  # or it would hang in every run
+        deadline = monotonic() + self._patience
+        while self._process is not None and self._process.poll() is None and stage not in _rehearsed():
+            if monotonic() > deadline:
+                with suppress(OSError):
+                    _note(*STAGES)  # or it would hang in every run
                 self._end()
-                return
-            self._coming -= {line} if line else set(PARTS[part])
+            else:
+                sleep(_LOOK)
 
     def __enter__(self) -> Self:
         return self
@@ -163,61 +116,53 @@ class Rehearsal:
         self._end()
 
     def _end(self) -> None:
-        with self._starting:
-            self._ended = True
-            self._coming.clear()
-            for process in self._processes.values():
-                process.kill()
-            for process in self._processes.values():
-                with suppress(subprocess.TimeoutExpired):
-                    process.wait(_ENDING)
-        if self._processes:
+        if self._process is not None:
+            self._process.kill()
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(_ENDING)
             self.memory = peak_memory(children=True)
 
 
-def _marker(part: str) -> Path:
-    return _REHEARSED.with_name(f"{_REHEARSED.name}-{part}")
+def _rehearsed() -> set[str]:
+    """Return the stages whose kernels are in the cache."""
+    try:
+        return {*_MARKER.read_text().split()}
+    except OSError:
+        return set()
 
 
-def warm_up_stages(job: WarmUpJob, part: str, folder: Path) -> Iterator[str]:
-    """Do the stages of ``part`` with as little as possible in ``folder``; name those whose kernels are compiled."""
+def _note(*stages: str) -> None:
+    with open(_MARKER, "a") as marker:
+        marker.writelines(f"{stage}\n" for stage in stages)
+
+
+def warm_up_stages(job: WarmUpJob, folder: Path) -> Iterator[str]:
+    """Do all stages with as little as possible in ``folder``; name those whose kernels are compiled."""
     with Store.create(folder / "made-up.db", job.spec) as store:
         store.append_all(_made_up(job.spec))
         layers = job.fit.layers or (1 if job.spec.joints == 1 else 2)  # as a longer recording will have
         simulation = fit_store(store, replace(job.fit, epochs=1, layers=layers)).simulation
         begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
-        yield from (_learn if part == "learning" else _move)(job, simulation, begin, store)
-    _marker(part).touch()
-
-
-def _learn(job: WarmUpJob, simulation: Simulation, begin: BeginStates, _: Store) -> Iterator[str]:
-    yield "simulation"
-    settings = replace(job.servo, agents=1, updates=1, validation_movements=8)
-    ServoLearner(simulation, begin, settings, 0, 0).validate(8)  # first what those who move need, too
-    agent = train(simulation, begin, settings).agent
-    yield "training"
-    test(agent, simulation, begin, 8)
-    yield "test"
-
-
-def _move(job: WarmUpJob, simulation: Simulation, begin: BeginStates, store: Store) -> Iterator[str]:
-    agent = ServoLearner(simulation, begin, replace(job.servo, coarse=0.0), 0, 0).agent()  # it has learned nothing
-    monitor = Monitor(job.spec, simulation, mode="warn")
-    # First the watch, because what an agent needs besides is compiled by those who learn meanwhile.
-    warm_up_watch(monitor, job.spec)
-    with SimulationArm(simulation) as arm:
-        transfer(agent, arm, store, TransferSettings(episodes=1, test_episodes=1), watch=monitor)
-        yield "transfer"
-        moves = MoveTrialSettings(goals=1, hold=0.2, frequencies=(1.0,), seconds=0.5)
-        try_moving(arm, agent.controller(), simulation.goal_range, moves)
-        yield "settle"
+        yield "simulation"
+        agent = train(simulation, begin, replace(job.servo, agents=1, updates=1, validation_movements=8)).agent
+        yield "training"
+        test(agent, simulation, begin, 8)
+        yield "test"
+        monitor = Monitor(job.spec, simulation, mode="warn")
+        warm_up_watch(monitor, job.spec)
+        with SimulationArm(simulation) as arm:
+            transfer(agent, arm, store, TransferSettings(episodes=1, test_episodes=1), watch=monitor)
+            yield "transfer"
+            moves = MoveTrialSettings(goals=1, hold=0.2, frequencies=(1.0,), seconds=0.5)
+            try_moving(arm, agent.controller(), simulation.goal_range, moves)
+            yield "settle"
     if job.physics is not None:
-        with open_arm(job.physics) as arm:
-            assert isinstance(arm, VirtualArm)
+        with open_arm(job.physics) as physics:
+            assert isinstance(physics, VirtualArm)
             low, high = simulation.goal_range.T
             # To a goal that cannot be reached no plan is sought.
             middle = np.stack([0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high], axis=1)
-            measure_bound(arm, middle, BoundSettings(episodes=_PLANNED))
+            measure_bound(physics, middle, BoundSettings(episodes=_PLANNED))
     yield "bound"
 
 
@@ -241,14 +186,14 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
 
 
 def main() -> None:
-    """Rehearse a part of the job on the standard input, and write the stages that are done."""
+    """Rehearse the job in the argument, and note the stages that are done."""
     signals_as_exceptions()  # also when the run that it is for has ended
     if hasattr(os, "nice"):
         os.nice(_NICE)
-    job = msgspec.convert(json.load(sys.stdin), WarmUpJob)
+    job = msgspec.json.decode(sys.argv[1], type=WarmUpJob)
     with TemporaryDirectory() as folder:
-        for stage in warm_up_stages(job, sys.argv[1], Path(folder)):
-            print(stage, flush=True)
+        for stage in warm_up_stages(job, Path(folder)):
+            _note(stage)
 
 
 if __name__ == "__main__":

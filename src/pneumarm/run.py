@@ -20,6 +20,7 @@ from msgspec import Meta
 from pneumarm.analysis import analyse
 from pneumarm.arm import Arm, ArmSpec, open_arm
 from pneumarm.arm.open import shape_of
+from pneumarm.bound.reaching import BoundSettings, known_bound
 from pneumarm.console import jsonable, peak_memory
 from pneumarm.control import Monitor, TransferSettings, save_history, transfer, version_keeper
 from pneumarm.control.condition import collected_results
@@ -41,7 +42,6 @@ from pneumarm.learning import (
 from pneumarm.learning import test as test_agent
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning import PlanSettings
-from pneumarm.planning.bound import BoundSettings, known_bound
 from pneumarm.progress import Display, compiling, silent
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
 from pneumarm.rehearsal import Rehearsal, WarmUpJob

@@ -1,14 +1,13 @@
 """Settings that a person chooses: every field says by its type which values are valid, in one way."""
 
 import math
-import operator
 from collections.abc import Iterator, Mapping
 from functools import cache
 from inspect import get_annotations
 from reprlib import repr as shortened
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 
+import msgspec
 from cyclopts import Parameter
 from msgspec import Meta
 
@@ -28,14 +27,6 @@ PythonOnly = Parameter(parse=False)
 
 Valid = Mapping[str, bool | str]
 """By field True where its value is valid; otherwise what is expected in its place, or False."""
-_LIMITS = {
-    "gt": (operator.gt, "above {:,.8g}"),
-    "ge": (operator.ge, "{:,.8g} or more"),
-    "lt": (operator.lt, "below {:,.8g}"),
-    "le": (operator.le, "at most {:,.8g}"),
-}
-"""By what limits are called in types: what has to hold, and how people are told."""
-_PLAIN = {float: "a finite number", int: "a whole number", bool: "true or false", str: "text"}
 
 
 class Settings:
@@ -102,46 +93,22 @@ def _types(kind: type) -> list[tuple[str, Any]]:
 
 def _expected(value: Any, kind: Any) -> str | None:
     """Return what the type ``kind`` expects in place of ``value``; None where it is valid, or not checked here."""
-    if kind in _PLAIN:
-        fits = isinstance(value, (int, float) if kind is float else kind) and isinstance(value, bool) is (
-            kind is bool
-        )
-        return None if fits and (kind is not float or math.isfinite(value)) else _PLAIN[kind]
-    if kind is NoneType:
-        return None if value is None else "nothing"
-    origin, inner = get_origin(kind), get_args(kind)
-    if origin is Annotated:
-        limits = (_beyond(value, one) for one in inner[1:] if isinstance(one, Meta))
-        return _expected(value, inner[0]) or next(filter(None, limits), None)
-    if origin is Literal:
-        *others, last = map(str, inner)
-        return None if value in inner else " or ".join(filter(None, (", ".join(others), last)))
-    if origin in (Union, UnionType):
-        expected = [_expected(value, one) for one in inner]
-        return None if None in expected else expected[0]
-    return _expected_each(value, inner) if origin is tuple else None
-
-
-def _expected_each(values: Any, kinds: tuple[Any, ...]) -> str | None:
-    """Return what a tuple of ``kinds`` expects in place of ``values``."""
-    if not isinstance(values, tuple):
-        return "several values"
-    if Ellipsis in kinds:
-        kinds = kinds[:1] * len(values)
-    if len(kinds) != len(values):
-        return f"{len(kinds)} values"
-    wrong = filter(None, map(_expected, values, kinds))
-    return next((f"{one}, each" for one in wrong), None)
-
-
-def _beyond(value: Any, limit: Meta) -> str | None:
-    """Return what ``limit`` says, where ``value`` is beyond it."""
-    if limit.min_length is not None or limit.max_length is not None:
-        found = _beyond(len(value), Meta(ge=limit.min_length, le=limit.max_length))
-        return found and f"{found} values"
-    bounds = {name: bound for name in _LIMITS if (bound := getattr(limit, name)) is not None}
-    if all(_LIMITS[name][0](value, bound) for name, bound in bounds.items()):
+    try:
+        msgspec.convert(value, kind, strict=True)
+    except msgspec.ValidationError as error:
+        return ", ".join(_choices(kind)) or str(error).removeprefix("Expected ")
+    except TypeError:  # a type that msgspec does not know
         return None
-    if bounds.keys() == {"ge", "le"}:
-        return "{ge:,.8g} to {le:,.8g}".format(**bounds) if limit.ge != limit.le else f"{limit.ge}"
-    return " and ".join(_LIMITS[name][1].format(bound) for name, bound in bounds.items())
+    return None if _is_finite(value) else "finite numbers"
+
+
+def _choices(kind: Any) -> Iterator[str]:
+    """Yield the values that ``kind`` lists, which msgspec does not name."""
+    for one in get_args(kind):
+        yield from [str(one)] if get_origin(kind) is Literal else _choices(one)
+
+
+def _is_finite(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return all(map(_is_finite, value))
+    return not isinstance(value, float) or math.isfinite(value)

@@ -11,11 +11,11 @@ import pneumarm
 from logged_arm import Logged
 from pneumarm.arm import GuardedArm
 from pneumarm.arm.cycle import BeginState, ControlCycle
+from pneumarm.bound.reaching import BoundSettings, measure_bound
 from pneumarm.checkup.measure import _Bench
 from pneumarm.cli import main
 from pneumarm.control.open_agent import open_agent
 from pneumarm.gym import register
-from pneumarm.planning.bound import BoundSettings, measure_bound
 from pneumarm.records import demonstrate
 
 SOURCE = Path(pneumarm.__file__).parent
@@ -106,7 +106,7 @@ def test_environments_and_the_bound_move_their_arm_through_the_guard(log, monkey
         environment.step(environment.action_space.sample())
     environment.close()
     check(log, more_than=5)
-    monkeypatch.setattr("pneumarm.planning.bound.VirtualArm", Logged)
+    monkeypatch.setattr("pneumarm.bound.reaching.VirtualArm", Logged)
     measure_bound(Logged(), np.array([[400.0, 600.0]]), BoundSettings(episodes=2))
     check(log, more_than=10)
 

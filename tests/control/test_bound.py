@@ -10,10 +10,11 @@ from synthetic_arm import synthetic_simulation
 
 from pneumarm.arm import ArmSpec
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.bound import reaching as bound
+from pneumarm.bound.reaching import BoundSettings, known_bound, measure_bound
 from pneumarm.cli import main
 from pneumarm.errors import UnusableInput
-from pneumarm.planning import PlanSettings, bound
-from pneumarm.planning.bound import BoundSettings, known_bound, measure_bound
+from pneumarm.planning import PlanSettings
 from pneumarm.simulation import SimulationArm
 
 GOALS = np.array([[250.0, 780.0]])

@@ -13,7 +13,8 @@ from pneumarm.control import move
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Agent, Learns, TrainSettings, fingerprint, test, train
 from pneumarm.learning.online.testing import run_test
-from pneumarm.planning import PlanAgent, simulated_planner
+from pneumarm.learning.planned.agent import PlanAgent
+from pneumarm.planning import simulated_planner
 from pneumarm.simulation import SimulationArm
 from pneumarm.task import StateTracker
 from pneumarm.task.acting import test_acting

@@ -25,7 +25,7 @@ from pneumarm.arm.valves import VALVES
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import PolicyAgent, PolicySettings, fingerprint
 from pneumarm.learning import train as train_any
-from pneumarm.planning import PlanAgent
+from pneumarm.learning.planned.agent import PlanAgent
 from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.quality import residue

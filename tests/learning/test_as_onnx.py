@@ -74,7 +74,7 @@ def test_a_policy_as_onnx_decides_as_the_original(joints: int) -> None:
     arms = lanes(mind, agent.sizes, random_states(0, STATES))
     fleet, task = arms.fleet, mind.environment.task
     fleet.x[: window.state_size] = scaled.T
-    fleet.x[task.goal_place : task.goal_place + joints] = ((goal - task.unit[:, 0]) / task.unit[:, 1]).T
+    fleet.x[task.layout.goal : task.layout.goal + joints] = ((goal - task.unit[:, 0]) / task.unit[:, 1]).T
     fleet.actions[:], fleet.still[:] = last, still
     judge_all(mind, arms)
     session = runtime.InferenceSession(as_onnx(agent))

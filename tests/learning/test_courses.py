@@ -103,7 +103,7 @@ def test_the_course_of_the_highest_return_is_found_wherever_it_stands(place: int
     mind, noise = agent.mind(at_rest(2)), np.zeros((12, 4), np.uint64)
     single, many = lanes(mind, agent.sizes, random_states(0, 1)), lanes(mind, agent.sizes, noise)
     single.fleet.goal[0] = 560.0, 440.0
-    single.fleet.x[mind.limits.goal_place : mind.limits.goal_place + 2, 0] = 0.15, -0.15  # 60 of 400 counts
+    single.fleet.x[mind.limits.layout.goal : mind.limits.layout.goal + 2, 0] = 0.15, -0.15  # 60 of 400 counts
     towards, away, waiting = (IN_OUT, OUT_IN), (OUT_IN, IN_OUT), (CLOSED, CLOSED)
     courses = np.array([np.tile(one, (20, 1)) for one in (away, waiting, waiting)])
     courses[place] = towards

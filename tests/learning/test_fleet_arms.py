@@ -108,7 +108,7 @@ def test_useless_actions() -> None:
     scale = simulation.scaling
     bounds = limits(simulation, 25.0, still=2.5, patience=2)
     x = np.zeros(24, np.float32)
-    goal = bounds.goal_place
+    goal = bounds.layout.goal
     still, held = np.zeros(1, np.int64), np.array([6])
     x[goal] = 100 / scale.observation_scale[0]
     assert all(useful(bounds, x, held, still))

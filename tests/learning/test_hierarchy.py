@@ -15,7 +15,7 @@ from pneumarm.learning.online.loop import Schedule, remember
 from pneumarm.learning.online.values import draw_networks, pack
 from pneumarm.random import random_state
 from pneumarm.simulation import Simulation
-from pneumarm.simulation.kernel import places
+from pneumarm.simulation.layout import layout_of
 from pneumarm.task.acting import test_acting as moved_step_by_step
 from pneumarm.task.environment import environment
 from pneumarm.task.movements import TEST
@@ -70,7 +70,7 @@ def test_what_both_levels_learn_from_a_step() -> None:
     agent = an_agent(simulation, settings)
     lower = np.zeros_like(agent.lower)
     levels = hierarchy((upper, lower), simulation.spec, window, scaling, settings)
-    thinks, place = level_memory(levels), places(window)
+    thinks, place = level_memory(levels), layout_of(window)
     x = np.zeros(place.size, np.float32)
     x[place.one] = 1
     x[: place.command] = begin.states[0]

@@ -8,6 +8,7 @@ import pytest
 from learning.synthetic_arm import KINDS_OF_SIMULATION, synthetic_begin_states, synthetic_simulation
 from pneumarm.arm import Reading
 from pneumarm.arm.reference import Reference
+from pneumarm.learning.planned.servo import PlannedServo
 from pneumarm.learning.servo import ServoAgent, ServoSettings
 from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.learning.servo.gradient import ServoTask, Tape, tape
@@ -22,7 +23,6 @@ from pneumarm.learning.servo.predictive import (
     slopes_by_commands,
 )
 from pneumarm.moving import MoveSettings, move, track
-from pneumarm.planning import PlannedServo
 from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.simulation import Simulation
 

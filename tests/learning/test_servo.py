@@ -17,14 +17,6 @@ from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
 from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import learn_once
-from pneumarm.learning.servo.price import (
-    PriceParameters,
-    price_of_changes,
-    price_of_cocontraction,
-    price_of_error,
-    price_of_slack,
-    prices_of_errors,
-)
 from pneumarm.learning.servo.references import draw_references, write_previews
 from pneumarm.moving import MoveSettings, move, track
 from pneumarm.simulation.arm import SimulationArm
@@ -32,6 +24,14 @@ from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.acting import test_acting
 from pneumarm.task.environment import environment
+from pneumarm.task.price import (
+    PriceParameters,
+    price_of_changes,
+    price_of_cocontraction,
+    price_of_error,
+    price_of_slack,
+    prices_of_errors,
+)
 
 SMALL = ServoSettings(arms=8, updates=4, agents=1, duration=0.3, hidden=(8, 8), validation_movements=8)
 

@@ -17,13 +17,13 @@ from pneumarm.learning.online.values import (
     unpack,
     update,
 )
-from pneumarm.simulation.kernel import places
+from pneumarm.simulation.layout import layout_of
 from pneumarm.transitions.window import Window
 
 
 def state(window: Window, seed: int = 0) -> np.ndarray:
     """Return a vector (sigma, 0, goal, 1, 0...) as the loop makes it."""
-    place = places(window)
+    place = layout_of(window)
     x = np.zeros(place.size, np.float32)
     random = np.random.default_rng(seed)
     x[: place.command] = random.uniform(-1, 1, place.command)
@@ -34,7 +34,7 @@ def state(window: Window, seed: int = 0) -> np.ndarray:
 
 def values(networks: Networks, window: Window, settings: TrainSettings, joint: int, x: np.ndarray) -> np.ndarray:
     """Return the action values in float64 from the definition of the networks."""
-    place = places(window)
+    place = layout_of(window)
     inputs = np.concatenate([x[: place.command], x[place.goal : place.one]]).astype(np.float64)
     w1, b1, w2, b2 = (array[joint].astype(np.float64) for array in networks)
     hidden = np.tanh(np.einsum("i,aih->ah", inputs, w1) + b1)

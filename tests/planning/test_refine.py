@@ -9,16 +9,16 @@ import pytest
 from learning.synthetic_arm import synthetic_simulation
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, without_noise
 from pneumarm.arm.virtual.rollout import capture, physics_of, physics_states
+from pneumarm.bound.moving import WAYS, MovingBoundSettings, _settling, measure_moving_bound
 from pneumarm.cli import main
 from pneumarm.learning.servo import ServoAgent, ServoSettings
-from pneumarm.learning.servo.price import PriceParameters
 from pneumarm.learning.servo.task import servo_sizes
 from pneumarm.moving.movement import MoveSettings
 from pneumarm.moving.settling import settled_at
 from pneumarm.networks.layers import initial_weights
 from pneumarm.planning import refine
-from pneumarm.planning.moving_bound import WAYS, MovingBoundSettings, _settling, measure_moving_bound
 from pneumarm.planning.refine import Wanted, refined
+from pneumarm.task.price import PriceParameters
 
 STEPS = 20
 PRICES = PriceParameters(precision=0.3, far=0.06, flat=0.1, change=0.0)

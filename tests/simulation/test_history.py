@@ -40,6 +40,14 @@ def test_an_arm_with_noisy_sensors_needs_more_and_is_predicted_better_with_them(
         assert by_itself.result.held_out.std[0] < usual.result.held_out.std[0]
 
 
+@pytest.mark.parametrize(("late", "least"), [(0.05, 4), (0.1, 5)])
+def test_valves_that_answer_late_need_what_was_commanded_since(tmp_path: Path, late: float, least: int) -> None:
+    sound = VirtualArm(seed=3)
+    slow = replace(sound.parameters, air=replace(sound.parameters.air, pipe_delay=late))
+    with Store.open(recorded(VirtualArm(slow, seed=3), tmp_path / "arm.db")) as store:
+        assert least <= chosen_history(store, store.spec) <= least + 3
+
+
 def test_it_is_what_was_asked_for_where_something_was(of_noisy: Path) -> None:
     with Store.open(of_noisy) as store:
         assert FitSettings(history=4).of_arm(store).history == 4

@@ -13,14 +13,13 @@ from pneumarm.networks.tansig import tansig
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
     begin,
-    padded,
-    places,
     raw_observation,
     scaled_state,
     simulation_parameters,
     simulation_state,
     step,
 )
+from pneumarm.simulation.layout import layout_of, padded
 from pneumarm.simulation.noise import NoiseSettings, noise_parameters
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.transitions.window import Window
@@ -169,8 +168,10 @@ def test_readings_stay_within_the_sensors(sign: int) -> None:
 
 
 def test_layout_of_the_state_vector() -> None:
-    assert places(Window()) == (16, 18, 19, 20)
-    assert places(Window(2, 4)) == (44, 48, 50, 52)
+    assert layout_of(Window()) == (1, 3, 4, 2, 16, 18, 19, 20)
+    assert layout_of(Window(2, 4)) == (2, 4, 8, 4, 44, 48, 50, 52)
+    assert [*layout_of(Window(2)).angles] == [0, 4]
+    assert layout_of(Window(2)).pressures == [2, 3, 6, 7]
     assert list(accumulate([padded(n, 16) for n in (1, 16, 17)])) == [16, 32, 64]
     state = simulation_state(simulation_parameters(made_up()), random_state(0))
     assert state.x.tolist() == [0] * 19 + [1]

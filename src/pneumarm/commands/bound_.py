@@ -5,14 +5,14 @@ from typing import Annotated, Any
 
 from pneumarm.arm import open_arm
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.bound.moving import WAYS, MovingBoundSettings, Way, measure_moving_bound
+from pneumarm.bound.reaching import BoundSettings, bound_results, measure_bound, measured_goal_range
 from pneumarm.commands.common import Json, Settings
 from pneumarm.console import show, table
 from pneumarm.control.transfer import check_fit
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import load_agent
 from pneumarm.learning.servo import ServoAgent
-from pneumarm.planning.bound import BoundSettings, bound_results, measure_bound, measured_goal_range
-from pneumarm.planning.moving_bound import WAYS, MovingBoundSettings, Way, measure_moving_bound
 from pneumarm.progress import progress
 from pneumarm.simulation import Simulation
 

@@ -14,8 +14,8 @@ from pneumarm.errors import UnusableInput
 from pneumarm.files import kind_of
 from pneumarm.learning import AnyAgent
 from pneumarm.learning.agents import goals_of
+from pneumarm.learning.planned.servo import PlannedServo
 from pneumarm.moving import Holding, at_period
-from pneumarm.planning.servo import PlannedServo
 from pneumarm.simulation.simulation import KIND as SIMULATION
 from pneumarm.transitions.goals import Goals
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from pneumarm.control.versions import agent_file
 from pneumarm.files import kind_of
 from pneumarm.learning import AnyAgent, find_method, load_agent
-from pneumarm.planning.agent import PlanAgent
+from pneumarm.learning.planned.agent import PlanAgent
 from pneumarm.simulation.simulation import KIND as SIMULATION
 
 

@@ -34,7 +34,8 @@ from pneumarm.learning.online.loop import Schedule, Workspace, loop_workspace
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state
-from pneumarm.simulation.kernel import Places, places, shift
+from pneumarm.simulation.kernel import shift
+from pneumarm.simulation.layout import Layout, layout_of, reading_at
 from pneumarm.task.begin import draw_goal_near
 from pneumarm.task.movements import Movements, movements
 from pneumarm.task.noting import goes_on, note_action
@@ -81,7 +82,7 @@ class _Mind(NamedTuple):
     """State window, shape (state_size,) [scaled]."""
     workspace: Workspace
     random: NDArray[np.uint64]
-    places: Places
+    layout: Layout
     offset: Array
     """Offset of the observations, shape (joints, 4) [sensor units]."""
     scale: Array
@@ -90,7 +91,6 @@ class _Mind(NamedTuple):
     """Shape (joints, 2)."""
     command: NDArray[np.float32]
     """Workspace, shape (2 joints,) [scaled]."""
-    history: int
 
 
 class _Rules(NamedTuple):
@@ -151,10 +151,10 @@ class Player:
             )
         self.agent, self.arm, self._begin = agent, arm, begin
         window.require((), "a compiled loop of movements")
-        joints, place = spec.joints, places(window)
+        joints, layout = spec.joints, layout_of(window)
         self._schedule = _schedule(exploration)
-        x = np.zeros(place.size, np.float32)
-        x[place.one] = 1
+        x = np.zeros(layout.size, np.float32)
+        x[layout.one] = 1
         learns = learner(agent.weights(), agent.settings, learning_rate)
         self._mind = _Mind(
             learns,
@@ -162,12 +162,11 @@ class Player:
             np.zeros(window.state_size, np.float32),
             loop_workspace(learns, joints),
             random_state(seed),
-            place,
+            layout,
             np.ascontiguousarray(window.of_joints(scaling.observation_offset), np.float64),
             np.ascontiguousarray(window.of_joints(scaling.observation_scale), np.float64),
             np.ascontiguousarray(scaling.command_scale.reshape(joints, 2), np.float64),
             np.zeros(2 * joints, np.float32),
-            window.history,
         )
         both = joints, 2
         self._watched = _Guard(
@@ -312,7 +311,7 @@ def _reach(body: Body, watched: _Guard, rules: _Rules, durations: Array) -> None
 @kernel
 def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
     """Put what was read into the state window, as :class:`~pneumarm.task.tracker.StateTracker` does."""
-    sigma, observed = mind.sigma, 4 * velocity.size
+    sigma, layout = mind.sigma, mind.layout
     if first:
         sigma[:] = 0
     else:
@@ -320,24 +319,23 @@ def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
             for m in range(2):
                 valve = np.float64(watched.applied[j, m]) / mind.command_scale[j, m]
                 mind.command[2 * j + m] = np.float32(valve)
-        shift(sigma, mind.history, observed, mind.command)
+        shift(layout, sigma, mind.command)
     for j in range(velocity.size):
         for q in range(4):
             value = watched.angle[j] if q == 0 else (velocity[j] if q == 1 else watched.pressure[j, q - 2])
             scaled = np.float32((value - mind.offset[j, q]) / mind.scale[j, q])
-            for lag in range(mind.history if first else 1):
-                sigma[lag * observed + 4 * j + q] = scaled
+            for lag in range(layout.history if first else 1):
+                sigma[reading_at(layout, lag, j, q)] = scaled
 
 
 @kernel
 def _begin(watched, mind, schedule, goal, velocity):  # type: ignore[no-untyped-def]
     """Begin a movement to ``goal`` in the state that was read."""
-    place = mind.places
     for j in range(goal.size):
         velocity[j] = 0.0
-        mind.x[place.goal + j] = np.float32((goal[j] - mind.offset[j, 0]) / mind.scale[j, 0])
+        mind.x[mind.layout.goal + j] = np.float32((goal[j] - mind.offset[j, 0]) / mind.scale[j, 0])
     _push(mind, watched, velocity, True)
-    for i in range(place.command):
+    for i in range(mind.layout.command):
         mind.x[i] = mind.sigma[i]
     begin_acting(mind.learner, schedule, mind.x, mind.workspace, mind.random)
 

@@ -111,7 +111,7 @@ def write_observation(environment, many, e, observations):  # type: ignore[no-un
     for i in range(size):
         observations[e, i] = many.x[e, i]
     for j in range(joints):
-        observations[e, size + j] = many.x[e, environment.task.goal_place + j]
+        observations[e, size + j] = many.x[e, environment.task.layout.goal + j]
 
 
 @part

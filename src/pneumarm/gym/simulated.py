@@ -130,7 +130,7 @@ class SimulatedPointToPoint(Copied, gymnasium.Env[Observation, Any]):
 
     def _set_goal(self, goal: NDArray[np.float64]) -> None:
         scaled = scaled_goal(goal, self.simulation.scaling)
-        place = self._world.task.goal_place
+        place = self._world.task.layout.goal
         self._many.goal[0] = goal
         self._many.x[0, place : place + goal.size] = scaled
         self._result.observation[0, -goal.size :] = scaled

@@ -16,7 +16,8 @@ import numpy as np
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import VALVES, possible_actions
-from pneumarm.planning.search import Agility, advance, copy
+from pneumarm.planning.search import Agility
+from pneumarm.planning.world import advance, copy
 
 _SHARES = 0.9, 0.75
 _ROLLOUTS = 50

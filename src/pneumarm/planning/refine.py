@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.kernels import inner, kernel
-from pneumarm.learning.servo.price import PriceParameters
-from pneumarm.planning.search import advance, copy
+from pneumarm.planning.world import advance, copy
+from pneumarm.task.price import PriceParameters
 
 Array = NDArray[np.float64]
 

@@ -28,50 +28,17 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS, VALVES, possible_actions
-from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import PART, kernel, part
+from pneumarm.kernels import kernel, part
+from pneumarm.planning.world import advance, copy
 from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings
-from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
 from pneumarm.task.reward import Reward
 
-_ADVANCE = {PhysicsStates: advance_physics, SimulatedStates: advance_simulated}
-_COPY = {PhysicsStates: copy_physics, SimulatedStates: copy_simulated}
 _UNLIKELY = 0.05
 """A plan that is less likely to succeed is none."""
-
-
-def advance(world: Any, states: Any, i: int, valves: NDArray[np.int8]) -> None:
-    """Let one control period pass in state ``i`` of any kind of ``states``, with ``valves`` (joints, 2)."""
-    _ADVANCE[type(states)](world, states, i, valves)
-
-
-def copy(states: Any, to: int, source: int) -> None:
-    """Copy state ``source`` to the place ``to``, in any kind of ``states``."""
-    _COPY[type(states)](states, to, source)
-
-
-# Compiled code picks by type as well: kernels handed over as arguments could not be cached.
-@overload(advance, jit_options=PART)
-def _advance(world, states, i, valves):  # type: ignore[no-untyped-def]
-    if states.instance_class is PhysicsStates:
-        return lambda world, states, i, valves: advance_physics(world, states, i, valves)
-    if states.instance_class is SimulatedStates:
-        return lambda world, states, i, valves: advance_simulated(world, states, i, valves)
-    return None
-
-
-@overload(copy, jit_options=PART)
-def _copy(states, to, source):  # type: ignore[no-untyped-def]
-    if states.instance_class is PhysicsStates:
-        return lambda states, to, source: copy_physics(states, to, source)
-    if states.instance_class is SimulatedStates:
-        return lambda states, to, source: copy_simulated(states, to, source)
-    return None
 
 
 @dataclass(frozen=True)

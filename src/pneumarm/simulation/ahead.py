@@ -24,7 +24,7 @@ from pneumarm.networks.layers import Trainable, adam, add_slopes, trainable
 from pneumarm.networks.network import Network
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
-from pneumarm.simulation.kernel import SimulationParameters, places, simulation_parameters
+from pneumarm.simulation.kernel import SimulationParameters, simulation_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.choice import hashed_uniform, held_out
 from pneumarm.transitions.rows import Rows
@@ -54,7 +54,7 @@ class Stretches(NamedTuple):
     """What the networks have to predict, shape (n, steps, outputs)."""
 
 
-class Tape(NamedTuple):
+class StretchTape(NamedTuple):
     """What is kept of stretches on their way. Made by :func:`_tape`."""
 
     x: NDArray[np.float32]
@@ -165,14 +165,14 @@ def _trainable(parameters: SimulationParameters) -> tuple[Trainable, SimulationP
     return net, trained
 
 
-def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: Stretches) -> Tape:
+def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: Stretches) -> StretchTape:
     (size, units), (_, steps, outputs) = parameters.hidden.shape, recorded.observed.shape
     commands = simulation.window.command_size
 
     def zeros(*shape: int) -> NDArray[np.float32]:
         return np.zeros((*shape, _AT_ONCE), np.float32)
 
-    tape = Tape(
+    tape = StretchTape(
         x=zeros(steps + 1, size),
         hidden=zeros(steps, units),
         free=zeros(steps, outputs),
@@ -183,11 +183,11 @@ def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: St
         later=zeros(size),
         sooner=zeros(size),
     )
-    tape.x[:, places(simulation.window).one] = 1
+    tape.x[:, parameters.layout.one] = 1
     return tape
 
 
-def _put(tape: Tape, recorded: Stretches, random: np.random.Generator) -> None:
+def _put(tape: StretchTape, recorded: Stretches, random: np.random.Generator) -> None:
     """Put stretches drawn at random on the tape."""
     chosen = random.integers(len(recorded.state), size=_AT_ONCE)
     tape.x[0, : recorded.state.shape[1]] = recorded.state[chosen].T
@@ -195,7 +195,9 @@ def _put(tape: Tape, recorded: Stretches, random: np.random.Generator) -> None:
     tape.observed[...] = recorded.observed[chosen].transpose(1, 2, 0)
 
 
-def _weigh(parameters: SimulationParameters, tape: Tape, recorded: Stretches, random: np.random.Generator) -> None:
+def _weigh(
+    parameters: SimulationParameters, tape: StretchTape, recorded: Stretches, random: np.random.Generator
+) -> None:
     """Make the errors of each step and output as large as those of the others are."""
     sizes = []
     for _ in range(8):
@@ -209,8 +211,7 @@ def _weigh(parameters: SimulationParameters, tape: Tape, recorded: Stretches, ra
 @kernel(fastmath=FASTMATH)
 def move_ahead(simulation, tape):  # type: ignore[no-untyped-def]
     """Let the simulation make all steps of the stretches on the tape."""
-    commanded = 2 * simulation.joints
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    first, commanded = simulation.layout.command, simulation.layout.commanded
     for t in range(tape.command.shape[0]):
         tape.x[t, first : first + commanded] = tape.command[t]
         step_all(simulation, tape.x[t], tape.x[t + 1], tape.work)
@@ -226,8 +227,7 @@ def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
         for u in range(simulation.output.shape[1]):
             simulation.output[o, u] = net.layers[last][u, o]
     move_ahead(simulation, tape)
-    commanded, clip = 2 * simulation.joints, np.float32(_CLIP)
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    first, commanded, clip = simulation.layout.command, simulation.layout.commanded, np.float32(_CLIP)
     steps, outputs, n = tape.observed.shape
     share = np.float32(1.0 / (steps * n))
     later, sooner, work = tape.later, tape.sooner, tape.work
@@ -252,7 +252,7 @@ def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
 
 def _networks(simulation: Simulation, parameters: SimulationParameters) -> tuple[Network, ...]:
     """Return the networks of which ``parameters`` are made."""
-    inputs, one = simulation.window.input_size, places(simulation.window).one
+    inputs, one = simulation.window.input_size, parameters.layout.one
     networks, u, s, o = [], 0, 0, 0
     for network in simulation.networks:
         units = last = slice(u, u + network.hidden_bias.size)

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from msgspec import Meta
@@ -32,7 +32,7 @@ from pneumarm.networks import (
 from pneumarm.networks import importance as importance_of
 from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings, Valid
 from pneumarm.simulation.ahead import fitted_ahead, stretches
-from pneumarm.simulation.history import LONGEST, USUAL, chosen_history, columns
+from pneumarm.simulation.history import LONGEST, SEEN, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
 from pneumarm.simulation.simulation import Commands, Scaling, Simulation, Velocity
 from pneumarm.simulation.spread import spread_over_periods
@@ -84,8 +84,8 @@ class FitSettings(Settings):
     """Observations that the networks read (thesis eq. 3.5: 3); by default 3, or more where more say more of this
     arm."""
     memory: PositiveInt | None = None
-    """Observations in the state, for a policy to see; by default 8 where predictions are fitted ahead, for agents
-    that settle, and else no more than the networks read (thesis)."""
+    """Observations in the state, for a policy to see; by default 8 or more where predictions are fitted ahead, for
+    agents that settle, and else no more than the networks read (thesis)."""
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
     layers: Literal[1, 2] | None = None
@@ -133,7 +133,7 @@ class FitSettings(Settings):
         """Return the settings with the history and memory that suit the arm of ``store`` where none is asked for."""
         history = self.history or min(chosen_history(store, store.spec, self.sensors), self._longest(store))
         settles = self.ahead > 0 and self.approximator == "network"
-        return replace(self, history=history, memory=self.memory or (LONGEST if settles else history))
+        return replace(self, history=history, memory=self.memory or max(history, SEEN if settles else 1))
 
     def with_layers(self, joints: int, rows: int) -> "FitSettings":
         """Return the settings with what suits ``joints`` and ``rows`` where no layers or hidden units are chosen."""
@@ -270,112 +270,133 @@ def fit(
     """
     settings = (settings or FitSettings()).with_layers(spec.joints, len(training.inputs))
     window = _window(spec, settings)
+    _check_transitions(training, window)
+    began = time.perf_counter()
+    simulation = _unfitted(training, spec, goal_range, valves, settings)
+    read = columns(window, settings.history or USUAL)
+    changes = _Changes.of(training, simulation, read)
+    linear = least_squares(changes.inputs, changes.targets)
+    fits: list[Fit] = []
+    if settings.approximator == "least-squares":
+        simulation = replace(simulation, networks=(linear.times(changes.factor).widened(read, window.input_size),))
+    else:
+        progress = progress or (lambda done, total: None)
+        simulation, fits = _fitted_in_rounds(simulation, changes, training, recorded, settings, progress)
+    seconds = time.perf_counter() - began
+    errors = statistics(simulation, held_out)
+    names = [name.removesuffix("[k]") for name in window.input_names()]
+    outputs = [names[place] for place in simulation.outputs]
+    inputs = [window.input_names()[one] for one in read]
+    return FitResult(
+        simulation=simulation.with_errors(errors.std),
+        held_out=errors,
+        training=statistics(simulation, training),
+        generalisation=None if generalisation is None else statistics(simulation, generalisation),
+        importance=importance_of(linear, changes.inputs, changes.targets, inputs, outputs),
+        outputs=outputs,
+        curves=[one.mse for one in fits],
+        converged=[one.converged for one in fits],
+        rows=len(training.inputs),
+        seconds=seconds,
+    )
+
+
+def _check_transitions(training: Transitions, window: Window) -> None:
+    """Raise UnusableInput where ``training`` has other windows, or too few transitions."""
     if training.inputs.shape[1] != window.input_size or training.target.shape[1] != window.observation_size:
         raise UnusableInput(
-            f"expected transitions of {spec.joints} joint(s) with a history of {window.history}, that is "
+            f"expected transitions of {window.joints} joint(s) with a history of {window.history}, that is "
             f"{window.input_size} inputs, got {training.inputs.shape[1]}; make them with the same window"
         )
     if len(training.inputs) <= window.input_size:
         raise UnusableInput(
             f"{len(training.inputs)} transitions are too few to fit; collect at least {FEWEST_TRANSITIONS:,}"
         )
-    began = time.perf_counter()
-    simulation = _unfitted(training, spec, goal_range, valves, settings)
-    scaling, places = simulation.scaling, simulation.outputs
-    change = training.target[:, places].astype(np.float64) - training.observation[:, places]
-    spread = change.std(axis=0)
-    spread[spread == 0] = 1.0
-    read = columns(window, settings.history or USUAL)
-    x = scaling.inputs(training.inputs, window).astype(np.float32)[:, read]
-    y = change / spread
-    names = window.input_names()
-    outputs = [names[place].removesuffix("[k]") for place in places]
-    linear = least_squares(x, y)
-    # The targets are in units of the change's spread, the simulation's are in those of the observation.
-    factor = spread / scaling.observation_scale[places]
-    factors = [factor] if settings.one_network else np.split(factor, len(factor))
-    fits: list[Fit] = []
-    if settings.approximator == "least-squares":
-        simulation = replace(simulation, networks=(linear.times(factor).widened(read, window.input_size),))
-    else:
-        spreads = settings.spread and simulation.commands == "valves"
-        again = max(1, round(_AGAIN * settings.epochs)) if spreads else 0
-        networks = 1 if settings.one_network else len(places)
-        ahead = round(settings.ahead / spec.period)
-        epochs = (settings.epochs, _EPOCHS_AHEAD if ahead > 1 else 0, again)
-        ends = networks * np.cumsum(epochs)
-
-        def part(number: int) -> Callable[[int, int], None]:
-            return _part_of(progress, int(ends[number]) - networks * epochs[number], int(ends[-1]))
-
-        simulation, fits = _fitted(simulation, x, read, y, factor, settings, part(0))
-        if ahead > 1:
-            report, units = part(1), networks * _EPOCHS_AHEAD
-            long_enough = stretches(recorded, simulation, ahead)
-            simulation = fitted_ahead(
-                simulation, long_enough, settings.seed, lambda share: report(int(share * units), units)
-            )
-            report(units, units)
-        if again:
-            pulses = spread_over_periods(simulation, training, settings.seed)
-            inputs = np.concatenate([training.inputs, pulses.inputs])
-            following = np.concatenate([simulation.predict(training.inputs), pulses.target])
-            more = (following - inputs[:, : window.observation_size])[:, places]
-            before = [one.times(1 / each) for one, each in zip(simulation.networks, factors, strict=True)]
-            simulation, fits = _fitted(
-                simulation,
-                scaling.inputs(inputs, window).astype(np.float32)[:, read],
-                read,
-                more / spread,
-                factor,
-                replace(settings, epochs=again),
-                part(2),
-                before,
-            )
-            simulation = replace(simulation, spread=True)
-    seconds = time.perf_counter() - began
-    errors = statistics(simulation, held_out)
-    return FitResult(
-        simulation=simulation.with_errors(errors.std),
-        held_out=errors,
-        training=statistics(simulation, training),
-        generalisation=None if generalisation is None else statistics(simulation, generalisation),
-        importance=importance_of(linear, x, y, [names[one] for one in read], outputs),
-        outputs=outputs,
-        curves=[one.mse for one in fits],
-        converged=[one.converged for one in fits],
-        rows=len(x),
-        seconds=seconds,
-    )
 
 
-def _part_of(progress: Callable[[int, int], None] | None, before: int, total: int) -> Callable[[int, int], None]:
-    """Return what reports the progress of one of several rounds of fits, which ``before`` epochs come before."""
+@dataclass(frozen=True)
+class _Changes:
+    """What networks are fitted to: how the outputs change in a step, in units of their spread."""
 
-    def report(done: int, _: int) -> None:
-        if progress is not None:
-            progress(before + done, total)
+    inputs: NDArray[np.float32]
+    """Scaled (rows, len(read))."""
+    targets: NDArray[np.float64]
+    """Changes, over their spread (rows, outputs)."""
+    read: NDArray[np.int64]
+    """Which inputs of the simulation these are."""
+    spread: NDArray[np.float64]
+    """Standard deviations of the changes, or 1 of those that are all the same (outputs,)."""
+    factor: NDArray[np.float64]
+    """The spreads in the simulation's units, which are those of its observations (outputs,)."""
 
-    return report
+    @classmethod
+    def of(cls, training: Transitions, simulation: Simulation, read: NDArray[np.int64]) -> Self:
+        """Return the changes in ``training``."""
+        places = simulation.outputs
+        change = training.target[:, places].astype(np.float64) - training.observation[:, places]
+        spread = change.std(axis=0)
+        spread[spread == 0] = 1.0
+        factor = spread / simulation.scaling.observation_scale[places]
+        return cls(_inputs(training.inputs, simulation, read), change / spread, read, spread, factor)
+
+
+def _inputs(inputs: NDArray[Any], simulation: Simulation, read: NDArray[np.int64]) -> NDArray[np.float32]:
+    return simulation.scaling.inputs(inputs, simulation.window).astype(np.float32)[:, read]
+
+
+def _fitted_in_rounds(
+    simulation: Simulation,
+    changes: _Changes,
+    training: Transitions,
+    recorded: Iterable[Rows],
+    settings: FitSettings,
+    progress: Callable[[int, int], None],
+) -> tuple[Simulation, list[Fit]]:
+    """Return ``simulation`` with networks fitted to single steps, to several of them, and to pulses, as chosen."""
+    networks = 1 if settings.one_network else changes.targets.shape[1]
+    steps = round(settings.ahead / simulation.spec.period)
+    spreads = settings.spread and simulation.commands == "valves"
+    epochs_ahead = _EPOCHS_AHEAD if steps > 1 else 0
+    epochs_again = max(1, round(_AGAIN * settings.epochs)) if spreads else 0
+    total = networks * (settings.epochs + epochs_ahead + epochs_again)
+
+    def after(epochs: int) -> Callable[[int, int], None]:
+        return lambda done, _: progress(networks * epochs + done, total)
+
+    simulation, fits = _fitted(simulation, changes, settings, after(0))
+    if steps > 1:
+        report, units = after(settings.epochs), networks * epochs_ahead
+        long_enough = stretches(recorded, simulation, steps)
+        simulation = fitted_ahead(
+            simulation, long_enough, settings.seed, lambda share: report(int(share * units), units)
+        )
+        report(units, units)
+    if spreads:
+        with_pulses = _with_pulses(simulation, changes, training, settings.seed)
+        before = after(settings.epochs + epochs_ahead)
+        simulation, fits = _fitted(simulation, with_pulses, replace(settings, epochs=epochs_again), before)
+        simulation = replace(simulation, spread=True)
+    return simulation, fits
+
+
+def _with_pulses(simulation: Simulation, changes: _Changes, training: Transitions, seed: int) -> _Changes:
+    """Return the changes that ``simulation`` predicts, and beside them what pulses do on average."""
+    pulses = spread_over_periods(simulation, training, seed)
+    inputs = np.concatenate([training.inputs, pulses.inputs])
+    following = np.concatenate([simulation.predict(training.inputs), pulses.target])
+    change = (following - inputs[:, : simulation.window.observation_size])[:, simulation.outputs]
+    return replace(changes, inputs=_inputs(inputs, simulation, changes.read), targets=change / changes.spread)
 
 
 def _fitted(
-    simulation: Simulation,
-    x: NDArray[np.float32],
-    read: NDArray[np.int64],
-    y: NDArray[np.float64],
-    factor: NDArray[np.float64],
-    settings: FitSettings,
-    progress: Callable[[int, int], None],
-    before: Sequence[Network] = (),
+    simulation: Simulation, changes: _Changes, settings: FitSettings, progress: Callable[[int, int], None]
 ) -> tuple[Simulation, list[Fit]]:
-    """Return ``simulation`` with networks fitted to ``x`` and ``y``, whose units are ``factor`` of its own.
-
-    ``x`` are the inputs that the networks ``read``. They begin as they were ``before``, or at random.
-    """
+    """Return ``simulation`` with networks fitted to ``changes``, from where its own are, or from random ones."""
     joints, size = simulation.window.joints, simulation.window.input_size
-    before = [one.reading(read) for one in before]
+    x, y, read = changes.inputs, changes.targets, changes.read
     targets = [y] if settings.one_network else [y[:, [i]] for i in range(y.shape[1])]
+    factors = np.split(changes.factor, len(targets))
+    before = [one.times(1 / each).reading(read) for one, each in zip(simulation.networks, factors, strict=False)]
     if settings.layers == 2:
         starts: list[Network | None] = list(before) or [None] * len(targets)
         fits = [_fit_two_layers(x, *pair, settings, joints, progress) for pair in zip(targets, starts, strict=True)]
@@ -383,7 +404,6 @@ def _fitted(
         chosen = _rows_to_fit(len(x), _weights(x.shape[1], settings, joints), settings.seed)
         fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0
-    factors = np.split(factor, len(fits))
     networks = [
         _without(one.network, still).times(scale).widened(read, size)
         for one, scale in zip(fits, factors, strict=True)
@@ -626,7 +646,7 @@ def fitted_on(
     on sequences that are held out. ``ahead`` is how far ahead it is fitted [s]. The ``newest`` transitions in
     ``store``, made by an agent, so where it has to know most, count several times with two layers.
     """
-    window, places, seed = simulation.window, simulation.outputs, simulation.seed
+    window, seed = simulation.window, simulation.seed
     layers: Literal[1, 2] = 1 if simulation.networks[0].second_weights is None else 2
     source = Stretched(store, simulation.stretch)
     filtered = filter_transitions(source, window, seed=seed, hold_out=simulation.held_out)
@@ -637,20 +657,12 @@ def fitted_on(
         known = picked(newest, ~np.any([held_out(one, simulation.held_out, seed) for one in of], axis=0))
         parts = zip(training, *[known] * (_NEWEST_COUNT - 1), strict=True)
         training = Transitions(*(np.concatenate(part) for part in parts))
-    change = training.target[:, places].astype(np.float64) - training.observation[:, places]
-    spread = change.std(axis=0)
-    spread[spread == 0] = 1.0
-    factor = spread / simulation.scaling.observation_scale[places]
-    factors, read = np.split(factor, len(simulation.networks)), np.flatnonzero(simulation.reads)
+    one_network = len(simulation.networks) == 1
     fitted, _ = _fitted(
         simulation,
-        simulation.scaling.inputs(training.inputs, window).astype(np.float32)[:, read],
-        read,
-        change / spread,
-        factor,
-        FitSettings(epochs=_EPOCHS_ON, layers=layers, ahead=0.0, one_network=len(factors) == 1, seed=seed),
+        _Changes.of(training, simulation, np.flatnonzero(simulation.reads)),
+        FitSettings(epochs=_EPOCHS_ON, layers=layers, ahead=0.0, one_network=one_network, seed=seed),
         lambda done, total: None,
-        [one.times(1 / each) for one, each in zip(simulation.networks, factors, strict=True)],
     )
     steps = round(ahead / simulation.spec.period)
     if steps > 1:

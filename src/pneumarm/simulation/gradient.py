@@ -1,6 +1,6 @@
 """The simulation's step over many states at once, without noise, and the derivatives by state and command.
 
-A state is a column of ``x`` (size, n), laid out as in :mod:`pneumarm.simulation.kernel`. One step is
+A state is a column of ``x`` (size, n), laid out as :mod:`.layout` says. One step is
 
     h = tansig(W1^T x),  change = W2 h + D x + b2,  o' = clip(o + change),  sigma' = (o', o, ..., a, a_{k-1}, ...)
 
@@ -18,6 +18,7 @@ from pneumarm.kernels import kernel
 from pneumarm.networks.layers import through_layer, weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.kernel import SimulationParameters
+from pneumarm.simulation.layout import angle_at, velocity_at
 from pneumarm.vectors import add_sums
 
 
@@ -82,14 +83,14 @@ def predict_all(simulation, x, work):  # type: ignore[no-untyped-def]
 def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
     """Set ``following`` (size, n) to the states one period after ``x`` (size, n), whose commands are in place."""
     predict_all(simulation, x, work)
-    observed, commanded, n = simulation.observed, 2 * simulation.joints, x.shape[1]
-    newest = simulation.history * observed
-    command = newest + (simulation.history - 1) * commanded
+    layout, n = simulation.layout, x.shape[1]
+    observed, commanded, command = layout.observed, layout.commanded, layout.command
+    newest = layout.history * observed
     for i in range(observed, newest):
         following[i] = x[i - observed]
     for i in range(newest + commanded, command):
         following[i] = x[i - commanded]
-    if simulation.history > 1:
+    if layout.history > 1:
         for i in range(commanded):
             following[newest + i] = x[command + i]
     for i in range(command, x.shape[0]):
@@ -103,9 +104,10 @@ def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
             work.free[o, e] = np.float32(1.0) if lowest < value < highest else np.float32(0.0)
             following[place, e] = min(max(value, lowest), highest)
     for joint in range(simulation.velocity.shape[0]):
-        angle, rate, rest = 4 * joint, simulation.velocity[joint, 0], simulation.velocity[joint, 1]
+        angle, velocity = angle_at(layout, 0, joint), velocity_at(layout, 0, joint)
+        rate, rest = simulation.velocity[joint, 0], simulation.velocity[joint, 1]
         for e in range(n):
-            following[angle + 1, e] = (following[angle, e] - x[angle, e]) * rate + rest
+            following[velocity, e] = (following[angle, e] - x[angle, e]) * rate + rest
 
 
 @kernel(fastmath=FASTMATH)
@@ -115,22 +117,23 @@ def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
     ``work`` must be that of :func:`step_all` for this step; ``later`` is used up. In the places of the command are
     then the derivatives by the command.
     """
-    observed, commanded, n = simulation.observed, 2 * simulation.joints, later.shape[1]
-    newest = simulation.history * observed
-    command = newest + (simulation.history - 1) * commanded
+    layout, n = simulation.layout, later.shape[1]
+    observed, commanded, command = layout.observed, layout.commanded, layout.command
+    newest = layout.history * observed
     sooner[:] = np.float32(0.0)
     for i in range(observed, newest):
         sooner[i - observed] = later[i]
     for i in range(newest + commanded, command):
         sooner[i - commanded] = later[i]
-    if simulation.history > 1:
+    if layout.history > 1:
         for i in range(commanded):
             sooner[command + i] = later[newest + i]
     for joint in range(simulation.velocity.shape[0]):
-        angle, rate = 4 * joint, simulation.velocity[joint, 0]
+        angle, velocity = angle_at(layout, 0, joint), velocity_at(layout, 0, joint)
+        rate = simulation.velocity[joint, 0]
         for e in range(n):
-            later[angle, e] += rate * later[angle + 1, e]
-            sooner[angle, e] -= rate * later[angle + 1, e]
+            later[angle, e] += rate * later[velocity, e]
+            sooner[angle, e] -= rate * later[velocity, e]
     for o in range(work.change.shape[0]):
         place = simulation.place[o]
         for e in range(n):

@@ -1,11 +1,7 @@
 """The simulation as a compiled step, in scaled units.
 
-Everything that reads the state reads one float32 vector ``x``, padded to a multiple of four:
-
-    x = (sigma, command, goal, 1, 0, ...)
-
-sigma is the state window of :mod:`pneumarm.transitions.window`; the networks of the simulation have zero weights at
-the goal, those of an agent at the command, and the 1 carries the biases. All hidden units of all networks of one
+Everything that reads the state reads one float32 vector, laid out as :mod:`.layout` says. The networks of the
+simulation have zero weights at the goal, those of an agent at the command. All hidden units of all networks of one
 kind lie side by side, ``[input][unit]``, padded to a multiple of sixteen, so that the compiler turns the loop over
 units into vector instructions; four inputs at a time, so that what is summed is loaded and stored less often.
 """
@@ -18,13 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.kernels import part
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.random import RandomState
+from pneumarm.simulation.layout import Layout, angle_at, command_at, layout_of, padded, velocity_at
 from pneumarm.simulation.noise import add_noise, begin_noise
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.transitions.window import Window
 from pneumarm.vectors import weighted_sums
 
 UNIT_BLOCK = 16
-INPUT_BLOCK = 4
 
 
 class SimulationParameters(NamedTuple):
@@ -54,17 +50,14 @@ class SimulationParameters(NamedTuple):
     """Highest prediction, shape (outputs,) [scaled]."""
     velocity: NDArray[np.float32]
     """Derived velocity by change of the angle, and at rest, shape (joints, 2) [scaled]; (0, 2) if predicted."""
-    joints: int
-    history: int
-    observed: int
-    """Numbers in an observation."""
+    layout: Layout
 
 
 class SimulationState(NamedTuple):
     """What one simulated arm changes: its state, its noise, its random state, and workspace for sums."""
 
     x: NDArray[np.float32]
-    """The vector described at the top of this module, shape (inputs,)."""
+    """State vector, see :mod:`.layout`, shape (inputs,)."""
     average: NDArray[np.float32]
     """Moving average of the noise, shape (outputs,)."""
     random: RandomState
@@ -76,45 +69,24 @@ class SimulationState(NamedTuple):
     """Shape (outputs,)."""
 
 
-def padded(size: int, block: int) -> int:
-    """Return ``size`` rounded up to a multiple of ``block``."""
-    return -(-size // block) * block
-
-
-class Places(NamedTuple):
-    """Where in ``x`` the command, the goal and the 1 are, and how long ``x`` is."""
-
-    command: int
-    goal: int
-    one: int
-    size: int
-
-
-def places(window: Window) -> Places:
-    """Return the places in ``x`` of a state ``window``."""
-    goal = window.state_size + window.command_size
-    one = goal + window.joints
-    return Places(window.state_size, goal, one, padded(one + 1, INPUT_BLOCK))
-
-
 def simulation_parameters(simulation: Simulation) -> SimulationParameters:
     """Pack ``simulation`` into float32 arrays."""
     window, scaling = simulation.window, simulation.scaling
-    joints, place = window.joints, places(window)
+    layout = layout_of(window)
     hidden_sizes = [network.hidden_bias.size for network in simulation.networks]
     second_sizes = [0 if network.second_bias is None else network.second_bias.size for network in simulation.networks]
     output_sizes = [network.output_bias.size for network in simulation.networks]
     inputs, outputs = window.input_size, sum(output_sizes)
     units, second_units = (padded(sum(sizes), UNIT_BLOCK) for sizes in (hidden_sizes, second_sizes))
-    hidden = np.zeros((place.size, units))
+    hidden = np.zeros((layout.size, units))
     second, second_bias = np.zeros((units if second_units else 0, second_units)), np.zeros(second_units)
     output, output_bias = np.zeros((outputs, second_units or units)), np.zeros(outputs)
     has_direct = any(network.direct is not None for network in simulation.networks)
-    direct = np.zeros((outputs if has_direct else 0, place.size))
+    direct = np.zeros((outputs if has_direct else 0, layout.size))
     u = s = o = 0
     for network, h, m, n in zip(simulation.networks, hidden_sizes, second_sizes, output_sizes, strict=True):
         hidden[:inputs, u : u + h] = network.hidden_weights
-        hidden[place.one, u : u + h] = network.hidden_bias
+        hidden[layout.one, u : u + h] = network.hidden_bias
         if network.second_weights is None:
             output[o : o + n, u : u + h] = network.output_weights.T
         else:
@@ -143,9 +115,7 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
         lowest=_float32(lowest[simulation.outputs]),
         highest=_float32(highest[simulation.outputs]),
         velocity=_float32(velocity if simulation.velocity == "derived" else velocity[:0]),
-        joints=joints,
-        history=window.history,
-        observed=window.observation_size,
+        layout=layout,
     )
 
 
@@ -154,8 +124,7 @@ def simulation_state(simulation: SimulationParameters, random: RandomState) -> S
     inputs, units = simulation.hidden.shape
     outputs = simulation.output_bias.size
     x = np.zeros(inputs, np.float32)
-    # After the history of observations and commands, the command and the goal, see the top of this module.
-    x[simulation.history * (simulation.observed + 2 * simulation.joints) + simulation.joints] = 1
+    x[simulation.layout.one] = 1
     return SimulationState(
         x=x,
         average=np.zeros(outputs, np.float32),
@@ -224,51 +193,50 @@ def predict_change(simulation, state):  # type: ignore[no-untyped-def]
 
 
 @part(entry=True)
-def shift(x, history, observed, command):  # type: ignore[no-untyped-def]
+def shift(layout, x, command):  # type: ignore[no-untyped-def]
     """Move the observations in the window at the begin of ``x`` one step into the past, and remember ``command``.
 
-    The newest of ``history`` observations of the size ``observed`` stays as it is until another is written over it.
+    The newest observation stays as it is until another is written over it.
     """
-    oldest, commanded = history * observed, command.shape[0]
-    for i in range(oldest - 1, observed - 1, -1):
-        x[i] = x[i - observed]
-    if history > 1:
-        last = oldest + (history - 1) * commanded - 1
-        for i in range(last, oldest + commanded - 1, -1):
-            x[i] = x[i - commanded]
-        for i in range(commanded):
-            x[oldest + i] = command[i]
+    newest = command_at(layout, 1)
+    for i in range(newest - 1, layout.observed - 1, -1):
+        x[i] = x[i - layout.observed]
+    if layout.history > 1:
+        for i in range(layout.command - 1, newest + layout.commanded - 1, -1):
+            x[i] = x[i - layout.commanded]
+        for i in range(layout.commanded):
+            x[newest + i] = command[i]
 
 
 @part
 def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
     """Shift the window in ``x`` by one step: add ``change`` to the newest observation, remember ``command``."""
-    shift(x, simulation.history, simulation.observed, command)
+    layout = simulation.layout
+    shift(layout, x, command)
     for joint in range(simulation.velocity.shape[0]):
-        x[4 * joint + 1] = x[4 * joint]
+        x[velocity_at(layout, 0, joint)] = x[angle_at(layout, 0, joint)]
     for o in range(change.shape[0]):
         place = simulation.place[o]
         x[place] = min(max(x[place] + change[o], simulation.lowest[o]), simulation.highest[o])
     for joint in range(simulation.velocity.shape[0]):
-        moved = x[4 * joint] - x[4 * joint + 1]
-        x[4 * joint + 1] = moved * simulation.velocity[joint, 0] + simulation.velocity[joint, 1]
+        velocity = velocity_at(layout, 0, joint)
+        moved = x[angle_at(layout, 0, joint)] - x[velocity]
+        x[velocity] = moved * simulation.velocity[joint, 0] + simulation.velocity[joint, 1]
 
 
 @part
 def put_command(simulation, x, command):  # type: ignore[no-untyped-def]
     """Put the scaled ``command`` (2 joints,) into ``x``, where the networks of the simulation read it."""
-    first = simulation.history * simulation.observed + (simulation.history - 1) * 2 * simulation.joints
     for i in range(command.shape[0]):
-        x[first + i] = command[i]
+        x[simulation.layout.command + i] = command[i]
 
 
 @part
 def settle(simulation, noise, state, command):  # type: ignore[no-untyped-def]
     """Let ``state`` go to what ``state.change`` predicts, with noise."""
     x = state.x
-    first = simulation.history * simulation.observed + (simulation.history - 1) * 2 * simulation.joints
     for i in range(command.shape[0]):
-        x[first + i] = np.float32(0.0)  # so that the command of the past is no input of an agent
+        x[simulation.layout.command + i] = np.float32(0.0)  # so that the command of the past is no input of an agent
     add_noise(noise, x, state.change, state.average, state.random)
     push(simulation, x, state.change, command)
 

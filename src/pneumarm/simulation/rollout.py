@@ -14,6 +14,7 @@ from pneumarm.simulation.kernel import (
     simulation_state,
     step,
 )
+from pneumarm.simulation.layout import angle_at, pressure_at, velocity_at
 from pneumarm.simulation.noise import NoiseParameters, NoiseSettings, noise_parameters
 from pneumarm.simulation.simulation import Simulation
 
@@ -39,7 +40,7 @@ class SimulatedStates(NamedTuple):
     """``n`` states of a simulation. Made by :func:`simulated_states`."""
 
     x: NDArray[np.float32]
-    """State vectors as described in :mod:`pneumarm.simulation.kernel`, shape (n, inputs)."""
+    """State vectors, see :mod:`.layout`, shape (n, inputs)."""
     angle: NDArray[np.float64]
     """Shape (n, joints) [counts]."""
     velocity: NDArray[np.float64]
@@ -78,12 +79,13 @@ def simulated_states(world: SimulatedWorld, n: int) -> SimulatedStates:
 @part(entry=True)
 def look_simulated(world, states, i):  # type: ignore[no-untyped-def]
     """Set the readings of state ``i`` to what its vector says."""
-    x, unit = states.x, world.unit
+    x, unit, layout = states.x, world.unit, world.simulation.layout
     for j in range(states.angle.shape[1]):
-        states.angle[i, j] = unit[j, 0, 0] + unit[j, 0, 1] * x[i, 4 * j]
-        states.velocity[i, j] = unit[j, 1, 0] + unit[j, 1, 1] * x[i, 4 * j + 1]
+        states.angle[i, j] = unit[j, 0, 0] + unit[j, 0, 1] * x[i, angle_at(layout, 0, j)]
+        states.velocity[i, j] = unit[j, 1, 0] + unit[j, 1, 1] * x[i, velocity_at(layout, 0, j)]
         for m in range(2):
-            states.pressure[i, j, m] = unit[j, 2 + m, 0] + unit[j, 2 + m, 1] * x[i, 4 * j + 2 + m]
+            pressure = x[i, pressure_at(layout, 0, j, m)]
+            states.pressure[i, j, m] = unit[j, 2 + m, 0] + unit[j, 2 + m, 1] * pressure
 
 
 @part(entry=True)

@@ -17,11 +17,11 @@ from pneumarm.simulation.kernel import (
     SimulationParameters,
     SimulationState,
     begin,
-    places,
     simulation_parameters,
     simulation_state,
     step,
 )
+from pneumarm.simulation.layout import Layout, angle_at, layout_of, velocity_at
 from pneumarm.simulation.noise import NoiseParameters, noise_parameters
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginParameters, BeginStates, begin_parameters, draw_begin
@@ -46,8 +46,8 @@ class Task(NamedTuple):
     """Offset and scale of angle and velocity, shape (joints, 4): angle, angle, velocity, velocity."""
     commands: NDArray[np.float32]
     """Scaled commands by action, shape (joints, 9, 2)."""
-    goal_place: int
-    """Place of the goals in the state vector."""
+    layout: Layout
+    """Of the state vector."""
     reward: RewardParameters
     cutoff: int
 
@@ -98,7 +98,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
         goal_limits=np.ascontiguousarray(simulation.goals.limits, np.float64),
         unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
         commands=np.ascontiguousarray(commands, np.float32),
-        goal_place=places(simulation.window).goal,
+        layout=layout_of(simulation.window),
         reward=settings.reward.on(simulation.spec).parameters,
         cutoff=int(settings.cutoff),
     )
@@ -112,7 +112,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
 
 def episode(environment: Environment, random: RandomState) -> Episode:
     """Return workspace for episodes in ``environment`` that draw from ``random``."""
-    joints = environment.simulation.joints
+    joints = environment.simulation.layout.joints
     return Episode(
         state=simulation_state(environment.simulation, random),
         goal=np.zeros(joints),
@@ -135,7 +135,7 @@ def begin_episode(environment, episode, deviation, random):  # type: ignore[no-u
     for joint in range(episode.goal.shape[0]):
         episode.actions[joint] = -1
         scaled = (episode.goal[joint] - task.unit[joint, 0]) / task.unit[joint, 1]
-        episode.state.x[task.goal_place + joint] = np.float32(scaled)
+        episode.state.x[task.layout.goal + joint] = np.float32(scaled)
     index = draw_begin(environment.begin, episode.goal, deviation, random)
     begin(environment.simulation, environment.noise, episode.state, environment.begin.states[index])
 
@@ -196,13 +196,13 @@ def take_pulses(environment, episode, pulses):  # type: ignore[no-untyped-def]
 @part
 def angle(task, episode, joint):  # type: ignore[no-untyped-def]
     """Return the angle of ``joint`` [counts]."""
-    return task.unit[joint, 0] + task.unit[joint, 1] * episode.state.x[4 * joint]
+    return task.unit[joint, 0] + task.unit[joint, 1] * episode.state.x[angle_at(task.layout, 0, joint)]
 
 
 @part
 def velocity(task, episode, joint):  # type: ignore[no-untyped-def]
     """Return the velocity of ``joint`` [counts/ms]."""
-    return task.unit[joint, 2] + task.unit[joint, 3] * episode.state.x[4 * joint + 1]
+    return task.unit[joint, 2] + task.unit[joint, 3] * episode.state.x[velocity_at(task.layout, 0, joint)]
 
 
 @part

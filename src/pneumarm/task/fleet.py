@@ -15,7 +15,8 @@ from pneumarm.arm.valves import CLOSED, VALVES
 from pneumarm.kernels import inner, kernel, part
 from pneumarm.random import RandomState
 from pneumarm.simulation.gradient import predict_all
-from pneumarm.simulation.kernel import SimulationState, places, put_command, settle
+from pneumarm.simulation.kernel import SimulationState, put_command, settle
+from pneumarm.simulation.layout import Layout, angle_at, layout_of, pressure_at, reading_at
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.environment import (
     Environment,
@@ -31,7 +32,7 @@ class Fleet(NamedTuple):
     """What changes of ``n`` simulated arms. Made by :func:`fleet`."""
 
     x: NDArray[np.float32]
-    """State vectors, shape (inputs, n), see :mod:`pneumarm.simulation.kernel`."""
+    """State vectors, shape (inputs, n), see :mod:`pneumarm.simulation.layout`."""
     average: NDArray[np.float32]
     """Moving averages of the noise, shape (outputs, n)."""
     random: RandomState
@@ -61,9 +62,9 @@ class Fleet(NamedTuple):
 def fleet(environment: Environment, random: RandomState) -> Fleet:
     """Return workspace for as many arms in ``environment`` as there are random states in ``random`` (n, 4)."""
     inputs, units = environment.simulation.hidden.shape
-    outputs, joints, n = environment.simulation.output_bias.size, environment.simulation.joints, len(random)
+    outputs, joints, n = environment.simulation.output_bias.size, environment.simulation.layout.joints, len(random)
     x = np.zeros((inputs, n), np.float32)
-    x[environment.task.goal_place + joints] = 1
+    x[environment.simulation.layout.one] = 1
     return Fleet(
         x=x,
         average=np.zeros((outputs, n), np.float32),
@@ -92,8 +93,8 @@ class Limits(NamedTuple):
     """Largest change of angle and of pressures that counts as none, shape (joints, 3) [scaled]."""
     tolerance: NDArray[np.float32]
     """Distance from the goal within which a joint may stand still, shape (joints,) [scaled]."""
-    goal_place: int
-    """Place of the goals in the state vector."""
+    layout: Layout
+    """Of the state vector."""
     patience: int
     """Steps without change after which an action is not taken again; 0: it always may."""
 
@@ -113,7 +114,7 @@ def limits(simulation: Simulation, tolerance: float, still: float = 2.5, patienc
         outlet=np.full((window.joints, 2), -np.inf, np.float32),
         still=np.ascontiguousarray(still * units / scale[:, [0, 2, 3]], np.float32),
         tolerance=(tolerance * spec.angle_unit / scale[:, 0]).astype(np.float32),
-        goal_place=places(window).goal,
+        layout=layout_of(window),
         patience=patience,
     )
 
@@ -127,11 +128,14 @@ def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-unty
     steps: an arm that sticks near its goal would stick for ever.
     """
     is_stuck = limits.patience > 0 and action == actions[joint] and still[joint] >= limits.patience
-    if is_stuck and abs(x[limits.goal_place + joint] - x[4 * joint]) > limits.tolerance[joint]:
+    if (
+        is_stuck
+        and abs(x[limits.layout.goal + joint] - x[angle_at(limits.layout, 0, joint)]) > limits.tolerance[joint]
+    ):
         return False
     does_something = action == CLOSED
     for muscle in range(2):
-        valve, pressure = VALVES[action, muscle], x[4 * joint + 2 + muscle]
+        valve, pressure = VALVES[action, muscle], x[pressure_at(limits.layout, 0, joint, muscle)]
         if valve > 0 and pressure > limits.inlet[joint, muscle]:
             return False
         if valve > 0 or (valve < 0 and pressure >= limits.outlet[joint, muscle]):
@@ -181,50 +185,44 @@ def gained_by(task, fleet, e, is_reached):  # type: ignore[no-untyped-def]
 @kernel
 def take_all(environment, limits, fleet, actions, is_reached):  # type: ignore[no-untyped-def]
     """Take ``actions`` (n, joints) for a period; set ``is_reached`` (n,) to whether the goals are reached."""
-    simulation = environment.simulation
-    for e in range(actions.shape[0]):
-        arm = one(fleet, e)
-        order(environment.task, arm, actions[e])
-        put_command(simulation, arm.state.x, arm.command)
-    predict_all(simulation, fleet.x, fleet)
-    for e in range(actions.shape[0]):
-        advance(environment, limits, fleet, e)
-        is_reached[e] = reached(environment.task, one(fleet, e))
+    take_alive(environment, limits, fleet, actions, np.ones(actions.shape[0], np.bool_), is_reached)
 
 
 @kernel
 def take_alive(environment, limits, fleet, actions, alive, is_reached):  # type: ignore[no-untyped-def]
     """Do what :func:`take_all` does, in the arms that are ``alive`` (n,) alone."""
-    simulation = environment.simulation
     for e in range(actions.shape[0]):
         if alive[e]:
-            arm = one(fleet, e)
-            order(environment.task, arm, actions[e])
-            put_command(simulation, arm.state.x, arm.command)
-    predict_all(simulation, fleet.x, fleet)
+            order(environment.task, one(fleet, e), actions[e])
+            look(limits.layout, fleet.x[:, e], fleet.before[e])
+    advance_alive(environment, fleet, alive)
     for e in range(actions.shape[0]):
         if alive[e]:
-            advance(environment, limits, fleet, e)
+            note_still(limits, fleet.x[:, e], fleet.before[e], fleet.switched[e], fleet.still[e])
+            fleet.taken[e] += 1
             is_reached[e] = reached(environment.task, one(fleet, e))
 
 
 @kernel
-def advance(environment, limits, fleet, e):  # type: ignore[no-untyped-def]
-    """Let arm ``e`` go to what is predicted, and note where that changes nothing."""
-    arm, before = one(fleet, e), fleet.before[e]
-    look(arm.state.x, before)
-    settle(environment.simulation, environment.noise, arm.state, arm.command)
-    note_still(limits, arm.state.x, before, arm.switched, fleet.still[e])
-    fleet.taken[e] += 1
+def advance_alive(environment, fleet, alive):  # type: ignore[no-untyped-def]
+    """Let a control period pass in the arms that are ``alive`` (n,), under their commands."""
+    simulation = environment.simulation
+    for e in range(alive.shape[0]):
+        if alive[e]:
+            put_command(simulation, fleet.x[:, e], fleet.command[e])
+    predict_all(simulation, fleet.x, fleet)
+    for e in range(alive.shape[0]):
+        if alive[e]:
+            settle(simulation, environment.noise, one(fleet, e).state, fleet.command[e])
 
 
 @part
-def look(x, before):  # type: ignore[no-untyped-def]
+def look(layout, x, before):  # type: ignore[no-untyped-def]
     """Set ``before`` (joints, 3) to the angle and the pressures in the state ``x`` (inputs,)."""
     for joint in range(before.shape[0]):
-        before[joint, 0] = x[4 * joint]
-        before[joint, 1] = x[4 * joint + 2]
-        before[joint, 2] = x[4 * joint + 3]
+        before[joint, 0] = x[angle_at(layout, 0, joint)]
+        before[joint, 1] = x[pressure_at(layout, 0, joint, 0)]
+        before[joint, 2] = x[pressure_at(layout, 0, joint, 1)]
 
 
 @part
@@ -233,7 +231,8 @@ def note_still(limits, x, before, switched, still):  # type: ignore[no-untyped-d
     for joint in range(still.shape[0]):
         count = still[joint] + 1 if switched[joint] == 0 else 1
         for quantity in range(3):
-            now = x[4 * joint + quantity + (1 if quantity > 0 else 0)]
+            skipped = 1 if quantity > 0 else 0  # the velocity
+            now = x[reading_at(limits.layout, 0, joint, quantity + skipped)]
             if abs(now - before[joint, quantity]) > limits.still[joint, quantity]:
                 count = 0
         still[joint] = count

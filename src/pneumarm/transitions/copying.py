@@ -9,7 +9,7 @@ import numpy as np
 
 from pneumarm.address import StoreAddress
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.transitions.database import PAGE, Line, pages
+from pneumarm.transitions.database import PAGE, Line
 from pneumarm.transitions.rows import values_of
 from pneumarm.transitions.store import SEQUENCE, Store
 
@@ -27,7 +27,7 @@ class CopyResult:
 
 
 @dataclass(frozen=True)
-class _Table:
+class _CopiedTable:
     """A table besides that of the rows: its columns, and what its lines are in order of."""
 
     name: str
@@ -37,10 +37,10 @@ class _Table:
 
 
 _TABLES = (
-    _Table("runs", ("number", "purpose", "metadata")),
-    _Table("sequences", SEQUENCE),
-    _Table("marks", ("sequence", "first", "last", "reason"), key="rowid"),
-    _Table("state", ("name", "value"), key="name", page=1),  # a state can be large
+    _CopiedTable("runs", ("number", "purpose", "metadata")),
+    _CopiedTable("sequences", SEQUENCE),
+    _CopiedTable("marks", ("sequence", "first", "last", "reason"), key="rowid"),
+    _CopiedTable("state", ("name", "value"), key="name", page=1),  # a state can be large
 )
 
 
@@ -85,10 +85,10 @@ def _fill(made: Store, original: Store) -> int:
     return count
 
 
-def _lines(store: Store, table: _Table) -> Iterator[Line]:
+def _lines(store: Store, table: _CopiedTable) -> Iterator[Line]:
     if table.name == "marks" and not store.keeps_marks:
         return iter(())
-    found = pages(store.database, table.name, table.columns, table.key, page=table.page)
+    found = store.database.pages(table.name, table.columns, table.key, page=table.page)
     return (tuple(line[1:]) for line in found)
 
 

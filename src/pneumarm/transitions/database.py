@@ -7,9 +7,9 @@ Queries are written once, in :mod:`pneumarm.transitions.store`, in SQL that all 
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import msgspec
 
@@ -35,6 +35,10 @@ Line = Sequence[Any]
 """A line of a table."""
 
 
+PAGE = 10_000
+"""Lines of a table that are held at once."""
+
+
 class Database(ABC):
     """The tables of one store, opened by one writer or for reading only."""
 
@@ -42,6 +46,13 @@ class Database(ABC):
     """Where it is; shown without a password."""
     writer: bool
     """Whether this is the one that may write."""
+    spec: ArmSpec
+    """The arm that the rows are of."""
+    valves: bool
+    """Whether the commands are valves -1, 0, +1 or pulses in between; imported ones may be continuous."""
+    begin_transaction = begin_snapshot = "BEGIN"
+    """Statements that begin a transaction which writes, and one that sees the moment of its first reading."""
+    _is_writing = False
 
     @classmethod
     @abstractmethod
@@ -51,7 +62,7 @@ class Database(ABC):
     @classmethod
     @abstractmethod
     def opened(cls, address: Any, *, writer: bool) -> Self:
-        """Return the database of the store at ``address``.
+        """Return the database of the store at ``address``, after checking that its tables are those of one.
 
         Raises:
             UnusableInput: there is none, it cannot be read, or another writer is at it.
@@ -60,27 +71,18 @@ class Database(ABC):
 
     @classmethod
     @abstractmethod
-    def created(cls, address: Any, spec: ArmSpec, valves: bool) -> Self:
-        """Make the database of an empty store and return it for writing.
+    def made_whole(cls, address: Any, spec: ArmSpec, valves: bool) -> AbstractContextManager[Self]:
+        """Give the database of an empty store to be filled; what fails on the way leaves nothing at ``address``.
 
         Raises:
             UnusableInput: there is something already, or nothing can be made there.
 
         """
 
-    @classmethod
-    @abstractmethod
-    def made_whole(cls, address: Any, spec: ArmSpec, valves: bool) -> AbstractContextManager[Self]:
-        """Give the database of an empty store to be filled; what fails on the way leaves nothing at ``address``."""
-
     @property
     @abstractmethod
     def version(self) -> int:
         """Version of the tables."""
-
-    @abstractmethod
-    def settings(self) -> tuple[ArmSpec, bool]:
-        """Return the arm and whether commands are valves, after checking that the tables are those of a store."""
 
     @abstractmethod
     def execute(self, query: str, values: Values | None = None) -> Iterator[Line]:
@@ -89,14 +91,6 @@ class Database(ABC):
     @abstractmethod
     def insert(self, table: str, columns: Sequence[str], lines: Sequence[Line]) -> None:
         """Add ``lines`` to a ``table``; None is NULL."""
-
-    @abstractmethod
-    def transaction(self) -> AbstractContextManager[None]:
-        """Write what is written within at once: durable when it ends well, nothing of it otherwise."""
-
-    @abstractmethod
-    def snapshot(self) -> AbstractContextManager[None]:
-        """Read what is read within as it was at one moment."""
 
     @abstractmethod
     def translated(self) -> AbstractContextManager[None]:
@@ -109,6 +103,113 @@ class Database(ABC):
     @abstractmethod
     def close(self) -> None:
         """Close it and let go of the writer's lock. May be called twice."""
+
+    @contextmanager
+    def opening(self) -> Iterator[None]:
+        """Close the database where what is done within fails."""
+        try:
+            with self.translated():
+                yield
+        except BaseException:
+            self.close()
+            raise
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """Write what is written within at once: durable when it ends well, nothing of it otherwise.
+
+        Within another one it is part of that.
+        """
+        if self._is_writing:
+            yield
+            return
+        self._is_writing = True
+        try:
+            with self._within(self.begin_transaction):
+                yield
+        finally:
+            self._is_writing = False
+
+    @contextmanager
+    def snapshot(self) -> Iterator[None]:
+        """Read what is read within as it was at one moment: that of the first reading."""
+        with self._within(self.begin_snapshot):
+            yield
+
+    @contextmanager
+    def _within(self, begin: str) -> Iterator[None]:
+        with self.translated():
+            self.execute(begin)
+            try:
+                yield
+                self.execute("COMMIT")
+            except BaseException:
+                with suppress(Exception):  # the first failure is the one to tell of
+                    self.execute("ROLLBACK")
+                raise
+
+    def query(self, query: str, values: Values | None = None) -> list[Line]:
+        """Return all lines of the answer to a query."""
+        with self.translated():
+            return list(self.execute(query, values))
+
+    def pages(
+        self,
+        table: str,
+        columns: Sequence[str],
+        key: str = "number",
+        where: str = "",
+        values: Values | None = None,
+        page: int = PAGE,
+    ) -> Iterator[Line]:
+        """Yield the lines of a ``table``, in order of its ``key``, which comes before their ``columns``.
+
+        They are asked for a ``page`` at a time, because servers send their answers whole. ``where`` is a condition
+        on them, with its ``values``.
+        """
+        known, conditions = dict(values or {}), [where] if where else []
+        found: list[Line] = [()] * page
+        while len(found) == page:
+            chosen = f" WHERE {' AND '.join(conditions)}" if conditions else ""
+            query = f'SELECT {", ".join([key, *columns])} FROM "{table}"{chosen} ORDER BY {key} LIMIT {page}'
+            found = self.query(query, known)
+            yield from found
+            if found:
+                known["after"], conditions = found[-1][0], [*filter(None, [where]), f"{key} > :after"]
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """Names of the further sensors whose readings it holds; in tables of an older version, none."""
+        return further_columns(self.spec, self.version)
+
+
+class TableSchema(NamedTuple):
+    """A table: its columns, with their types, and how its statement ends; in the words of SQLite."""
+
+    columns: Mapping[str, str]
+    end: str = ")"
+
+
+def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, TableSchema]:
+    """Return the tables of a store by name; servers translate the types."""
+    number, text, key = "INTEGER NOT NULL", "TEXT NOT NULL", {"number": "INTEGER PRIMARY KEY"}
+    named, of_sequence = {"name": "TEXT PRIMARY KEY"}, {"sequence": "INTEGER NOT NULL REFERENCES sequences"}
+    columns = row_columns(spec.joints, further_columns(spec, version))
+    values = {name: "REAL" if "_command_" in name else "REAL NOT NULL" for name in columns}
+    made = {
+        "store": TableSchema({**named, "value": text}, ") WITHOUT ROWID"),
+        "runs": TableSchema({**key, "purpose": text, "metadata": text}),
+        "sequences": TableSchema(
+            {**key, "run": "INTEGER REFERENCES runs", "kind": text}
+            | {"at_rest": number, "rows": number, "transitions": number, "info": text}
+        ),
+        "rows": TableSchema(
+            {**of_sequence, "step": number, **values}, ", PRIMARY KEY (sequence, step)) WITHOUT ROWID"
+        ),
+        "state": TableSchema({**named, "value": "BLOB NOT NULL"}, ") WITHOUT ROWID"),
+    }
+    marks = TableSchema({**of_sequence, "first": number, "last": number, "reason": text})
+    return made if version == 1 else made | {"marks": marks}
 
 
 def row_columns(joints: int, further: Sequence[str] = ()) -> list[str]:
@@ -139,12 +240,6 @@ def read_settings(kept: Mapping[str, str], address: Address) -> tuple[ArmSpec, b
     return spec, valves
 
 
-def check_joints(spec: ArmSpec, address: Address) -> None:
-    """Raise UnusableInput where a store has no room for so many joints."""
-    if spec.joints > MOST_JOINTS:
-        raise UnusableInput(f"{address}: a store has room for {MOST_JOINTS} joints, this arm has {spec.joints}")
-
-
 def check_version(version: int, address: Address) -> None:
     """Raise UnusableInput where tables of this ``version`` cannot be read."""
     if not 1 <= version <= VERSION:
@@ -162,33 +257,3 @@ def kept_json(text: Any, address: Address, what: str) -> dict[str, Any]:
 def damaged(address: Address, what: str) -> UnusableInput:
     """Return the error for a store that cannot be trusted."""
     return UnusableInput(f"{address}: the store is damaged ({what}); use a copy of it or collect again")
-
-
-PAGE = 10_000
-"""Lines of a table that are held at once."""
-
-
-def pages(
-    database: Database,
-    table: str,
-    columns: Sequence[str],
-    key: str = "number",
-    where: str = "",
-    values: Values | None = None,
-    page: int = PAGE,
-) -> Iterator[Line]:
-    """Yield the lines of a ``table``, in order of its ``key``, which comes before their ``columns``.
-
-    They are asked for a ``page`` at a time, because servers send their answers whole. ``where`` is a condition on
-    them, with its ``values``.
-    """
-    known, conditions = dict(values or {}), [where] if where else []
-    found: list[Line] = [()] * page
-    while len(found) == page:
-        chosen = f" WHERE {' AND '.join(conditions)}" if conditions else ""
-        query = f'SELECT {", ".join([key, *columns])} FROM "{table}"{chosen} ORDER BY {key} LIMIT {page}'
-        with database.translated():
-            found = list(database.execute(query, known))
-        yield from found
-        if found:
-            known["after"], conditions = found[-1][0], [*filter(None, [where]), f"{key} > :after"]

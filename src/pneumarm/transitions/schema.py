@@ -8,7 +8,7 @@ import os
 import sqlite3
 import struct
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Self
 
@@ -22,12 +22,10 @@ from pneumarm.transitions.database import (
     Line,
     Values,
     as_settings,
-    check_joints,
     check_version,
     damaged,
-    further_columns,
     read_settings,
-    row_columns,
+    tables,
 )
 from pneumarm.transitions.lock import WriterLock
 
@@ -40,15 +38,22 @@ _LONGEST_VALUE = 16 << 20  # bytes of a text or a blob: far over any state of an
 class SqliteFile(Database):
     """A store in a file."""
 
-    def __init__(self, path: Path, connection: sqlite3.Connection, lock: WriterLock | None) -> None:
+    begin_transaction = "BEGIN IMMEDIATE"
+
+    def __init__(self, path: Path, *, writer: bool) -> None:
+        """Open the file; the writer has the lock then, and makes tables of version 1 those of version 2."""
         self.address = self._path = path
-        self.connection = connection
-        self._lock = lock
-        self.writer = lock is not None
-        with self.translated():
-            if self.writer and self.version == 1:
-                self.settings()  # these are the tables that it says they are
-                connection.executescript(f"BEGIN IMMEDIATE; {_MARKS}; PRAGMA user_version = 2; COMMIT;")
+        self.writer = writer
+        self._held = ExitStack()
+        with self.opening():
+            if writer:
+                self._held.callback(WriterLock(path).release)
+            self.connection = connect(path, writer=writer)
+            self._held.callback(self.connection.close)
+            self.spec, self.valves = self._settings()
+            if writer and self.version == 1:
+                marks = _statements(self.spec, 2)["marks"]
+                self.connection.executescript(f"BEGIN IMMEDIATE; {marks}; PRAGMA user_version = 2; COMMIT;")
 
     @classmethod
     def is_there(cls, address: Path) -> bool:
@@ -58,23 +63,9 @@ class SqliteFile(Database):
     @classmethod
     def opened(cls, address: Path, *, writer: bool) -> Self:
         """Return the file of a store."""
-        if not writer:
-            return cls._opened(address, None)
-        if not address.parent.is_dir():
+        if writer and not address.parent.is_dir():
             raise UnusableInput(f"{address}: the folder {address.parent} does not exist")
-        return cls._opened(address, WriterLock(address))
-
-    @classmethod
-    def created(cls, address: Path, spec: ArmSpec, valves: bool) -> Self:
-        """Make the file of an empty store and return it for writing."""
-        lock = lock_vacant(address)
-        try:
-            with written_whole(address) as temporary:
-                create_tables(temporary, spec, valves)
-        except BaseException:
-            lock.release()
-            raise
-        return cls._opened(address, lock)
+        return cls(address, writer=writer)
 
     @classmethod
     @contextmanager
@@ -83,34 +74,18 @@ class SqliteFile(Database):
         lock = lock_vacant(address)
         try:
             with written_whole(address) as temporary:
-                made = cls.created(temporary, spec, valves)
-                try:
+                create_tables(temporary, spec, valves)
+                with closing(cls(temporary, writer=True)) as made:
                     yield made
-                finally:
-                    made.close()
         finally:
             lock.release()
 
-    @classmethod
-    def _opened(cls, path: Path, lock: WriterLock | None) -> Self:
-        try:
-            connection = connect(path, writer=lock is not None)
-            try:
-                return cls(path, connection, lock)
-            except BaseException:
-                connection.close()
-                raise
-        except BaseException:
-            if lock is not None:
-                lock.release()
-            raise
-
     @property
     def version(self) -> int:
-        """Version of the tables."""
-        return int(self.connection.execute("PRAGMA user_version").fetchone()[0])
+        """Version of the tables, which a writer may change at any time."""
+        return int(self.query("PRAGMA user_version")[0][0])
 
-    def settings(self) -> tuple[ArmSpec, bool]:
+    def _settings(self) -> tuple[ArmSpec, bool]:
         """Return the arm and whether commands are valves, after checking that the tables are ours to the letter.
 
         Nothing else may be in the file: a view or a trigger in place of a table could do anything.
@@ -118,7 +93,7 @@ class SqliteFile(Database):
         kept = dict(self.connection.execute("SELECT name, value FROM store LIMIT 10"))
         spec, valves = read_settings(kept, self._path)
         found = self.connection.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 100")
-        if dict(found) != tables(spec, self.version):
+        if dict(found) != _statements(spec, self.version):
             raise damaged(self._path, "its tables are not those of a store")
         return spec, valves
 
@@ -131,36 +106,9 @@ class SqliteFile(Database):
         places = ", ".join("?" * len(columns))
         self.connection.executemany(f'INSERT INTO "{table}" ({", ".join(columns)}) VALUES ({places})', lines)
 
-    @contextmanager
-    def transaction(self) -> Iterator[None]:
-        """Write what is written within at once: the log is synced at the end."""
-        with self._within("BEGIN IMMEDIATE"):
-            yield
-
-    @contextmanager
-    def snapshot(self) -> Iterator[None]:
-        """Read what is read within as it was at one moment: that of the first reading."""
-        with self._within("BEGIN"):
-            yield
-
-    @contextmanager
-    def _within(self, begin: str) -> Iterator[None]:
-        connection = self.connection
-        with self.translated():
-            connection.execute(begin)
-            try:
-                yield
-                connection.execute("COMMIT")
-            except BaseException:
-                if connection.in_transaction:
-                    connection.execute("ROLLBACK")
-                raise
-
-    @contextmanager
-    def translated(self) -> Iterator[None]:
+    def translated(self) -> AbstractContextManager[None]:
         """Turn SQLite's errors into ours."""
-        with translated(self._path):
-            yield
+        return translated(self._path)
 
     def check(self) -> None:
         """Raise UnusableInput where SQLite finds something wrong."""
@@ -170,9 +118,7 @@ class SqliteFile(Database):
 
     def close(self) -> None:
         """Close the file and let go of the lock."""
-        self.connection.close()
-        if self._lock is not None:
-            self._lock.release()
+        self._held.close()
 
 
 def lock_vacant(path: Path) -> WriterLock:
@@ -193,35 +139,16 @@ def lock_vacant(path: Path) -> WriterLock:
     return lock
 
 
-_MARKS = (
-    "CREATE TABLE marks (sequence INTEGER NOT NULL REFERENCES sequences, first INTEGER NOT NULL, "
-    "last INTEGER NOT NULL, reason TEXT NOT NULL)"
-)
-
-
-def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, str]:
-    """Return the statements that create the tables of a ``version``, by name."""
-    columns = row_columns(spec.joints, further_columns(spec, version))
-    values = "".join(f", {name} REAL{'' if '_command_' in name else ' NOT NULL'}" for name in columns)
-    made = {
-        "store": "CREATE TABLE store (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
-        "runs": "CREATE TABLE runs (number INTEGER PRIMARY KEY, purpose TEXT NOT NULL, metadata TEXT NOT NULL)",
-        "sequences": (
-            "CREATE TABLE sequences (number INTEGER PRIMARY KEY, run INTEGER REFERENCES runs, kind TEXT NOT NULL, "
-            "at_rest INTEGER NOT NULL, rows INTEGER NOT NULL, transitions INTEGER NOT NULL, info TEXT NOT NULL)"
-        ),
-        "rows": (
-            "CREATE TABLE rows (sequence INTEGER NOT NULL REFERENCES sequences, step INTEGER NOT NULL"
-            f"{values}, PRIMARY KEY (sequence, step)) WITHOUT ROWID"
-        ),
-        "state": "CREATE TABLE state (name TEXT PRIMARY KEY, value BLOB NOT NULL) WITHOUT ROWID",
+def _statements(spec: ArmSpec, version: int) -> dict[str, str]:
+    """Return the statements that create the tables of a ``version``, by name, to the letter as SQLite keeps them."""
+    return {
+        name: f"CREATE TABLE {name} ({', '.join(map(' '.join, table.columns.items()))}{table.end}"
+        for name, table in tables(spec, version).items()
     }
-    return made if version == 1 else made | {"marks": _MARKS}
 
 
 def create_tables(path: Path, spec: ArmSpec, valves: bool) -> None:
     """Make an empty store of the file ``path``, which does not exist yet."""
-    check_joints(spec, path)
     connection = sqlite3.connect(path, isolation_level=None)
     try:
         with translated(path):
@@ -229,7 +156,7 @@ def create_tables(path: Path, spec: ArmSpec, valves: bool) -> None:
             connection.execute(f"PRAGMA application_id = {APPLICATION}")
             version = VERSION if spec.further else 2
             connection.execute(f"PRAGMA user_version = {version}")
-            for statement in tables(spec, version).values():
+            for statement in _statements(spec, version).values():
                 connection.execute(statement)
             connection.executemany("INSERT INTO store VALUES (?, ?)", as_settings(spec, valves).items())
     finally:

@@ -1,7 +1,7 @@
 """A store in a database on a server: PostgreSQL, or MySQL and MariaDB with InnoDB; through SQLAlchemy.
 
-The tables are those of a file (:mod:`pneumarm.transitions.schema`), in a database, or a schema of PostgreSQL, of
-their own. Where we differ from a file:
+The tables are those of a file (:func:`pneumarm.transitions.database.tables`), in a database, or a schema of
+PostgreSQL, of their own. Where we differ from a file:
 
 1. The one writer holds a lock of the server's, by the session that it writes in. The server lets go of it when that
    session ends, however it does; then nothing can be written in it any more.
@@ -14,30 +14,29 @@ their own. Where we differ from a file:
 import os
 import socket
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from time import monotonic, sleep
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import sqlalchemy
-from sqlalchemy import BigInteger, Column, Double, LargeBinary, MetaData, String, Table, Text
-from sqlalchemy.dialects.mysql import LONGBLOB, LONGTEXT
 from sqlalchemy.exc import DBAPIError
 
 from pneumarm.address import ServerAddress
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
+from pneumarm.extras import extra
 from pneumarm.transitions.database import (
     EXPECTED,
     VERSION,
     Database,
     Line,
+    TableSchema,
     Values,
     as_settings,
-    check_joints,
     check_version,
     damaged,
     read_settings,
-    row_columns,
+    tables,
 )
 
 _PATIENCE = 1.0  # s for which a lock is waited for: the server may not have noticed yet that its holder is dead
@@ -66,6 +65,12 @@ class System(NamedTuple):
     """The database or schema that the session is in."""
     engine: str
     """What keeps a table ``t`` of the catalogue; 'InnoDB' is safe."""
+    types: Mapping[str, str]
+    """Types of columns, by what SQLite calls them."""
+    counted: str
+    """Type of a key that the server counts by itself."""
+    options: str
+    """End of the statements that create tables."""
 
 
 _POSTGRESQL = System(
@@ -92,6 +97,9 @@ _POSTGRESQL = System(
     snapshot="BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY",
     here="current_schema()",
     engine="'InnoDB'",
+    types={"INTEGER": "BIGINT", "REAL": "DOUBLE PRECISION", "TEXT": "TEXT", "BLOB": "BYTEA"},
+    counted="BIGSERIAL PRIMARY KEY",
+    options="",
 )
 _MYSQL = System(
     driver="mysql+pymysql",
@@ -117,6 +125,10 @@ _MYSQL = System(
     snapshot="START TRANSACTION WITH CONSISTENT SNAPSHOT, READ ONLY",
     here="DATABASE()",
     engine="t.engine",
+    types={"INTEGER": "BIGINT", "REAL": "DOUBLE", "TEXT": "LONGTEXT", "BLOB": "LONGBLOB"},
+    counted="BIGINT PRIMARY KEY AUTO_INCREMENT",
+    # By default it takes "Velocity" and "velocity" for the same kind of sequence.
+    options=" ENGINE = InnoDB CHARACTER SET utf8mb4 COLLATE utf8mb4_bin",
 )
 _SYSTEMS = {"postgresql": _POSTGRESQL, "mysql": _MYSQL}
 
@@ -130,22 +142,19 @@ class Server(Database):
         """Connect; the writer has the lock then."""
         self.address = self._address = address
         self.writer = writer
-        self._system = _SYSTEMS[address.system]
-        self._writing = False
+        self._system = system = _SYSTEMS[address.system]
+        self.begin_snapshot = system.snapshot
+        extra(system.driver.partition("+")[2], "server", f"{address}: a store on a server")
         try:
-            self._connection = _engine(address, self._system).connect()
+            self._connection = _engine(address, system).connect()
         except (DBAPIError, TypeError, ValueError, RuntimeError) as error:  # drivers do not check all settings well
             raise UnusableInput(
                 f"{address}: cannot be opened ({_reason(error)}); expected a server that runs there, and a user, a "
                 "password and a database that it knows"
             ) from error
-        try:
-            with self.translated():
-                self._begin_session()
-                self._tables = self._catalogue()
-        except BaseException:
-            self.close()
-            raise
+        with self.opening():
+            self._begin_session()
+            self._tables = self._catalogue()
 
     def _begin_session(self) -> None:
         for statement in self._system.session + (self._system.writing if self.writer else ()):
@@ -182,63 +191,48 @@ class Server(Database):
     @classmethod
     def is_there(cls, address: ServerAddress) -> bool:
         """Return whether there is a store in the database, also an empty one."""
-        database = cls(address, writer=False)
-        try:
-            with database.translated():
-                return bool(database._kept())
-        finally:
-            database.close()
+        with closing(cls(address, writer=False)) as database, database.translated():
+            return bool(database._kept())
 
     @classmethod
     def opened(cls, address: ServerAddress, *, writer: bool) -> Self:
         """Return the database of a store."""
         database = cls(address, writer=writer)
-        try:
-            with database.translated():
-                database._require_store()
-                if writer:
-                    with database.transaction():
-                        database.execute("DELETE FROM store WHERE name = :name", {"name": _WRITER})
-                        database.insert("store", ("name", "value"), [(_WRITER, _this_process())])
-        except BaseException:
-            database.close()
-            raise
-        return database
-
-    @classmethod
-    def created(cls, address: ServerAddress, spec: ArmSpec, valves: bool) -> Self:
-        """Make the tables of an empty store in an empty database and return it for writing."""
-        check_joints(spec, address)
-        database = cls(address, writer=True)
-        try:
-            with database.translated():
-                database._require_vacant()
-                tables = _tables(spec)
-                tables.drop_all(database._connection)
-                tables.create_all(database._connection)
-                database._tables = database._catalogue()
-                settings = {**as_settings(spec, valves), "version": str(VERSION), _WRITER: _this_process()}
-                with database.transaction():  # it is a store once it has these
-                    database.insert("store", ("name", "value"), list(settings.items()))
-        except BaseException:
-            database.close()
-            raise
+        with database.opening():
+            database._require_store()
+            database.spec, database.valves = database._settings()
+            if writer:
+                with database.transaction():
+                    database.execute("DELETE FROM store WHERE name = :name", {"name": _WRITER})
+                    database.insert("store", ("name", "value"), [(_WRITER, _this_process())])
         return database
 
     @classmethod
     @contextmanager
     def made_whole(cls, address: ServerAddress, spec: ArmSpec, valves: bool) -> Iterator[Self]:
-        """Give the database of an empty store to be filled, in one transaction; without it the tables go again."""
-        database = cls.created(address, spec, valves)
-        try:
-            with database.transaction():
-                yield database
-        except BaseException:
-            with suppress(Exception):  # what is left is empty then, and the next one clears it away
-                _tables(spec).drop_all(database._usable())
-            raise
-        finally:
-            database.close()
+        """Give an empty store to be filled, in one transaction; where that fails the tables go again."""
+        with closing(cls(address, writer=True)) as database:
+            with database.translated():
+                database._require_vacant()
+                database._drop()
+                for name, table in _tables(spec).items():
+                    database.execute(_statement(name, table, database._system))
+                database._tables = database._catalogue()
+                settings = {**as_settings(spec, valves), "version": str(VERSION), _WRITER: _this_process()}
+                with database.transaction():  # it is a store once it has these
+                    database.insert("store", ("name", "value"), list(settings.items()))
+                database.spec, database.valves = database._settings()
+            try:
+                with database.transaction():
+                    yield database
+            except BaseException:
+                with suppress(Exception):  # what is left is empty then, and the next one clears it away
+                    database._drop()
+                raise
+
+    def _drop(self) -> None:
+        for name in _tables(ArmSpec()):
+            self.execute(f'DROP TABLE IF EXISTS "{name}"')
 
     # ---- what is in the database
 
@@ -258,7 +252,7 @@ class Server(Database):
 
     def _known(self) -> set[str]:
         """Return the names of those that are tables of a store, of an arm of one joint or of more."""
-        ours = {name: table.columns.keys() for name, table in _tables(ArmSpec()).tables.items()}
+        ours = {name: list(table.columns) for name, table in _tables(ArmSpec()).items()}
         found = {name: self._tables.get(name, []) for name in ours}
         found["rows"] = found["rows"][: len(ours["rows"])]
         return {name for name, columns in ours.items() if found[name] == columns}
@@ -271,7 +265,7 @@ class Server(Database):
 
     def _require_store(self) -> None:
         """Raise UnusableInput unless the tables of a store are there."""
-        if len(self._known()) < len(_tables(ArmSpec()).tables) or "version" not in self._kept():
+        if len(self._known()) < len(_tables(ArmSpec())) or "version" not in self._kept():
             holds = f"holds other tables ({_some(set(self._tables))})" if self._tables else "is empty"
             raise UnusableInput(f"{self.address}: {EXPECTED}, this database {holds}")
 
@@ -292,13 +286,13 @@ class Server(Database):
         if any(list(self.execute(f'SELECT 1 FROM "{name}" LIMIT 1')) for name in known - {"store"}):
             raise UnusableInput(f"{self.address}: exists already; remove its tables or give another database")
 
-    def settings(self) -> tuple[ArmSpec, bool]:
+    def _settings(self) -> tuple[ArmSpec, bool]:
         """Return the arm and whether commands are valves, after checking that the tables are those of a store."""
         kept = self._kept()
         version = kept.get("version", "")
         check_version(int(version) if version.isdigit() else 0, self.address)
         spec, valves = read_settings(kept, self.address)
-        if any(self._tables.get(name) != table.columns.keys() for name, table in _tables(spec).tables.items()):
+        if any(self._tables.get(name) != list(table.columns) for name, table in _tables(spec).items()):
             raise damaged(self.address, "its tables are not those of a store")
         return spec, valves
 
@@ -320,37 +314,6 @@ class Server(Database):
         places = ", ".join(["%s"] * len(columns))
         statement = f'INSERT INTO "{table}" ({", ".join(columns)}) VALUES ({places})'
         self._usable().exec_driver_sql(statement, [tuple(line) for line in lines])
-
-    @contextmanager
-    def transaction(self) -> Iterator[None]:
-        """Write what is written within at once; within another transaction, with all of that."""
-        if self._writing:
-            yield
-            return
-        self._writing = True
-        try:
-            with self._within("BEGIN"):
-                yield
-        finally:
-            self._writing = False
-
-    @contextmanager
-    def snapshot(self) -> Iterator[None]:
-        """Read what is read within as it was at one moment: that of the first reading."""
-        with self._within(self._system.snapshot):
-            yield
-
-    @contextmanager
-    def _within(self, begin: str) -> Iterator[None]:
-        with self.translated():
-            self.execute(begin)
-            try:
-                yield
-                self.execute("COMMIT")
-            except BaseException:
-                with suppress(PneumarmError, DBAPIError):  # the first failure is the one to tell of
-                    self.execute("ROLLBACK")
-                raise
 
     @contextmanager
     def translated(self) -> Iterator[None]:
@@ -385,49 +348,25 @@ def _engine(address: ServerAddress, system: System) -> sqlalchemy.Engine:
     )
 
 
-def _tables(spec: ArmSpec) -> MetaData:
-    """Return the tables of a store of version 3, those with the most columns last."""
-    tables = MetaData()
-    text, blob = Text().with_variant(LONGTEXT(), "mysql"), LargeBinary().with_variant(LONGBLOB(), "mysql")
+def _tables(spec: ArmSpec) -> dict[str, TableSchema]:
+    """Return the tables of a store; lines of marks are counted, which SQLite does by itself."""
+    found = tables(spec)
+    return found | {"marks": TableSchema({"rowid": "", **found["marks"].columns})}
 
-    def table(name: str, *columns: Column[Any]) -> None:
-        # By default MySQL takes "Velocity" and "velocity" for the same kind of sequence.
-        Table(
-            name,
-            tables,
-            *columns,
-            mysql_engine="InnoDB",
-            mysql_charset="utf8mb4",
-            mysql_collate="utf8mb4_bin",
-        )
 
-    def number(name: str, *, key: bool = False, null: bool = False) -> Column[Any]:
-        return Column(name, BigInteger, primary_key=key, autoincrement=False, nullable=null)
+def _statement(name: str, table: TableSchema, system: System) -> str:
+    """Return the statement that creates a ``table``."""
+    columns = [f'"{column}" {_type(words, system)}' for column, words in table.columns.items()]
+    return f'CREATE TABLE "{name}" ({", ".join(columns)}{table.end.removesuffix(" WITHOUT ROWID")}{system.options}'
 
-    def words(name: str) -> Column[Any]:
-        return Column(name, text, nullable=False)
 
-    def called() -> Column[Any]:
-        return Column("name", String(100), primary_key=True)
-
-    table("store", called(), words("value"))
-    table("runs", number("number", key=True), words("purpose"), words("metadata"))
-    table(
-        "sequences",
-        number("number", key=True),
-        number("run", null=True),
-        words("kind"),
-        number("at_rest"),
-        number("rows"),
-        number("transitions"),
-        words("info"),
-    )
-    table("state", called(), Column("value", blob, nullable=False))
-    order = Column("rowid", BigInteger, primary_key=True, autoincrement=True)  # which SQLite has by itself
-    table("marks", order, number("sequence"), number("first"), number("last"), words("reason"))
-    values = [Column(name, Double, nullable="_command_" in name) for name in row_columns(spec.joints, spec.further)]
-    table("rows", number("sequence", key=True), number("step", key=True), *values)
-    return tables
+def _type(words: str, system: System) -> str:
+    """Return what a ``system`` calls the type of a column; it checks no references, which only we make."""
+    if not words:
+        return system.counted
+    kind, _, rest = words.partition(" REFERENCES ")[0].partition(" ")
+    # A text of any length cannot be a key.
+    return f"{'VARCHAR(100)' if (kind, rest) == ('TEXT', 'PRIMARY KEY') else system.types[kind]} {rest}"
 
 
 def _this_process() -> str:

@@ -25,15 +25,14 @@ from pneumarm.address import Address, ServerAddress, StoreAddress, address_of
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.extras import extra
-from pneumarm.transitions.blocks import STEPS, Blocks, Predicate
+from pneumarm.transitions.blocks import STEPS, Blocks, Predicate, stored_marks
 from pneumarm.transitions.choice import hashed_uniform
 from pneumarm.transitions.database import (
     LONGEST_SEQUENCE,
+    MOST_JOINTS,
     Database,
     damaged,
-    further_columns,
     kept_json,
-    pages,
     row_columns,
 )
 from pneumarm.transitions.doubtful import with_doubtful_marked
@@ -89,20 +88,14 @@ class Store:
         self.database = database
         self._run: int | None = None
         self._part: _Part | None = None
-        self._is_writing = False
-        self.spec: ArmSpec
+        self.spec = database.spec
         """The arm that the rows are of."""
-        self.valves: bool
+        self.valves = database.valves
         """Whether the commands are valves -1, 0, +1 or pulses in between; imported ones may be continuous."""
-        try:
-            with database.translated():
-                self.spec, self.valves = database.settings()
-                self.further: tuple[str, ...] = further_columns(self.spec, database.version)
-                """Names of the further sensors whose readings it holds; in a store of an older version, none."""
-                self._check_sequences()
-        except BaseException:
-            database.close()
-            raise
+        with database.opening():
+            self.further = database.further
+            """Names of the further sensors whose readings it holds; in a store of an older version, none."""
+            self._check_sequences()
 
     @classmethod
     def create(cls, address: StoreAddress, spec: ArmSpec, valves: bool = True) -> "Store":
@@ -113,8 +106,9 @@ class Store:
                 there.
 
         """
-        place = address_of(address)
-        return cls(_kind(place).created(place, spec, valves))
+        with cls.made_whole(address, spec, valves):
+            pass
+        return cls.append_to(address)
 
     @classmethod
     @contextmanager
@@ -126,6 +120,8 @@ class Store:
 
         """
         place = address_of(address)
+        if spec.joints > MOST_JOINTS:
+            raise UnusableInput(f"{place}: a store has room for {MOST_JOINTS} joints, this arm has {spec.joints}")
         with _kind(place).made_whole(place, spec, valves) as database:
             yield cls(database)
 
@@ -207,7 +203,7 @@ class Store:
         total = self.transitions
         if self._part is not None or total <= most:
             return self
-        pairs = chain.from_iterable(pages(self.database, "sequences", ("transitions",)))
+        pairs = chain.from_iterable(self.database.pages("sequences", ("transitions",)))
         number, transitions = np.fromiter(pairs, np.int64).reshape(-1, 2).T
         order = np.argsort(hashed_uniform(_DRAWN, number))
         order = order[np.cumsum(transitions[order]) <= most]
@@ -230,8 +226,8 @@ class Store:
     def catalogue(self, run: int | None = None) -> Iterator[SequenceEntry]:
         """Yield what is known of every sequence, or of those of a run."""
         where = "" if run is None else "run = :run"
-        for number, of_run, kind, at_rest, rows, transitions, info in pages(
-            self.database, "sequences", SEQUENCE[1:], where=where, values={"run": run} if where else {}
+        for number, of_run, kind, at_rest, rows, transitions, info in self.database.pages(
+            "sequences", SEQUENCE[1:], where=where, values={"run": run} if where else {}
         ):
             if self._part is not None and number not in self._part.sequences:
                 continue
@@ -241,8 +237,7 @@ class Store:
     @property
     def keeps_marks(self) -> bool:
         """Whether it can hold marks; a store of version 1 that is opened for reading cannot."""
-        with self.database.translated():
-            return self.database.version > 1
+        return self.database.version > 1
 
     def snapshot(self) -> AbstractContextManager[None]:
         """Have all that is read within be as it was at one moment, whatever is written meanwhile."""
@@ -250,7 +245,7 @@ class Store:
 
     def runs(self) -> dict[int, dict[str, Any]]:
         """Return for each run its purpose, settings, arm, version of pneumarm and time of its beginning."""
-        found = pages(self.database, "runs", ("purpose", "metadata"))
+        found = self.database.pages("runs", ("purpose", "metadata"))
         return {
             number: {"purpose": purpose, **kept_json(metadata, self.address, f"what run {number} is")}
             for number, purpose, metadata in found
@@ -258,8 +253,7 @@ class Store:
 
     def state(self, name: str = "arm") -> bytes | None:
         """Return the state last kept under ``name``, or None."""
-        with self.database.translated():
-            found = list(self.database.execute("SELECT value FROM state WHERE name = :name", {"name": name}))
+        found = self.database.query("SELECT value FROM state WHERE name = :name", {"name": name})
         return bytes(found[0][0]) if found else None
 
     def __iter__(self) -> Iterator[Rows]:
@@ -279,58 +273,36 @@ class Store:
         that no transition spans, unless ``marked`` asks for them. The result can be iterated over again and again.
         """
         if (part := self._part) is None:
-            return Blocks(self, rows, sequences, kinds, marked)
+            return Blocks(self.database, rows, sequences, kinds, marked)
         drawn = np.array(sorted(part.sequences), np.int64)
 
         def among_drawn(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
             wanted: NDArray[np.bool_] = np.isin(numbers, drawn)
             return wanted if sequences is None else wanted & sequences(numbers)
 
-        return Blocks(self, rows, among_drawn, kinds, marked)
+        return Blocks(self.database, rows, among_drawn, kinds, marked)
 
     def marks(self, number: int | None = None) -> dict[int, list[Mark]]:
         """Return the marks of every sequence that has some, or of sequence ``number``, in the order of marking."""
         found: dict[int, list[Mark]] = {}
-        for sequence, mark in self._marks(*(_ALL if number is None else (number, number))):
+        for sequence, mark in stored_marks(self.database, *(_ALL if number is None else (number, number))):
             found.setdefault(sequence, []).append(mark)
         return found
 
     def marked_rows(self, run: int | None = None) -> dict[str, int]:
         """Return how many rows of ``run``, or of all, are marked, by reason; one marked twice counts for both."""
-        database = self.database
         if not self.keeps_marks:
             return {}
         of_run = "" if run is None else "AND sequences.run = :run "
-        with database.translated():
-            found = list(
-                database.execute(
-                    f'SELECT marks.reason, count(DISTINCT "rows".sequence * {STEPS} + "rows".step) FROM marks '
-                    f"JOIN sequences ON sequences.number = marks.sequence {of_run}"
-                    'JOIN "rows" ON "rows".sequence = marks.sequence '
-                    'AND "rows".step BETWEEN marks.first AND marks.last '
-                    "GROUP BY marks.reason ORDER BY min(marks.rowid)",
-                    {} if run is None else {"run": run},
-                )
-            )
+        found = self.database.query(
+            f'SELECT marks.reason, count(DISTINCT "rows".sequence * {STEPS} + "rows".step) FROM marks '
+            f"JOIN sequences ON sequences.number = marks.sequence {of_run}"
+            'JOIN "rows" ON "rows".sequence = marks.sequence '
+            'AND "rows".step BETWEEN marks.first AND marks.last '
+            "GROUP BY marks.reason ORDER BY min(marks.rowid)",
+            {} if run is None else {"run": run},
+        )
         return {str(reason): int(rows) for reason, rows in found}
-
-    def _marks(self, first: int, last: int) -> list[tuple[int, Mark]]:
-        """Return the marks of the sequences from ``first`` to ``last``, in the order of marking."""
-        database = self.database
-        if not self.keeps_marks:
-            return []
-        with database.translated():
-            found = list(
-                database.execute(
-                    "SELECT sequence, first, last, reason FROM marks WHERE sequence BETWEEN :first AND :last "
-                    "GROUP BY sequence, first, last, reason ORDER BY sequence, min(rowid)",
-                    {"first": first, "last": last},
-                )
-            )
-        try:
-            return [(int(sequence), Mark(begin, end, reason)) for sequence, begin, end, reason in found]
-        except (UnusableInput, TypeError, ValueError) as error:
-            raise damaged(self.address, f"an impossible mark: {error}") from error
 
     def percentiles(
         self,
@@ -477,16 +449,13 @@ class Store:
 
         Sequences before the arm's clock last began anew have times of another clock, and are left as they are.
         """
-        database = self.database
-        with database.translated():
-            numbers = list(
-                database.execute("SELECT number FROM sequences WHERE run = :run ORDER BY number DESC", {"run": run})
-            )
+        numbers = self.database.query(
+            "SELECT number FROM sequences WHERE run = :run ORDER BY number DESC", {"run": run}
+        )
         after = math.inf  # when the next sequence began
         query = 'SELECT step, time FROM "rows" WHERE sequence = :number ORDER BY step'
         for (number,) in numbers:
-            with database.translated():
-                rows = list(database.execute(query, {"number": number}))
+            rows = self.database.query(query, {"number": number})
             steps = [step for step, read in rows if read >= time]
             if not steps or rows[-1][1] > after:
                 return
@@ -526,15 +495,8 @@ class Store:
         """
         if not self.database.writer:
             raise PneumarmError(f"{self.address}: was opened for reading; open it with Store.append_to to write")
-        if self._is_writing:
+        with self.database.transaction():
             yield self.database
-            return
-        self._is_writing = True
-        try:
-            with self.database.transaction():
-                yield self.database
-        finally:
-            self._is_writing = False
 
     # ---- checks
 
@@ -566,17 +528,14 @@ class Store:
             raise damaged(self.address, "its sequences are not numbered from 1 or are of impossible lengths")
 
     def _one(self, query: str) -> Any:
-        with self.database.translated():
-            return next(self.database.execute(query))[0]
+        return self.database.query(query)[0][0]
 
 
 def _kind(address: Address) -> type[Database]:
     """Return what keeps the store at ``address``."""
     if not isinstance(address, ServerAddress):
         return SqliteFile
-    drivers = {"postgresql": "psycopg", "mysql": "pymysql"}
-    for library in ("sqlalchemy", drivers[address.system]):
-        extra(library, "server", f"{address}: a store on a server")
+    extra("sqlalchemy", "server", f"{address}: a store on a server")
     from pneumarm.transitions.server import Server
 
     return Server

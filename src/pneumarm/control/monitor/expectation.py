@@ -11,11 +11,11 @@ from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
     SimulationParameters,
     SimulationState,
-    places,
     predict_change,
     simulation_parameters,
     simulation_state,
 )
+from pneumarm.simulation.layout import command_at, further_at, reading_at, velocity_at
 from pneumarm.simulation.simulation import Simulation
 
 _LEAST_STD = 0.5  # counts; below this the converter's rounding is all there is
@@ -36,8 +36,6 @@ class Predictor(NamedTuple):
     """Shape (2 joints,)."""
     std: NDArray[np.float64]
     """Standard deviation of the error on held-out sequences, shape (joints, 4) [sensor units]."""
-    first_command: int
-    """Place of the command among the inputs."""
     lowest: NDArray[np.float64]
     """Lowest pressures of the muscles, shape (2 joints,) [counts]."""
     highest: float
@@ -68,7 +66,6 @@ def predictor(simulation: Simulation) -> Predictor:
         scale=np.ascontiguousarray(window.of_joints(scaling.observation_scale)),
         command_scale=scaling.command_scale,
         std=_usual_errors(simulation),
-        first_command=places(simulation.window).command,
         lowest=np.minimum(simulation.pressure_range[..., 0].ravel(), _LOW * simulation.spec.max_pressure_counts),
         highest=simulation.spec.max_pressure_counts,
         period=simulation.spec.period,
@@ -91,13 +88,13 @@ def _usual_errors(simulation: Simulation) -> NDArray[np.float64]:
 @part
 def expect_further(predictor, lag):  # type: ignore[no-untyped-def]
     """Put what further sensors said ``lag`` readings ago where the networks read it."""
-    first, joints, velocities = predictor.simulation.observed * lag, predictor.simulation.joints, predictor.velocities
+    layout, velocities = predictor.simulation.layout, predictor.velocities
     for j in range(velocities):
         scaled = (predictor.measured[lag, j] - predictor.offset[j, 1]) / predictor.scale[j, 1]
-        predictor.state.x[first + 4 * j + 1] = np.float32(scaled)
+        predictor.state.x[velocity_at(layout, lag, j)] = np.float32(scaled)
     for i in range(predictor.further_scale.shape[0]):
         scaled = (predictor.measured[lag, velocities + i] - predictor.further_offset[i]) / predictor.further_scale[i]
-        predictor.state.x[first + 4 * joints + i] = np.float32(scaled)
+        predictor.state.x[further_at(layout, lag, i)] = np.float32(scaled)
 
 
 @part
@@ -107,12 +104,12 @@ def expect_by_simulation(predictor, readings, memory):  # type: ignore[no-untype
     What comes in and what goes out while both valves of a muscle are open is added: no simulation has seen that, so
     a part of what comes in is doubt.
     """
-    simulation, x = predictor.simulation, predictor.state.x
-    for lag in range(simulation.history):
-        for j in range(simulation.joints):
+    layout, x = predictor.simulation.layout, predictor.state.x
+    for lag in range(layout.history):
+        for j in range(layout.joints):
             for q in range(4):
                 scaled = (memory.observed[lag, j, q] - predictor.offset[j, q]) / predictor.scale[j, q]
-                x[simulation.observed * lag + 4 * j + q] = np.float32(scaled)
+                x[reading_at(layout, lag, j, q)] = np.float32(scaled)
         expect_further(predictor, lag)
     for h in range(memory.expected.shape[0]):
         expected, doubt = memory.expected[h], memory.doubt[h]
@@ -144,18 +141,15 @@ def expect_under(predictor, readings, memory, h, both):  # type: ignore[no-untyp
     Returned is whether both valves of a muscle were open at once.
     """
     simulation, state = predictor.simulation, predictor.state
-    x, history, muscles, both_open = state.x, simulation.history, 2 * simulation.joints, False
-    for m in range(muscles):
+    x, layout, both_open = state.x, simulation.layout, False
+    for m in range(layout.commanded):
         lowest = predictor.lowest[m]
         level = (memory.observed[0, m // 2, 2 + m % 2] - lowest) / (predictor.highest - lowest)
         source = readings.source[h, m]
-        for lag in range(history):
+        for lag in range(layout.history):
             told = memory.command[lag, source]
-            place = predictor.first_command + m
-            if lag > 0:
-                place = simulation.observed * history + muscles * (lag - 1) + m
             done = carried_out(readings, h, m, told, level, both)
-            x[place] = np.float32(done / predictor.command_scale[m])
+            x[command_at(layout, lag) + m] = np.float32(done / predictor.command_scale[m])
             both_open = both_open or at_once(readings, h, m, told)
     predict_change(simulation, state)
     for o in range(simulation.place.shape[0] - predictor.further_scale.shape[0]):

@@ -16,7 +16,7 @@ from pneumarm.learning.hierarchy.settings import HierarchySettings
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.values import network_shapes, pack
 from pneumarm.random import random_state
-from pneumarm.simulation.kernel import places
+from pneumarm.simulation.layout import layout_of
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment, episode
@@ -96,8 +96,8 @@ class HierarchicalActor:
         window = agent.window
         self._levels = hierarchy((agent.upper, agent.lower), agent.spec, window, agent.scaling, agent.settings, 0.0)
         self._memory, self._random, self._size = level_memory(self._levels), random_state(0), window.state_size
-        self._x = np.zeros(places(window).size, np.float32)
-        self._x[places(window).one] = 1
+        self._x = np.zeros(layout_of(window).size, np.float32)
+        self._x[layout_of(window).one] = 1
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""

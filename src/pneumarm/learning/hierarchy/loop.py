@@ -29,7 +29,8 @@ from pneumarm.kernels import kernel, part
 from pneumarm.learning.hierarchy.settings import HierarchySettings
 from pneumarm.learning.online.loop import Workspace, decide, learn, look_ahead, loop_workspace, remember
 from pneumarm.learning.online.values import ActionValues, forget_traces, learner, td_target, update
-from pneumarm.simulation.kernel import INPUT_BLOCK, UNIT_BLOCK, padded, places
+from pneumarm.simulation.kernel import UNIT_BLOCK
+from pneumarm.simulation.layout import INPUT_BLOCK, Layout, angle_at, layout_of, padded, velocity_at
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.task.environment import begin_episode, take
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
@@ -53,8 +54,8 @@ class Hierarchy(NamedTuple):
     """Reward of the task."""
     unit: NDArray[np.float64]
     """Offset and scale of angle and velocity, shape (joints, 4): angle, angle, velocity, velocity."""
-    goal_place: int
-    """Place of the goals in the state vector."""
+    layout: Layout
+    """Of the state vector."""
     is_whole: bool
     """Whether the upper agent sees all of it."""
 
@@ -76,7 +77,7 @@ class LevelMemory(NamedTuple):
 
 def upper_inputs(window: Window, settings: HierarchySettings) -> int:
     """Return the length of what the upper agent sees."""
-    return places(window).size if settings.upper_state == "whole" else padded(2 * window.joints + 1, INPUT_BLOCK)
+    return layout_of(window).size if settings.upper_state == "whole" else padded(2 * window.joints + 1, INPUT_BLOCK)
 
 
 def upper_shape(window: Window, settings: HierarchySettings) -> tuple[int, int, int]:
@@ -105,7 +106,7 @@ def hierarchy(
         period=int(settings.period),
         reward=settings.reward.on(spec).parameters,
         unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
-        goal_place=places(window).goal,
+        layout=layout_of(window),
         is_whole=settings.upper_state == "whole",
     )
 
@@ -130,11 +131,11 @@ def see(levels, memory, x):  # type: ignore[no-untyped-def]
     if levels.is_whole:
         for i in range(x.shape[0]):
             memory.seen[i] = x[i]
-    first = levels.goal_place if levels.is_whole else joints
+    first = levels.layout.goal if levels.is_whole else joints
     for joint in range(joints):
         memory.seen[first + joint] = np.float32((memory.goal[joint] - levels.unit[joint, 0]) / levels.unit[joint, 1])
         if not levels.is_whole:
-            memory.seen[joint] = x[4 * joint]
+            memory.seen[joint] = x[angle_at(levels.layout, 0, joint)]
     if not levels.is_whole:
         memory.seen[2 * joints] = np.float32(1.0)
 
@@ -148,10 +149,10 @@ def set_subgoals(levels, schedule, memory, x, random):  # type: ignore[no-untype
     for joint in range(memory.goal.shape[0]):
         way = levels.ways[left % levels.ways.shape[0]]
         left //= levels.ways.shape[0]
-        here = levels.unit[joint, 0] + levels.unit[joint, 1] * x[4 * joint]
+        here = levels.unit[joint, 0] + levels.unit[joint, 1] * x[angle_at(levels.layout, 0, joint)]
         memory.aim[joint] = here + way * (memory.goal[joint] - here)
         scaled = (memory.aim[joint] - levels.unit[joint, 0]) / levels.unit[joint, 1]
-        x[levels.goal_place + joint] = np.float32(scaled)
+        x[levels.layout.goal + joint] = np.float32(scaled)
     for agent in range(memory.low.chosen.shape[0]):
         forget_traces(levels.lower, agent)
     look_ahead(levels.lower, schedule, x, memory.low, random)
@@ -172,8 +173,8 @@ def arrive(levels, memory, x):  # type: ignore[no-untyped-def]
     """Note which joints are at their subgoals in the state ``x`` (inputs,); return whether all are."""
     are_all = True
     for joint in range(memory.aim.shape[0]):
-        angle = levels.unit[joint, 0] + levels.unit[joint, 1] * x[4 * joint]
-        velocity = levels.unit[joint, 2] + levels.unit[joint, 3] * x[4 * joint + 1]
+        angle = levels.unit[joint, 0] + levels.unit[joint, 1] * x[angle_at(levels.layout, 0, joint)]
+        velocity = levels.unit[joint, 2] + levels.unit[joint, 3] * x[velocity_at(levels.layout, 0, joint)]
         is_there = has_reached(levels.reward, angle, velocity, memory.aim[joint])
         memory.low.there[joint] = is_there
         are_all = are_all and is_there

@@ -32,7 +32,7 @@ from pneumarm.learning.online.values import (
     unpack,
 )
 from pneumarm.random import random_state
-from pneumarm.simulation.kernel import places
+from pneumarm.simulation.layout import layout_of
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment
@@ -181,17 +181,17 @@ class OnlineLearner:
         self._learner = learner(agent.weights(), agent.settings, learning_rate)
         self._random = random_state(seed)
         joints = agent.window.joints
-        self._places = places(agent.window)
-        self._x = np.zeros(self._places.size, np.float32)
-        self._x[self._places.one] = 1
+        self._layout = layout_of(agent.window)
+        self._x = np.zeros(self._layout.size, np.float32)
+        self._x[self._layout.one] = 1
         self._workspace = loop_workspace(self._learner, joints)
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
         window, scaling = self._agent.window, self._agent.scaling
         goal = np.asarray(goal, np.float64).reshape(window.joints)
-        self._x[self._places.goal : self._places.one] = scaled_goal(goal, scaling)
-        self._x[: self._places.command] = self._checked(state)
+        self._x[self._layout.goal : self._layout.one] = scaled_goal(goal, scaling)
+        self._x[: self._layout.command] = self._checked(state)
         begin_acting(self._learner, self.schedule, self._x, self._workspace, self._random)
 
     def act(self) -> NDArray[np.int64]:
@@ -223,7 +223,7 @@ class OnlineLearner:
 
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state`` without learning, as if an episode began there."""
-        self._x[: self._places.command] = self._checked(next_state)
+        self._x[: self._layout.command] = self._checked(next_state)
         begin_acting(self._learner, self.schedule, self._x, self._workspace, self._random)
 
     def weights(self) -> NDArray[np.float32]:
@@ -248,7 +248,7 @@ class OnlineLearner:
         window, scaling = self._agent.window, self._agent.scaling
         offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
         seen = window.of_joints(state[: window.observation_size]) * scale + offset
-        goal = self._x[self._places.goal : self._places.one] * scale[:, 0] + offset[:, 0]
+        goal = self._x[self._layout.goal : self._layout.one] * scale[:, 0] + offset[:, 0]
         reward = self._agent.settings.reward.on(self._agent.spec)
         there: NDArray[np.bool_] = has_reached.py_func(reward, seen[:, 0], seen[:, 1], goal)
         return there
@@ -285,8 +285,8 @@ class OnlineLearner:
 
     def _checked(self, state: ArrayLike) -> NDArray[np.float32]:
         checked = np.asarray(state, np.float32)
-        if checked.shape != (self._places.command,):
-            raise PneumarmError(f"a state must have the shape ({self._places.command},), got {checked.shape}")
+        if checked.shape != (self._layout.command,):
+            raise PneumarmError(f"a state must have the shape ({self._layout.command},), got {checked.shape}")
         return checked
 
 

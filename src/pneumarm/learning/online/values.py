@@ -27,7 +27,8 @@ from pneumarm.arm.valves import ACTIONS, NEVER, possible_actions
 from pneumarm.kernels import part
 from pneumarm.learning.online.settings import Team, TrainSettings
 from pneumarm.networks.tansig import tansig
-from pneumarm.simulation.kernel import UNIT_BLOCK, padded, places
+from pneumarm.simulation.kernel import UNIT_BLOCK
+from pneumarm.simulation.layout import layout_of, padded
 from pneumarm.task.reward import RewardParameters
 from pneumarm.transitions.window import Window
 from pneumarm.vectors import LANES, add_products, follow, weighted_sums
@@ -146,14 +147,14 @@ def draw_networks(window: Window, settings: TrainSettings, random: np.random.Gen
 
 def pack(networks: Networks, window: Window) -> NDArray[np.float32]:
     """Return ``networks`` as the weights of a :class:`ActionValues`."""
-    place, state = places(window), window.state_size
+    layout, state = layout_of(window), window.state_size
     agents, choices, _, size = networks.hidden_weights.shape
     width = padded(size, LANES)
-    weights = np.zeros((agents, place.size + 2, padded(choices * width, UNIT_BLOCK)), np.float32)
+    weights = np.zeros((agents, layout.size + 2, padded(choices * width, UNIT_BLOCK)), np.float32)
     rows = _by_action(weights, width, choices)
     rows[:, :, :state, :size] = networks.hidden_weights[:, :, :state]
-    rows[:, :, place.goal : place.one, :size] = networks.hidden_weights[:, :, state:]
-    rows[:, :, place.one, :size] = networks.hidden_bias
+    rows[:, :, layout.goal : layout.one, :size] = networks.hidden_weights[:, :, state:]
+    rows[:, :, layout.one, :size] = networks.hidden_bias
     rows[:, :, -2, :size] = networks.output_weights
     rows[:, :, -1, 0] = networks.output_bias
     return weights
@@ -161,12 +162,12 @@ def pack(networks: Networks, window: Window) -> NDArray[np.float32]:
 
 def unpack(weights: NDArray[np.float32], window: Window, hidden: int, team: Team = "common") -> Networks:
     """Return what :func:`pack` packed."""
-    place, state = places(window), window.state_size
+    layout, state = layout_of(window), window.state_size
     width = padded(hidden, LANES)
     rows = _by_action(weights, width, _choices(weights.shape[2] // width, team))
     return Networks(
-        np.concatenate([rows[:, :, :state, :hidden], rows[:, :, place.goal : place.one, :hidden]], axis=2),
-        rows[:, :, place.one, :hidden].copy(),
+        np.concatenate([rows[:, :, :state, :hidden], rows[:, :, layout.goal : layout.one, :hidden]], axis=2),
+        rows[:, :, layout.one, :hidden].copy(),
         rows[:, :, -2, :hidden].copy(),
         rows[:, :, -1, 0].copy(),
     )

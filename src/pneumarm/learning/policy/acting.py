@@ -61,7 +61,7 @@ class Lanes(NamedTuple):
 
 def lanes(mind: Mind, sizes: tuple[int, ...], random: RandomState) -> Lanes:
     """Return as many lanes as there are random states in ``random`` (n, 4), for a policy of ``sizes``."""
-    n, joints = len(random), mind.environment.simulation.joints
+    n, joints = len(random), mind.environment.simulation.layout.joints
     return Lanes(
         fleet=fleet(mind.environment, random),
         rows=np.zeros((sizes[0], n), np.float32),
@@ -120,7 +120,7 @@ def run_lanes(mind, lanes, record, first, count):  # type: ignore[no-untyped-def
 @inner
 def copy_all(mind, lanes, arm, samples):  # type: ignore[no-untyped-def]
     """Make every lane the first of the fleet ``arm``; equal ``samples`` (n,) get equal noise."""
-    arms, goal_place = lanes.fleet, mind.limits.goal_place
+    arms, goal_place = lanes.fleet, mind.limits.layout.goal
     unit = mind.environment.task.unit
     for e in range(samples.shape[0]):
         for i in range(arms.x.shape[0]):

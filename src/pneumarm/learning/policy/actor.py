@@ -32,7 +32,7 @@ class PolicyActor:
         self._courses = Courses(simulation, settings) if several else None
         self._hurries_left = _HURRIES
         self._decided = False
-        self._state_size = mind.inputs.state_size
+        self._state_size = mind.inputs.layout.command
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode at rest in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""

@@ -25,7 +25,7 @@ def policy_as_onnx(agent: PolicyAgent) -> bytes:
         window.of_joints(one)[:, 0] for one in (agent.scaling.observation_offset, agent.scaling.observation_scale)
     )
     wanted = graph.node("Div", graph.node("Sub", goal, offset), scale)
-    angles = graph.columns(x, range(0, 4 * joints, 4))
+    angles = graph.columns(x, mind.inputs.layout.angles)
     away = graph.node("Sub", wanted, angles)
     squashed = graph.node("Mul", graph.reshaped(away, joints, 1), mind.inputs.gain)
     bent = graph.reshaped(graph.node("Tanh", squashed), joints * mind.inputs.gain.shape[1])
@@ -51,7 +51,7 @@ def policy_as_onnx(agent: PolicyAgent) -> bytes:
 def _useless(graph: Graph, agent: PolicyAgent, x: str, away: str, again: str, still: str) -> str:
     """Return which actions are of no use (samples, joints, 9), see :func:`pneumarm.task.fleet.is_useful`."""
     limits, joints = agent.mind().limits, agent.window.joints
-    pressures = graph.columns(x, [4 * j + 2 + m for j in range(joints) for m in range(2)])
+    pressures = graph.columns(x, limits.layout.pressures)
     over = graph.reshaped(graph.node("Greater", pressures, limits.inlet.ravel()), joints, 1, 2)
     opens = graph.node("And", over, graph.constant(VALVES > 0, bool))
     useless = graph.node("Or", *(graph.node("Gather", opens, graph.constant(m, np.int64), axis=3) for m in range(2)))

@@ -80,7 +80,7 @@ class Courses:
             return False
         before = single.fleet.actions[0]
         sticks = self._patience > 0 and bool((single.fleet.still[0] >= self._patience).all())
-        state = single.fleet.x[: mind.inputs.state_size, 0]
+        state = single.fleet.x[: mind.inputs.layout.command, 0]
         begins = before[0] < 0
         if not begins:
             self._spent -= self._reward.action + self._reward.switch * int(single.fleet.switched[0].sum())
@@ -134,7 +134,7 @@ class _Search:
         self._problem = problem(np.zeros(joints), reward, plan, uncertainty, muscles, agility)
         self.goal = self._problem.goal
         """Shape (joints,) [counts]."""
-        self._tree, self._find, self._halved = tree(plan, joints), find, halved
+        self._tree = tree(plan, joints)
         self._actions = to_actions(self._problem.commands)
         """Actions of each joint by those of the whole arm, shape (9**joints, joints)."""
 
@@ -149,12 +149,12 @@ class _Search:
         self._model.put(state)
         same = np.flatnonzero((self._actions == before).all(axis=1))
         last = int(same[0]) if same.size else -1  # none before the first
-        found = self._find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
+        found = find(self._model.world, self._model.states, self._problem, self._tree, last, may_hold)
         return self._actions[found.actions], found.cost
 
     def hurry(self) -> None:
         """Keep half as many states from now on."""
-        self._tree = self._halved(self._tree, len(self._problem.commands))
+        self._tree = halved(self._tree, len(self._problem.commands))
 
 
 @kernel

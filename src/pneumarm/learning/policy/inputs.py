@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel
 from pneumarm.networks.tansig import tansig
-from pneumarm.simulation.kernel import places
+from pneumarm.simulation.layout import Layout, angle_at, layout_of
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import Window
 
@@ -21,15 +21,14 @@ class InputParameters(NamedTuple):
 
     gain: NDArray[np.float32]
     """Shape (joints, squashes) [by scaled angle]."""
-    state_size: int
-    goal_place: int
+    layout: Layout
 
 
 def input_parameters(window: Window, scaling: Scaling, squash: tuple[float, ...]) -> InputParameters:
     """Return the inputs for an arm; ``squash`` are the errors at which tansig bends [counts]."""
     scale = window.of_joints(scaling.observation_scale)[:, :1]
     gain = np.ascontiguousarray(scale / np.array(squash), np.float32)
-    return InputParameters(gain, window.state_size, places(window).goal)
+    return InputParameters(gain, layout_of(window))
 
 
 def policy_input_size(window: Window, squash: tuple[float, ...]) -> int:
@@ -41,17 +40,17 @@ def policy_input_size(window: Window, squash: tuple[float, ...]) -> int:
 def write_policy_inputs(inputs, x, actions, rows):  # type: ignore[no-untyped-def]
     """Set ``rows`` (input_size, n) for the states ``x`` (inputs, n) after the last ``actions`` (n, joints)."""
     joints, n = actions.shape[1], actions.shape[0]
-    row = inputs.state_size
+    row = inputs.layout.command
     for i in range(row):
         for e in range(n):
             rows[i, e] = x[i, e]
     for joint in range(joints):
-        goal = x[inputs.goal_place + joint]
+        goal = x[inputs.layout.goal + joint]
         for e in range(n):
             rows[row, e] = goal[e]
         row += 1
     for joint in range(joints):
-        angle, goal = x[4 * joint], x[inputs.goal_place + joint]
+        angle, goal = x[angle_at(inputs.layout, 0, joint)], x[inputs.layout.goal + joint]
         for squash in range(inputs.gain.shape[1]):
             gain = inputs.gain[joint, squash]
             for e in range(n):

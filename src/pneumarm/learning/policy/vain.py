@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import CLOSED, VALVES
 from pneumarm.kernels import kernel, part
 from pneumarm.learning.policy.settings import PolicySettings
+from pneumarm.simulation.layout import angle_at, pressure_at
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.fleet import look, note_still
 from pneumarm.task.reward import is_switch
@@ -64,7 +65,7 @@ def vain(simulation: Simulation, settings: PolicySettings) -> Vain:
 @part
 def side_of(limits, x, joint):  # type: ignore[no-untyped-def]
     """Return on which side of its goal ``joint`` is in ``x`` (inputs,): -1, 1, or 0 within the tolerance."""
-    beyond = x[4 * joint] - x[limits.goal_place + joint]
+    beyond = x[angle_at(limits.layout, 0, joint)] - x[limits.layout.goal + joint]
     if abs(beyond) <= limits.tolerance[joint]:
         return 0
     return 1 if beyond > 0 else -1
@@ -78,7 +79,7 @@ def begin(mind, single, vain, state, goal):  # type: ignore[no-untyped-def]
         arm.x[i, 0] = state[i]
     for joint in range(goal.shape[0]):
         arm.goal[0, joint] = goal[joint]
-        arm.x[task.goal_place + joint, 0] = (goal[joint] - task.unit[joint, 0]) / task.unit[joint, 1]
+        arm.x[task.layout.goal + joint, 0] = (goal[joint] - task.unit[joint, 0]) / task.unit[joint, 1]
         arm.actions[0, joint] = -1
         arm.still[0, joint] = 0
         vain.side[joint] = side_of(mind.limits, arm.x[:, 0], joint)
@@ -102,7 +103,7 @@ def take_up(single, vain):  # type: ignore[no-untyped-def]
 def follow(mind, single, vain, state):  # type: ignore[no-untyped-def]
     """Go on in the scaled ``state``, and note what was done in vain."""
     arm = single.fleet
-    look(arm.x[:, 0], arm.before[0])
+    look(mind.limits.layout, arm.x[:, 0], arm.before[0])
     for i in range(state.shape[0]):
         arm.x[i, 0] = state[i]
     note_still(mind.limits, arm.x[:, 0], arm.before[0], arm.switched[0], arm.still[0])
@@ -132,7 +133,8 @@ def _note_idle(limits, vain, x, side, action, joint):  # type: ignore[no-untyped
     works = side == 0
     for muscle in range(2):
         valve = VALVES[action, muscle]
-        works = works or valve > 0 or (valve < 0 and x[4 * joint + 2 + muscle] >= vain.empty[joint, muscle])
+        pressure = x[pressure_at(limits.layout, 0, joint, muscle)]
+        works = works or valve > 0 or (valve < 0 and pressure >= vain.empty[joint, muscle])
     vain.idle[joint] = 0 if works else vain.idle[joint] + 1
     for muscle in range(2):
         is_over = vain.idle[joint] >= vain.longest_idle

@@ -21,7 +21,6 @@ from pneumarm.learning.servo.gradient import (
     tape,
 )
 from pneumarm.learning.servo.predictive import PLANS, PredictiveControl
-from pneumarm.learning.servo.price import prices_of_errors
 from pneumarm.learning.servo.references import draw_references, write_previews
 from pneumarm.learning.servo.settings import SOFT, STIFF, USUAL_PERIOD, ServoSettings
 from pneumarm.learning.servo.task import servo_sizes, servo_task
@@ -33,6 +32,7 @@ from pneumarm.task.begin import BeginStates
 from pneumarm.task.changes import valve_changes
 from pneumarm.task.environment import environment
 from pneumarm.task.movements import Movement, Movements, movements
+from pneumarm.task.price import prices_of_errors
 
 KIND = "pneumarm servo"
 _WEIGHTS, _MOVEMENTS, _VALIDATION = 0, 1, 2  # streams of random numbers

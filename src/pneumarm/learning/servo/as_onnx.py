@@ -35,22 +35,22 @@ def servo_as_onnx(agent: ServoAgent) -> bytes:
 def _seen(graph: Graph, agent: ServoAgent, x: str, reference: str) -> str:
     """Return what the network sees, see :mod:`pneumarm.learning.servo.inputs`."""
     window, scaling, seen = agent.window, agent.scaling, agent.task.inputs
-    observed, columns = window.observation_size, list[str]()
-    for joint in range(window.joints):
-        angle = graph.columns(x, [4 * joint])
+    layout, columns = seen.layout, list[str]()
+    for joint, place in enumerate(layout.angles):
+        angle = graph.columns(x, [place])
         columns.append(angle)
         for lag in range(1, window.history):
-            then = graph.columns(x, [lag * observed + 4 * joint])
+            then = graph.columns(x, [lag * layout.observed + place])
             columns.append(graph.node("Mul", graph.node("Sub", angle, then), seen.rate[joint] / np.float32(lag)))
-        for place in (4 * joint + 2, 4 * joint + 3):
+        for place in layout.pressures[2 * joint : 2 * joint + 2]:
             pressure = graph.columns(x, [place])
-            before = graph.columns(x, [observed + place]) if window.history > 1 else pressure
+            before = graph.columns(x, [layout.observed + place]) if window.history > 1 else pressure
             columns += [pressure, graph.node("Mul", graph.node("Sub", pressure, before), PRESSURE_CHANGE)]
     if window.history > 1:
-        columns.append(graph.columns(x, range(window.history * observed, window.state_size)))
+        columns.append(graph.columns(x, range(layout.history * layout.observed, layout.command)))
     offset, scale = (window.of_joints(one)[:, 0] for one in (scaling.observation_offset, scaling.observation_scale))
     wanted = graph.node("Div", graph.node("Sub", reference, offset), scale)
-    angles = graph.reshaped(graph.columns(x, range(0, 4 * window.joints, 4)), 1, window.joints)
+    angles = graph.reshaped(graph.columns(x, layout.angles), 1, window.joints)
     distance = graph.node("Mul", graph.node("Sub", wanted, angles), seen.tolerances)
     parts = [graph.node("Mul", distance, FAR)]
     parts += [graph.node("Tanh", graph.node("Mul", distance, bend)) for bend in BENDS]
@@ -62,11 +62,11 @@ def _seen(graph: Graph, agent: ServoAgent, x: str, reference: str) -> str:
 
 def _pulses(graph: Graph, agent: ServoAgent, x: str, said: str) -> str:
     """Return the pulses (samples, 2 joints), see :mod:`pneumarm.learning.servo.commands`."""
-    made, joints = agent.task.commands, agent.window.joints
+    made = agent.task.commands
     shortest, whole = np.float32(made.shortest), min(float(WHOLE), 1 - made.shortest / 2)
     v = graph.node("Mul", graph.node("Tanh", said), GAIN)
     size = graph.node("Div", graph.node("Sub", graph.node("Abs", v), made.dead), 1 - made.dead)
-    pressures = graph.columns(x, [4 * j + 2 + m for j in range(joints) for m in range(2)])
+    pressures = graph.columns(x, made.layout.pressures)
     over = graph.node("Greater", pressures, made.inlet.ravel())
     closed = graph.node("And", graph.node("Greater", v, 0.0), over)
     size = graph.node("Clip", graph.node("Where", closed, 0.0, size), 0.0, 1.0)

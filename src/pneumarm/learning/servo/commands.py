@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.kernels import kernel, part
 from pneumarm.networks.tansig import FASTMATH, tansig
+from pneumarm.simulation.layout import Layout, layout_of, pressure_at
 from pneumarm.simulation.simulation import Simulation
 
 GAIN = np.float32(1.25)
@@ -41,6 +42,7 @@ class CommandParameters(NamedTuple):
     """Pulses are a multiple of it, in periods; 0: any."""
     leak: float
     """Share of the gradient that passes where the command does not change."""
+    layout: Layout
     inlet: NDArray[np.float32]
     """Pressure over which an inlet stays closed, shape (joints, 2) [scaled]."""
     coarse: float
@@ -58,7 +60,8 @@ def command_parameters(simulation: Simulation, dead: float, shortest: float, coa
     inlet = (spec.max_pressure_counts - offset[:, 2:]) / scale[:, 2:]
     inlet, slow = np.ascontiguousarray(inlet, np.float32), _FAST * spec.period
     step = spec.pulse_step / spec.period if spec.pulses else 0.0
-    return CommandParameters(float(dead), float(shortest), step, _LEAK, inlet, float(coarse), NEAR, slow)
+    layout = layout_of(window)
+    return CommandParameters(float(dead), float(shortest), step, _LEAK, layout, inlet, float(coarse), NEAR, slow)
 
 
 def shortest_share(spec: ArmSpec) -> float:
@@ -100,7 +103,7 @@ def write_commands(parameters, x, underway, said, slope, command):  # type: igno
     for c in range(command.shape[0]):
         tansig(said[c])
         joint, muscle = c // 2, c % 2
-        place, limit = 4 * joint + 2 + muscle, parameters.inlet[joint, muscle]
+        place, limit = pressure_at(parameters.layout, 0, joint, muscle), parameters.inlet[joint, muscle]
         for e in range(command.shape[1]):
             bent = said[c, e]
             v = GAIN * bent

@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.kernels import kernel
 from pneumarm.random import random_states
 from pneumarm.simulation.kernel import predict_change, push, put_command, simulation_parameters, simulation_state
+from pneumarm.simulation.layout import angle_at
 from pneumarm.simulation.simulation import Simulation
 
 
@@ -43,4 +44,4 @@ def _roll(simulation, state, begin, commands, angle):  # type: ignore[no-untyped
             predict_change(simulation, state)
             push(simulation, state.x, state.change, command)
             for joint in range(angle.shape[2]):
-                angle[c, step, joint] = state.x[4 * joint]
+                angle[c, step, joint] = state.x[angle_at(simulation.layout, 0, joint)]

@@ -17,17 +17,18 @@ from numpy.typing import NDArray
 from pneumarm.kernels import kernel
 from pneumarm.learning.servo.commands import CommandParameters, write_commands
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, inputs_back, write_inputs
-from pneumarm.learning.servo.price import (
+from pneumarm.networks.layers import Trainable, backward, forward, through_weights
+from pneumarm.networks.tansig import FASTMATH
+from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
+from pneumarm.simulation.kernel import SimulationParameters
+from pneumarm.simulation.layout import angle_at, command_at, pressure_at
+from pneumarm.task.price import (
     PriceParameters,
     price_of_changes,
     price_of_cocontraction,
     price_of_error,
     price_of_slack,
 )
-from pneumarm.networks.layers import Trainable, backward, forward, through_weights
-from pneumarm.networks.tansig import FASTMATH
-from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
-from pneumarm.simulation.kernel import SimulationParameters
 
 _ZERO = np.float32(0.0)
 
@@ -93,7 +94,7 @@ class Tape(NamedTuple):
 
 def tape(task: ServoTask, steps: int, n: int, hidden: int = 0) -> Tape:
     """Return room for movements of ``n`` arms over ``steps``, by a policy with so many ``hidden`` units if by one."""
-    simulation, joints = task.simulation, task.simulation.joints
+    simulation, joints = task.simulation, task.simulation.layout.joints
     (size, units), outputs = simulation.hidden.shape, simulation.output_bias.size
     inputs, previews = input_size(task.inputs), task.inputs.steps.size
 
@@ -107,7 +108,7 @@ def tape(task: ServoTask, steps: int, n: int, hidden: int = 0) -> Tape:
         inputs=zeros(steps, inputs),
         units=zeros(steps, hidden),
         slope=zeros(steps, 2 * joints),
-        noise=zeros(steps + simulation.history - 1, 3 * joints),
+        noise=zeros(steps + simulation.layout.history - 1, 3 * joints),
         reference=zeros(steps + 1, joints),
         preview=zeros(steps, previews, joints),
         work=step_workspace(simulation, n),
@@ -123,11 +124,10 @@ def tape(task: ServoTask, steps: int, n: int, hidden: int = 0) -> Tape:
 def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
     """Let the policy ``net`` move all arms from ``tape.x[0]`` on."""
     simulation = task.simulation
-    commanded = 2 * simulation.joints
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    first, commanded = simulation.layout.command, simulation.layout.commanded
     for t in range(tape.slope.shape[0]):
         x = tape.x[t]
-        write_inputs(task.inputs, x, tape.noise, t + simulation.history - 1, tape.preview[t], tape.inputs[t])
+        write_inputs(task.inputs, x, tape.noise, t + simulation.layout.history - 1, tape.preview[t], tape.inputs[t])
         forward(net.layers, tape.inputs[t], net.units)
         end = 0
         for layer in range(len(net.units) - 1):
@@ -153,12 +153,13 @@ def note_free(task, tape, t):  # type: ignore[no-untyped-def]
 @kernel(fastmath=FASTMATH)
 def note_underway(task, tape, t):  # type: ignore[no-untyped-def]
     """Note which joints are on their way to a goal that stays, at step ``t``."""
-    lag, commands = task.simulation.history - 1, task.commands
+    layout, commands = task.simulation.layout, task.commands
+    lag = layout.history - 1
     near, slow = np.float32(commands.near), np.float32(commands.slow * lag)
     for joint in range(tape.underway.shape[0]):
-        scale, then = task.inputs.tolerances[joint], lag * task.simulation.observed + 4 * joint
+        scale, now, then = task.inputs.tolerances[joint], angle_at(layout, 0, joint), angle_at(layout, lag, joint)
         for e in range(tape.underway.shape[1]):
-            angle, wanted = tape.x[t, 4 * joint, e], tape.preview[t, 0, joint, e]
+            angle, wanted = tape.x[t, now, e], tape.preview[t, 0, joint, e]
             moves = abs(angle - tape.x[t, then, e]) * scale > slow or abs(angle - wanted) * scale > near
             tape.underway[joint, e] = moves and wanted == tape.preview[t, -1, joint, e]
 
@@ -166,22 +167,23 @@ def note_underway(task, tape, t):  # type: ignore[no-untyped-def]
 @kernel(fastmath=FASTMATH)
 def errors_at(task, tape, t, joint, error):  # type: ignore[no-untyped-def]
     """Set ``error`` (n,) to how far ``joint`` is from what is asked for at step ``t`` [tolerances]."""
-    scale = task.inputs.tolerances[joint]
+    scale, angle = task.inputs.tolerances[joint], angle_at(task.simulation.layout, 0, joint)
     for e in range(error.shape[0]):
-        error[e] = (tape.x[t, 4 * joint, e] - tape.reference[t, joint, e]) * scale
+        error[e] = (tape.x[t, angle, e] - tape.reference[t, joint, e]) * scale
 
 
 @kernel(fastmath=FASTMATH)
 def prices_of_pressures(task, tape, t, joint, row):  # type: ignore[no-untyped-def]
     """Set ``row`` (3, n) to the price of the pressures of ``joint`` at step ``t`` and its slopes by both [scaled]."""
-    first, scale = 4 * joint + 2, task.inputs.tolerances[joint]
+    layout, scale = task.simulation.layout, task.inputs.tolerances[joint]
+    angle, first = angle_at(layout, 0, joint), pressure_at(layout, 0, joint, 0)
     empty, to_share = task.lowest[joint], task.to_share[joint]
     for e in range(row.shape[1]):
         wanted = tape.reference[t, joint, e]
         one = (tape.x[t, first, e] - empty[0]) * to_share[0]
         two = (tape.x[t, first + 1, e] - empty[1]) * to_share[1]
         if wanted == tape.reference[t - 1, joint, e]:
-            error = (tape.x[t, first - 2, e] - wanted) * scale
+            error = (tape.x[t, angle, e] - wanted) * scale
             price_one, by_one = price_of_slack(task.prices, error, one)
             price_two, by_two = price_of_slack(task.prices, error, two)
             price = price_one + price_two
@@ -199,34 +201,35 @@ def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
     steps that follow, by the state after it.
     """
     simulation, later, sooner, row = task.simulation, tape.later, tape.sooner, tape.row
-    commanded, joints, n = 2 * simulation.joints, simulation.joints, tape.row.shape[1]
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    layout, n = simulation.layout, tape.row.shape[1]
+    first, commanded, before_first = layout.command, layout.commanded, command_at(layout, 1)
     total = 0.0
-    for joint in range(joints):
+    for joint in range(layout.joints):
         errors_at(task, tape, t + 1, joint, row[0])
         total += price_of_error(task.prices, row[0], row[1])
-        scale = task.inputs.tolerances[joint] * share
+        scale, angle = task.inputs.tolerances[joint] * share, angle_at(layout, 0, joint)
+        pressure = pressure_at(layout, 0, joint, 0)
         for e in range(n):
-            later[4 * joint, e] += row[1, e] * scale
+            later[angle, e] += row[1, e] * scale
         prices_of_pressures(task, tape, t + 1, joint, row)
         for e in range(n):
             total += row[0, e]
-            later[4 * joint + 2, e] += row[1, e] * share
-            later[4 * joint + 3, e] += row[2, e] * share
+            later[pressure, e] += row[1, e] * share
+            later[pressure + 1, e] += row[2, e] * share
     tape.work.hidden[:] = tape.hidden[t]
     tape.work.free[:] = tape.free[t]
     step_back(simulation, later, sooner, tape.work)
     for c in range(commanded):
         command, before = tape.x[t, first + c], row[0]
         before[:] = _ZERO
-        if simulation.history > 1:
-            before[:] = tape.x[t, first - (simulation.history - 1) * commanded + c]
+        if layout.history > 1:
+            before[:] = tape.x[t, before_first + c]
         total += price_of_changes(task.prices, command, before, row[1], row[2])
         for e in range(n):
             sooner[first + c, e] += row[1, e] * share
-        if simulation.history > 1:
+        if layout.history > 1:
             for e in range(n):
-                sooner[first - (simulation.history - 1) * commanded + c, e] += row[2, e] * share
+                sooner[before_first + c, e] += row[2, e] * share
     return total
 
 
@@ -234,8 +237,7 @@ def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
 def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost a step to ``net.gradient``, after :func:`move_forward`; return the cost."""
     simulation = task.simulation
-    commanded = 2 * simulation.joints
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    first, commanded = simulation.layout.command, simulation.layout.commanded
     steps, n = tape.slope.shape[0], tape.slope.shape[2]
     share = np.float32(1.0 / (steps * n))
     later, sooner = tape.later, tape.sooner
@@ -289,8 +291,7 @@ def learn_once(task, net, tape):  # type: ignore[no-untyped-def]
 
 def errors_of(task: ServoTask, tape: Tape) -> NDArray[np.float32]:
     """Return the errors (steps, joints, n) of the movements on ``tape`` [tolerances]."""
-    joints = task.simulation.joints
-    angle = tape.x[1:, 0 : 4 * joints : 4]
+    angle = tape.x[1:, task.simulation.layout.angles]
     difference: NDArray[np.float32] = (angle - tape.reference[1:]) * task.inputs.tolerances[:, None]
     return difference
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel
 from pneumarm.networks.tansig import FASTMATH, tansig
+from pneumarm.simulation.layout import Layout, angle_at, command_at, layout_of, pressure_at
 from pneumarm.simulation.simulation import Simulation
 
 PRESSURE_CHANGE = np.float32(5.0)  # the pressures of a period differ by a fifth of what they differ by in all
@@ -32,9 +33,7 @@ class SeenParameters(NamedTuple):
     """S, shape (joints,)."""
     steps: NDArray[np.int64]
     """Steps ahead at which the reference is looked at, shape (previews,)."""
-    history: int
-    observed: int
-    """Numbers in an observation."""
+    layout: Layout
 
 
 def seen_parameters(simulation: Simulation, preview: tuple[float, ...], tolerance: float) -> SeenParameters:
@@ -46,14 +45,13 @@ def seen_parameters(simulation: Simulation, preview: tuple[float, ...], toleranc
         rate=(scale[:, 0] / (1e3 * spec.period * scale[:, 1])).astype(np.float32),
         tolerances=(scale[:, 0] / (spec.counts_per_degree * tolerance)).astype(np.float32),
         steps=np.array(steps, np.int64),
-        history=window.history,
-        observed=window.observation_size,
+        layout=layout_of(window),
     )
 
 
 def input_size(parameters: SeenParameters) -> int:
     """Return how many inputs there are."""
-    joints, history = parameters.rate.size, parameters.history
+    joints, history = parameters.rate.size, parameters.layout.history
     return joints * (1 + (history - 1) + 4 + 2 * (history - 1) + 3 * parameters.steps.size)
 
 
@@ -64,38 +62,38 @@ def write_inputs(parameters, x, noise, now, preview, inputs):  # type: ignore[no
     ``noise`` (steps, 3 joints, n) is that of readings of angle and pressures, scaled, the newest being the one
     number ``now``; ``preview`` (previews, joints, n) are scaled references.
     """
-    history, observed, n = parameters.history, parameters.observed, x.shape[1]
-    joints = parameters.rate.shape[0]
+    layout, n = parameters.layout, x.shape[1]
+    joints, history = layout.joints, layout.history
     row = 0
     for joint in range(joints):
-        angle, seen = 4 * joint, 3 * joint
+        angle, seen = angle_at(layout, 0, joint), 3 * joint
         for e in range(n):
             inputs[row, e] = x[angle, e] + noise[now, seen, e]
         row += 1
         for lag in range(1, history):
-            rate, then = parameters.rate[joint] / np.float32(lag), lag * observed + angle
+            rate, then = parameters.rate[joint] / np.float32(lag), angle_at(layout, lag, joint)
             for e in range(n):
                 moved = x[angle, e] + noise[now, seen, e] - x[then, e] - noise[now - lag, seen, e]
                 inputs[row, e] = moved * rate
             row += 1
         for muscle in range(2):
-            place, read = angle + 2 + muscle, seen + 1 + muscle
+            place, read = pressure_at(layout, 0, joint, muscle), seen + 1 + muscle
+            earlier = pressure_at(layout, 1, joint, muscle)
             for e in range(n):
                 pressure = x[place, e] + noise[now, read, e]
                 inputs[row, e] = pressure
-                before = x[observed + place, e] + noise[now - 1, read, e] if history > 1 else pressure
+                before = x[earlier, e] + noise[now - 1, read, e] if history > 1 else pressure
                 inputs[row + 1, e] = (pressure - before) * PRESSURE_CHANGE
             row += 2
-    first = history * observed
-    for i in range(2 * joints * (history - 1)):
+    for i in range(command_at(layout, 1), layout.command):
         for e in range(n):
-            inputs[row, e] = x[first + i, e]
+            inputs[row, e] = x[i, e]
         row += 1
     for joint in range(joints):
-        scale = parameters.tolerances[joint]
+        scale, angle = parameters.tolerances[joint], angle_at(layout, 0, joint)
         for p in range(preview.shape[0]):
             for e in range(n):
-                here = x[4 * joint, e] + noise[now, 3 * joint, e]
+                here = x[angle, e] + noise[now, 3 * joint, e]
                 distance = (preview[p, joint, e] - here) * scale
                 inputs[row, e] = distance * FAR
                 inputs[row + 1, e] = distance * BENDS[0]
@@ -108,40 +106,39 @@ def write_inputs(parameters, x, noise, now, preview, inputs):  # type: ignore[no
 @kernel(fastmath=FASTMATH)
 def inputs_back(parameters, inputs, slopes, x_slopes):  # type: ignore[no-untyped-def]
     """Add to ``x_slopes`` (size, n) the derivatives by states, ``slopes`` (inputs, n) being those by inputs."""
-    history, observed, n = parameters.history, parameters.observed, inputs.shape[1]
-    joints = parameters.rate.shape[0]
+    layout, n = parameters.layout, inputs.shape[1]
+    joints, history = layout.joints, layout.history
     row = 0
     for joint in range(joints):
-        angle = 4 * joint
+        angle = angle_at(layout, 0, joint)
         for e in range(n):
             x_slopes[angle, e] += slopes[row, e]
         row += 1
         for lag in range(1, history):
-            rate, then = parameters.rate[joint] / np.float32(lag), lag * observed + angle
+            rate, then = parameters.rate[joint] / np.float32(lag), angle_at(layout, lag, joint)
             for e in range(n):
                 x_slopes[angle, e] += slopes[row, e] * rate
                 x_slopes[then, e] -= slopes[row, e] * rate
             row += 1
         for muscle in range(2):
-            place = angle + 2 + muscle
+            place, earlier = pressure_at(layout, 0, joint, muscle), pressure_at(layout, 1, joint, muscle)
             for e in range(n):
                 x_slopes[place, e] += slopes[row, e]
                 if history > 1:
                     x_slopes[place, e] += slopes[row + 1, e] * PRESSURE_CHANGE
-                    x_slopes[observed + place, e] -= slopes[row + 1, e] * PRESSURE_CHANGE
+                    x_slopes[earlier, e] -= slopes[row + 1, e] * PRESSURE_CHANGE
             row += 2
-    first = history * observed
-    for i in range(2 * joints * (history - 1)):
+    for i in range(command_at(layout, 1), layout.command):
         for e in range(n):
-            x_slopes[first + i, e] += slopes[row, e]
+            x_slopes[i, e] += slopes[row, e]
         row += 1
     for joint in range(joints):
-        scale = parameters.tolerances[joint]
+        scale, angle = parameters.tolerances[joint], angle_at(layout, 0, joint)
         for _ in range(parameters.steps.shape[0]):
             for e in range(n):
                 total = slopes[row, e] * FAR
                 for b in range(2):
                     bent = inputs[row + 1 + b, e]
                     total += slopes[row + 1 + b, e] * BENDS[b] * (np.float32(1.0) - bent * bent)
-                x_slopes[4 * joint, e] -= total * scale
+                x_slopes[angle, e] -= total * scale
             row += 3

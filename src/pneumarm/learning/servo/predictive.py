@@ -29,12 +29,13 @@ from pneumarm.learning.servo.gradient import (
     prices_of_pressures,
     tape,
 )
-from pneumarm.learning.servo.price import price_of_one_error
 from pneumarm.learning.servo.settings import USUAL_PERIOD
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import step_all
+from pneumarm.simulation.layout import angle_at, command_at, pressure_at
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.changes import changes
+from pneumarm.task.price import price_of_one_error
 
 _changes = part(changes)
 _HORIZON = 0.55  # s
@@ -79,13 +80,12 @@ def plans_of(steps: int, there: NDArray[np.float32], n: int) -> Plans:
 def play(task, plans, tape):  # type: ignore[no-untyped-def]
     """Play the commands from ``tape.x[0]`` on."""
     simulation, how = task.simulation, task.commands
-    commanded = 2 * simulation.joints
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    first, commanded = simulation.layout.command, simulation.layout.commanded
     shortest, step, leak = np.float32(how.shortest), np.float32(how.step), np.float32(how.leak)
     for t in range(plans.commands.shape[0]):
         x = tape.x[t]
         for c in range(commanded):
-            place, limit = 4 * (c // 2) + 2 + c % 2, how.inlet[c // 2, c % 2]
+            place, limit = pressure_at(simulation.layout, 0, c // 2, c % 2), how.inlet[c // 2, c % 2]
             for e in range(x.shape[1]):
                 wished = plans.commands[t, c, e] * plans.there[c]
                 stopped = wished > _ZERO and x[place, e] > limit
@@ -101,30 +101,28 @@ def play(task, plans, tape):  # type: ignore[no-untyped-def]
 def price(task, plans, tape):  # type: ignore[no-untyped-def]
     """Set ``plans.cost`` to what the movements on ``tape`` cost; valve changes are counted."""
     simulation, cost = task.simulation, plans.cost
-    commanded = 2 * simulation.joints
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
-    lag = (simulation.history - 1) * commanded  # to the command of the period before, where states hold it
+    layout = simulation.layout
+    first, commanded, before = layout.command, layout.commanded, command_at(layout, 1)
     change = np.float32(task.prices.change)
     cost[:] = _ZERO
     for t in range(tape.slope.shape[0]):
-        for joint in range(simulation.joints):
-            scale = task.inputs.tolerances[joint]
+        for joint in range(layout.joints):
+            scale, angle = task.inputs.tolerances[joint], angle_at(layout, 0, joint)
             prices_of_pressures(task, tape, t + 1, joint, tape.row)
             for e in range(cost.shape[0]):
-                error = (tape.x[t + 1, 4 * joint, e] - tape.reference[t + 1, joint, e]) * scale
+                error = (tape.x[t + 1, angle, e] - tape.reference[t + 1, joint, e]) * scale
                 cost[e] += price_of_one_error(task.prices, error)[0] + tape.row[0, e]
         for c in range(commanded):
             for e in range(cost.shape[0]):
                 now = tape.x[t, first + c, e]
-                cost[e] += change * _changes(now, tape.x[t, first - lag + c, e] if lag else _ZERO)
+                cost[e] += change * _changes(now, tape.x[t, before + c, e] if layout.history > 1 else _ZERO)
 
 
 @kernel(fastmath=FASTMATH)
 def slopes_by_commands(task, plans, tape):  # type: ignore[no-untyped-def]
     """Set ``plans.gradient`` to the derivatives of what the movements on ``tape`` cost, after :func:`play`."""
     simulation = task.simulation
-    commanded = 2 * simulation.joints
-    first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
+    first, commanded = simulation.layout.command, simulation.layout.commanded
     steps = tape.slope.shape[0]
     tape.later[:] = _ZERO
     for back in range(steps):
@@ -191,7 +189,7 @@ class PredictiveControl:
         """Periods to come for which it has to know what is wanted."""
         hidden = 0 if policy is None else sum(len(units) for units in policy.units[:-1])
         self._tape = tape(task, self._steps, PLANS, hidden)
-        self._tape.x[0, window.input_size + window.joints] = 1
+        self._tape.x[0, task.simulation.layout.one] = 1
         there = np.ones((window.joints, 2), np.float32)
         there[:, 1] = simulation.spec.muscles > 1
         self._plans = plans_of(self._steps, there.ravel(), PLANS)

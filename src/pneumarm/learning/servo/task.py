@@ -5,10 +5,10 @@ import numpy as np
 from pneumarm.learning.servo.commands import command_parameters, shortest_share
 from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.inputs import input_size, seen_parameters
-from pneumarm.learning.servo.price import PriceParameters
 from pneumarm.learning.servo.settings import SOFT, USUAL_PERIOD, ServoSettings
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.price import PriceParameters
 
 _PAST_THE_LIMIT = 0.2  # share of the gradient, see ServoTask
 

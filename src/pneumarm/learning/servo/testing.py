@@ -7,12 +7,10 @@ from pneumarm.kernels import kernel
 from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.servo.actor import ServoNetwork
 from pneumarm.random import random_state, random_states
-from pneumarm.simulation.gradient import predict_all
-from pneumarm.simulation.kernel import put_command, settle
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import begin_episode, environment, order_pulses, reached
-from pneumarm.task.fleet import fleet, one
+from pneumarm.task.fleet import advance_alive, fleet, one
 from pneumarm.task.movements import NOISE, Movements, movements
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
 
@@ -31,7 +29,7 @@ def run_servo(
         raise UnusableInput(f"a test needs at least one episode, got {episodes}")
     env, n = environment(simulation, begin, agent.settings), min(episodes, _TOGETHER)
     random, arms = random_state(seed), fleet(env, random_states((*seed, NOISE), n))
-    network, joints, place = ServoNetwork(agent, n), simulation.window.joints, env.task.goal_place
+    network, joints, place = ServoNetwork(agent, n), simulation.window.joints, env.task.layout.goal
     underway = np.zeros((joints, n), bool)
     previews = np.zeros((network.task.inputs.steps.size, joints, n), np.float32)
     record, number = movements(episodes, joints), np.full(n, -1)
@@ -63,17 +61,14 @@ def _begin(environment, arms, random, record, number, begun):  # type: ignore[no
 @kernel
 def _take(environment, arms, pulses, record, number):  # type: ignore[no-untyped-def]
     """Take ``pulses`` (n, joints, 2) for a period where there is a movement, and note which end."""
-    task, simulation = environment.task, environment.simulation
+    task, alive = environment.task, number >= 0
     for e in range(number.shape[0]):
-        if number[e] >= 0:
-            arm = one(arms, e)
-            order_pulses(task, arm, pulses[e])
-            put_command(simulation, arm.state.x, arm.command)
-    predict_all(simulation, arms.x, arms)
+        if alive[e]:
+            order_pulses(task, one(arms, e), pulses[e])
+    advance_alive(environment, arms, alive)
     for e in range(number.shape[0]):
-        if number[e] >= 0:
+        if alive[e]:
             arm = one(arms, e)
-            settle(simulation, environment.noise, arm.state, arm.command)
             is_reached = reached(task, arm)
             note_action(task.reward, arm.switched, is_reached, record, number[e])
             if not goes_on(task, is_reached, record, number[e]):

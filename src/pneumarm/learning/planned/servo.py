@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Self
 
 from pneumarm.learning.agents import SimulationAgent
+from pneumarm.learning.planned.agent import simulation_of_valves
 from pneumarm.learning.servo import ServoSettings
 from pneumarm.learning.servo.controller import ServoController, ready_controller
 from pneumarm.learning.servo.gradient import ServoTask
 from pneumarm.learning.servo.predictive import PredictiveControl
 from pneumarm.learning.servo.task import servo_task
-from pneumarm.planning.agent import simulation_of_valves
 
 
 @dataclass(frozen=True, repr=False)

@@ -2,8 +2,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-READY := $(VENV)/.ready
+# What is installed in it: the program alone, with what make test needs, with all that development needs.
 INSTALLED := $(VENV)/.installed
+TESTABLE := $(VENV)/.testable
+READY := $(VENV)/.ready
 PYTHON311 ?= python3.11
 LOWEST := .venv-lowest
 
@@ -11,21 +13,18 @@ LOWEST := .venv-lowest
 
 setup: $(READY)
 
-$(READY): pyproject.toml
+$(TESTABLE): EXTRAS := [test]
+$(READY): EXTRAS := [dev]
+$(INSTALLED) $(TESTABLE) $(READY): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	touch $(READY) $(INSTALLED)
-
-$(INSTALLED): pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable .
-	touch $(INSTALLED)
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.$(EXTRAS)'
+	touch $(INSTALLED) $(if $(EXTRAS),$(TESTABLE)) $@
 
 run: $(INSTALLED)  ## the whole job on the virtual arm, into runs/first
 	mkdir -p runs
 	$(BIN)/pneumarm run --out runs/first
 
-test: setup  ## what proves the whole in some minutes
+test: $(TESTABLE)  ## what proves the whole in some minutes
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m 'not soak and not walk and not thorough'
 
 test-all: setup  ## all tests but soak and walk
@@ -55,8 +54,8 @@ baselines: setup  ## the table of baselines on the held-out arms, into runs/base
 soak: setup  ## attacks, in about an hour: kills, power cuts, hostile files, bad lines, damaged frames; see CONTRIBUTING.md
 	$(BIN)/python -m pytest -m soak -s
 
-mutants: setup  ## changes the program in one place at a time: tests must fail; ONLY=name for one, or a package; minutes, a second call goes on
-	$(BIN)/python tests/mutate.py $(if $(ONLY),--only '$(ONLY)')
+mutants: $(if $(QUICK),$(TESTABLE),$(READY))  ## changes the program in one place at a time: tests must fail; ONLY=name for one, or a package; QUICK=1 for one in each folder, by what make test runs; minutes, a second call goes on
+	$(BIN)/python tests/mutate.py $(if $(ONLY),--only '$(ONLY)') $(if $(QUICK),--quick)
 
 walk: setup  ## a new user's walk: the wheel in a fresh environment, every command of the README; takes minutes
 	$(BIN)/python -m pytest -m walk -s

@@ -16,11 +16,10 @@ from small import SMALL
 hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")
 
+HERE = Path(__file__).parent
 
 THOROUGH = (
-    "appendix_a/",  # each error of the thesis' appendix A, played
     "arm/test_emulated_port.py",  # an emulated board in real time
-    "checkup/test_checkup.py",
     "control/test_any_sound_arm.py",
     "control/test_hardware.py",
     "experiments/test_claims.py",
@@ -52,7 +51,10 @@ THOROUGH = (
     "test_rehearsal.py",
     "transitions/test_server.py",  # stores on PostgreSQL and MySQL
 )
-"""What takes three quarters of the time: ``make test`` leaves it out, ``make test-all`` does not."""
+"""What takes three quarters of the time: ``make test`` leaves it out, ``make test-all`` does not.
+
+Of other files single tests are marked where they are.
+"""
 
 
 @pytest.fixture(scope="session")
@@ -71,11 +73,20 @@ def pytest_configure() -> None:
             signal.signal(number, handler)
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Do not even import what is left out: it may need what ``make test`` does not install."""
+    left_out = "not thorough" in config.option.markexpr
+    return True if left_out and _is_thorough(collection_path) else None
+
+
+def _is_thorough(path: Path) -> bool:
+    return path.is_file() and path.relative_to(HERE).as_posix().startswith(THOROUGH)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what is thorough, and begin with what takes minutes: or the last worker works alone on it in the end."""
-    here = Path(__file__).parent
     for item in items:
-        if item.path.relative_to(here).as_posix().startswith(THOROUGH):
+        if _is_thorough(item.path):
             item.add_marker("thorough")
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
 

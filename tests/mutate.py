@@ -4,6 +4,8 @@ The list is ``mutants.toml`` beside this file. Each mutant replaces a snippet, f
 copy of the project, and its tests, which pass without the change, have to fail with it. What was found is kept in
 ``.mutants``, with what it was found for: the sources, the tests and the mutant. A second call goes on from there.
 
+With ``--quick`` (`make mutants QUICK=1`) there is one mutant for each folder, and the tests are those of `make test`.
+
 Ends with 0 where every mutant is killed, with 1 where one survives, and with 2 where the list itself is wrong. Where
 tests are skipped on this machine, a mutant was not run, which is said and is no failure.
 """
@@ -31,6 +33,8 @@ LIST = "tests/mutants.toml"
 KEPT = ".mutants"
 TOO_LONG = 900
 """Tests of a mutant that run for so long [s] hang; a change that makes them hang is none for this list."""
+QUICK = "not soak and not walk and not thorough"
+"""Marks of the tests that `make test` runs."""
 NOT_COPIED = (".*", "__pycache__", "runs", "site", "build", "node_modules", "*.egg-info", "*.db*")
 
 Outcome = Literal["wrong", "survived", "not run", "killed"]
@@ -57,6 +61,11 @@ class Mutant:
     """Ids as pytest has them, without parameters or with them."""
     kernel: bool = False
     """Whether the change is in code that is compiled, so that kernels compiled before are of no use."""
+
+    @property
+    def folder(self) -> str:
+        """Return the folder that it is in, see :func:`folder_of`."""
+        return folder_of(Path(self.file))
 
 
 class Found(NamedTuple):
@@ -101,6 +110,45 @@ def _wrong_with(root: Path, mutant: Mutant, tests: str) -> Iterable[str]:
         path, _, name = test.partition("::")
         if not (root / path).is_file() or f"def {name.partition('[')[0]}(" not in tests:
             yield f"there is no test {test}"
+
+
+def folder_of(file: Path) -> str:
+    """Return the folder of the package or the firmware that ``file`` lies in, itself or deeper."""
+    return "/".join(file.parent.parts[:3])
+
+
+def folders(root: Path) -> set[str]:
+    """Return all folders that code lies in, see :func:`folder_of`."""
+    files = [*(root / "src").rglob("*.py"), *(root / "firmware").glob("*.c")]
+    return {folder_of(file.relative_to(root)) for file in files}
+
+
+def quick_ones(root: Path, mutants: Sequence[Mutant]) -> list[Mutant]:
+    """Return one of the ``mutants`` for each folder, with tests that are all run by `make test`.
+
+    Raises:
+        ListError: a folder has none, or the tests cannot be collected.
+
+    """
+    command = [sys.executable, "-m", "pytest", "--collect-only", "--verbosity=-1", "-p", "no:xdist", "-m", QUICK]
+    said = subprocess.run(command, cwd=root, env=_environment(root), capture_output=True, text=True, check=False)
+    if said.returncode:
+        raise ListError(f"tests cannot be collected: {said.stdout}{said.stderr}")
+    run = {line for line in said.stdout.splitlines() if "::" in line}
+    run |= {line.partition("[")[0] for line in run}  # all its cases, or some of them
+    chosen: dict[str, Mutant] = {}
+    for mutant in sorted(mutants, key=lambda one: one.kernel):  # what need not be compiled first
+        if run.issuperset(mutant.tests):
+            chosen.setdefault(mutant.folder, mutant)
+    if missing := folders(root) - chosen.keys():
+        raise ListError("\n".join(f"{folder}: make test runs the tests of no mutant" for folder in sorted(missing)))
+    return [mutant for mutant in mutants if mutant in chosen.values()]
+
+
+def _environment(place: Path) -> dict[str, str]:
+    """Return the variables with which tests run the project in ``place``."""
+    paths = os.pathsep.join(str(one) for one in (place / "src", place / "tests", place))
+    return os.environ | {"PYTHONPATH": paths}
 
 
 class Results:
@@ -149,10 +197,12 @@ def hash_of(root: Path) -> str:
 class Tree:
     """A copy of the project in which one place can be changed; its path stays, since compiled kernels know it."""
 
-    def __init__(self, root: Path, place: Path) -> None:
+    def __init__(self, root: Path, place: Path, marks: str | None) -> None:
+        """Copy the project in ``root`` to ``place``; tests are run if they have the ``marks``."""
         shutil.rmtree(place, ignore_errors=True)
         shutil.copytree(root, place, ignore=shutil.ignore_patterns(*NOT_COPIED))
         self._place = place
+        self._marks = [] if marks is None else ["-m", marks]
         self._kernels = place.with_name(f"{place.name}-kernels")
         """Compiled for the sources as they are."""
 
@@ -193,9 +243,8 @@ class Tree:
         report = place.with_name(f"{place.name}.xml")
         report.unlink(missing_ok=True)
         quiet = ["-q", "--tb=short", "-p", "no:cacheprovider", "-p", "no:xdist"]
-        command = [sys.executable, "-m", "pytest", *tests, *options, *quiet, f"--junitxml={report}"]
-        paths = os.pathsep.join(str(one) for one in (place / "src", place / "tests", place))
-        environment = os.environ | {"PYTHONPATH": paths, "PNEUMARM_CACHE": str(kernels)} | more
+        command = [sys.executable, "-m", "pytest", *tests, *options, *self._marks, *quiet, f"--junitxml={report}"]
+        environment = _environment(place) | {"PNEUMARM_CACHE": str(kernels)} | more
         began = perf_counter()
         try:
             done = subprocess.run(
@@ -306,12 +355,12 @@ class Progress:
 class Hunt:
     """Runs mutants, several packages at a time, each worker in a copy of its own."""
 
-    def __init__(self, root: Path, mutants: Sequence[Mutant], workers: int) -> None:
+    def __init__(self, root: Path, mutants: Sequence[Mutant], workers: int, marks: str | None) -> None:
         self._root, self._workers = root, workers
-        self._mutants = mutants
+        self._mutants, self._marks = mutants, marks
         self._kept = root / KEPT
         self._kept.mkdir(exist_ok=True)
-        self._results = Results(self._kept / "results.json", hash_of(root))
+        self._results = Results(self._kept / ("quick.json" if marks else "results.json"), hash_of(root))
         self._places = list(range(workers))
         self._lock = Lock()
 
@@ -339,7 +388,7 @@ class Hunt:
         with self._lock:
             place = self._places.pop(0)
         try:
-            tree = Tree(self._root, self._kept / f"tree-{place}")
+            tree = Tree(self._root, self._kept / f"tree-{place}", self._marks)
             name = f"{group[0].package}: unchanged"
             tests = sorted({test for mutant in group for test in mutant.tests})
             ran = tree.run(tests)
@@ -365,12 +414,16 @@ class Hunt:
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
     """Run the mutants that are asked for; return 0 where all are killed."""
     parser = argparse.ArgumentParser(description="Change the program in one place at a time: its tests must fail.")
-    parser.add_argument("--only", metavar="NAME", action="append", help="a mutant, or a package; again for more")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--only", metavar="NAME", action="append", help="a mutant, or a package; again for more")
+    which.add_argument("--quick", action="store_true", help="one in each folder, by the tests of make test alone")
     parser.add_argument("--list", action="store_true", help="say which there are, and run nothing")
     parser.add_argument("--workers", type=int, default=min(os.cpu_count() or 1, 2), help="so many at a time")
     options = parser.parse_args(arguments)
     try:
         mutants = read_list(root)
+        if options.quick:
+            mutants = quick_ones(root, mutants)
     except ListError as error:
         print(f"{LIST} has to be put right:\n{error}", file=sys.stderr)
         return 2
@@ -384,7 +437,7 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
         print("\n".join(f"{mutant.package}: {mutant.name}" for mutant in mutants))
         return 0
     began = monotonic()
-    found = Hunt(root, mutants, max(options.workers, 1)).run()
+    found = Hunt(root, mutants, max(options.workers, 1), QUICK if options.quick else None).run()
     counts = Counter(one.outcome for one in found.values())
     for mutant in mutants:
         one = found[mutant.name]

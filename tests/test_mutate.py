@@ -1,6 +1,7 @@
 """Mutants: the list names what is there, and a change that no test notices is found, told of and not forgotten."""
 
 import json
+import re
 import tomllib
 from collections import Counter
 from pathlib import Path
@@ -9,15 +10,22 @@ import pytest
 
 import mutate
 
-PACKAGES = {"guard", "cycle", "store", "link", "firmware", "live", "task", "servo", "monitor"}
+MANY = {"guard", "cycle", "store", "link", "firmware", "live", "task", "servo", "monitor"}
+"""Safety, data or truth depend on these."""
 
 
 def test_the_list_names_what_is_there() -> None:
     mutants = mutate.read_list(mutate.ROOT)  # each snippet is found once, each test is there
     counts = Counter(mutant.package for mutant in mutants)
-    assert {*counts} == PACKAGES
-    assert min(counts.values()) >= 5
+    assert min(counts[package] for package in MANY) >= 5
     assert len(mutants) >= 80
+    assert {mutant.folder for mutant in mutants} == mutate.folders(mutate.ROOT)
+    assert len(mutate.folders(mutate.ROOT)) >= 20
+
+
+def test_quick_tests_are_those_of_make_test() -> None:
+    (line,) = re.findall(r"^test:.*\n\t(.*)$", (mutate.ROOT / "Makefile").read_text(), re.M)
+    assert line.endswith(f" -m '{mutate.QUICK}'")
 
 
 ENTRY = """
@@ -46,6 +54,14 @@ def test_with_tools():
 
 def test_that_fails_anyway():
     assert total(1, 1) == 3
+
+@pytest.mark.thorough
+def test_thoroughly():
+    assert total(2, 1) == 3
+
+@pytest.mark.parametrize("a", [0, pytest.param(2, marks=pytest.mark.thorough)])
+def test_some(a):
+    assert total(1, a) == 1 + a
 """
 
 
@@ -102,6 +118,29 @@ def test_each_mutant_is_killed_or_told_of_and_what_was_killed_is_not_run_again(
     (project / "src" / "total.py").write_text(SOURCE + "\n# something else\n")  # nothing is known of other sources
     assert mutate.main(["--only", "sum"], project) == 1
     assert "killed    minus" in capsys.readouterr().out
+
+
+def test_quickly_there_is_one_for_each_folder_by_tests_that_are_quick(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    thorough = ("thorough", "a + b", "a - b", "test_thoroughly")
+    listed(project, thorough, ("slow part", "a + b", "a - b", "test_some"), KILLED)
+    assert mutate.main(["--quick"], project) == 1  # what is told by the thorough case alone is not told
+    said = capsys.readouterr().out
+    assert "SURVIVED slow part" in said
+    assert "1 mutants: 0 killed, 0 not run, 1 survived" in said
+    listed(project, thorough, KILLED, ("slow part", "a + b", "a - b", "test_some"))
+    assert mutate.main(["--quick"], project) == 0
+    assert "1 mutants: 1 killed" in capsys.readouterr().out
+    assert mutate.main(["--only", "slow part"], project) == 0
+
+    listed(project, thorough)
+    assert mutate.main(["--quick"], project) == 2
+    assert "src: make test runs the tests of no mutant" in capsys.readouterr().err
+    (project / "tests" / "test_total.py").write_text("import nothing_like_this\n\ndef test_total(): ...\n")
+    listed(project, KILLED)
+    assert mutate.main(["--quick"], project) == 2
+    assert "tests cannot be collected" in capsys.readouterr().err
 
 
 def test_what_was_killed_before_an_interruption_stays_so(project: Path) -> None:

@@ -94,9 +94,10 @@ class Rehearsal:
         if self._process is not None or _rehearsed() >= {*STAGES}:
             return
         command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", json.dumps(asdict(job))]
-        quiet = None if os.environ.get("PNEUMARM_DEBUG") else subprocess.DEVNULL  # it is no part of the run
+        nothing = subprocess.DEVNULL
+        errors = None if os.environ.get("PNEUMARM_DEBUG") else nothing  # it is no part of the run
         with suppress(OSError):
-            self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=quiet, stderr=quiet)
+            self._process = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
 
     def wait_for(self, stage: str) -> None:
         """Return when the kernels of ``stage`` are in the cache, or will not be."""

@@ -18,6 +18,7 @@ from pneumarm.transitions import WHOLE_PERIODS, Store, collect
 
 
 @pytest.mark.long
+@pytest.mark.thorough
 def test_every_error_is_revealed_and_named(capsys, tmp_path):
     with pytest.raises(SystemExit) as ended:
         main(

@@ -3,7 +3,6 @@
 import ast
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 import pytest
 
@@ -15,7 +14,6 @@ from pneumarm.bound.reaching import BoundSettings, measure_bound
 from pneumarm.checkup.measure import _Bench
 from pneumarm.cli import main
 from pneumarm.control.open_agent import open_agent
-from pneumarm.gym import register
 from pneumarm.records import demonstrate
 
 SOURCE = Path(pneumarm.__file__).parent
@@ -99,6 +97,9 @@ def test_demonstrations_move_the_arm_through_the_guard(small_run, log):
 
 
 def test_environments_and_the_bound_move_their_arm_through_the_guard(log, monkeypatch):
+    gymnasium = pytest.importorskip("gymnasium")
+    from pneumarm.gym import register
+
     register()
     environment = gymnasium.make("pneumarm/PointToPoint-v0", arm=Logged())
     environment.reset(seed=1)

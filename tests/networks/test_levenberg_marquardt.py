@@ -210,12 +210,11 @@ def test_the_same_on_any_thread() -> None:
 
 
 def test_it_does_as_well_as_scipy_from_the_same_start() -> None:
-    from scipy.optimize import least_squares
-
+    optimize = pytest.importorskip("scipy.optimize")
     x, y = data(400, 3, 1, seed=12)
     start = nguyen_widrow(3, 4, 1, 0)
     problem = Problem(x, y, start)
-    oracle = least_squares(lambda w: (problem.unpack(w)(x) - y).ravel(), problem.pack(start), method="lm")
+    oracle = optimize.least_squares(lambda w: (problem.unpack(w)(x) - y).ravel(), problem.pack(start), method="lm")
     fit = levenberg_marquardt(x, y, start, LevenbergMarquardt(epochs=500, tolerance=1e-8))
     assert fit.mse[-1] <= 2 * oracle.cost / 400 * 1.02
 

@@ -17,7 +17,6 @@ from urllib.parse import quote
 
 import mysqld
 import pytest
-import sqlalchemy
 
 PASSWORD = "s3cr@t/?"
 _LIMIT = 60.0  # s for whatever a server is asked to do
@@ -98,6 +97,7 @@ class MySQL:
     def __init__(self) -> None:
         if (named := mysqld.program()) is None:
             pytest.skip(mysqld.missing())
+        pytest.importorskip("pymysql")
         self._program, self._made = Path(named), 0
         self._folder = Path(tempfile.mkdtemp(prefix="pneumarm-mysql-"))
         with closing(socket.socket()) as free:
@@ -148,6 +148,8 @@ class MySQL:
             self._process.wait(_LIMIT)
 
     def start(self) -> None:
+        from sqlalchemy.exc import DBAPIError
+
         local = ["--bind-address=127.0.0.1", f"--port={self._port}", f"--socket={self._folder / 'socket'}"]
         local += [f"--pid-file={self._folder / 'pid'}"]
         with open(self._folder / "log", "a") as log:
@@ -156,7 +158,7 @@ class MySQL:
             )
         deadline = monotonic() + _LIMIT
         while True:
-            with suppress(sqlalchemy.exc.DBAPIError):
+            with suppress(DBAPIError):
                 self.execute("SELECT 1")
                 return
             if self._process.poll() is not None or monotonic() > deadline:
@@ -170,7 +172,9 @@ class MySQL:
 
 
 def executed(url: str, statement: str) -> list[Any]:
-    engine = sqlalchemy.create_engine(url, poolclass=sqlalchemy.NullPool, isolation_level="AUTOCOMMIT")
+    from sqlalchemy import NullPool, create_engine, text  # make test does without
+
+    engine = create_engine(url, poolclass=NullPool, isolation_level="AUTOCOMMIT")
     with engine.connect() as connection:
-        found = connection.execute(sqlalchemy.text(statement))
+        found = connection.execute(text(statement))
         return list(found) if found.returns_rows else []

@@ -160,14 +160,16 @@ def test_the_viewer_of_rerun_reads_it_in_degrees_and_bar(exportable: Path, tmp_p
     np.testing.assert_array_equal(series["/joint_1/valves"], rows.command[:, 0])
 
 
-def test_what_is_there_is_not_overwritten_and_what_is_missing_is_named(
-    exportable: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize(("name", "needs"), [("arm.lerobot", "pyarrow"), ("arm.minari", "h5py")])
+def test_what_is_there_is_not_overwritten(exportable: Path, tmp_path: Path, name: str, needs: str) -> None:
+    pytest.importorskip(needs)
+    (tmp_path / name).mkdir()
+    with Store.open(exportable) as store, pytest.raises(UnusableInput, match="exists already"):
+        export_recording(store, tmp_path / name)
+
+
+def test_what_is_missing_is_named(exportable: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with Store.open(exportable) as store:
-        for name in ("arm.lerobot", "arm.minari"):
-            (tmp_path / name).mkdir()
-            with pytest.raises(UnusableInput, match="exists already"):
-                export_recording(store, tmp_path / name)
         missing = {"b.parquet": "pyarrow", "b.lerobot": "pyarrow", "b.minari": "h5py", "b.rerun": "rerun"}
         for name, library in missing.items():
             monkeypatch.setitem(sys.modules, library, None)

@@ -157,12 +157,18 @@ def onset(rises: Sequence[tuple[Array, Array]]) -> float:
     """Return after what time [s] values begin to rise, the same in all ``rises``; NaN where readings are too few.
 
     A rise is times from 0 on [s] and values. Least squares of a level that goes over into a parabola: finer than the
-    readings are apart, and without the lateness of a threshold above the noise.
+    readings are apart, and without the lateness of a threshold above the noise. What is looked at ends soon after the
+    first of the rises is seen by such a threshold.
     """
-    begins = np.arange(0.0, _ONSET / 2, _ONSET / 400)
+    if not rises:
+        return float("nan")
+    least = _BEGUN * max(np.ptp(values) for _, values in rises)
+    risen = [float(time[values - values[0] > least][:1].sum()) for time, values in rises]  # 0 where it never has
+    until = max(_ONSET, min(filter(None, risen), default=0.0) + _ONSET / 2)
+    begins = np.arange(0.0, until - _ONSET / 2, _ONSET / 400)
     left = np.zeros(len(begins))
     for time, values in rises:
-        seen = time <= _ONSET
+        seen = time <= until
         if seen.sum() < _FEWEST:
             return float("nan")
         since = np.maximum(time[seen] - begins[:, None], 0.0) / _ONSET
@@ -172,7 +178,8 @@ def onset(rises: Sequence[tuple[Array, Array]]) -> float:
     return float(begins[np.argmin(left)])
 
 
-_ONSET = 0.1  # s: what is looked at for the beginning of a rise
+_ONSET = 0.1  # s: what is looked at for the beginning of a rise at least
+_BEGUN = 0.1  # of a rise: what is surely more than noise
 _FEWEST = 10  # readings that tell it
 
 

@@ -41,7 +41,7 @@ class Blocks:
         """Return number, rows and at_rest of the sequences to read."""
         kinds = {f"kind_{k}": kind for k, kind in enumerate(self._kinds or ())}
         where = "" if self._kinds is None else f"kind IN ({', '.join(f':{name}' for name in kinds) or 'NULL'})"
-        found = self._database.pages("sequences", ('"rows"', "at_rest"), where=where, values=kinds)
+        found = self._database.pages("sequences", ("rows", "at_rest"), where=where, values=kinds)
         table = np.fromiter(chain.from_iterable(found), np.int64).reshape(-1, 3)
         if self._sequences is not None:
             table = table[self._sequences(table[:, 0])]

@@ -11,7 +11,7 @@ from pneumarm.address import StoreAddress
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.transitions.database import PAGE, Line
 from pneumarm.transitions.rows import values_of
-from pneumarm.transitions.store import SEQUENCE, Store
+from pneumarm.transitions.store import Store
 
 _ROWS = 20_000  # of a block, which is in memory as Python's numbers
 
@@ -26,22 +26,8 @@ class CopyResult:
     runs: int
 
 
-@dataclass(frozen=True)
-class _CopiedTable:
-    """A table besides that of the rows: its columns, and what its lines are in order of."""
-
-    name: str
-    columns: tuple[str, ...]
-    key: str = "number"
-    page: int = PAGE
-
-
-_TABLES = (
-    _CopiedTable("runs", ("number", "purpose", "metadata")),
-    _CopiedTable("sequences", SEQUENCE),
-    _CopiedTable("marks", ("sequence", "first", "last", "reason"), key="rowid"),
-    _CopiedTable("state", ("name", "value"), key="name", page=1),  # a state can be large
-)
+_KEYS = {"runs": "number", "sequences": "number", "marks": "rowid", "state": "name"}
+"""Tables besides that of the rows, and what their lines are copied in order of."""
 
 
 def copy_store(source: StoreAddress, target: StoreAddress) -> CopyResult:
@@ -75,26 +61,32 @@ def _fill(made: Store, original: Store) -> int:
     """Write all that ``original`` holds into ``made``; return how many rows these are."""
     count = 0
     with made.writing() as database:
-        for table in _TABLES:
+        for table in _KEYS:
             lines = _lines(original, table)
-            while page := list(islice(lines, table.page)):
-                database.insert(table.name, table.columns, page)
+            while page := list(islice(lines, _page(table))):
+                database.insert(table, page)
         for rows in original.blocks(_ROWS, marked=True):
             made.insert_rows(rows.sequence, rows.step, values_of(rows, made.further))
             count += len(rows)
     return count
 
 
-def _lines(store: Store, table: _CopiedTable) -> Iterator[Line]:
-    if table.name == "marks" and not store.keeps_marks:
+def _lines(store: Store, table: str) -> Iterator[Line]:
+    if table == "marks" and not store.keeps_marks:
         return iter(())
-    found = store.database.pages(table.name, table.columns, table.key, page=table.page)
+    database = store.database
+    found = database.pages(table, database.columns(table), _KEYS[table], page=_page(table))
     return (tuple(line[1:]) for line in found)
+
+
+def _page(table: str) -> int:
+    """Return how many lines of a table are held at once; a state can be large."""
+    return 1 if table == "state" else PAGE
 
 
 def _content(store: Store) -> Iterator[Any]:
     """Yield all that a store holds, part by part, such that what is equal compares so."""
-    yield from chain.from_iterable(_lines(store, table) for table in _TABLES)
+    yield from chain.from_iterable(_lines(store, table) for table in _KEYS)
     for rows in store.blocks(_ROWS, marked=True):
         numbers = np.column_stack([rows.sequence, rows.step, values_of(rows, store.further)])
         yield np.nan_to_num(numbers, nan=np.inf).tobytes()  # no stored number is infinite

@@ -33,8 +33,6 @@ Values = Mapping[str, Any]
 """Values of a query by their names."""
 Line = Sequence[Any]
 """A line of a table."""
-
-
 PAGE = 10_000
 """Lines of a table that are held at once."""
 
@@ -52,6 +50,8 @@ class Database(ABC):
     """Whether the commands are valves -1, 0, +1 or pulses in between; imported ones may be continuous."""
     begin_transaction = begin_snapshot = "BEGIN"
     """Statements that begin a transaction which writes, and one that sees the moment of its first reading."""
+    place: str
+    """What stands for a value in a statement for many lines."""
     _is_writing = False
 
     @classmethod
@@ -89,8 +89,8 @@ class Database(ABC):
         """Execute a query and return the lines of its answer."""
 
     @abstractmethod
-    def insert(self, table: str, columns: Sequence[str], lines: Sequence[Line]) -> None:
-        """Add ``lines`` to a ``table``; None is NULL."""
+    def execute_many(self, statement: str, lines: Sequence[Line]) -> None:
+        """Execute a statement with the values of each of the ``lines`` in its places."""
 
     @abstractmethod
     def translated(self) -> AbstractContextManager[None]:
@@ -148,6 +148,16 @@ class Database(ABC):
                     self.execute("ROLLBACK")
                 raise
 
+    def columns(self, table: str) -> list[str]:
+        """Return the names of a table's columns."""
+        return list(tables(self.spec, self.version)[table].columns)
+
+    def insert(self, table: str, lines: Sequence[Line]) -> None:
+        """Add ``lines`` to a ``table``, their values in the order of its columns; None is NULL."""
+        columns = self.columns(table)
+        values = ", ".join([self.place] * len(columns))
+        self.execute_many(f'INSERT INTO "{table}" ({_quoted(columns)}) VALUES ({values})', lines)
+
     def query(self, query: str, values: Values | None = None) -> list[Line]:
         """Return all lines of the answer to a query."""
         with self.translated():
@@ -171,7 +181,7 @@ class Database(ABC):
         found: list[Line] = [()] * page
         while len(found) == page:
             chosen = f" WHERE {' AND '.join(conditions)}" if conditions else ""
-            query = f'SELECT {", ".join([key, *columns])} FROM "{table}"{chosen} ORDER BY {key} LIMIT {page}'
+            query = f'SELECT {_quoted([key, *columns])} FROM "{table}"{chosen} ORDER BY {key} LIMIT {page}'
             found = self.query(query, known)
             yield from found
             if found:
@@ -183,32 +193,36 @@ class Database(ABC):
         return further_columns(self.spec, self.version)
 
 
-class TableSchema(NamedTuple):
+def _quoted(columns: Sequence[str]) -> str:
+    return ", ".join(f'"{column}"' for column in columns)
+
+
+class StoreTable(NamedTuple):
     """A table: its columns, with their types, and how its statement ends; in the words of SQLite."""
 
     columns: Mapping[str, str]
     end: str = ")"
 
 
-def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, TableSchema]:
+def tables(spec: ArmSpec, version: int = VERSION) -> dict[str, StoreTable]:
     """Return the tables of a store by name; servers translate the types."""
     number, text, key = "INTEGER NOT NULL", "TEXT NOT NULL", {"number": "INTEGER PRIMARY KEY"}
     named, of_sequence = {"name": "TEXT PRIMARY KEY"}, {"sequence": "INTEGER NOT NULL REFERENCES sequences"}
     columns = row_columns(spec.joints, further_columns(spec, version))
     values = {name: "REAL" if "_command_" in name else "REAL NOT NULL" for name in columns}
     made = {
-        "store": TableSchema({**named, "value": text}, ") WITHOUT ROWID"),
-        "runs": TableSchema({**key, "purpose": text, "metadata": text}),
-        "sequences": TableSchema(
+        "store": StoreTable({**named, "value": text}, ") WITHOUT ROWID"),
+        "runs": StoreTable({**key, "purpose": text, "metadata": text}),
+        "sequences": StoreTable(
             {**key, "run": "INTEGER REFERENCES runs", "kind": text}
             | {"at_rest": number, "rows": number, "transitions": number, "info": text}
         ),
-        "rows": TableSchema(
+        "rows": StoreTable(
             {**of_sequence, "step": number, **values}, ", PRIMARY KEY (sequence, step)) WITHOUT ROWID"
         ),
-        "state": TableSchema({**named, "value": "BLOB NOT NULL"}, ") WITHOUT ROWID"),
+        "state": StoreTable({**named, "value": "BLOB NOT NULL"}, ") WITHOUT ROWID"),
     }
-    marks = TableSchema({**of_sequence, "first": number, "last": number, "reason": text})
+    marks = StoreTable({**of_sequence, "first": number, "last": number, "reason": text})
     return made if version == 1 else made | {"marks": marks}
 
 

@@ -39,6 +39,7 @@ class SqliteFile(Database):
     """A store in a file."""
 
     begin_transaction = "BEGIN IMMEDIATE"
+    place = "?"
 
     def __init__(self, path: Path, *, writer: bool) -> None:
         """Open the file; the writer has the lock then, and makes tables of version 1 those of version 2."""
@@ -101,10 +102,9 @@ class SqliteFile(Database):
         """Execute a query and return the lines of its answer."""
         return self.connection.execute(query, values or {})
 
-    def insert(self, table: str, columns: Sequence[str], lines: Sequence[Line]) -> None:
-        """Add ``lines`` to a ``table``."""
-        places = ", ".join("?" * len(columns))
-        self.connection.executemany(f'INSERT INTO "{table}" ({", ".join(columns)}) VALUES ({places})', lines)
+    def execute_many(self, statement: str, lines: Sequence[Line]) -> None:
+        """Execute a statement with the values of each of the ``lines``."""
+        self.connection.executemany(statement, lines)
 
     def translated(self) -> AbstractContextManager[None]:
         """Turn SQLite's errors into ours."""

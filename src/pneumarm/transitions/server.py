@@ -30,7 +30,7 @@ from pneumarm.transitions.database import (
     VERSION,
     Database,
     Line,
-    TableSchema,
+    StoreTable,
     Values,
     as_settings,
     check_version,
@@ -137,6 +137,7 @@ class Server(Database):
     """A store on a server."""
 
     version = VERSION
+    place = "%s"
 
     def __init__(self, address: ServerAddress, *, writer: bool) -> None:
         """Connect; the writer has the lock then."""
@@ -204,7 +205,7 @@ class Server(Database):
             if writer:
                 with database.transaction():
                     database.execute("DELETE FROM store WHERE name = :name", {"name": _WRITER})
-                    database.insert("store", ("name", "value"), [(_WRITER, _this_process())])
+                    database.insert("store", [(_WRITER, _this_process())])
         return database
 
     @classmethod
@@ -212,6 +213,7 @@ class Server(Database):
     def made_whole(cls, address: ServerAddress, spec: ArmSpec, valves: bool) -> Iterator[Self]:
         """Give an empty store to be filled, in one transaction; where that fails the tables go again."""
         with closing(cls(address, writer=True)) as database:
+            database.spec, database.valves = spec, valves
             with database.translated():
                 database._require_vacant()
                 database._drop()
@@ -220,8 +222,7 @@ class Server(Database):
                 database._tables = database._catalogue()
                 settings = {**as_settings(spec, valves), "version": str(VERSION), _WRITER: _this_process()}
                 with database.transaction():  # it is a store once it has these
-                    database.insert("store", ("name", "value"), list(settings.items()))
-                database.spec, database.valves = database._settings()
+                    database.insert("store", list(settings.items()))
             try:
                 with database.transaction():
                     yield database
@@ -309,10 +310,8 @@ class Server(Database):
         found = self._usable().execute(sqlalchemy.text(query), dict(values or {}))
         return iter(found) if found.returns_rows else iter(())
 
-    def insert(self, table: str, columns: Sequence[str], lines: Sequence[Line]) -> None:
-        """Add ``lines`` to a ``table``."""
-        places = ", ".join(["%s"] * len(columns))
-        statement = f'INSERT INTO "{table}" ({", ".join(columns)}) VALUES ({places})'
+    def execute_many(self, statement: str, lines: Sequence[Line]) -> None:
+        """Execute a statement with the values of each of the ``lines``."""
         self._usable().exec_driver_sql(statement, [tuple(line) for line in lines])
 
     @contextmanager
@@ -348,13 +347,13 @@ def _engine(address: ServerAddress, system: System) -> sqlalchemy.Engine:
     )
 
 
-def _tables(spec: ArmSpec) -> dict[str, TableSchema]:
+def _tables(spec: ArmSpec) -> dict[str, StoreTable]:
     """Return the tables of a store; lines of marks are counted, which SQLite does by itself."""
     found = tables(spec)
-    return found | {"marks": TableSchema({"rowid": "", **found["marks"].columns})}
+    return found | {"marks": StoreTable({"rowid": "", **found["marks"].columns})}
 
 
-def _statement(name: str, table: TableSchema, system: System) -> str:
+def _statement(name: str, table: StoreTable, system: System) -> str:
     """Return the statement that creates a ``table``."""
     columns = [f'"{column}" {_type(words, system)}' for column, words in table.columns.items()]
     return f'CREATE TABLE "{name}" ({", ".join(columns)}{table.end.removesuffix(" WITHOUT ROWID")}{system.options}'

@@ -33,7 +33,6 @@ from pneumarm.transitions.database import (
     Database,
     damaged,
     kept_json,
-    row_columns,
 )
 from pneumarm.transitions.doubtful import with_doubtful_marked
 from pneumarm.transitions.possible import row_values
@@ -49,8 +48,6 @@ MOST_USED = 400_000
 """Transitions that a simulation is fitted to and judged by at most: twice as many as the thesis collects."""
 _DRAWN = 11  # seed of the draw of these, not that of what is held out
 
-SEQUENCE = ("number", "run", "kind", "at_rest", '"rows"', "transitions", "info")
-"""Columns of the table of sequences."""
 _ALL = (1, 1 << 62)  # the first and the last number of any sequence
 
 
@@ -226,8 +223,9 @@ class Store:
     def catalogue(self, run: int | None = None) -> Iterator[SequenceEntry]:
         """Yield what is known of every sequence, or of those of a run."""
         where = "" if run is None else "run = :run"
+        _, *columns = self.database.columns("sequences")
         for number, of_run, kind, at_rest, rows, transitions, info in self.database.pages(
-            "sequences", SEQUENCE[1:], where=where, values={"run": run} if where else {}
+            "sequences", columns, where=where, values={"run": run} if where else {}
         ):
             if self._part is not None and number not in self._part.sequences:
                 continue
@@ -351,7 +349,7 @@ class Store:
         }
         with self.writing() as database:
             number = 1 + int(self._one("SELECT coalesce(max(number), 0) FROM runs"))
-            database.insert("runs", ("number", "purpose", "metadata"), [(number, purpose, _as_json(metadata))])
+            database.insert("runs", [(number, purpose, _as_json(metadata))])
         self._run = number
         return number
 
@@ -400,7 +398,7 @@ class Store:
                 self._insert(number, one, grows)
             for name, value in (state or {}).items():
                 database.execute("DELETE FROM state WHERE name = :name", {"name": name})
-                database.insert("state", ("name", "value"), [(name, value)])
+                database.insert("state", [(name, value)])
         return number
 
     def extend(self, number: int, more: Recorded) -> None:
@@ -468,14 +466,14 @@ class Store:
     def _insert_marks(self, number: int, marks: Iterable[Mark]) -> None:
         lines = [(number, one.first, one.last, one.reason) for one in marks]
         if lines:
-            self.database.insert("marks", ("sequence", "first", "last", "reason"), lines)
+            self.database.insert("marks", lines)
 
     def _insert(self, number: int, one: Recorded, grows: bool) -> None:
         values = row_values(one, self.spec, self.further, self.valves)
         if not grows:
             one = with_doubtful_marked(one, self.spec, self.valves)
         known = (number, self._run, one.kind, int(one.at_rest), len(one), one.transitions, _as_json(one.info))
-        self.database.insert("sequences", SEQUENCE, [known])
+        self.database.insert("sequences", [known])
         self._insert_marks(number, one.marks)
         self.insert_rows(np.full(len(one), number), one.step, values)
 
@@ -484,8 +482,7 @@ class Store:
         lines = list(zip(sequence.tolist(), step.tolist(), *values.T.tolist(), strict=True))
         for k in np.flatnonzero(np.isnan(values).any(axis=1)).tolist():  # rows without a command
             lines[k] = tuple(None if value != value else value for value in lines[k])
-        columns = ("sequence", "step", *row_columns(self.joints, self.further))
-        self.database.insert("rows", columns, lines)
+        self.database.insert("rows", lines)
 
     @contextmanager
     def writing(self) -> Iterator[Database]:

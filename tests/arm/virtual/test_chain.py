@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -31,7 +30,12 @@ from pneumarm.kernels import kernel
 swing, solve = kernel(swing.py_func), kernel(solve.py_func)
 
 
-def in_mujoco(parameters, payload=(0.0,) * 4):
+@pytest.fixture
+def mujoco():
+    return pytest.importorskip("mujoco")
+
+
+def in_mujoco(mujoco, parameters, payload=(0.0,) * 4):
     """The same links in MuJoCo; an angle is 0 there where the link hangs straight on."""
     tail, place = "", 0.0
     text = ""
@@ -56,9 +60,9 @@ def pushed(body, angle, speed):
 
 @pytest.mark.parametrize("joints", [2, 3, 4])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_mass_matrix_and_bias_are_those_of_mujoco(joints, seed):
+def test_mass_matrix_and_bias_are_those_of_mujoco(mujoco, joints, seed):
     parameters = draw_parameters(seed, joints)
-    body, model, random = body_of(parameters), in_mujoco(parameters), np.random.default_rng(seed)
+    body, model, random = body_of(parameters), in_mujoco(mujoco, parameters), np.random.default_rng(seed)
     data, tilt = mujoco.MjData(model), body.constants.joints["tilt"]
     for _ in range(200):
         angle, speed = random.uniform(-3, 3, joints), random.uniform(-20, 20, joints)
@@ -73,9 +77,9 @@ def test_mass_matrix_and_bias_are_those_of_mujoco(joints, seed):
         np.testing.assert_allclose(body.joints["torque"], np.linalg.solve(expected, -bias), rtol=1e-9, atol=1e-9)
 
 
-def test_a_payload_is_a_mass_more_for_mujoco_too():
+def test_a_payload_is_a_mass_more_for_mujoco_too(mujoco):
     parameters = draw_parameters(3, 3)
-    body, model = body_of(parameters), in_mujoco(parameters, (0.0, 0.0, 0.2))
+    body, model = body_of(parameters), in_mujoco(mujoco, parameters, (0.0, 0.0, 0.2))
     data = mujoco.MjData(model)
     hang(body.constants, 2, parameters.joints[2].distance, 0.2, 1.0)
     angle, speed = np.array([0.3, -1.0, 0.7]), np.array([1.0, 5.0, -3.0])

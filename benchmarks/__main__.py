@@ -8,7 +8,7 @@ import sys
 import benchmarks
 from pneumarm.console import complain
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.leaving import Interrupted, leave_by_exceptions
+from pneumarm.leaving import Interrupted, signals_as_exceptions
 
 LONG = (
     "adaptation",
@@ -55,5 +55,5 @@ def main(names: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    leave_by_exceptions()
+    signals_as_exceptions()
     sys.exit(main(sys.argv[1:]))

@@ -112,7 +112,9 @@ def collected(
 
     Whole sequences are stored, so there may be one more than needed. Returns the transitions and the minutes.
     """
-    return there_and_back.collected(path, f"virtual:seed={arm}", seed, Recipe(transitions, minutes, pulses=pulses))
+    return there_and_back.collect_until(
+        path, f"virtual:seed={arm}", seed, Recipe(transitions, minutes, pulses=pulses)
+    )
 
 
 def fitted(path: Path, seed: int) -> tuple[StoreFit, BeginStates]:

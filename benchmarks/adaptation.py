@@ -53,7 +53,7 @@ from pneumarm.report.style import key, legend_below, panels, styled
 from pneumarm.simulation import SINGLE_STEPS, fit_store
 from pneumarm.statistics import moving_mean
 from pneumarm.task import begin_states
-from pneumarm.task.movements import joined
+from pneumarm.task.movements import join_movements
 from pneumarm.transitions import KINDS, WHOLE_PERIODS, Store, collect
 
 Floats = NDArray[np.float64]
@@ -165,7 +165,7 @@ class Bench:
         arm = changed_arm(change, seed, 2000 + seed)
         with tempfile.TemporaryDirectory() as place, Store.for_arm(Path(place) / "db", arm.spec) as store:
             moved = transfer(agent, arm, store, settings, seed=seed)
-        made = joined([moved.movements["before"], moved.movements["learning"]])
+        made = join_movements([moved.movements["before"], moved.movements["learning"]])
         assert moved.adapted is not None
         return {
             "change": change,

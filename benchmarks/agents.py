@@ -84,7 +84,7 @@ def prepared(
     db, seed = store_of(folder, arm), seed_of(arm) + recording
     file = db.with_suffix(".sim")
     if not file.exists():
-        there_and_back.collected(db, arm, seed, Recipe(minutes=minutes) if minutes else Recipe(TRANSITIONS))
+        there_and_back.collect_until(db, arm, seed, Recipe(minutes=minutes) if minutes else Recipe(TRANSITIONS))
         with Store.open(db) as store:
             fit_store(store, replace(settings, seed=seed)).simulation.save(file)
     simulation = Simulation.load(file)

@@ -38,7 +38,7 @@ from pneumarm.transitions import FEWEST_TRANSITIONS, CollectSettings, Store, col
 from pneumarm.transitions.collect import random_actions
 from pneumarm.transitions.fill_times import find_fill_times
 from pneumarm.transitions.players import Trajectory
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import join_rows
 from pneumarm.transitions.window import Window, transitions
 
 RANDOM, CHOSEN, OF_A_KIND = WAYS = ("random", "chosen", "chosen of a kind")
@@ -94,7 +94,7 @@ class Chooser:
 def quickly_fitted(store: Store) -> list[Simulation]:
     """Return simulations that are fitted to all of ``store``, from different weights."""
     window = Window.of(store.spec, HISTORY)
-    known = transitions(joined(store.blocks()), window)
+    known = transitions(join_rows(store.blocks()), window)
     return [
         fit(
             known, known, spec=store.spec, goal_range=store.percentiles(), valves=store.valves, settings=settings

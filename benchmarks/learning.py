@@ -19,7 +19,7 @@ from pneumarm.arm import Reading
 from pneumarm.control import AgentController
 from pneumarm.kernels import kernel
 from pneumarm.learning import TrainSettings, test, train
-from pneumarm.learning.online.loop import Schedule, train_episode, workspace
+from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episode
 from pneumarm.learning.online.values import Networks, draw_networks, learner, pack, unpack
 from pneumarm.random import normal, random_state, uniform
 from pneumarm.task.environment import Environment, environment, episode
@@ -224,7 +224,9 @@ def measure() -> Iterator[str]:
     def composed(steps: int = STEPS) -> Any:
         weights, one = start.copy(), episode(endless, random_state(1))
         task, learns = endless.task._replace(cutoff=steps), learner(weights, settings)
-        outcome = train_episode(endless._replace(task=task), learns, schedule, one, workspace(learns, one.goal.size))
+        outcome = train_episode(
+            endless._replace(task=task), learns, schedule, one, loop_workspace(learns, one.goal.size)
+        )
         return weights, outcome[1]
 
     one = episode(endless, random_state(1))

@@ -132,7 +132,7 @@ def prepared(plan: Plan, name: str, arm: str, seed: int) -> str:
             with tempfile.TemporaryDirectory() as place:
                 db = Path(place) / "arm.db"
                 recipe = Recipe(minutes=plan.minutes, pulses=CollectSettings().pulses)
-                there_and_back.collected(db, arm, seed, recipe)
+                there_and_back.collect_until(db, arm, seed, recipe)
                 made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
             made.simulation.save(simulation)
             train(made.simulation, begin, None, seed).agent.save(agent)

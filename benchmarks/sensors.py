@@ -66,7 +66,7 @@ def measure() -> Iterator[str]:
             if missing:
                 with tempfile.TemporaryDirectory() as place:
                     db = Path(place) / "transitions.db"
-                    there_and_back.collected(db, name_of(arm), seed, Recipe(transitions))
+                    there_and_back.collect_until(db, name_of(arm), seed, Recipe(transitions))
                     for one in missing:
                         rows.add(trial(db, arm, seed, one, transitions, movements))
                         yield f"arm {arm}, seed {seed}, {one}: measured"

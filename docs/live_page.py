@@ -15,7 +15,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from live.browser import opened_browser  # noqa: E402
 from live.serving import served  # noqa: E402
-from pneumarm.live.rig import Rig  # noqa: E402
+from pneumarm.live.live_arm import LiveArm  # noqa: E402
 from pneumarm.run import RunSettings  # noqa: E402
 
 _COLORS = 256
@@ -29,7 +29,7 @@ _PLACE = """(degrees) => {
 
 def draw(agent: str, arm: str) -> None:
     """Move ``arm`` by ``agent`` on the page, and draw that."""
-    with served(Rig(RunSettings(arm=arm), [agent], None)) as server, opened_browser() as browser:
+    with served(LiveArm(RunSettings(arm=arm), [agent], None)) as server, opened_browser() as browser:
         page = browser.new_page(viewport={"width": 1240, "height": 800}, color_scheme="light")
         page.goto(server.url)
         page.locator("body[data-role=writer]").wait_for()

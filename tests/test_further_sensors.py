@@ -17,7 +17,7 @@ from pneumarm.learning import ServoSettings, load_agent
 from pneumarm.run import Run, RunSettings, RunTransferSettings
 from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.transitions import Store
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import join_rows
 
 ARM = "virtual:seed=3,sensors=velocity+temperature"
 NEEDS = ("joint_1_velocity", "joint_1_temperature_1", "joint_1_temperature_2")
@@ -57,7 +57,7 @@ def test_a_run_stores_fits_and_uses_them(done: Path) -> None:
     for kept in (simulation, agent):
         assert kept.window.needs == NEEDS == kept.spec.further
     with Store.open(done / "transitions.db") as store:
-        rows = joined(store)
+        rows = join_rows(store)
     low, high = simulation.further_range.T
     temperature = rows.measured[NEEDS[1]]
     assert len(temperature) == len(rows)
@@ -71,7 +71,7 @@ def test_a_run_stores_fits_and_uses_them(done: Path) -> None:
 def test_success_is_judged_by_the_velocity_that_the_agent_sees(done: Path) -> None:
     with Store.open(done / "transitions.db") as store:
         movements = [entry for entry in store.catalogue() if entry.kind == "episode"]
-        rows = joined(store.blocks(kinds=["episode"]))
+        rows = join_rows(store.blocks(kinds=["episode"]))
     for entry in movements:
         own = rows.where(rows.sequence == entry.number)
         info, end = entry.info, entry.info["actions"]  # what was held on after the end is recorded, too

@@ -14,7 +14,7 @@ from children import python
 from pneumarm.arm import ArmSpec
 from pneumarm.arm.spec_file import save_spec
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.row_file import read_rows
+from pneumarm.experiments.row_file import read_trial_rows
 from pneumarm.files import write_arrays, write_json, written_whole
 from pneumarm.learning import METHODS, load_agent
 from pneumarm.run import settings_in
@@ -265,7 +265,7 @@ def test_numbers_of_any_length_are_refused(capsys: pytest.CaptureFixture[str]) -
 def test_a_row_of_an_experiment_may_not_be_nested_without_end(tmp_path: Path) -> None:
     (tmp_path / "rows.jsonl").write_text("[" * 100_000 + "\n")
     with pytest.raises(UnusableInput, match="line 1"):
-        read_rows(tmp_path / "rows.jsonl")
+        read_trial_rows(tmp_path / "rows.jsonl")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs links")

@@ -1,10 +1,10 @@
-"""A module imports only from its own row and those above it in ARCHITECTURE.md's table."""
+"""A module imports only from its own row and those above it in ARCHITECTURE.md's table, and never in a circle."""
 
 import ast
 import re
 from pathlib import Path
 
-from tools.figures import imports
+from tools.figures import circles, imports
 
 import pneumarm
 
@@ -46,3 +46,7 @@ def test_imports_go_up_the_table():
         if module not in ENTRANCES and row_of(other) > row_of(module) and not opens(module, other)
     ]
     assert wrong == []
+
+
+def test_nothing_is_imported_in_a_circle():
+    assert circles(IMPORTED) == []

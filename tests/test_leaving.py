@@ -112,8 +112,8 @@ def test_without_an_arm_none_is_said_to_be_closed(
 
 COMPILING = """
 import ctypes, signal, time
-from pneumarm.leaving import Interrupted, leave_by_exceptions
-leave_by_exceptions()
+from pneumarm.leaving import Interrupted, signals_as_exceptions
+signals_as_exceptions()
 def _raw_object_cache_notify():
     signal.raise_signal(signal.SIGINT)
 try:

@@ -21,7 +21,7 @@ from pneumarm.cli import main
 from pneumarm.commands.common import move_command
 from pneumarm.control.versions import agent_file
 from pneumarm.transitions import Store
-from pneumarm.transitions.rows import Mark, Rows, joined
+from pneumarm.transitions.rows import Mark, Rows, join_rows
 
 ARM = ("--arm", "virtual:seed=3")
 
@@ -223,7 +223,7 @@ def test_what_was_done_is_recorded_and_can_be_shown(
 def rows_of(path: Path) -> Rows:
     with Store.open(path) as store:
         store.check()
-        return joined(store.blocks(marked=True))
+        return join_rows(store.blocks(marked=True))
 
 
 def rows_in(path: Path) -> int:

@@ -28,9 +28,9 @@ import pneumarm.cli
 for name in {modules}:
     importlib.import_module(name)
 from pneumarm.console import peak_memory
-from pneumarm.leaving import leave_by_exceptions
+from pneumarm.leaving import signals_as_exceptions
 assert peak_memory() > 1
-leave_by_exceptions()
+signals_as_exceptions()
 from pneumarm.cli import main
 main(["arm", "emulate", "virtual", "--link", "arm.port"])
 """

@@ -13,7 +13,7 @@ import pytest
 from pneumarm import rehearsal
 from pneumarm.arm import open_arm
 from pneumarm.learning import ServoSettings
-from pneumarm.rehearsal import STAGES, Rehearsal, WarmUpJob, installed, rehearse
+from pneumarm.rehearsal import STAGES, Rehearsal, WarmUpJob, installed, warm_up_stages
 from pneumarm.run import Run, RunSettings
 from pneumarm.simulation import FitSettings
 
@@ -34,7 +34,7 @@ def job() -> WarmUpJob:
 
 @pytest.fixture
 def run_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Return what has a script of the shell rehearse in place of Python."""
+    """Return what has a script of the shell warm_up_stages in place of Python."""
 
     def run_by(script: str) -> None:
         python = tmp_path / "python"
@@ -62,7 +62,7 @@ def test_the_same_sources_elsewhere_or_newer_are_rehearsed_anew(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["virtual:seed=2", "virtual:wide,seed=3", "virtual:joints=2,seed=1"])
 def test_every_stage_is_rehearsed(name: str, tmp_path: Path) -> None:
     with open_arm(name) as arm:
-        assert tuple(rehearse(WarmUpJob(arm.spec, FitSettings(), SMALL, None), tmp_path)) == STAGES
+        assert tuple(warm_up_stages(WarmUpJob(arm.spec, FitSettings(), SMALL, None), tmp_path)) == STAGES
 
 
 def test_a_rehearsal_is_waited_for_and_ended(job: WarmUpJob) -> None:

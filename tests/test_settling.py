@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pneumarm.moving.settling import scatter, settled_at
+from pneumarm.moving.settling import reading_noise, settled_at
 
 TOLERANCE, DWELL, REACHED = 1.0, 0.3, 0.4
 RATES = 20.0, 45.0, 90.0
@@ -69,10 +69,10 @@ def test_one_joint_that_stays_away_is_enough() -> None:
 def test_scatter_is_that_of_the_noise_and_not_of_the_motion() -> None:
     times, off = movement(45.0, 0.0, 1.0)
     late = times > 1.0
-    assert scatter(off[late]) < 0.05
+    assert reading_noise(off[late]) < 0.05
     noisy = off + 0.5 * np.random.default_rng(0).standard_normal(len(off))
-    assert scatter(noisy[late]) == pytest.approx(0.5, rel=0.3)
-    assert scatter(np.zeros(3)) == 0.0
+    assert reading_noise(noisy[late]) == pytest.approx(0.5, rel=0.3)
+    assert reading_noise(np.zeros(3)) == 0.0
 
 
 @pytest.mark.parametrize("far", [1e150, 6e302, -6e302])

@@ -15,7 +15,7 @@ from pneumarm.simulation import Simulation, by_quantity, refiltered
 from pneumarm.simulation.fit import remarks
 from pneumarm.simulation.quality import Resynchronisation, Statistics, propagation, statistics, validity
 from pneumarm.transitions import Filtered, Store, Transitions, transitions
-from pneumarm.transitions.choice import joined, picked
+from pneumarm.transitions.choice import join_transitions, picked
 from pneumarm.transitions.grid import CellCounts
 
 Floats = NDArray[np.float64]
@@ -110,7 +110,7 @@ def _in_order(filtered: Filtered, most: int = 300_000) -> Transitions:
         raise UnusableInput(
             f"{count} transitions of sequences that were kept out of the fit are too few to judge by; collect more"
         )
-    return joined(parts)
+    return join_transitions(parts)
 
 
 def _longest(apart: Transitions, steps: int) -> int:

@@ -17,7 +17,7 @@ from pneumarm.commands.config_file import take_config, take_option
 from pneumarm.commands.help_pages import HELP, HELP_ALL, LOG, AllOptions, FewOptions
 from pneumarm.console import complain, open_closed_streams
 from pneumarm.errors import PneumarmError
-from pneumarm.leaving import leave_by_exceptions
+from pneumarm.leaving import signals_as_exceptions
 from pneumarm.progress import LEVELS, checked_level, print_lines
 from pneumarm.version import __version__
 
@@ -164,7 +164,7 @@ RESUMED = ("run", "collect", "transfer", "experiment")
 """Commands that go on, when they are called again, where they were interrupted."""
 
 _NO_BUG = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
-"""Of errors of the operating system: disks that are full, read-only or broken, and what is not allowed."""
+"""Errors of the operating system that are no bug: full, read-only or broken disks, and what is not allowed."""
 _NO_NAME = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR)
 """... and names that no file, or no folder, can have or has."""
 
@@ -202,7 +202,7 @@ _USAGE = {
     "move": "Usage: pneumarm move CONTROLLER --arm ARM [OPTIONS] GOALS...",
     "live": "Usage: pneumarm live [CONTROLLERS...] [OPTIONS]",
 }
-"""Of commands that take any number of words."""
+"""Usage of commands that take any number of words."""
 for _name, (_help, _example) in COMMANDS.items():
     _file, _, _part = _name.partition(" ")
     _groups.get(_file, app).command(
@@ -227,7 +227,7 @@ def _run(arguments: list[str]) -> int:
         open_closed_streams()
         if not sys.warnoptions and "PNEUMARM_DEBUG" not in os.environ:
             warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's, which are not for whoever calls a command
-        leave_by_exceptions()
+        signals_as_exceptions()
         arguments, level = take_option(arguments, LOG, "one of " + ", ".join(LEVELS))
         print_lines(checked_level(level))
         arguments, config = take_config(arguments, app)

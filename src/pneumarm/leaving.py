@@ -38,7 +38,7 @@ class Interrupted(KeyboardInterrupt):
         """What a shell reports of a program that a signal ended: 130 for SIGINT, 143 for SIGTERM."""
 
 
-def leave_by_exceptions() -> None:
+def signals_as_exceptions() -> None:
     """Have signals, and on Linux the end of the parent process, raise :class:`Interrupted` in the main thread.
 
     A signal that is ignored stays so: ``nohup`` means what it says, also for the end of the parent.

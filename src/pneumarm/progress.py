@@ -8,7 +8,7 @@ import logging
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from time import monotonic
 from typing import Any
 
@@ -29,9 +29,11 @@ from pneumarm.errors import UnusableInput
 
 Report = Callable[[float, float], None]
 """Called with what is done and the total."""
+Display = Callable[[str], AbstractContextManager[Report]]
+"""Shows how far a stage of this title is while the block runs: :func:`progress`, or :func:`silent`."""
 
 LEVELS = ("debug", "info", "warning")
-"""Of what is said about long work: every kernel that is compiled; where a stage is; nothing."""
+"""Levels of what is said about long work: every kernel that is compiled; where a stage is; nothing."""
 _BEGAN = monotonic()
 _EVERY = 10.0  # s between two plain lines of a stage
 _TITLE = 34  # letters, so that bars stand below each other
@@ -97,7 +99,7 @@ class Compiling:
 
 
 compiling = Compiling()
-"""Of this process."""
+"""Compiling of this process."""
 
 
 class Stage:
@@ -134,6 +136,12 @@ class Stage:
         """Return a line on how long it took."""
         spent = f", {self.compiling:.1f} s of them compiling" if self.compiling > 0.05 else ""
         return f"{self.title}: done in {self.seconds:.1f} s{spent}"
+
+
+@contextmanager
+def silent(title: str) -> Iterator[Report]:
+    """Show no progress."""
+    yield lambda done, total: None
 
 
 @contextmanager

@@ -28,13 +28,13 @@ from pneumarm.console import peak_memory
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.kernels import CACHE_FOLDER
 from pneumarm.learning import ServoSettings, test, train
-from pneumarm.leaving import leave_by_exceptions
+from pneumarm.leaving import signals_as_exceptions
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.simulation import FitSettings, SimulationArm, fit_store
 from pneumarm.task import begin_states
 from pneumarm.transitions import Store
 from pneumarm.transitions.rows import Recorded
-from pneumarm.transitions.watch import warm_up
+from pneumarm.transitions.watch import warm_up_watch
 
 _ROWS, _SEQUENCE = 4_000, 100  # made up, and of a sequence of them
 _PLANNED = 4  # movements
@@ -137,7 +137,7 @@ def _note(*stages: str) -> None:
         marker.writelines(f"{stage}\n" for stage in stages)
 
 
-def rehearse(job: WarmUpJob, folder: Path) -> Iterator[str]:
+def warm_up_stages(job: WarmUpJob, folder: Path) -> Iterator[str]:
     """Do all stages with as little as possible in ``folder``; name those whose kernels are compiled."""
     with Store.create(folder / "made-up.db", job.spec) as store:
         store.append_all(_made_up(job.spec))
@@ -150,7 +150,7 @@ def rehearse(job: WarmUpJob, folder: Path) -> Iterator[str]:
         test(agent, simulation, begin, 8)
         yield "test"
         monitor = Monitor(job.spec, simulation, mode="warn")
-        warm_up(monitor, job.spec)
+        warm_up_watch(monitor, job.spec)
         with SimulationArm(simulation) as arm:
             transfer(agent, arm, store, TransferSettings(episodes=1, test_episodes=1), watch=monitor)
             yield "transfer"
@@ -188,12 +188,12 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
 
 def main() -> None:
     """Rehearse the job in the argument, and note the stages that are done."""
-    leave_by_exceptions()  # also when the run that it is for has ended
+    signals_as_exceptions()  # also when the run that it is for has ended
     if hasattr(os, "nice"):
         os.nice(_NICE)
     job = msgspec.json.decode(sys.argv[1], type=WarmUpJob)
     with TemporaryDirectory() as folder:
-        for stage in rehearse(job, Path(folder)):
+        for stage in warm_up_stages(job, Path(folder)):
             _note(stage)
 
 

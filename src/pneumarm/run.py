@@ -9,7 +9,7 @@ the same folder goes on after the last of them.
 import json
 import time
 from collections.abc import Callable, Collection, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -42,11 +42,11 @@ from pneumarm.learning import (
 from pneumarm.learning import test as test_agent
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.planning import PlanSettings
-from pneumarm.progress import Report, compiling
+from pneumarm.progress import Display, compiling, silent
 from pneumarm.records import demonstrate, marked_record, moving_record, training_record
 from pneumarm.rehearsal import Rehearsal, WarmUpJob
 from pneumarm.report.beside import ReportBeside
-from pneumarm.report.files import REPORT, TEST, read_results, save_demonstration, save_spec
+from pneumarm.report.files import REPORT, TEST, read_results, save_demonstration, write_spec
 from pneumarm.report.shown import read_shown
 from pneumarm.report.viewing import write_view
 from pneumarm.settings import NonNegativeInt, PositiveInt
@@ -59,18 +59,10 @@ from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectResult, Colle
 SETTINGS = "settings.json"
 RECORDED = "recorded.svg"
 """A picture that plays: how the arm moved at the end of its recording."""
-Progress = Callable[[str], AbstractContextManager[Report]]
-
 
 _PLANNED = 40  # movements, by default
 _DRAWN = {"transfer": ("learned",), "settle": ("learned", "moved")}
 """Parts of the report that can be drawn once a stage begins: nothing that it says in them changes any more."""
-
-
-@contextmanager
-def silent(title: str) -> Iterator[Report]:
-    """Show no progress."""
-    yield lambda done, total: None
 
 
 @dataclass(frozen=True)
@@ -138,7 +130,7 @@ class Run:
         self,
         folder: Path,
         settings: RunSettings,
-        progress: Progress = silent,
+        progress: Display = silent,
         seen_by: Callable[[Arm], Arm] = lambda arm: arm,
         monitor: Mode = "stop",
         tell: Callable[[str], None] = lambda line: None,
@@ -290,7 +282,7 @@ class Run:
             if wanted.transitions is None:
                 decided = {"enough": collect_enough(record, store, wanted.enough)}
             collected = record(wanted.transitions or FEWEST_TRANSITIONS)
-            save_spec(self.folder, arm.spec)
+            write_spec(self.folder, arm.spec)
             marked_record(store).save(self.folder)
         write_view(read_shown(self.store), self.folder / RECORDED)
         self._tell(f"the arm as it moved: {self.folder / RECORDED}, which plays in a browser; the report follows")

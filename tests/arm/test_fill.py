@@ -7,7 +7,7 @@ import pytest
 from tests.plain_arms import angle_alone
 
 from pneumarm.arm import Arm, ArmSpec, GuardedArm, Reading, guarded, open_arm
-from pneumarm.arm.fill import Fill, filled
+from pneumarm.arm.fill import PressureEstimate, estimated_pressures
 from pneumarm.arm.seam import check_pressures
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.errors import UnusableInput
@@ -43,7 +43,7 @@ def test_an_arm_whose_supply_nobody_vouches_for_is_refused_and_closed():
 
 
 def test_a_muscle_is_filled_and_emptied_in_the_times_of_the_spec():
-    fill = Fill(replace(SPEC, fill_times=(0.8, 0.5), max_pressure=1.2))
+    fill = PressureEstimate(replace(SPEC, fill_times=(0.8, 0.5), max_pressure=1.2))
     full = 1.2 * SPEC.counts_per_bar
     fill.pass_until(0.0)
     fill.command(np.array([[1, 0]], np.int8))
@@ -64,14 +64,14 @@ def test_a_muscle_is_filled_and_emptied_in_the_times_of_the_spec():
 
 
 def test_time_passes_alike_in_one_step_or_in_many_and_pulses_end_by_themselves():
-    steps, whole = Fill(SPEC), Fill(SPEC)
+    steps, whole = PressureEstimate(SPEC), PressureEstimate(SPEC)
     for fill, times in ((steps, np.linspace(0.0, 0.3, 61)), (whole, [0.0, 0.3])):
         fill.pass_until(0.0)
         fill.command(np.array([[0.5, 1.0]]))
         for time in times:
             fill.pass_until(time)
     assert steps.pressure == pytest.approx(whole.pressure, rel=1e-9)
-    half = Fill(SPEC)
+    half = PressureEstimate(SPEC)
     half.pass_until(0.0)
     half.command(np.array([[1, 0]], np.int8))
     half.pass_until(0.5 * SPEC.period)
@@ -136,7 +136,7 @@ def test_a_recording_of_commands_gives_the_estimates_of_the_arm_that_made_it(tmp
         collect(arm, store, 2000, seed=3)
         rows = next(iter(store.blocks()))
     one = rows.where(rows.sequence == 1)
-    again = filled(arm.spec, one.time, one.command)
+    again = estimated_pressures(arm.spec, one.time, one.command)
     # It began with some air, which a muscle that was full or vented once has forgotten.
     forgotten = ((one.pressure == 0) | (one.pressure > 0.999 * arm.spec.max_pressure_counts)).cumsum(axis=0) > 0
     assert forgotten.any(axis=(0, 1)).any()

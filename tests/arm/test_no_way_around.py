@@ -23,7 +23,7 @@ GUARDED = {
     "arm/fill.py": "an arm, behind the guard like any other",
     "arm/corrected.py": "an arm, behind the guard like any other",
     "arm/own.py": "an arm, behind the guard like any other, that closes its valves where its code fails",
-    "arm/passed_on.py": "an arm, behind the guard like any other",
+    "arm/wrapper.py": "an arm, behind the guard like any other",
     "arm/slower.py": "an arm, behind the guard like any other",
     "arm/serial/board.py": "a controller, which does what it is asked behind the guard",
     "arm/virtual/arm.py": "an arm that sets its own valves on closing and resting",

@@ -16,7 +16,7 @@ from pneumarm.learning import Agent, Exploration, TrainSettings
 from pneumarm.learning.online.agent import OnlineLearner
 from pneumarm.learning.online.loop import Schedule
 from pneumarm.learning.online.values import draw_networks
-from pneumarm.task.movements import joined
+from pneumarm.task.movements import join_movements
 
 COUNT = 12
 RANGE = np.array([[150.0, 850.0]])
@@ -79,7 +79,9 @@ def check_it_is_move(parameters: ArmParameters, settings: dict[str, object], beg
         begin.reach(cycle.arm, draw.random)
         expected.append(move(cycle, controller, draw.goal, agent.settings).row())
     player = Player(agent, other, rate, exploration, seed=4, begin=begin)
-    played = joined(player.play(*(a[part] for a in draws(begin, joints))) for part in (slice(0, 5), slice(5, COUNT)))
+    played = join_movements(
+        player.play(*(a[part] for a in draws(begin, joints))) for part in (slice(0, 5), slice(5, COUNT))
+    )
     assert played.rows() == expected
     np.testing.assert_array_equal(player.learned.weights(), learning.weights())
     assert other.get_state() == one.get_state()

@@ -11,7 +11,7 @@ import pytest
 from pneumarm.cli import main
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
-from pneumarm.experiments.claims import conclusions, judge, keys_of, read_results, sections
+from pneumarm.experiments.claims import conclusions, judge, keys_of, read_all_results, sections
 from pneumarm.experiments.experiment import Analysis, Claim, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import Factorial
 from pneumarm.experiments.findings import weights_dominate
@@ -36,7 +36,7 @@ def results(folder: Path, name: str, claims: list[tuple[str, str]], arms: int = 
 
 
 def judged(folder: Path) -> dict[str, Any]:
-    return {each.conclusion.key: each for each in judge(read_results(folder))}
+    return {each.conclusion.key: each for each in judge(read_all_results(folder))}
 
 
 def test_every_conclusion_names_experiments_of_the_thesis() -> None:
@@ -80,7 +80,7 @@ def test_a_claim_about_nothing_listed_is_not_lost(tmp_path: Path) -> None:
 def test_what_is_missing_has_its_command(tmp_path: Path) -> None:
     results(tmp_path, "all-goals", [("sarsa", "holds")], arms=1, runs=8)
     results(tmp_path, "long-training", [("q-fluctuates", "open")], arms=5, runs=4)
-    made = sections(judge(read_results(tmp_path)), tmp_path)
+    made = sections(judge(read_all_results(tmp_path)), tmp_path)
     commands = {row[0]: row[-1] for row in made[-1].tables[0].rows}
     assert commands["no-shaping"] == f"pneumarm experiment no-shaping --out {tmp_path}"
     assert "--runs 4" in commands["all-goals"]
@@ -122,13 +122,13 @@ def test_the_table_for_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 def test_a_damaged_result_is_said(tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match="expected the folder of a laboratory"):
-        read_results(tmp_path / "nothing")
+        read_all_results(tmp_path / "nothing")
     (tmp_path / "all-goals").mkdir()
     with pytest.raises(UnusableInput, match="expected experiments with results; finish one first"):
-        read_results(tmp_path)
+        read_all_results(tmp_path)
     (tmp_path / "all-goals" / "results.json").write_text('{"experiment": "all-goals"}')
     with pytest.raises(UnusableInput, match=r"results.json: expected results of an experiment .*run it again"):
-        read_results(tmp_path)
+        read_all_results(tmp_path)
 
 
 def rows(made: Factorial, reward: Any, arms: int = 3, runs: int = 4, success: float = 1.0) -> TrialRows:
@@ -254,6 +254,6 @@ def test_results_carry_what_claims_need(tmp_path: Path) -> None:
     (tmp_path / "all-goals").mkdir()
     analysis = Analysis([], {"rows": 3}, [], claims(ALL_GOALS, table))
     write_page(ALL_GOALS, tmp_path / "all-goals", analysis, table.runs, table.arms)
-    found = read_results(tmp_path)["all-goals"]
+    found = read_all_results(tmp_path)["all-goals"]
     assert (len(found.arms), found.runs) == (3, 4)
     assert {claim.about for claim in found.claims} == keys_of("all-goals")

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import spearmanr
 
-from pneumarm.experiments.analysis import filled, number, shown
-from pneumarm.experiments.differences import Interval, interval, within
+from pneumarm.experiments.analysis import filled_words, number, shown_trials
+from pneumarm.experiments.differences import Interval, interval, within_margin
 from pneumarm.experiments.experiment import Axis, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import rank_correlation
 from pneumarm.experiments.means import (
@@ -19,11 +19,11 @@ from pneumarm.experiments.means import (
     estimate,
     from_series,
     mean,
+    means_table,
     numbers,
     over_arms,
     samples,
     series,
-    table,
     text,
 )
 from pneumarm.experiments.overnight.analysis import answer
@@ -101,15 +101,15 @@ def test_values_and_differences_in_words() -> None:
 
 
 def test_within_a_margin() -> None:
-    assert within(Interval(0.5, 0.4, 5), 1.0) == "holds"
-    assert within(Interval(0.5, 0.6, 5), 1.0) == "open"
-    assert within(Interval(-3.0, 1.0, 5), 1.0) == "does not hold"
+    assert within_margin(Interval(0.5, 0.4, 5), 1.0) == "holds"
+    assert within_margin(Interval(0.5, 0.6, 5), 1.0) == "open"
+    assert within_margin(Interval(-3.0, 1.0, 5), 1.0) == "does not hold"
 
 
 def test_a_table_says_what_programs_are_told() -> None:
     percent = Column(figure="x", words="x [%]", digits=1, factor=100.0, thesis={TRIALS[2]: 0.5})
     columns = [percent, Column(figure="x", words="x")]
-    made = table(ROWS, TRIALS, columns, "Means.")
+    made = means_table(ROWS, TRIALS, columns, "Means.")
     assert made.header == ["trial", "x [%]", "thesis", "x"]
     told = numbers(ROWS, TRIALS, columns)["x"]
     for line, words, thesis in zip(made.rows, TRIALS.values(), ("", "0.5"), strict=True):
@@ -172,15 +172,15 @@ def test_words_name_trials_and_columns_that_there_are(name: str) -> None:
         assert number(made, one.trial) in made.trials
         assert one.base is None or number(made, one.base) in made.trials
     for section in made.words.sections:
-        assert shown(made, section)
+        assert shown_trials(made, section)
         assert len(section.drawn) == len(section.dots)
 
 
 def test_trials_are_named_or_counted_and_called_by_what_differs() -> None:
     made = experiment("coupling")
     assert [number(made, trial) for trial in ("policy, all goals, 0.5", 2, -1, None)] == [2, 2, 6, None]
-    assert list(shown(made, made.words.sections[1]).values()) == [f"coupling\u00a0{x:g}" for x in (0, 0.5, 1)]
-    assert list(shown(made, made.words.sections[1], called=False)) == [1, 2, 3]
+    assert list(shown_trials(made, made.words.sections[1]).values()) == [f"coupling\u00a0{x:g}" for x in (0, 0.5, 1)]
+    assert list(shown_trials(made, made.words.sections[1], called=False)) == [1, 2, 3]
     with pytest.raises(KeyError, match="no such trial"):
         number(made, "no such trial")
 
@@ -192,6 +192,6 @@ def test_what_programs_get_of_all_trials_is_said_too() -> None:
         for arm_, arm in enumerate(("a", "b"))
         for trial in made.trials
     )
-    words, found = filled(made, rows)
+    words, found = filled_words(made, rows)
     assert found["lost"]["without shaping"] == estimate(rows, Quantity(figure="simulation: reward", less="reward"), 2)
     assert f"without shaping: {found['lost']['without shaping']:.1f};" in words.summary[0]

@@ -133,7 +133,7 @@ def test_days_are_alike_until_they_differ(small_material: Simulated) -> None:
 
 def test_looking_tells_goals_and_scales() -> None:
     arm = VirtualArm(draw_parameters(2), seed=1)
-    agent = from_scratch.look(arm, from_scratch.ONE, 60, seed=3)
+    agent = from_scratch.untrained_agent(arm, from_scratch.ONE, 60, seed=3)
     low, high = agent.goal_range[0]
     assert high - low > 400
     durations = np.random.default_rng(8).uniform(0, 1.5, (40, 1, 2))
@@ -154,7 +154,7 @@ def test_learning_on_the_arm_ends_when_the_criterion_is_met() -> None:
     shaping = Shaping(initial_deviation=30.0, episodes=10, performance_rate=0.2, grow=0.5)
     settings = replace(from_scratch.ONE, reward=wide, shaping=shaping)
     arm = VirtualArm(draw_parameters(2), seed=1)
-    agent = from_scratch.look(arm, settings, 10, seed=3)
+    agent = from_scratch.untrained_agent(arm, settings, 10, seed=3)
     found = from_scratch.learn_on(arm, agent, 3)
     hours, deviation, performance = np.array(found.course).T
     assert found.met

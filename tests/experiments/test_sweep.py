@@ -19,7 +19,7 @@ from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import LaboratorySettings, Row, run_seed, sorted_rows
 from pneumarm.experiments.preparation import SETTINGS, STORE
 from pneumarm.experiments.results import write_page
-from pneumarm.experiments.row_file import RowWriter, read_rows
+from pneumarm.experiments.row_file import RowWriter, read_trial_rows
 from pneumarm.experiments.sweep import ROWS, arm_folder, sweep
 from pneumarm.transitions import Store, collect
 
@@ -27,7 +27,7 @@ ROW = Row("virtual", 1, 1, {"sum": 1.5}, 0.25)
 
 
 def figures(laboratory: Path, name: str = "sum") -> dict[tuple[str, int, int], float]:
-    return {row.key: row.figures[name] for row in read_rows(laboratory / "toy" / ROWS)}
+    return {row.key: row.figures[name] for row in read_trial_rows(laboratory / "toy" / ROWS)}
 
 
 def test_every_row_is_computed_once(tmp_path: Path) -> None:
@@ -35,7 +35,7 @@ def test_every_row_is_computed_once(tmp_path: Path) -> None:
     assert first.computed == len(first.rows.rows) == 6
     second = sweep(Toy(), tmp_path, runs=3, arms=("virtual", "virtual:seed=1"))
     assert second.computed == 30
-    assert len(read_rows(tmp_path / "toy" / ROWS)) == len(second.rows.rows) == 36
+    assert len(read_trial_rows(tmp_path / "toy" / ROWS)) == len(second.rows.rows) == 36
     assert sweep(Toy(), tmp_path, runs=2).computed == 0
     found = figures(tmp_path)
     assert all(found[arm, t, r] == 10 * t + r + 1000 * len(arm) for arm, t, r in found)
@@ -90,9 +90,9 @@ def test_a_line_cut_short_is_computed_again(tmp_path: Path) -> None:
     whole = file.read_bytes()
     for kept in range(len(whole) - 1, len(whole) - 40, -7):
         file.write_bytes(whole[:kept])
-        assert len(read_rows(file)) == 11
+        assert len(read_trial_rows(file)) == 11
         assert sweep(Toy(), tmp_path).computed == 1
-        assert len(figures(tmp_path)) == len(read_rows(file)) == 12
+        assert len(figures(tmp_path)) == len(read_trial_rows(file)) == 12
     file.write_bytes(whole + b"nonsense\n")
     with pytest.raises(UnusableInput, match=r"rows.jsonl, line 13: expected a row"):
         sweep(Toy(), tmp_path)
@@ -102,12 +102,12 @@ def test_rows_are_on_disk_as_soon_as_they_are_appended(tmp_path: Path) -> None:
     file = tmp_path / "rows.jsonl"
     with RowWriter(file) as writer:
         writer.append(ROW)
-        assert read_rows(file) == [ROW]
+        assert read_trial_rows(file) == [ROW]
         with pytest.raises(UnusableInput, match="is writing to it"):
             RowWriter(file)
     with RowWriter(file) as writer:
         assert writer.rows == [ROW]
-    assert read_rows(tmp_path / "none") == []
+    assert read_trial_rows(tmp_path / "none") == []
 
 
 def test_rows_that_are_missing_are_named() -> None:
@@ -132,13 +132,13 @@ def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
     path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     file = tmp_path / "toy" / ROWS
     with child(sys.executable, "-c", code, env={**os.environ, "PYTHONPATH": path}) as process:
-        wait_until("three rows", lambda: len(read_rows(file)) >= 3, process)
+        wait_until("three rows", lambda: len(read_trial_rows(file)) >= 3, process)
         end(process, signal.SIGKILL)
-    there = read_rows(file)
+    there = read_trial_rows(file)
     assert 3 <= len(there) < 12
     done = sweep(Toy(), tmp_path)
     assert done.computed == 12 - len(there)
-    assert read_rows(file)[: len(there)] == there
+    assert read_trial_rows(file)[: len(there)] == there
     assert len(figures(tmp_path)) == 12
 
 

@@ -20,9 +20,9 @@ from pneumarm.experiments.noise_for_transfer import NoiseForTransfer
 from pneumarm.experiments.registry import experiment
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.state_history import StateHistory
-from pneumarm.experiments.state_history.histories import errors_with_period, shortened
+from pneumarm.experiments.state_history.histories import errors_with_period, with_history
 from pneumarm.experiments.sweep import sweep
-from pneumarm.experiments.there_and_back import Prepared, Recipe, opened, over_joints, prepared, train_and_move
+from pneumarm.experiments.there_and_back import Prepared, Recipe, open_arm_at, over_joints, prepared, train_and_move
 from pneumarm.experiments.valves_closed import ValvesClosed
 from pneumarm.experiments.valves_closed.inflation import inflation
 from pneumarm.learning import TrainSettings
@@ -190,9 +190,9 @@ def test_the_arm_is_controlled_at_the_frequency(material: Prepared, laboratory: 
 
 
 def test_a_period_shorter_than_the_latency_is_refused() -> None:
-    assert opened(ARM, 0, 50.0).spec.period == 0.02
+    assert open_arm_at(ARM, 0, 50.0).spec.period == 0.02
     with pytest.raises(UnusableInput, match="latency"):
-        opened(ARM, 0, 1000.0)
+        open_arm_at(ARM, 0, 1000.0)
 
 
 def test_shorter_histories_are_cut_out_of_longer_ones(material: Prepared) -> None:
@@ -203,7 +203,7 @@ def test_shorter_histories_are_cut_out_of_longer_ones(material: Prepared) -> Non
     for history in (1, 2, 3, 4):
         direct = transitions(rows, Window(1, history))
         assert len(direct.inputs) == len(whole.inputs)  # sequences begin at rest
-        np.testing.assert_array_equal(shortened(whole, longest, history).inputs, direct.inputs)
+        np.testing.assert_array_equal(with_history(whole, longest, history).inputs, direct.inputs)
 
 
 def halves(material: Prepared, window: Window) -> tuple[Transitions, Transitions]:

@@ -16,7 +16,7 @@ from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.registry import PLACES, experiment
 from pneumarm.experiments.trainings import LEARNING, train_and_test, with_setting, with_settings
 from pneumarm.learning import Exploration, TrainSettings
-from pneumarm.learning.online.training import train
+from pneumarm.learning.online.training import train_online
 
 SHORT = LaboratorySettings(test_episodes=200, max_episodes=1000, exploring=True)
 FACTORIALS = [name for name in PLACES if isinstance(experiment(name), Factorial)]
@@ -114,8 +114,8 @@ def test_training_on_begins_as_training(material: Simulated) -> None:
     laboratory = LaboratorySettings(test_episodes=100)
     settings = replace(TrainSettings(), agents=1, validation_episodes=1, stops=False, max_episodes=3000)
     seed = run_seed(laboratory, 1)
-    short = train(material.simulation, material.begin, settings, seed)
-    long = train(material.simulation, material.begin, replace(settings, max_episodes=4000), seed)
+    short = train_online(material.simulation, material.begin, settings, seed)
+    long = train_online(material.simulation, material.begin, replace(settings, max_episodes=4000), seed)
     np.testing.assert_array_equal(short.curves[0], long.curves[0][: len(short.curves[0])])
     assert long.episodes[0] == 4000
     row = chosen.measure(material, 10, 1, laboratory)
@@ -126,10 +126,10 @@ def test_training_on_begins_as_training(material: Simulated) -> None:
 
 def test_training_that_does_not_stop_meets_the_criterion_for_good(material: Simulated) -> None:
     settings = replace(TrainSettings(), agents=1, validation_episodes=1, max_episodes=40_000)
-    stopped = train(material.simulation, material.begin, settings, 3)
+    stopped = train_online(material.simulation, material.begin, settings, 3)
     assert stopped.met[0]
     most = int(stopped.episodes[0]) + 1000
-    on = train(material.simulation, material.begin, replace(settings, stops=False, max_episodes=most), 3)
+    on = train_online(material.simulation, material.begin, replace(settings, stops=False, max_episodes=most), 3)
     assert on.met[0]
     assert on.episodes[0] == most
 
@@ -139,7 +139,7 @@ def test_without_shaping_the_end_is_looked_for_after_every_episode(material: Sim
     settings = experiment("no-shaping").train_settings(2)  # type: ignore[attr-defined]
     assert (settings.exploration.epsilon, settings.exploration.temperature, settings.shaping) == (0.09, 10.0, None)
     one = replace(settings, agents=1, validation_episodes=1, max_episodes=40_000)
-    ends = [train(material.simulation, material.begin, one, seed) for seed in (1, 2)]
+    ends = [train_online(material.simulation, material.begin, one, seed) for seed in (1, 2)]
     assert all(end.met[0] for end in ends)
     assert any(end.episodes[0] % 500 for end in ends)
     for end in ends:

@@ -12,11 +12,11 @@ from pneumarm.experiments.experiment import (
     Experiment,
     Figures,
     LaboratorySettings,
-    Report,
     TrialRows,
     run_seed,
 )
 from pneumarm.experiments.words import Words
+from pneumarm.progress import Report
 
 
 @dataclass(frozen=True)

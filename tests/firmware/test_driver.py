@@ -21,7 +21,7 @@ from pneumarm.arm.virtual.further import THERMOMETER
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.errors import ArmFailure
 from pneumarm.learning import Agent
-from pneumarm.task.movements import joined
+from pneumarm.task.movements import join_movements
 from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
 from tests.arm.serial.table_board import TableArm
 from tests.firmware.board import SimulatedBoard, single_conversions, valves_of
@@ -136,7 +136,7 @@ def test_collecting_and_moving(
         store.check()
     assert (collected.transitions, collected.missed_deadlines) == (120, 0)
     assert watch.findings == []
-    made = joined(moved.movements.values())
+    made = join_movements(moved.movements.values())
     assert made.n == 2
     assert (made.success | (made.actions == agent.settings.cutoff)).all()
 

@@ -31,7 +31,7 @@ from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.simulation.quality import residue
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions import Store, collect
-from pneumarm.transitions.rows import Recorded, Rows, joined
+from pneumarm.transitions.rows import Recorded, Rows, join_rows
 from pneumarm.transitions.window import transitions
 
 POLICY = PolicySettings(updates=40, agents=1, arms=32, steps=16, hidden=(8,), validation_episodes=200, lookahead=0)
@@ -66,7 +66,7 @@ def moved(simulation: Simulation, movements: int, seed: int = 0, noise: float = 
         one = Recorded.from_steps(list(cycle.run(decide)), arm.spec)
         each = (np.full(len(one), number), one.step, one.time, one.angle, one.pressure, one.command)
         blocks.append(Rows(*each, np.ones(len(one), bool)))
-    return joined(blocks)
+    return join_rows(blocks)
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +124,7 @@ def movement(rows: Rows, number: int) -> Rows:
 
 
 def first_of(rows: Rows, movements: int) -> Rows:
-    return joined([movement(rows, number) for number in range(movements)])
+    return join_rows([movement(rows, number) for number in range(movements)])
 
 
 @pytest.mark.parametrize(("joints", "second"), [(1, False), (2, False), (2, True)])

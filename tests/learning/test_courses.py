@@ -14,7 +14,7 @@ from pneumarm.control import AgentController
 from pneumarm.learning import PolicyAgent, PolicySettings
 from pneumarm.learning.policy import courses
 from pneumarm.learning.policy.acting import lanes
-from pneumarm.learning.policy.agent import policy_sizes, practised
+from pneumarm.learning.policy.agent import policy_sizes, scaled_for_joints
 from pneumarm.learning.policy.courses import compare
 from pneumarm.networks.layers import weight_count
 from pneumarm.planning import search
@@ -177,5 +177,5 @@ def test_what_little_is_looked_ahead_is_not_halved(compared: list[int]) -> None:
 
 def test_several_joints_practise_more() -> None:
     settings = PolicySettings(updates=10, practice=3)
-    assert practised(settings, simulation(1)) == settings
-    assert [practised(settings, simulation(joints)).updates for joints in (2, 3)] == [30, 90]
+    assert scaled_for_joints(settings, simulation(1)) == settings
+    assert [scaled_for_joints(settings, simulation(joints)).updates for joints in (2, 3)] == [30, 90]

@@ -25,7 +25,7 @@ from pneumarm.learning import (
     test_ahead,
     train,
 )
-from pneumarm.learning.policy.agent import KIND, PolicyLearner, patient
+from pneumarm.learning.policy.agent import KIND, PolicyLearner, with_longer_cutoff
 from pneumarm.learning.training import CHECKPOINT
 from pneumarm.simulation import SimulationArm
 from pneumarm.simulation.simulation import Simulation
@@ -51,11 +51,13 @@ def agent(trained: dict[str, Training]) -> PolicyAgent:
 
 
 def test_slow_muscles_have_more_actions_until_a_movement_is_cut_off(simulation: Simulation) -> None:
-    needed = [patient(PolicySettings(cutoff=10, fillings=fillings), simulation).cutoff for fillings in (1, 2, 4)]
+    needed = [
+        with_longer_cutoff(PolicySettings(cutoff=10, fillings=fillings), simulation).cutoff for fillings in (1, 2, 4)
+    ]
     assert needed[0] > 10
     np.testing.assert_allclose(needed, needed[0] * np.array([1, 2, 4]), atol=3)
-    assert patient(PolicySettings(), simulation).cutoff == max(100, needed[1])
-    assert patient(PolicySettings(cutoff=10, fillings=0), simulation).cutoff == 10
+    assert with_longer_cutoff(PolicySettings(), simulation).cutoff == max(100, needed[1])
+    assert with_longer_cutoff(PolicySettings(cutoff=10, fillings=0), simulation).cutoff == 10
 
 
 @pytest.mark.parametrize("method", SETTINGS)

@@ -12,7 +12,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from children import python
 from pneumarm.learning import TrainSettings
-from pneumarm.learning.online.loop import Schedule, train_episode, train_episodes, workspace
+from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episode, train_episodes
 from pneumarm.learning.online.values import draw_networks, learner, network_shapes, pack, unpack
 from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings
@@ -38,7 +38,7 @@ def one_episode(
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     work = learner(weights, settings)
-    outcome = train_episode(env, work, GREEDY, one, workspace(work, one.goal.size))
+    outcome = train_episode(env, work, GREEDY, one, loop_workspace(work, one.goal.size))
     return outcome, 50 * unpack(weights, simulation.window, settings.hidden).output_bias[0]
 
 
@@ -79,7 +79,7 @@ def _chunk(joints: int, count: int, method: str = "q-learning") -> dict[str, lis
     one = episode(env, random_state(4))
     work = learner(weights, settings)
     performance, steps, _ = train_episodes(
-        env, work, Schedule(150.0, 0.5, 20.0, 0.002), one, workspace(work, one.goal.size), count, 0.5
+        env, work, Schedule(150.0, 0.5, 20.0, 0.002), one, loop_workspace(work, one.goal.size), count, 0.5
     )
     return {
         "weights": weights.ravel().tolist(),
@@ -115,7 +115,7 @@ def test_performance_is_the_moving_average_of_successes(simulation: Simulation, 
     env = environment(simulation, begin, settings)
     one = episode(env, random_state(0))
     work = learner(pack(networks, simulation.window), settings)
-    performance, steps, _ = train_episodes(env, work, GREEDY, one, workspace(work, one.goal.size), 500, 0.2)
+    performance, steps, _ = train_episodes(env, work, GREEDY, one, loop_workspace(work, one.goal.size), 500, 0.2)
     assert steps == 500
     assert performance == pytest.approx(1 - 0.8 * 0.998**500, rel=1e-9)
 
@@ -134,7 +134,7 @@ def test_training_ends_with_the_episode_in_which_the_performance_is_enough(
     one = episode(env, random_state(0))
     work = learner(pack(networks, simulation.window), settings)
     performance, steps, count = train_episodes(
-        env, work, GREEDY._replace(enough=0.5), one, workspace(work, one.goal.size), 500, 0.2
+        env, work, GREEDY._replace(enough=0.5), one, loop_workspace(work, one.goal.size), 500, 0.2
     )
     assert (steps, count) == (235, 235)
     assert 0.5 <= performance < 0.5 + 0.002

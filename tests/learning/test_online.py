@@ -6,7 +6,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.learning import Agent, Exploration, OnlineLearner, TrainSettings
-from pneumarm.learning.online.loop import Schedule, train_episode, workspace
+from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episode
 from pneumarm.learning.online.values import draw_networks, learner
 from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings
@@ -35,7 +35,7 @@ def test_learns_what_the_training_loop_learns(joints: int, settings: dict) -> No
     one = episode(env, random_state(7))
     work = learner(weights, agent.settings)
     for _ in range(20):
-        train_episode(env, work, Schedule(60.0, 0.0, 1.0, 0.0), one, workspace(work, one.goal.size))
+        train_episode(env, work, Schedule(60.0, 0.0, 1.0, 0.0), one, loop_workspace(work, one.goal.size))
 
     online = OnlineLearner(agent, agent.settings.learning_rate)
     other, size = episode(env, random_state(7)), simulation.window.state_size

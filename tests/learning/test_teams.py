@@ -9,7 +9,7 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.arm.valves import to_valves
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import TrainSettings, test, train
-from pneumarm.learning.online.loop import learn, spread, workspace
+from pneumarm.learning.online.loop import learn, loop_workspace, spread
 from pneumarm.learning.online.values import draw_networks, learner, network_shapes, pack, unpack
 from pneumarm.transitions.window import Window
 
@@ -21,7 +21,7 @@ def learned(team: Any, reached: bool, paid: tuple[float, float], chosen: tuple[i
     settings = TrainSettings(team=team, learning_rate=0.1, discount=0.9, return_scale=1.0)
     weights = pack(network_shapes(WINDOW, settings.hidden, team), WINDOW)
     work = learner(weights, settings)
-    memory = workspace(work, 2)
+    memory = loop_workspace(work, 2)
     memory.chosen[:] = chosen
     memory.next_values[:] = (5.0, 7.0)[: len(chosen)]
     memory.paid[:] = paid

@@ -9,7 +9,7 @@ import pytest
 from live.serving import ARM, served
 from pneumarm.arm import open_arm
 from pneumarm.classical import TuneSettings, tune
-from pneumarm.live.rig import Rig
+from pneumarm.live.live_arm import LiveArm
 from pneumarm.live.server import LiveServer
 from pneumarm.run import RunSettings
 
@@ -26,5 +26,5 @@ def pid(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def server(pid: Path) -> Iterator[LiveServer]:
     """Return a server of the arm with its controller."""
-    with served(Rig(RunSettings(arm=ARM), [str(pid)], None)) as server:
+    with served(LiveArm(RunSettings(arm=ARM), [str(pid)], None)) as server:
         yield server

@@ -13,7 +13,7 @@ from live.browser import WIDTHS, keep, opened_browser, smallest_text, too_wide, 
 from live.chromium import missing
 from live.noted_arm import board, vented_after
 from live.serving import ARM, served
-from pneumarm.live.rig import Rig
+from pneumarm.live.live_arm import LiveArm
 from pneumarm.live.server import LiveServer
 from pneumarm.run import RunSettings
 
@@ -32,7 +32,10 @@ def browser() -> Iterator[Browser]:
 @contextmanager
 def on_board(pid: Path, folder: Path) -> Iterator[tuple[LiveServer, Path]]:
     """Serve the page of an arm behind an emulated board and a serial port; give the notes of the board too."""
-    with board(folder) as (link, notes), served(Rig(RunSettings(arm=f"serial:{link}"), [str(pid)], None)) as server:
+    with (
+        board(folder) as (link, notes),
+        served(LiveArm(RunSettings(arm=f"serial:{link}"), [str(pid)], None)) as server,
+    ):
         yield server, notes
 
 
@@ -234,7 +237,7 @@ def test_what_can_be_done_and_what_is_done_is_said(browser: Browser, server: Liv
 
 
 def test_a_page_that_hears_nothing_says_so(browser: Browser, pid: Path) -> None:
-    with served(Rig(RunSettings(arm=ARM), [str(pid)], None)) as server:
+    with served(LiveArm(RunSettings(arm=ARM), [str(pid)], None)) as server:
         context = window(browser)
         page = context.new_page()
         page.add_init_script("window.WebSocket = class { readyState = 0; send() {} }; WebSocket.OPEN = 1;")
@@ -254,7 +257,7 @@ def test_a_page_that_hears_nothing_says_so(browser: Browser, pid: Path) -> None:
 
 def test_an_arm_with_one_muscle_is_drawn_with_a_spring_also_while_it_learns(browser: Browser, tmp_path: Path) -> None:
     settings = RunSettings(arm=f"{ARM},muscles=1", transitions=200_000)
-    with served(Rig(settings, [], tmp_path / "run")) as server, page_of(browser, server) as page:
+    with served(LiveArm(settings, [], tmp_path / "run")) as server, page_of(browser, server) as page:
         assert page.locator("#arm .muscle").count() == 1
         assert page.locator("#arm .spring").get_by_text("spring").is_visible()
         assert page.get_by_text("muscle 2").all() == [] or not any(

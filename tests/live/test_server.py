@@ -16,7 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 from children import wait_until
 from live.serving import ARM, served
 from pneumarm.errors import UnusableInput
-from pneumarm.live.rig import Rig
+from pneumarm.live.live_arm import LiveArm
 from pneumarm.live.server import MOST_PAGES, LiveServer
 from pneumarm.run import RunSettings
 
@@ -107,7 +107,7 @@ def test_only_this_machine_and_this_page_may_come_without_a_token(server: LiveSe
 
 
 def test_with_a_token_nobody_comes_without_it(pid: Path) -> None:
-    with served(Rig(RunSettings(arm=ARM), [str(pid)], None), "secret") as server:
+    with served(LiveArm(RunSettings(arm=ARM), [str(pid)], None), "secret") as server:
         assert server.url.endswith("/?token=secret")
         assert status(server.url) == 200
         for guess in ("guess", "", "s", "secre", "secrets", "Secret", "secret%00"):
@@ -137,11 +137,11 @@ def test_only_so_many_pages_are_open_at_a_time(server: LiveServer, monkeypatch: 
 def test_a_port_that_is_taken_is_said(server: LiveServer) -> None:
     port = int(server.url.rstrip("/").rpartition(":")[2])
     with pytest.raises(UnusableInput, match="another --host or --port"):
-        LiveServer(server.rig, "127.0.0.1", port, None)
+        LiveServer(server.live_arm, "127.0.0.1", port, None)
 
 
 def test_hosts_and_tokens_of_any_letters_are_answered(pid: Path) -> None:
-    with served(Rig(RunSettings(arm=ARM), [str(pid)], None)) as server:
+    with served(LiveArm(RunSettings(arm=ARM), [str(pid)], None)) as server:
         address = server.url
         assert status(address) == 200
         assert [status(address, Host=host) for host in ("[", "[::1", "[]:80", "\xe4")] == [403] * 4

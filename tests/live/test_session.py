@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 
 from children import wait_until
 from pneumarm.arm import Reading, open_arm
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.control import Monitor
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.live.choices import Choice, opened
-from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
+from pneumarm.live.lease import HOLD_AFTER, VENT_AFTER
+from pneumarm.live.live_arm import LiveArm
 from pneumarm.live.orders import Faults, FollowCurve, GoTo, Hold, Order, Relax, Release, Stop, Take
-from pneumarm.live.rig import Rig
 from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
 from pneumarm.run import RunSettings
 
 
-class Scripted(PassedOn):
+class Scripted(ArmWrapper):
     """A virtual arm whose reads are told: what happens at which of its times is laid down."""
 
     def __init__(self, arm: VirtualArm) -> None:
@@ -95,25 +95,25 @@ VENTED = [[-1, -1]]
 
 
 def test_the_arm_is_seen_before_its_monitor_is_compiled(pid: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    rig = Rig(RunSettings(arm="virtual:seed=3"), [str(pid)], None)
+    live_arm = LiveArm(RunSettings(arm="virtual:seed=3"), [str(pid)], None)
     seen: list[object] = []
-    monkeypatch.setattr("pneumarm.live.session.warm_up", lambda *_: seen.append(rig.screen.state["mode"]))
-    assert json.loads(rig.screen.frame)["goal"] is None
-    with rig:
-        wait_until("it is ready", lambda: rig.screen.state["mode"] == "relaxed")
+    monkeypatch.setattr("pneumarm.live.session.warm_up_watch", lambda *_: seen.append(live_arm.screen.state["mode"]))
+    assert json.loads(live_arm.screen.frame)["goal"] is None
+    with live_arm:
+        wait_until("it is ready", lambda: live_arm.screen.state["mode"] == "relaxed")
     assert seen == ["opening"]
 
 
 def test_only_the_page_that_controls_the_arm_moves_it_and_any_page_stops_it(pid: Path) -> None:
-    rig = Rig(RunSettings(arm="virtual:seed=3"), [str(pid)], None)  # nothing moves yet
-    writer, watcher = rig.desk.enter(), rig.desk.enter()
-    rig.order(writer, Take())
-    rig.order(writer, GoTo([10.0]))
+    live_arm = LiveArm(RunSettings(arm="virtual:seed=3"), [str(pid)], None)  # nothing moves yet
+    writer, watcher = live_arm.lease.enter(), live_arm.lease.enter()
+    live_arm.order(writer, Take())
+    live_arm.order(writer, GoTo([10.0]))
     for order in (GoTo([10.0]), Hold(), Relax(), Release(), FollowCurve([0.0, 1.0], [[0.0], [0.0]])):
         with pytest.raises(UnusableInput, match="another page controls the arm"):
-            rig.order(watcher, order)
-    rig.order(watcher, Stop())
-    assert rig.desk.writer == writer
+            live_arm.order(watcher, order)
+    live_arm.order(watcher, Stop())
+    assert live_arm.lease.writer == writer
 
 
 def test_of_an_arm_with_one_muscle_nothing_else_is_shown() -> None:
@@ -168,7 +168,7 @@ def test_only_a_release_ends_a_stop(played: Played) -> None:
 
 
 def test_a_stop_outlasts_a_board_that_has_vented_by_itself(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pneumarm.live.session.behind", lambda *_: played.virtual)  # which has no board
+    monkeypatch.setattr("pneumarm.live.session.unwrapped", lambda *_: played.virtual)  # which has no board
 
     def not_heard() -> None:
         raise ArmFailure("this computer was too busy")

@@ -20,7 +20,7 @@ from pneumarm.report.shown import read_shown
 from pneumarm.transitions import Store, Window, transitions
 from pneumarm.transitions import recorder as module
 from pneumarm.transitions.recorder import Recorder, recorder
-from pneumarm.transitions.rows import Rows, joined
+from pneumarm.transitions.rows import Rows, join_rows
 
 CLOSED = np.zeros((1, 2), np.int8)
 
@@ -79,7 +79,7 @@ def stored(path: Path) -> Rows:
     """Return all rows of a store, marked or not, after checking it."""
     with Store.open(path) as store:
         store.check()
-        return joined(store.blocks(marked=True))
+        return join_rows(store.blocks(marked=True))
 
 
 def reasons(path: Path) -> dict[int, tuple[int, str]]:

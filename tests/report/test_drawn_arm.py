@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pneumarm.arm import ArmSpec
 from pneumarm.drawing.arm_picture import ArmPicture
-from pneumarm.drawing.drawn_arm import DrawnArm, Pose, faded
+from pneumarm.drawing.drawn_arm import DrawnArm, Pose, brightness
 from pneumarm.drawing.moving_arm import Shown, moving_arm
 from pneumarm.report.data import MovingData
 from pneumarm.report.page import Picture
@@ -66,7 +66,7 @@ def test_a_playing_picture_a_figure_and_the_page_show_the_same_shapes(joints: in
 
 
 def test_a_valve_is_seen_to_close() -> None:
-    np.testing.assert_allclose(faded(np.array([0.0, 1.0, 0.0, 0.0, -0.25])), [0, 1, 0.75, 0.75**2, -0.5])
+    np.testing.assert_allclose(brightness(np.array([0.0, 1.0, 0.0, 0.0, -0.25])), [0, 1, 0.75, 0.75**2, -0.5])
 
 
 def test_the_record_of_movements_keeps_pressures_and_one_of_an_older_version_has_none(tmp_path: Path) -> None:

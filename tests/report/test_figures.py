@@ -37,7 +37,7 @@ def figures_of(n, joints):
     made = {
         "projections": figures.projections(seen.observation, spec),
         "cells": figures.cells(seen.cells_holding, 5, seen.growth),
-        "residue": figures.residue(q.target[:, :, 0], q.predicted[:, :, 0], spec),
+        "residue": figures.residues(q.target[:, :, 0], q.predicted[:, :, 0], spec),
         "residue_by_class": figures.residue_by_class(simulated[:, 0, 0], classifications(q, 0, spec)),
         "isoplot": figures.isoplot(real, simulated, spec),
         "propagation": figures.error_propagation(q.propagation, spec),

@@ -11,7 +11,7 @@ from pneumarm.arm import ArmSpec
 from pneumarm.control import save_history
 from pneumarm.errors import UnusableInput
 from pneumarm.report.data import CoverageData, Demonstration, MovingData, QualityData, TrainingData
-from pneumarm.report.files import TEST, save_demonstration, save_spec
+from pneumarm.report.files import TEST, save_demonstration, write_spec
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Section, Table, render
 from pneumarm.report.run_report import read_run, run_page, write_report
@@ -226,7 +226,7 @@ def test_sections_of_the_same_title_are_refused():
 
 def save(folder, run):
     (folder / "results.json").write_text(json.dumps(run.results))
-    save_spec(folder, run.spec)
+    write_spec(folder, run.spec)
     for record in (run.coverage, run.quality, run.training, run.marked):
         if record is not None:
             record.save(folder)
@@ -265,7 +265,7 @@ def test_write_report_writes_the_same_page_every_time(tmp_path):
 
 def test_report_of_a_run_without_transfer(tmp_path):
     (tmp_path / "results.json").write_text("{}")
-    save_spec(tmp_path, ArmSpec())
+    write_spec(tmp_path, ArmSpec())
     builders.episodes(1, on_arm=False).save(tmp_path / TEST)
     page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
     assert [a["id"] for t, a in page.elements if t == "section"] == [
@@ -295,7 +295,7 @@ def test_run_whose_arm_did_nothing_can_be_reported():
 )
 def test_unusable_files_are_named_with_what_to_do(tmp_path, file, content, told):
     (tmp_path / "results.json").write_text("{}")
-    save_spec(tmp_path, ArmSpec())
+    write_spec(tmp_path, ArmSpec())
     (tmp_path / file).write_text(content)
     with pytest.raises(UnusableInput, match=told) as caught:
         write_report(tmp_path)

@@ -15,10 +15,17 @@ from pneumarm.simulation import FitSettings, Simulation, StoreFit, fit_store, re
 from pneumarm.simulation.enough import enough_data
 from pneumarm.simulation.fit import fitted_on
 from pneumarm.transitions import Recorded, Store, Window, new_cells
-from pneumarm.transitions.choice import HeldOut, Stretched, choose_held_out, held_out, joined, share_held_out
+from pneumarm.transitions.choice import (
+    HeldOut,
+    Stretched,
+    choose_held_out,
+    held_out,
+    join_transitions,
+    share_held_out,
+)
 from pneumarm.transitions.grid import GridSettings
 from pneumarm.transitions.rows import Rows
-from pneumarm.transitions.rows import joined as joined_rows
+from pneumarm.transitions.rows import join_rows as joined_rows
 
 Make = Callable[..., Rows]
 SETTINGS = FitSettings(epochs=15, hidden=6, ahead=0.0, spread=False, history=3)
@@ -101,7 +108,7 @@ def test_of_a_single_sequence_stretches_are_held_out_that_no_fitted_window_reach
                 for s, last in zip(t.sequence, t.step, strict=True)
                 for k in range(last - history + 1, last + 2)
             }
-            for t in (made.filtered.transitions, joined(list(made.filtered.stream("held-out"))))
+            for t in (made.filtered.transitions, join_transitions(list(made.filtered.stream("held-out"))))
         ]
         assert len(read[1]) > 100
         assert not read[0] & read[1]

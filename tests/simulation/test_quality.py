@@ -17,7 +17,7 @@ from pneumarm.simulation.quality import (
     advanced,
     classified,
     free_run,
-    isoplot,
+    isoplot_cells,
     propagation,
     residue,
     starts,
@@ -97,13 +97,13 @@ def test_an_isoplot_counts_every_transition() -> None:
     g = np.random.default_rng(0)
     observed = g.normal(0, 5, 5000)
     predicted = observed + g.normal(0, 1, 5000)
-    found = isoplot(observed, predicted, cells=20, points=300)
+    found = isoplot_cells(observed, predicted, cells=20, points=300)
     assert found.counts.sum() == 5000
     assert len(found.observed) == len(found.density) == 300
     assert found.density.min() >= 1
     densest = np.argmax(found.density)
     assert np.hypot(found.observed[densest], found.predicted[densest]) < 5
-    same = isoplot([2.0, 2.0], [2.0, 2.0], cells=3)
+    same = isoplot_cells([2.0, 2.0], [2.0, 2.0], cells=3)
     assert same.counts.sum() == 2
 
 

@@ -13,7 +13,7 @@ from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.transitions import WHOLE_PERIODS, CollectBegin, CollectSettings, Store, collect
 from pneumarm.transitions.collect import End, end_of, random_actions
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import join_rows
 
 SHORT = CollectSettings(
     actions=100, pulses=0.0, inlets=0.5, lean=0.0, begin=CollectBegin(deflate=0.5, inflate=0.5, settle=0.2)
@@ -29,7 +29,7 @@ def collected(folder, name="s.db", joints=1, count=2000, settings=SHORT, arm=Non
 
 def content(path):
     with Store.open(path) as store:
-        rows = vars(joined(store))
+        rows = vars(join_rows(store))
         return rows | rows.pop("measured"), list(store.catalogue()), store.state()
 
 

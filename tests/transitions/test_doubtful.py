@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pneumarm.arm import ArmSpec, Reading
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.cli import main
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.transitions import Store, collect, import_recording
@@ -144,7 +144,7 @@ def test_a_recording_that_is_all_marked_is_refused_with_what_is_wrong(tmp_path):
     assert not (tmp_path / "s.db").exists()
 
 
-class Frozen(PassedOn):
+class Frozen(ArmWrapper):
     """An arm of which the first pressure sensor reads one constant."""
 
     def read(self) -> Reading:

@@ -9,20 +9,20 @@ import pytest
 from pneumarm.errors import UnusableInput
 from pneumarm.transitions import Store, import_recording
 from pneumarm.transitions.export import export_recording
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import join_rows
 
 
 def test_csv_comes_back_as_it_was(exportable: Path, tmp_path: Path) -> None:
     with Store.open(exportable) as store:
         exported = export_recording(store, tmp_path / "arm.csv")
-        before = joined(store.blocks())
+        before = join_rows(store.blocks())
         spec, sequences = store.spec, store.sequences
     assert exported.rows == len(before)
     assert exported.sequences == sequences
     imported = import_recording(tmp_path / "arm.csv", None, tmp_path / "again.db")
     assert imported.rows == exported.rows
     with Store.open(tmp_path / "again.db") as store:
-        after = joined(store.blocks())
+        after = join_rows(store.blocks())
         assert store.spec == spec
     for name in ("time", "angle", "pressure", "command"):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))

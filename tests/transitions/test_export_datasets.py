@@ -12,7 +12,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.transitions import Store, import_recording
 from pneumarm.transitions.episodes import action_names, episodes, observation_names
 from pneumarm.transitions.export import export_recording
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import join_rows
 
 TOO_LARGE = """
 import resource, sys
@@ -108,10 +108,10 @@ def test_what_is_in_parquet_is_imported_again(exportable: Path, tmp_path: Path, 
     pytest.importorskip("pyarrow")
     with Store.open(exportable) as store:
         exported = export_recording(store, tmp_path / name)
-        before, spec, ends = joined(store.blocks()), store.spec, [len(one.action) for one in episodes(store)]
+        before, spec, ends = join_rows(store.blocks()), store.spec, [len(one.action) for one in episodes(store)]
     import_recording(tmp_path / name, str(exported.mapping), tmp_path / "again.db")
     with Store.open(tmp_path / "again.db") as store:
-        after = joined(store.blocks())
+        after = join_rows(store.blocks())
         assert store.spec == spec
     kept = np.ones(len(before), bool)
     if (
@@ -144,7 +144,7 @@ def test_the_viewer_of_rerun_reads_it_in_degrees_and_bar(exportable: Path, tmp_p
     chunk = pytest.importorskip("rerun.chunk", reason="rerun is not installed: pip install --editable '.[rerun]'")
     with Store.open(exportable) as store:
         exported = export_recording(store, tmp_path / "arm.rrd")
-        rows, spec = joined(store.blocks()), store.spec
+        rows, spec = join_rows(store.blocks()), store.spec
     assert (exported.rows, exported.mapping) == (len(rows), None)
     reader = chunk.RrdReader(tmp_path / "arm.rrd")
     assert len(reader.recordings()) == len(reader.blueprints()) == 1

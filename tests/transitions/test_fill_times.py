@@ -9,7 +9,7 @@ from pneumarm.arm import guarded
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store, collect
 from pneumarm.transitions.fill_times import find_fill_times
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import join_rows
 
 
 class Unplugged(FirstOrderArm):
@@ -50,7 +50,7 @@ def test_an_arm_without_air_is_taken_for_one_like_the_thesis():
 def full(folder, settings):
     with throttled() as arm, Store.create(folder / "slow.db", arm.spec) as store:
         collect(arm, store, 6_000, settings=settings)
-        pressure = joined(store).pressure
+        pressure = join_rows(store).pressure
         low = pressure.min(axis=(0, 1))
         return float((pressure - low > 0.6 * arm.spec.max_pressure_counts).mean())
 
@@ -75,7 +75,7 @@ def test_an_interrupted_collection_goes_on_with_the_times_found(tmp_path):
                     )
                 except KeyboardInterrupt:
                     continue
-                rows = joined(store)
+                rows = join_rows(store)
                 return rows.angle, rows.command, rows.time, result.seconds
 
     for one, other in zip(content("whole.db"), content("parts.db", interrupt), strict=True):

@@ -13,7 +13,7 @@ from pneumarm.arm import ArmSpec
 from pneumarm.arm.valves import ACTIONS, to_valves
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.transitions import Grid, GridSettings, Store, Window, filter_transitions, held_out, new_cells
-from pneumarm.transitions.choice import hashed_uniform, joined, sample, share_held_out
+from pneumarm.transitions.choice import hashed_uniform, join_transitions, sample, share_held_out
 from pneumarm.transitions.grid import CellCounts, Coverage
 
 COARSE = GridSettings(angle_bins=3, velocity_bins=2, pressure_bins=2)
@@ -135,13 +135,13 @@ def test_the_three_parts_are_disjoint_and_complete(store):
     filtered = filter_transitions(store, Window(1, 3), COARSE, seed=1, hold_out=0.25)
     keys = {}
     for part in ("kept", "generalisation", "held-out"):
-        streamed = joined(list(filtered.stream(part)))
+        streamed = join_transitions(list(filtered.stream(part)))
         keys[part] = set(zip(streamed.sequence.tolist(), streamed.step.tolist(), strict=True))
     assert sum(map(len, keys.values())) == len(set.union(*keys.values())) == store.transitions
     apart = {sequence for sequence, _ in keys["held-out"]}
     assert not apart & {sequence for sequence, _ in keys["kept"] | keys["generalisation"]}
     assert 5 <= len(apart) <= 25
-    assert same(filtered.transitions, joined(list(filtered.stream("kept"))))
+    assert same(filtered.transitions, join_transitions(list(filtered.stream("kept"))))
     assert set(np.flatnonzero(held_out(np.arange(61), 0.25, 1))) - {0} == apart
 
 
@@ -186,7 +186,7 @@ def test_hashes_are_uniform_and_of_both_numbers(seed, first):
 
 def test_a_sample_is_as_large_as_asked_in_order_and_uniform(store):
     blocks = list(filter_transitions(store, Window(1, 1), COARSE).stream("generalisation"))
-    everything = joined(blocks)
+    everything = join_transitions(blocks)
     total = len(everything.sequence)
     drawn = sample(blocks, 500, 1)
     assert len(drawn.sequence) == 500

@@ -11,7 +11,7 @@ from stand_ins import make_recorded
 from pneumarm.arm import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
 from pneumarm.transitions import Store, Window, filter_transitions, import_recording, transitions
-from pneumarm.transitions.rows import Mark, joined, rows_of
+from pneumarm.transitions.rows import Mark, join_rows, rows_of
 from pneumarm.transitions.window import observations
 
 
@@ -35,8 +35,8 @@ def test_a_store_gives_back_what_they_said(tmp_path, joints):
         store.check()
     with Store.open(tmp_path / "db") as store:
         assert store.further == spec_of(joints).further
-        whole = joined(store.blocks(rows=9, marked=True))
-        kept = joined(store)
+        whole = join_rows(store.blocks(rows=9, marked=True))
+        kept = join_rows(store)
     for name in spec_of(joints).further:
         np.testing.assert_array_equal(whole.measured[name], np.concatenate([s.measured[name] for s in sequences]))
         assert len(kept.measured[name]) == len(kept) == len(whole) - 3
@@ -81,9 +81,9 @@ def test_an_older_store_of_an_arm_that_measured_its_velocity_is_read_and_gone_on
     with Store.append_to(path) as store:
         assert (store.spec, store.further) == (spec, ())
         store.append(replace(make_recorded(2), measured={"joint_1_velocity": np.zeros(21)}))
-        assert joined(store).measured == {}
+        assert join_rows(store).measured == {}
         with pytest.raises(UnusableInput, match="lacks joint_1_velocity"):
-            transitions(joined(store), Window.of(spec, 3, ["velocity"]))
+            transitions(join_rows(store), Window.of(spec, 3, ["velocity"]))
         store.check()
 
 
@@ -157,7 +157,7 @@ def test_a_recording_with_further_sensors_is_imported(tmp_path):
     import_recording(tmp_path / "r.csv", tmp_path / "m.toml", tmp_path / "db")
     with Store.open(tmp_path / "db") as store:
         assert store.spec.sensors == (Sensor("acceleration"), Sensor("temperature", 1, 2))
-        measured = joined(store).measured
+        measured = join_rows(store).measured
     np.testing.assert_allclose(measured["joint_1_velocity"], [0, 1, 2, 3])  # 100 deg/s of 10 counts a degree
     np.testing.assert_allclose(measured["joint_1_acceleration"], [0, -1, -2, -3])
     np.testing.assert_allclose(measured["joint_1_temperature_2"], [20, 21, 22, 23])

@@ -8,7 +8,7 @@ import pytest
 from pneumarm.errors import UnusableInput
 from pneumarm.transitions import Store, import_recording
 from pneumarm.transitions.recording import read_mapping
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import join_rows
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "recordings" / "mpi_pam.toml"
 
@@ -42,7 +42,7 @@ def imported(tmp_path):
         result = import_recording(tmp_path / "r.csv", tmp_path / "m.toml", tmp_path / "s.db")
         with Store.open(tmp_path / "s.db") as store:
             store.check()
-            rows = vars(joined(store))
+            rows = vars(join_rows(store))
             return result, store.spec, rows | rows.pop("measured")
 
     return run

@@ -12,7 +12,7 @@ import pytest
 from pneumarm.errors import UnusableInput
 from pneumarm.transitions import Rows, Store, import_recording
 from pneumarm.transitions.recording import ImportResult
-from pneumarm.transitions.rows import joined
+from pneumarm.transitions.rows import join_rows
 
 MAPPING = """
 time = "t"
@@ -55,7 +55,7 @@ def imported(tmp_path: Path) -> Imported:
         result = import_recording(tmp_path / name, tmp_path / "m.toml", tmp_path / f"{name}.db")
         with Store.open(tmp_path / f"{name}.db") as store:
             store.check()
-            return result, joined(store)
+            return result, join_rows(store)
 
     return run
 
@@ -342,7 +342,7 @@ def test_names_that_repeat_are_told_apart_by_their_feature(tmp_path: Path, inner
     (tmp_path / "m.toml").write_text(mapping)
     result = import_recording(shared(tmp_path / "d", inner), tmp_path / "m.toml", tmp_path / "s.db")
     with Store.open(tmp_path / "s.db") as store:
-        assert_sound(result, joined(store))
+        assert_sound(result, join_rows(store))
 
 
 def test_names_that_are_ambiguous_are_refused_with_those_that_are_not(tmp_path: Path) -> None:
@@ -369,7 +369,7 @@ def test_text_in_parquet_may_hold_any_character(tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(MAPPING)
     result = import_recording(parquet_of(tmp_path / "r.parquet", note=notes), tmp_path / "m.toml", tmp_path / "s.db")
     with Store.open(tmp_path / "s.db") as store:
-        assert_sound(result, joined(store))
+        assert_sound(result, join_rows(store))
 
 
 def test_a_sequence_of_text_in_parquet_may_hold_any_character(tmp_path: Path) -> None:

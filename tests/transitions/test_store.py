@@ -19,7 +19,7 @@ from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.transitions import Mark, Recorded, Store, lock
 from pneumarm.transitions.lock import WriterLock
 from pneumarm.transitions.quantiles import Quantiles
-from pneumarm.transitions.rows import broken_off, joined
+from pneumarm.transitions.rows import broken_off, join_rows
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def path(tmp_path):
 
 
 def all_rows(store, **options):
-    rows = vars(joined(store.blocks(**options)))
+    rows = vars(join_rows(store.blocks(**options)))
     return rows | rows.pop("measured")
 
 
@@ -170,7 +170,7 @@ def test_a_sequence_that_grew_is_the_one_that_was_appended_at_once(address, reco
         store.check()
         first, second = (entry._replace(number=0) for entry in store.catalogue())
         assert first == second
-        at_once, grown = (joined(store.blocks(sequences=lambda n, k=k: n == k)) for k in (1, 2))
+        at_once, grown = (join_rows(store.blocks(sequences=lambda n, k=k: n == k)) for k in (1, 2))
     for name in ("step", "time", "angle", "pressure", "command"):
         np.testing.assert_array_equal(getattr(grown, name), getattr(at_once, name), err_msg=name)
 

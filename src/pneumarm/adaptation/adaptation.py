@@ -37,7 +37,7 @@ from pneumarm.adaptation.plastic import plastic, with_plastic
 from pneumarm.adaptation.refit import Refit, RefitSettings, refit, refit_to_all
 from pneumarm.adaptation.trial import TrialSettings, verdict
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.agents import Acts, Adapts, Stiffens
+from pneumarm.learning.agents import Acts, Adapts, Retrainable
 from pneumarm.settings import NonNegativeInt, PositiveFloat, PositiveInt, PythonOnly, Settings, Share
 from pneumarm.simulation import FitSettings
 from pneumarm.task.begin import begin_states
@@ -66,7 +66,7 @@ class AdaptationSettings(Settings):
     warm_up: Annotated[NonNegativeInt, PythonOnly] = 8
     """Updates before these that learn the values of states alone, which an agent does not keep."""
     learning_rate: PositiveFloat = 1e-3
-    """Of the policy, by Adam, at the start; falls linearly to 0."""
+    """Learning rate of the policy, by Adam, at the start; falls linearly to 0."""
     unsettled: Annotated[Share, PythonOnly] = 0.05
     """Share of movements, and two at least, that do not settle above which an agent that is to settle learns more
     thoroughly."""
@@ -108,7 +108,7 @@ class Adaptation:
         self._settled_before: list[bool] = []  # of the trusted agent, while another is on trial
         self._thorough = False  # whether its newest version learned thoroughly
         self._stiff = self._trusted_stiff = False  # whether the agent, and the trusted one, were made anew
-        self._anew = False  # whether any was
+        self._retrained = False  # whether any was
         self.quantities = output_names(agent.simulation)
         """What the ratios are of."""
 
@@ -178,7 +178,7 @@ class Adaptation:
             self._tried = self.movements
 
     def prefer(self) -> None:
-        """Of a version of an agent that settles and the one before it, go on with what was better on average.
+        """Go on with the version of an agent that settles, or the one before it, whichever was better on average.
 
         What it learned in a simulation changes how it comes to rest for better or worse, by more than a trial that is
         to be sure finds out in time.
@@ -238,8 +238,9 @@ class Adaptation:
             simulation = found.simulation
             begin = begin_states(rows, simulation.window, simulation.scaling, simulation.spec)
             seed = self._seed + self.movements
-            if recording is not None and is_thorough and not self._anew and isinstance(self.agent, Stiffens):
-                self.agent, self._stiff, self._anew = self.agent.stiffer().anew(simulation, begin, seed), True, True
+            if recording is not None and is_thorough and not self._retrained and isinstance(self.agent, Retrainable):
+                self.agent = self.agent.stiffer().retrained(simulation, begin, seed)
+                self._stiff = self._retrained = True
             else:
                 self.agent = self.agent.adapted(simulation, begin, updates, tuned.warm_up, rate, seed)
             self.version, self.versions, self._thorough = self.versions, self.versions + 1, recording is not None
@@ -295,7 +296,7 @@ class Adaptation:
             "new": self._new,
             **dict(zip(_SETTLED, (self._settled, self._settled_before), strict=True)),
             "thorough": self._thorough,
-            "stiff": [self._stiff, self._trusted_stiff, self._anew],
+            "stiff": [self._stiff, self._trusted_stiff, self._retrained],
             "events": [asdict(event) for event in self.events],
             "watch": self._watch.get_state(),
         }
@@ -320,7 +321,7 @@ class Adaptation:
             self._old, self._new = list(map(float, head["old"])), list(map(float, head["new"]))
             self._settled, self._settled_before = (list(map(bool, head[name])) for name in _SETTLED)
             self._thorough = bool(head["thorough"])
-            self._stiff, self._trusted_stiff, self._anew = map(bool, head["stiff"])
+            self._stiff, self._trusted_stiff, self._retrained = map(bool, head["stiff"])
             self.events = [Event(**event) for event in head["events"]]
             self._watch.set_state(head["watch"])
         except (ValueError, TypeError, KeyError, IndexError) as error:
@@ -336,7 +337,7 @@ class Adaptation:
     def _restored(self, numbers: NDArray[np.float64], stiff: bool) -> Adapts:
         """Return the agent that had these ``numbers`` of :func:`plastic` and was made anew, ``stiff``, or not."""
         origin = self._origin
-        return with_plastic(origin.stiffer() if stiff and isinstance(origin, Stiffens) else origin, numbers)
+        return with_plastic(origin.stiffer() if stiff and isinstance(origin, Retrainable) else origin, numbers)
 
 
 def adaptation_of(agent: Acts, settings: AdaptationSettings, seed: int = 0) -> Adaptation | None:

@@ -20,7 +20,7 @@ from pneumarm.control.monitor import Monitor
 from pneumarm.settings import PositiveInt, Settings
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.transitions import FEWEST_TRANSITIONS, WHOLE_PERIODS, Store, collect
-from pneumarm.transitions.choice import joined
+from pneumarm.transitions.choice import join_transitions
 from pneumarm.transitions.rows import Rows
 
 Array = NDArray[np.float64]
@@ -94,7 +94,7 @@ def run(
     with tempfile.TemporaryDirectory() as folder, Store.for_arm(Path(folder) / "db", arm.spec) as store:
         collect(arm, store, settings.transitions, seed, settings=WHOLE_PERIODS)
         fitted = fit_store(store, replace(SINGLE_STEPS, epochs=settings.epochs, seed=seed))
-        apart = joined(list(fitted.filtered.stream("held-out")))
+        apart = join_transitions(list(fitted.filtered.stream("held-out")))
         found = findings(store.blocks(), Monitor(arm.spec, before))
     shape = (-1, arm.spec.joints, 4)
     now = apart.observation.reshape(shape).astype(np.float64)

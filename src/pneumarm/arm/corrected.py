@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Arm, Reading, checked
 from pneumarm.arm.spec_file import ArmFile
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.errors import UnusableInput
 
 
-class CorrectedArm(PassedOn):
+class CorrectedArm(ArmWrapper):
     """``arm`` with the spec and the corrections of its file; everything else is the arm's own."""
 
     def __init__(self, arm: Arm, known: ArmFile) -> None:

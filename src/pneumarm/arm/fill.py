@@ -24,14 +24,14 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Arm, ArmSpec, Reading, checked
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.errors import UnusableInput
 
 _ATMOSPHERE = 1.01325  # bar
 
 
-class Fill:
+class PressureEstimate:
     """Estimated pressures of the muscles of an arm, and what its valves do; at first all are vented.
 
     In plain Python: for the handful of muscles of an arm that is several times faster than NumPy.
@@ -101,52 +101,52 @@ class Fill:
         return struct.Struct(f"<{1 + 3 * len(self._levels)}d")
 
 
-_FILLS: "WeakKeyDictionary[Arm, Fill]" = WeakKeyDictionary()
-"""Of the arms that are open: a guard that comes later goes on with the estimates of the one before."""
+_ESTIMATES: "WeakKeyDictionary[Arm, PressureEstimate]" = WeakKeyDictionary()
+"""Estimates of the arms that are open: a guard that comes later goes on with those of the one before."""
 
 
-class EstimatedArm(PassedOn):
+class EstimatedArm(ArmWrapper):
     """``arm``, which measures no pressures, with estimates in their place."""
 
     def __init__(self, arm: Arm) -> None:
         super().__init__(arm)
-        while isinstance(arm, PassedOn):
+        while isinstance(arm, ArmWrapper):
             arm = arm.arm
-        self._fill = _FILLS.setdefault(arm, Fill(self.spec))
+        self._estimate = _ESTIMATES.setdefault(arm, PressureEstimate(self.spec))
 
     def read(self) -> Reading:
         """Return what the sensors say, with the estimated pressures."""
         reading = checked(self.arm.read(), self.spec)
-        self._fill.pass_until(reading.time)
-        return replace(reading, pressure=self._fill.pressure)
+        self._estimate.pass_until(reading.time)
+        return replace(reading, pressure=self._estimate.pressure)
 
     def set_valves(self, valves: NDArray[np.int8]) -> None:
         """Set the valves."""
         self.arm.set_valves(valves)
-        self._fill.command(valves)
+        self._estimate.command(valves)
 
     def set_pulses(self, command: NDArray[np.float64]) -> bool:
         """Set pulses, if the arm can time them."""
         done = self.arm.set_pulses(command)
         if done:
-            self._fill.command(command)
+            self._estimate.command(command)
         return done
 
     def wait(self, seconds: float) -> None:
         """Let time pass [s]."""
         self.arm.wait(seconds)
-        if self._fill.time is not None:
-            self._fill.pass_until(self._fill.time + seconds)
+        if self._estimate.time is not None:
+            self._estimate.pass_until(self._estimate.time + seconds)
 
     def close(self) -> None:
         """Close the arm, and its valves with it."""
         self.arm.close()
-        self._fill.command(np.zeros((self.spec.joints, 2)))
+        self._estimate.command(np.zeros((self.spec.joints, 2)))
 
     def get_state(self) -> bytes | None:
         """Return the state of the arm and of the estimates."""
         state = self.arm.get_state()
-        return None if state is None else self._fill.get_state() + state
+        return None if state is None else self._estimate.get_state() + state
 
     def set_state(self, state: bytes) -> None:
         """Restore both.
@@ -155,19 +155,21 @@ class EstimatedArm(PassedOn):
             UnusableInput: the arm has no state, or this is none of it.
 
         """
-        size = self._fill.state_size if self.arm.get_state() is not None else 0
+        size = self._estimate.state_size if self.arm.get_state() is not None else 0
         if len(state) < size:
             raise UnusableInput(f"{self.spec.name}: expected the saved state of an arm without pressure sensors")
         self.arm.set_state(state[size:])
-        self._fill.set_state(state[:size])
+        self._estimate.set_state(state[:size])
 
 
-def filled(spec: ArmSpec, times: NDArray[np.float64], command: NDArray[np.float64]) -> NDArray[np.float64]:
+def estimated_pressures(
+    spec: ArmSpec, times: NDArray[np.float64], command: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the pressures (n, joints, 2) [counts] of muscles that were vented at first, as they are estimated.
 
     ``command`` (n, joints, 2) was applied at ``times`` (n,) [s], and none, NaN, after the last.
     """
-    fill, found = Fill(spec), []
+    fill, found = PressureEstimate(spec), []
     for now, applied in zip(times.tolist(), np.clip(np.nan_to_num(command), -1, 1), strict=True):
         fill.pass_until(now)
         found.append(fill.pressure)

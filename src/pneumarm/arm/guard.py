@@ -35,10 +35,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.fill import EstimatedArm
 from pneumarm.arm.own import OwnArm, owned
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Arm, Reading, checked
 from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import Watchdog
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError, UnusableInput
 
 _SETTINGS = frozenset((-1, 0, 1))
@@ -484,7 +484,7 @@ def guarded(arm: Arm) -> GuardedArm:
 
 def _waits_itself(arm: Arm) -> bool:
     """Return whether ``arm`` brings a ``wait_until`` of its own."""
-    while isinstance(arm, PassedOn) and type(arm).wait_until in (PassedOn.wait_until, OwnArm.wait_until):
+    while isinstance(arm, ArmWrapper) and type(arm).wait_until in (ArmWrapper.wait_until, OwnArm.wait_until):
         arm = arm.arm
     return type(arm).wait_until is not Arm.wait_until
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Arm, ArmSpec, Reading, checked
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 
 STILL = 0.25
@@ -64,7 +64,7 @@ def _checked(method: str, check: Callable[[Any], Any] | None = None) -> Callable
     return lambda self, *values: self._call(method, *values, check=check)
 
 
-class OwnArm(PassedOn):
+class OwnArm(ArmWrapper):
     """``arm``, with its calls and its clock checked; see :func:`owned`.
 
     Whatever a method raises, except on purpose (PneumarmError) or by Ctrl-C, is an ArmFailure that says where, and so
@@ -74,7 +74,7 @@ class OwnArm(PassedOn):
 
     def __init__(self, arm: Arm) -> None:
         super().__init__(arm)
-        while isinstance(arm, PassedOn) and _is_ours(arm):
+        while isinstance(arm, ArmWrapper) and _is_ours(arm):
             arm = arm.arm
         self._kind, self._clock = type(arm), _Clock()
         self._named = f"{self._kind.__module__}.{self._kind.__qualname__}"
@@ -167,7 +167,7 @@ def owned(arm: Arm) -> Arm:
             f"{type(spec).__name__}; set self.spec where the arm is made"
         )
     inner = arm
-    while _is_ours(inner) and isinstance(inner, PassedOn) and not isinstance(inner, OwnArm):
+    while _is_ours(inner) and isinstance(inner, ArmWrapper) and not isinstance(inner, OwnArm):
         inner = inner.arm
     return arm if _is_ours(inner) else OwnArm(arm)
 

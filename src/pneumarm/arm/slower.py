@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Arm
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.errors import UnusableInput
 
 _FASTEST, _USUAL = 50.0, 30.0  # Hz: who is faster than the first is controlled near the second
@@ -23,7 +23,7 @@ def usual_turns(period: float) -> int:
     return max(round(1 / (_USUAL * period)), 1) if period * _FASTEST < 1 else 1
 
 
-class SlowerArm(PassedOn):
+class SlowerArm(ArmWrapper):
     """``arm``, with a control period that is ``turns`` of its own."""
 
     def __init__(self, arm: Arm, turns: int) -> None:

@@ -16,11 +16,12 @@ from pneumarm.arm import ArmSpec, GuardedArm, Reading
 from pneumarm.classical.pressure_loop import PressureLoop, Rates
 from pneumarm.classical.static_map import StaticMap, fit_map
 from pneumarm.errors import ArmFailure
+from pneumarm.progress import Report
 
 _VENT, _FILL, _PAUSE = 2.0, 2.5, 0.3
 """Times that all muscles are vented, filled, and left closed in between [s]."""
 _SUMS = (0.4, 0.7, 1.0, 1.3, 1.6)
-"""Of the map, in units of the highest pressure."""
+"""Sums of both pressures at which the map is measured, in units of the highest pressure."""
 _RATIOS = (-0.96, -0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 0.96)
 _SETTING, _RESTING, _LOOKING = 0.6, 0.8, 0.25
 """Times to set the pressures of a point of the map, to let the joint come to rest, and to read it [s]."""
@@ -31,18 +32,15 @@ _NODES = 13
 _Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Times [s] and pressures [bar], each of shape (n,)."""
 
-Report = Callable[[float, float], None]
-"""Called with the arm time that has passed and all there is [s]."""
-
 
 @dataclass(frozen=True)
 class Calibration:
     """What was measured of an arm."""
 
     maps: tuple[StaticMap, ...]
-    """Of each joint."""
+    """Static map of each joint."""
     rates: tuple[tuple[Rates, Rates], ...]
-    """Of each joint's two muscles."""
+    """Rates of each joint's two muscles."""
     goal_range: tuple[tuple[float, float], ...]
     """Angles that each joint came to rest at, lowest and highest [counts]."""
     seconds: float
@@ -61,7 +59,7 @@ class _Watched:
     """Shape (n, joints, 2) [bar]."""
 
 
-def calibrate(arm: GuardedArm, report: Report | None = None) -> Calibration:
+def measure_calibration(arm: GuardedArm, report: Report | None = None) -> Calibration:
     """Measure ``arm``, which is free to move all the way.
 
     Raises:

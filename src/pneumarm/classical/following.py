@@ -47,7 +47,7 @@ class Law(Protocol):
     """How one joint's valves follow from what is wanted and what is read."""
 
     muscles: Muscles
-    """Of the joint; who follows tells them what is read and what is commanded."""
+    """The joint's muscles; who follows tells them what is read and what is commanded."""
 
     def begin(self) -> None:
         """Begin a movement."""

@@ -48,7 +48,7 @@ class Tuned:
     kind: str
     """One of :data:`KINDS`."""
     spec: ArmSpec
-    """Of the arm, with the control period that it was tuned for."""
+    """The arm, with the control period that it was tuned for."""
     calibration: Calibration
     gains: CommonGains
     shortest_pulse: float | None
@@ -56,7 +56,7 @@ class Tuned:
     seconds: float
     """Arm time that tuning took, calibration among it [s]."""
     cost: float
-    """Of the gains, as measured in the end, see :mod:`pneumarm.classical.tuning`; -1 where there was no time."""
+    """Cost of the gains, as measured in the end, see :mod:`pneumarm.classical.tuning`; -1 where there was no time."""
 
     @property
     def is_as_it_began(self) -> bool:

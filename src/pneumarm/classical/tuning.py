@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, ArmSpec, GuardedArm, guarded
 from pneumarm.arm.reference import Reference
-from pneumarm.classical.calibration import calibrate, calibration_seconds
+from pneumarm.classical.calibration import calibration_seconds, measure_calibration
 from pneumarm.classical.following import CommonGains
 from pneumarm.classical.ranges import RANGES, Range
 from pneumarm.classical.search import Evolution
 from pneumarm.classical.tuned import KINDS, Tuned
 from pneumarm.errors import UnusableInput
 from pneumarm.moving import Moved, MoveSettings, at_period, move, track
+from pneumarm.progress import Report
 from pneumarm.settings import Settings, Valid
 from pneumarm.task.reference import parse_reference
 
@@ -32,14 +33,14 @@ _STEP = 0.05
 _HOLD = 1.2
 """For how long a goal is held while tuning [s]."""
 _PLACES = (0.1, 0.62, 0.33, 0.9, 0.45, 0.5)
-"""Of the goals within the range, in order; each is moved a little for every generation."""
+"""Places of the goals within the range, in order; each is moved a little for every generation."""
 _SINES = (0.5, 1.0)
 """Frequencies that are followed [Hz]."""
 _SINE_SECONDS = 2.0
 _TRIAL = len(_PLACES) * _HOLD + len(_SINES) * _SINE_SECONDS
 """Arm time of one trial [s]."""
 _AMPLITUDE = 20.0
-"""Of the sinusoids, as far as the arm reaches [degrees]."""
+"""Amplitude of the sinusoids, as far as the arm reaches [degrees]."""
 _SETTLED = ((1.0, 1.0), (2.2, 0.5))
 """Within how many degrees a movement is to settle, and what a second until then counts as."""
 _REST = 0.6
@@ -57,8 +58,6 @@ _PATIENCE = 3
 _FINALISTS = 4
 _FINAL_SHARE = 0.2
 """Share of the arm time that is left for measuring the best again."""
-
-Report = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ def tune(
         if report is not None:
             report(min(passed(), settings.seconds), settings.seconds)
 
-    calibration = calibrate(guard, tell)
+    calibration = measure_calibration(guard, tell)
     pulses = KINDS[kind].pulses and arm.spec.pulses and not settings.whole_periods
     shortest = arm.spec.shortest_pulse if pulses else None
     space = RANGES[kind]

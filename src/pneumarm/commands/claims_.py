@@ -12,10 +12,10 @@ from pneumarm.experiments.claims import (
     HEADER,
     Judged,
     as_markdown,
+    claims_figures,
     evidence,
-    figures,
     judge,
-    read_results,
+    read_all_results,
     sections,
     summary,
 )
@@ -40,13 +40,13 @@ def claims_(
     markdown
         Print the table as Markdown, for a note or a paper.
     """
-    judged = judge(read_results(out))
+    judged = judge(read_all_results(out))
     page = out / PAGE
     write_text(page, render("The thesis' claims", summary(judged), sections(judged, out)))
     if markdown and not json:
         print(as_markdown(judged))
     else:
-        show({**figures(judged), "page": str(page)}, json, lambda: [*_tables(judged), *summary(judged)])
+        show({**claims_figures(judged), "page": str(page)}, json, lambda: [*_tables(judged), *summary(judged)])
     say(f"page: {page}")
 
 

@@ -11,7 +11,7 @@ from pneumarm.commands.common import Json, OwnMethod
 from pneumarm.console import say, show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.live.learning import TRANSFER, TRANSITIONS
-from pneumarm.live.rig import Rig
+from pneumarm.live.live_arm import LiveArm
 from pneumarm.live.server import LiveServer
 from pneumarm.progress import progress
 from pneumarm.run import SETTINGS, RunSettings, settings_in
@@ -74,17 +74,17 @@ def live_(
     if not token:
         token = None if host in _LOCAL else secrets.token_urlsafe(12)
     with progress(f"opening {settings.arm}"):
-        rig = Rig(settings, named, folder, method)
-    server = LiveServer(rig, host, port, token)
+        live_arm = LiveArm(settings, named, folder, method)
+    server = LiveServer(live_arm, host, port, token)
 
     def opened() -> None:
         say(f"open {server.url}")
         if browser or (browser is None and _has_screen()):
             webbrowser.open(server.url)
 
-    with rig, suppress(KeyboardInterrupt):  # that is how it is meant to end
+    with live_arm, suppress(KeyboardInterrupt):  # that is how it is meant to end
         server.run(opened)
-    result = {"url": server.url, "figures": rig.screen.state.get("figures", {})}
+    result = {"url": server.url, "figures": live_arm.screen.state.get("figures", {})}
     rows = [(name, *found.values()) for name, found in result["figures"].items()]
     header = ("controller", "goals", "settled", "median time [s]", "rest error [deg]", "last curve [deg]")
     show(result, json, lambda: [table(header, rows, settings.arm)] if rows else [])

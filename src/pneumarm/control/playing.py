@@ -30,7 +30,7 @@ from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import kernel, part
 from pneumarm.learning.online.agent import Agent, begin_acting, learn_and_act
-from pneumarm.learning.online.loop import Schedule, Workspace, workspace
+from pneumarm.learning.online.loop import Schedule, Workspace, loop_workspace
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state
@@ -84,7 +84,7 @@ class _Mind(NamedTuple):
     random: NDArray[np.uint64]
     layout: Layout
     offset: Array
-    """Of the observations, shape (joints, 4) [sensor units]."""
+    """Offset of the observations, shape (joints, 4) [sensor units]."""
     scale: Array
     """Shape (joints, 4) [sensor units]."""
     command_scale: Array
@@ -160,7 +160,7 @@ class Player:
             learns,
             x,
             np.zeros(window.state_size, np.float32),
-            workspace(learns, joints),
+            loop_workspace(learns, joints),
             random_state(seed),
             layout,
             np.ascontiguousarray(window.of_joints(scaling.observation_offset), np.float64),

@@ -27,10 +27,9 @@ from pneumarm.moving.settling import settled_at
 from pneumarm.settings import NonNegativeInt, PositiveInt, PythonOnly, Settings, Share
 from pneumarm.task.movements import Movement, Movements, of_rows, write_episodes
 from pneumarm.transitions import KINDS, Store
-from pneumarm.transitions.rows import Recorded, joined, rows_of
+from pneumarm.transitions.rows import Recorded, join_rows, rows_of
 from pneumarm.transitions.store import SequenceEntry
-from pneumarm.transitions.watch import Patience, keep_watch
-from pneumarm.transitions.watch import warm_up as warm_up_watch
+from pneumarm.transitions.watch import Patience, keep_watch, warm_up_watch
 
 Phase = Literal["before", "learning", "after"]
 PHASES: tuple[Phase, ...] = ("before", "learning", "after")
@@ -316,7 +315,7 @@ class Transfer:
         self._keep()  # it learns from what is stored, so that an interruption changes nothing
         made = [entry.number for entry in self._stored()][-adapting.usable :]
         blocks = list(self._store.blocks(sequences=lambda numbers: np.isin(numbers, made)))
-        if blocks and adapting.learn(joined(blocks), self._recording()):
+        if blocks and adapting.learn(join_rows(blocks), self._recording()):
             self._judge()
             self._keep_version(adapting.version, adapting.agent)
 

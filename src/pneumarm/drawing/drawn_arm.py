@@ -84,7 +84,7 @@ class Measures:
     muscle: float
     """Length of a muscle with the joint in the middle [m]."""
     diameter: float
-    """Of a muscle without pressure [m]."""
+    """Diameter of a muscle without pressure [m]."""
 
 
 USUAL = Measures(link=0.21, pulley=0.034, muscle=0.19, diameter=0.03)
@@ -96,7 +96,7 @@ class Pose:
     """What an arm does at a moment; or at n of them, then each has n rows."""
 
     degrees: Array
-    """Of the joints, shape (joints,)."""
+    """Angles of the joints, shape (joints,)."""
     full: Array
     """Pressures over the arm's highest, shape (joints, 2)."""
     lights: Array
@@ -216,7 +216,7 @@ class DrawnArm:
         self.links = [1000 * one.link for one in measures]
         self.muscles: list[list[Muscle]] = []
         self.turning: list[list[Shape]] = []
-        """Of each joint, what turns with it."""
+        """What turns with each joint."""
         for j, one in enumerate(measures):
             rest = min(1000 * one.muscle, 0.6 * self.links[j - 1] if j else np.inf)
             made = [_muscle(n + 1, one, rest) if n < muscles else _spring(one, rest) for n in range(2)]
@@ -227,7 +227,7 @@ class DrawnArm:
         """From the first hinge to the upper end of the picture, and to the end of the arm that hangs down."""
         self.plate = [_line("plate", (-70, top - 18), (70, top - 18)), _line("column", (0, top - 18), (0, 0))]
         self.ghost = [[_line("ghost", (0, 0), (0, length))] for length in self.links]
-        """Of each joint, its bare link."""
+        """The bare link of each joint."""
 
     @classmethod
     def of(cls, spec: ArmSpec) -> "DrawnArm":
@@ -301,7 +301,7 @@ def air(full: Array) -> Array:
     return PROPORTIONS["pale"] + PROPORTIONS["air"] * np.clip(full, 0, 1)
 
 
-def faded(valves: Array) -> Array:
+def brightness(valves: Array) -> Array:
     """Return how bright the lights of ``valves`` (n, ...) are, -1 to 1 as they are, from picture to picture."""
     lights = np.sign(valves) * np.sqrt(np.abs(valves))
     for k in range(1, len(lights)):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.hand import link_ends
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.drawing.drawn_arm import LOOKS, DrawnArm, Look, Muscle, Pose, Shape, air, faded, style
+from pneumarm.drawing.drawn_arm import LOOKS, DrawnArm, Look, Muscle, Pose, Shape, air, brightness, style
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Shown:
             if self.pressure is None
             else self.spec.bar(self.pressure) / self.spec.max_pressure
         )
-        lights = faded(np.zeros(shape) if self.command is None else self.command)
+        lights = brightness(np.zeros(shape) if self.command is None else self.command)
         begin = np.clip(np.searchsorted(self.time - self.time[0], times, "right") - 1, 0, None)
         return Pose(self.at(times, self.spec.degrees(self.angle)), self.at(times, full), lights[begin])
 
@@ -60,7 +60,7 @@ class _Layout:
     arm: tuple[int, int, int]
     """Middle, upper and lower end of the arm."""
     left: int
-    """Of the curve, as are the next three."""
+    """Left end of the curve; the next three are its other ends."""
     right: int
     top: int
     bottom: int

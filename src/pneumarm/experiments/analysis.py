@@ -11,7 +11,7 @@ import msgspec
 
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, TrialRows
-from pneumarm.experiments.means import estimate, numbers, table
+from pneumarm.experiments.means import estimate, means_table, numbers
 from pneumarm.experiments.pictures import against, dots
 from pneumarm.experiments.words import Quantity, SectionWords, Words
 from pneumarm.report.page import Picture, Section, Table
@@ -19,7 +19,7 @@ from pneumarm.report.page import Picture, Section, Table
 
 def analysis(experiment: Experiment, rows: TrialRows) -> Analysis:
     """Return what the rows say by the words alone."""
-    return analysed(experiment, rows, *filled(experiment, rows))
+    return analysed(experiment, rows, *filled_words(experiment, rows))
 
 
 class ByTrial(dict[str, Interval]):
@@ -30,7 +30,7 @@ class ByTrial(dict[str, Interval]):
         return "; ".join(f"{trial}: {found:{form}}" for trial, found in self.items())
 
 
-def filled(experiment: Experiment, rows: TrialRows, **own: Any) -> tuple[Words, dict[str, Any]]:
+def filled_words(experiment: Experiment, rows: TrialRows, **own: Any) -> tuple[Words, dict[str, Any]]:
     """Return the words with what was found in their places, and what was found: what they estimate and ``own``."""
     words = experiment.words
     found: dict[str, Any] = {name: by_trial(experiment, rows, what) for name, what in words.results.items()}
@@ -81,15 +81,17 @@ def analysed(
         figures = named or _columns(experiment, rows, words)
     sections = []
     for place, section in enumerate(words.sections):
-        trials = shown(experiment, section)
-        made = [table(rows, trials, section.columns, section.table)] if section.table and section.columns else []
+        trials = shown_trials(experiment, section)
+        made = (
+            [means_table(rows, trials, section.columns, section.table)] if section.table and section.columns else []
+        )
         drawn = (pictures or {}).get(place) or _drawn(experiment, rows, section, trials)
         sections.append(Section(section.title, section.text, drawn, [*made, *(tables or {}).get(place, ())]))
     claims = [Claim(c.claim, c.thesis, c.ours, c.verdict(found), c.about) for c in words.claims]
     return Analysis([words.question, *words.summary], figures, sections, claims)
 
 
-def shown(experiment: Experiment, section: SectionWords, *, called: bool = True) -> dict[int, str]:
+def shown_trials(experiment: Experiment, section: SectionWords, *, called: bool = True) -> dict[int, str]:
     """Return the trials of a section, as they are ``called`` there or by their names."""
     name = section.called if called else None
     return {
@@ -104,7 +106,7 @@ def _columns(experiment: Experiment, rows: TrialRows, words: Words) -> dict[str,
     made: dict[str, Any] = {}
     for section in words.sections:
         of_section = made.setdefault(section.results, {})
-        for figure, means in numbers(rows, shown(experiment, section, called=False), section.columns).items():
+        for figure, means in numbers(rows, shown_trials(experiment, section, called=False), section.columns).items():
             of_section.setdefault(figure, {}).update(means)
     return made
 

@@ -91,7 +91,7 @@ def below(found: Interval, threshold: float = 0.0) -> Verdict:
     return above(found.times(-1), -threshold)
 
 
-def within(found: Interval, margin: float) -> Verdict:
+def within_margin(found: Interval, margin: float) -> Verdict:
     """Return whether what is estimated lies within ``margin`` of 0; open while the interval includes an end."""
     if max(abs(found.low), abs(found.high)) <= margin:
         return "holds"

@@ -3,7 +3,7 @@
 import importlib
 import importlib.util
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.differences import Verdict
 from pneumarm.experiments.words import Words
+from pneumarm.progress import Report
 from pneumarm.settings import NonNegativeInt, PositiveInt, Settings
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 Figures = Mapping[str, float]
 """What was measured, by name."""
-Report = Callable[[float, float], None]
-"""Called with what is done and the total."""
 ARMS = tuple(f"virtual:seed={number}" for number in range(1, 6))
 """Five different arms to develop on; those to judge on are ``virtual:seed=1001`` to ``1010``."""
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.experiments.design.anova import Source, anova
-from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best, within
+from pneumarm.experiments.differences import Interval, Verdict, above, below, interval, of_the_best, within_margin
 from pneumarm.experiments.experiment import Claim, TrialRows
 from pneumarm.experiments.factorial import Analyses, Factorial
 from pneumarm.experiments.trainings import LEARNING
@@ -89,7 +89,7 @@ def traces_are_marginal(made: Factorial, rows: TrialRows, ours: Analyses, theirs
         f"The effect of eligibility traces on the reward is marginal: less than a switch costs ({_MARGINAL:g})",
         f"{effect:+.2f} ± {their.margin('mean'):.2f}",
         str(found),
-        within(found, _MARGINAL),
+        within_margin(found, _MARGINAL),
         "traces",
     )
 

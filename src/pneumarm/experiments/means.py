@@ -126,7 +126,7 @@ def text(rows: TrialRows, column: Column, trial: int) -> str:
     return f"{estimate(rows, column, trial):.{column.digits}f}"
 
 
-def table(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column], caption: str) -> Table:
+def means_table(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column], caption: str) -> Table:
     """Return the means of ``columns`` by trial with their intervals, and beside them what the thesis has."""
     header = ["trial"]
     for column in columns:
@@ -143,7 +143,7 @@ def table(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column],
 
 
 def numbers(rows: TrialRows, trials: Mapping[int, str], columns: Sequence[Column]) -> dict[str, Any]:
-    """Return for programs the means of the figures that :func:`table` shows, by trial."""
+    """Return for programs the means of the figures that :func:`means_table` shows, by trial."""
     return {
         column.figure: {
             words: {"mean": one.mean, "half": one.half}

@@ -15,11 +15,12 @@ from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.virtual import ArmParameters, VirtualArm
 from pneumarm.control.movement import BEGIN, drawn
 from pneumarm.control.turns import player
-from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Experiment, LaboratorySettings, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import Agent, Exploration, TrainSettings
 from pneumarm.learning.online.testing import GREEDY, run_test
-from pneumarm.learning.online.training import train
+from pneumarm.learning.online.training import train_online
+from pneumarm.progress import Report
 from pneumarm.simulation.kernel import scaled_state
 from pneumarm.simulation.noise import NoiseSettings
 from pneumarm.task import BeginStates
@@ -117,7 +118,7 @@ def agent_of(of: Simulated, settings: TrainSettings, run: int, laboratory: Labor
 
 @functools.lru_cache(maxsize=64)
 def _trained(of: Simulated, settings: TrainSettings, seed: int) -> Agent:
-    return train(of.simulation, of.begin, settings, seed, threads=1).agent
+    return train_online(of.simulation, of.begin, settings, seed, threads=1).agent
 
 
 def draws(agent: Agent, seed: int, count: int, stream: int, first: int = 0) -> tuple[Array, Array]:

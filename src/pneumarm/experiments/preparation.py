@@ -6,8 +6,9 @@ from pathlib import Path
 
 from pneumarm.arm import open_arm
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import LaboratorySettings, Report
+from pneumarm.experiments.experiment import LaboratorySettings
 from pneumarm.files import read_json, write_json, write_text
+from pneumarm.progress import Report
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import WHOLE_PERIODS, Store, collect

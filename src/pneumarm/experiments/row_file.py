@@ -15,7 +15,7 @@ from pneumarm.transitions.lock import WriterLock
 _LARGEST = 256 << 20  # bytes; a row has some hundred
 
 
-def read_rows(path: Path) -> list[Row]:
+def read_trial_rows(path: Path) -> list[Row]:
     """Return the rows in ``path``; none where there is no file. A last line cut short by a crash does not count.
 
     Raises:

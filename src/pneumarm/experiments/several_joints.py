@@ -14,18 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.there_and_back import (
     BEFORE,
     MOVEMENTS,
     Prepared,
     Recipe,
-    opened,
+    open_arm_at,
     prepared,
     train_and_move,
 )
 from pneumarm.experiments.words import Words
 from pneumarm.learning import PolicySettings, TrainSettings, find_method
+from pneumarm.progress import Report
 from pneumarm.simulation import SINGLE_STEPS
 
 ARMS = tuple(f"virtual:joints=2,seed={number}" for number in range(1, 6))
@@ -93,7 +94,7 @@ class SeveralJoints(Experiment):
 
     def measure(self, material: Any, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Learn what ``trial`` is about, and move the arm with it."""
-        return learned(material, self.lessons[self.trials[trial]], run, settings)
+        return lesson_results(material, self.lessons[self.trials[trial]], run, settings)
 
 
 def of_several(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySettings, progress: Report) -> Prepared:
@@ -103,13 +104,13 @@ def of_several(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetti
         UnusableInput: no arm has this name, or it has one joint, about which there is no question here.
 
     """
-    with opened(arm, settings.seed) as found:
+    with open_arm_at(arm, settings.seed) as found:
         if found.spec.joints == 1:
             raise UnusableInput(f"arm {arm!r} has one joint; expected several, such as {ARMS[0]}")
     return prepared(arm, folder, recipe, settings, progress)
 
 
-def learned(material: Prepared, lesson: Lesson, run: int, settings: LaboratorySettings) -> Figures:
+def lesson_results(material: Prepared, lesson: Lesson, run: int, settings: LaboratorySettings) -> Figures:
     """Return how agents do that took ``lesson`` in the simulation of an arm, there and on the arm."""
     if lesson.goals != "all":
         simulation = material.simulation

@@ -9,24 +9,24 @@ import hashlib
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.arm_time import arm_time
-from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Report, Row, TrialRows, sorted_rows
+from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, TrialRows, sorted_rows
 from pneumarm.experiments.preparation import SETTINGS, claim
 from pneumarm.experiments.row_file import RowWriter
 from pneumarm.files import make_folder
 from pneumarm.learning.training import cores
+from pneumarm.progress import Display, silent
 
 ROWS = "rows.jsonl"
 _OF_MANY = ("virtual", "simulation:", "emulated:virtual")
 """How the names of arms begin of which there can be several at once."""
 _PATIENCE = 10.0  # s, for a scheduler to answer
-Progress = Callable[[str], AbstractContextManager[Report]]
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,6 @@ class Sweep:
     """Wall time of computing them [s], without preparing arms."""
 
 
-@contextmanager
-def silent(title: str) -> Iterator[Report]:
-    """Show no progress."""
-    yield lambda done, total: None
-
-
 def sweep(
     experiment: Experiment,
     laboratory: Path,
@@ -55,7 +49,7 @@ def sweep(
     *,
     workers: int | None = None,
     dask: str | None = None,
-    progress: Progress = silent,
+    progress: Display = silent,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Sweep:
     """Compute the rows of ``experiment`` that the folder ``laboratory`` does not hold yet, and return all of them.

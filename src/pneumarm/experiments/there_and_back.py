@@ -18,16 +18,17 @@ from pneumarm.arm import Arm, ControlCycle, guarded, open_arm
 from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.control.agent import warm_up
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.preparation import SIMULATION, STORE, claim
 from pneumarm.files import read_json, write_json
 from pneumarm.learning import Acts, Method, TrainSettings, test, train
+from pneumarm.progress import Report
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, Simulation, StoreFit, fit_store
 from pneumarm.simulation.quality import propagation
 from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
 from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, QUANTITIES, CollectSettings, Store, collect
-from pneumarm.transitions.choice import joined
+from pneumarm.transitions.choice import join_transitions
 from pneumarm.transitions.goals import Goals
 
 TRANSITIONS = 40_000
@@ -48,7 +49,7 @@ _FIGURES = "figures.json"
 _SAME = 1e-9
 
 
-def opened(arm: str, seed: int, frequency: float | None = None) -> Arm:
+def open_arm_at(arm: str, seed: int, frequency: float | None = None) -> Arm:
     """Return the arm called ``arm``, controlled at ``frequency`` [Hz] where one is given.
 
     Raises:
@@ -82,12 +83,12 @@ class Recipe:
     fit: FitSettings = SINGLE_STEPS
 
 
-def usual(settings: LaboratorySettings, **varied: Any) -> Recipe:
+def usual_recipe(settings: LaboratorySettings, **varied: Any) -> Recipe:
     """Return the recipe of most experiments, with what is ``varied``."""
     return Recipe(min(TRANSITIONS, settings.transitions), **varied)
 
 
-def collected(
+def collect_until(
     path: Path, arm: str, seed: int, recipe: Recipe, progress: Report = lambda done, total: None
 ) -> tuple[int, float]:
     """Collect into the store ``path`` until there are so many transitions and so many minutes have passed.
@@ -96,7 +97,7 @@ def collected(
     arm's clock, those between its sequences included.
     """
     collecting = CollectSettings(close_while_computing=recipe.close_while_computing, pulses=recipe.pulses)
-    with opened(arm, seed, recipe.frequency) as there, Store.for_arm(path, there.spec) as store:
+    with open_arm_at(arm, seed, recipe.frequency) as there, Store.for_arm(path, there.spec) as store:
         first = max(recipe.transitions, FEWEST_TRANSITIONS)
         done = collect(there, store, first, seed, settings=collecting, progress=progress)
         while done.seconds < 60 * recipe.minutes:
@@ -134,13 +135,13 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
         UnusableInput: no arm has this name.
 
     """
-    with opened(arm, settings.seed) as found:
+    with open_arm_at(arm, settings.seed) as found:
         if recipe.frequency is not None and abs(found.spec.period * recipe.frequency - 1) < _SAME:
             recipe = replace(recipe, frequency=None)  # so that it is shared with experiments that leave it alone
     fit = replace(recipe.fit, seed=settings.seed)
-    folder = place(folder, {"arm": arm, "seed": settings.seed, "recipe": asdict(recipe)})
+    folder = trial_folder(folder, {"arm": arm, "seed": settings.seed, "recipe": asdict(recipe)})
     if not (folder / _FIGURES).exists():
-        transitions, minutes = collected(folder / STORE, arm, settings.seed, recipe, progress)
+        transitions, minutes = collect_until(folder / STORE, arm, settings.seed, recipe, progress)
         with Store.open(folder / STORE) as store:
             made = fit_store(store, fit)
             figures = {"transitions": float(transitions), "minutes": minutes, **quality(made)}
@@ -153,7 +154,7 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
     return Prepared(arm, recipe, folder, simulation, begin, figures)
 
 
-def place(folder: Path, wanted: object) -> Path:
+def trial_folder(folder: Path, wanted: object) -> Path:
     """Return the folder below an arm's ``folder`` of what ``wanted`` (JSON) makes, whichever experiment asks."""
     digest = hashlib.sha256(json.dumps(wanted, sort_keys=True).encode()).hexdigest()[:12]
     claim(folder / digest, wanted)
@@ -169,7 +170,7 @@ def quality(made: StoreFit) -> dict[str, float]:
     """
     simulation, held_out = made.simulation, made.result.held_out
     steps = round(1 / simulation.spec.period)
-    spread = propagation(simulation, joined(list(made.filtered.stream("held-out"))), steps)
+    spread = propagation(simulation, join_transitions(list(made.filtered.stream("held-out"))), steps)
     coverage = made.filtered.coverage
     figures = {
         "rows": float(made.result.rows),
@@ -227,7 +228,7 @@ def train_and_move(
     wanted = material.simulation.goals if goals is None else goals
     numbers = range(min(MOVEMENTS, settings.test_episodes))
     warm_up(agent)
-    with opened(material.arm, seed % 2**31, recipe.frequency) as arm:
+    with open_arm_at(material.arm, seed % 2**31, recipe.frequency) as arm:
         closes = recipe.close_while_computing
         rows = greedy_movements(agent, arm, wanted, numbers, seed, close_while_computing=closes)
     made = of_rows((one.row() for one in rows), material.simulation.spec.joints)

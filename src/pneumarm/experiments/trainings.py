@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import TrainSettings, test
-from pneumarm.learning.online.loop import Schedule, train_episodes, workspace
+from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episodes
 from pneumarm.learning.online.testing import run_test
-from pneumarm.learning.online.training import train
+from pneumarm.learning.online.training import train_online
 from pneumarm.learning.online.values import learner
+from pneumarm.progress import Report
 from pneumarm.random import random_state
 from pneumarm.task.environment import Environment, environment, episode
 from pneumarm.task.movements import TEST
@@ -113,7 +114,7 @@ def train_and_test(
         simulation = replace(simulation, goal_range=np.full_like(simulation.goal_range, goal))
     most = laboratory.max_episodes or settings.max_episodes
     one = replace(settings, agents=1, validation_episodes=1, max_episodes=most)
-    training = train(simulation, material.begin, one, run_seed(laboratory, run), threads=1)
+    training = train_online(simulation, material.begin, one, run_seed(laboratory, run), threads=1)
     agent, count = training.agent, laboratory.test_episodes
     found = test(agent, simulation, material.begin, count, _TEST_SEED).means()
     env = environment(simulation, material.begin, one)
@@ -140,5 +141,5 @@ def _learning(env: Environment, weights: NDArray[np.float32], settings: TrainSet
     deviation = float(high - low) if settings.shaping else np.inf
     schedule = Schedule(deviation, float(last.epsilon), float(last.temperature), _NEWEST)
     learns = learner(weights.copy(), settings)
-    performance, _, _ = train_episodes(env, learns, schedule, one, workspace(learns, one.goal.size), count, 0.0)
+    performance, _, _ = train_episodes(env, learns, schedule, one, loop_workspace(learns, one.goal.size), count, 0.0)
     return float(performance / (1 - (1 - _NEWEST) ** count))

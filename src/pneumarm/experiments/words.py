@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import Interval, Verdict, above, all_hold, below, within
+from pneumarm.experiments.differences import Interval, Verdict, above, all_hold, below, within_margin
 
 _RULE = re.compile(r"(\|?)(\w+)\|? ([<>]) (-?[\d.]+)")
 
@@ -75,7 +75,7 @@ def _verdict(rule: str, found: Mapping[str, Any]) -> Verdict:
         raise ValueError(f"{rule!r}: expected a rule such as 'drop > 15' or '|drop| < 3'")
     interval: Interval = found[parts[2]]
     if parts[1]:
-        return within(interval, float(parts[4]))
+        return within_margin(interval, float(parts[4]))
     return (above if parts[3] == ">" else below)(interval, float(parts[4]))
 
 

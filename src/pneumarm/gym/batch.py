@@ -95,7 +95,7 @@ def outcome(n: int, size: int) -> Outcome:
 
 
 @part
-def movement(many, e, thread):  # type: ignore[no-untyped-def]
+def as_episode(many, e, thread):  # type: ignore[no-untyped-def]
     """Return movement ``e`` as an episode; for other parts only, because no references are counted."""
     state = SimulationState(
         many.x[e], many.average[e], many.random[e], many.hidden[thread], many.second[thread], many.change[thread]
@@ -104,7 +104,7 @@ def movement(many, e, thread):  # type: ignore[no-untyped-def]
 
 
 @part
-def observe(environment, many, e, observations):  # type: ignore[no-untyped-def]
+def write_observation(environment, many, e, observations):  # type: ignore[no-untyped-def]
     """Write state and goal of movement ``e`` into ``observations`` (n, state_size + joints)."""
     joints = many.goal.shape[1]
     size = observations.shape[1] - joints
@@ -117,7 +117,7 @@ def observe(environment, many, e, observations):  # type: ignore[no-untyped-def]
 @part
 def begin_movement(environment, many, e, thread):  # type: ignore[no-untyped-def]
     """Begin movement ``e`` at any begin state, with any goal."""
-    one = movement(many, e, thread)
+    one = as_episode(many, e, thread)
     begin_episode(environment, one, np.inf, one.state.random)
     many.taken[e] = 0
 
@@ -125,7 +125,7 @@ def begin_movement(environment, many, e, thread):  # type: ignore[no-untyped-def
 @part
 def act(environment, many, e, thread, actions, result):  # type: ignore[no-untyped-def]
     """Take ``actions`` (n, joints) in movement ``e``; return whether it ended."""
-    one, task = movement(many, e, thread), environment.task
+    one, task = as_episode(many, e, thread), environment.task
     is_reached = take(environment, one, actions[e])
     many.taken[e] += 1
     ended = ending(task, is_reached, many.taken[e])
@@ -136,7 +136,7 @@ def act(environment, many, e, thread, actions, result):  # type: ignore[no-untyp
 
 
 @part
-def turn(environment, many, e, thread, actions, same_step, result):  # type: ignore[no-untyped-def]
+def act_or_begin(environment, many, e, thread, actions, same_step, result):  # type: ignore[no-untyped-def]
     """Let movement ``e`` act, or begin anew if it has ended."""
     if many.taken[e] < 0:
         begin_movement(environment, many, e, thread)
@@ -144,11 +144,11 @@ def turn(environment, many, e, thread, actions, same_step, result):  # type: ign
         result.terminated[e] = result.truncated[e] = False
     elif act(environment, many, e, thread, actions, result):
         if same_step:
-            observe(environment, many, e, result.final)
+            write_observation(environment, many, e, result.final)
             begin_movement(environment, many, e, thread)
         else:
             many.taken[e] = -1
-    observe(environment, many, e, result.observation)
+    write_observation(environment, many, e, result.observation)
 
 
 @kernel
@@ -157,7 +157,7 @@ def begin_batch(environment, many, first, last, thread, chosen, observations):  
     for e in range(first, last):
         if chosen[e]:
             begin_movement(environment, many, e, thread)
-            observe(environment, many, e, observations)
+            write_observation(environment, many, e, observations)
 
 
 @kernel
@@ -168,4 +168,4 @@ def step_batch(environment, many, first, last, thread, actions, same_step, resul
     or with ``same_step`` false in the next step, whose action is ignored then.
     """
     for e in range(first, last):
-        turn(environment, many, e, thread, actions, same_step, result)
+        act_or_begin(environment, many, e, thread, actions, same_step, result)

@@ -58,7 +58,7 @@ class Drawing(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._figure.draw(*self._pose(self._seen))
 
 
-def drawn(env: gymnasium.Env[Any, Any], pose: Pose, spec: ArmSpec, mode: str | None) -> gymnasium.Env[Any, Any]:
+def renderable(env: gymnasium.Env[Any, Any], pose: Pose, spec: ArmSpec, mode: str | None) -> gymnasium.Env[Any, Any]:
     """Return ``env``, which can be rendered if a ``mode`` is asked for.
 
     Raises:

@@ -12,7 +12,7 @@ from pneumarm.address import StoreAddress
 from pneumarm.arm import Arm, open_arm
 from pneumarm.arm.reference import Reference
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.drawing import Counts, Drawing, Pose, drawn
+from pneumarm.gym.drawing import Counts, Drawing, Pose, renderable
 from pneumarm.gym.follow import ArmFollow, FollowSettings
 from pneumarm.gym.on_arm import ArmPointToPoint
 from pneumarm.gym.simulated import SimulatedPointToPoint
@@ -114,14 +114,14 @@ def point_to_point(
             raise UnusableInput("like= is for arms; a simulation has a state window of its own")
         settings = TaskSettings(reward, cutoff, noise)
         within = SimulatedPointToPoint(_with_goals(simulation, goals), _begin(simulation, transitions), settings)
-        return drawn(within, _pose_with_goal(simulation.scaling), simulation.spec, render_mode)
+        return renderable(within, _pose_with_goal(simulation.scaling), simulation.spec, render_mode)
     if transitions is not None:
         raise UnusableInput("transitions= is for simulations; an arm is brought to its begin states")
     opened, view = _opened(arm, seed, like)
     if goals is not None:
         view = view._replace(goals=_goals(goals, view.window.joints))
     on_arm = ArmPointToPoint(opened, view, TaskSettings(reward, cutoff))
-    return drawn(on_arm, _pose_with_goal(view.scaling), opened.spec, render_mode)
+    return renderable(on_arm, _pose_with_goal(view.scaling), opened.spec, render_mode)
 
 
 def follow(
@@ -194,7 +194,7 @@ def follow(
     except UnusableInput:
         opened.close()
         raise
-    return drawn(env, _pose_with_distance(view.window, view.scaling), opened.spec, render_mode)
+    return renderable(env, _pose_with_distance(view.window, view.scaling), opened.spec, render_mode)
 
 
 def _opened(arm: str | Arm | Simulation, seed: int, like: str | Path | Simulation | None) -> tuple[Arm, View]:

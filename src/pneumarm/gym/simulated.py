@@ -13,7 +13,7 @@ from numba.experimental import structref
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.gym.batch import act, begin_movement, observe, outcome, simulated_arms
+from pneumarm.gym.batch import act, begin_movement, outcome, simulated_arms, write_observation
 from pneumarm.gym.options import chosen_goal
 from pneumarm.gym.spaces import action_space, numbered, observation_space, sensor_ranges
 from pneumarm.kernels import kernel
@@ -48,7 +48,7 @@ def _handle(environment, many, result):  # type: ignore[no-untyped-def]
 def _begin(handle):  # type: ignore[no-untyped-def]
     environment, many = handle.environment, handle.many
     begin_movement(environment, many, 0, 0)
-    observe(environment, many, 0, handle.result.observation)
+    write_observation(environment, many, 0, handle.result.observation)
 
 
 @kernel
@@ -56,7 +56,7 @@ def _step(handle, actions):  # type: ignore[no-untyped-def]
     """Take ``actions`` (1, joints); return the reward, whether the goal is reached, and whether it is cut off."""
     environment, many, result = handle.environment, handle.many, handle.result
     act(environment, many, 0, 0, actions, result)
-    observe(environment, many, 0, result.observation)
+    write_observation(environment, many, 0, result.observation)
     return result.reward[0], result.terminated[0], result.truncated[0]
 
 

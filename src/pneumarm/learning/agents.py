@@ -2,7 +2,7 @@
 
 Whatever kind an agent is of, it is tested, transferred, saved, loaded and used as a controller by the same commands.
 What only some can do is asked for by the class that says so, never by the kind: :class:`Learns`,
-:class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`, :class:`Stiffens`. Whether one settles at its goals, or
+:class:`SelfTesting`, :class:`LooksAhead`, :class:`Adapts`, :class:`Retrainable`. Whether one settles at its goals, or
 only reaches them, it says itself: ``settles``.
 """
 
@@ -35,11 +35,11 @@ class OfAnArm(Protocol):
 
     @property
     def window(self) -> Window:
-        """Of its state."""
+        """Window of its state."""
 
     @property
     def scaling(self) -> Scaling:
-        """Of its state."""
+        """Scaling of its state."""
 
     @property
     def goal_range(self) -> NDArray[np.float64]:
@@ -138,13 +138,13 @@ class Knows(Protocol):
 
 
 @runtime_checkable
-class Stiffens(Protocol):
+class Retrainable(Protocol):
     """An agent that can be made anew for joints that are kept stiffer, which swing less and are slower."""
 
     def stiffer(self) -> Self:
         """Return the agent with joints to be kept stiffer wherever it learns from now on."""
 
-    def anew(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
+    def retrained(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
         """Return the agent trained from the beginning in ``simulation``, from states ``begin``."""
 
 
@@ -154,7 +154,7 @@ class Adapts(Acts, Saved, Protocol):
 
     @property
     def simulation(self) -> Simulation:
-        """Of its arm."""
+        """Simulation of its arm."""
 
     def weights(self) -> NDArray[np.float32]:
         """Return a copy of what it has learned."""
@@ -208,12 +208,12 @@ class SimulationAgent(ReachesGoals):
 
     @property
     def window(self) -> Window:
-        """Of its state."""
+        """Window of its state."""
         return self.simulation.window
 
     @property
     def scaling(self) -> Scaling:
-        """Of its state."""
+        """Scaling of its state."""
         return self.simulation.scaling
 
     @property

@@ -36,7 +36,7 @@ from pneumarm.learning.method import Method, TaskName
 from pneumarm.learning.online.agent import KIND as ACTION_VALUES
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.settings import TrainSettings
-from pneumarm.learning.online.training import train as train_online
+from pneumarm.learning.online.training import train_online
 from pneumarm.learning.policy.agent import KIND as POLICY
 from pneumarm.learning.policy.agent import PolicyAgent, train_policy
 from pneumarm.learning.policy.settings import PolicySettings
@@ -157,13 +157,13 @@ class LearnSettings(Settings):
     agents; sarsa and q-learning: the thesis'. An installed method has a name too. By default servo, and policy to
     reach."""
     servo: ServoSettings = field(default_factory=ServoSettings)
-    """Of the method servo."""
+    """Settings of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)
-    """Of the method policy."""
+    """Settings of the method policy."""
     batched: BatchedSettings = field(default_factory=BatchedSettings)
-    """Of the method batched."""
+    """Settings of the method batched."""
     thesis: TrainSettings = field(default_factory=TrainSettings)
-    """Of the methods sarsa and q-learning."""
+    """Settings of the methods sarsa and q-learning."""
     own: dict[str, Any] = field(default_factory=dict)
     """Settings of hierarchy, or of a method of your own, as --own.NAME VALUE."""
 

@@ -7,7 +7,7 @@ from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import Window
 
 
-def scaled_state(graph: Graph, window: Window, scaling: Scaling) -> str:
+def add_scaled_state(graph: Graph, window: Window, scaling: Scaling) -> str:
     """Add the input ``state`` (samples, state_size) in sensor units; return it scaled."""
     history = window.history
     offset = [np.tile(scaling.observation_offset, history), np.zeros(2 * window.joints * (history - 1))]

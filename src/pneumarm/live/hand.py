@@ -31,7 +31,7 @@ class Dragged:
         return Reference(lambda time: self.goal, smooth=False, known_ahead=False)
 
 
-def drawn(time: Sequence[float], angle: ArrayLike, begin: ArrayLike) -> Reference:
+def curve_reference(time: Sequence[float], angle: ArrayLike, begin: ArrayLike) -> Reference:
     """Return the reference that moves from ``begin`` to a drawn curve, follows it, and stays at its end.
 
     Args:

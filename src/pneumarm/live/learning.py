@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Reading
+from pneumarm.arm.wrapper import ArmWrapper
 from pneumarm.errors import PneumarmError
 from pneumarm.live.screen import Screen
 from pneumarm.progress import Report, compiling
@@ -41,7 +41,7 @@ class LeftOff(PneumarmError):  # noqa: N818 - reads as a sentence where it is ra
     """Somebody stopped the learning; what was recorded so far is kept."""
 
 
-class Watched(PassedOn):
+class Watched(ArmWrapper):
     """An arm whose readings are shown on the page, and that stops when somebody wants that."""
 
     def __init__(self, arm: Arm, screen: Screen, check: Callable[[], None]) -> None:

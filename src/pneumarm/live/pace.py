@@ -2,8 +2,8 @@
 
 from time import monotonic, sleep
 
-from pneumarm.arm.passed_on import PassedOn
 from pneumarm.arm.seam import Arm, Reading
+from pneumarm.arm.wrapper import ArmWrapper
 
 _NAP = 0.05
 """For so long [s] a clock is watched to find out whether it stands still."""
@@ -11,7 +11,7 @@ _MOST_BEHIND = 0.1
 """An arm farther behind the clock on the wall than this [s] lets that time go, as after this computer slept."""
 
 
-class Paced(PassedOn):
+class Paced(ArmWrapper):
     """Gives each reading when its time has come: a virtual arm then takes the time that a real one takes."""
 
     def __init__(self, arm: Arm) -> None:

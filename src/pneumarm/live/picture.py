@@ -9,7 +9,7 @@ from pneumarm.drawing.drawn_arm import DrawnArm, Measures
 _Kind = TypeVar("_Kind", bound=Arm)
 
 
-def behind(arm: Arm | None, kind: type[_Kind]) -> _Kind | None:
+def unwrapped(arm: Arm | None, kind: type[_Kind]) -> _Kind | None:
     """Return the arm of a ``kind`` behind ``arm``, which may be guarded, paced or corrected; None where none is."""
     while arm is not None and not isinstance(arm, kind):
         arm = getattr(arm, "arm", None)
@@ -18,7 +18,7 @@ def behind(arm: Arm | None, kind: type[_Kind]) -> _Kind | None:
 
 def drawing_of(arm: Arm) -> tuple[DrawnArm, bool]:
     """Return ``arm`` as it is drawn, and whether that is to scale."""
-    virtual = behind(arm, VirtualArm)
+    virtual = unwrapped(arm, VirtualArm)
     if virtual is None:
         return DrawnArm.of(arm.spec), False
     measures = [

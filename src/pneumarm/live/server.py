@@ -25,8 +25,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.live.door import Door
+from pneumarm.live.live_arm import LiveArm
 from pneumarm.live.orders import LARGEST, AnyOrder, Choose, PutBack, read_order
-from pneumarm.live.rig import Rig
 
 MOST_PAGES = 50
 """Pages that may be open at a time."""
@@ -45,15 +45,15 @@ _REFUSED, _FULL = 4403, 4429  # codes that a refused connection is closed with
 
 
 class LiveServer:
-    """Serves ``rig`` on ``host`` and ``port``; 0 takes any port that is free.
+    """Serves ``live_arm`` on ``host`` and ``port``; 0 takes any port that is free.
 
     Raises:
         UnusableInput: the host is none of this machine, or the port is taken.
 
     """
 
-    def __init__(self, rig: Rig, host: str, port: int, token: str | None) -> None:
-        self.rig, self.token = rig, token
+    def __init__(self, live_arm: LiveArm, host: str, port: int, token: str | None) -> None:
+        self.live_arm, self.token = live_arm, token
         self._host = host
         self._socket = _bound(host, port)
         self._port = int(self._socket.getsockname()[1])
@@ -89,7 +89,7 @@ class LiveServer:
             lifespan="off",
             proxy_headers=False,  # the door knows a connection by the address that it comes from
         )
-        self._serving = serving = _Uvicorn(config, self.rig, self._door, self._socket, opened)
+        self._serving = serving = _Uvicorn(config, self.live_arm, self._door, self._socket, opened)
         with _closing(self._socket):
             try:
                 asyncio.get_running_loop()
@@ -106,7 +106,7 @@ class LiveServer:
 
     def end(self) -> None:
         """Have the arm vented and the serving ended, from another thread."""
-        self.rig.leave()
+        self.live_arm.leave()
         if self._serving is not None:
             self._serving.should_exit = True
 
@@ -145,29 +145,29 @@ class LiveServer:
         if not self._allowed(socket):
             await socket.close(_REFUSED)
             return
-        desk = self.rig.desk
-        if len(desk.pages) >= MOST_PAGES:
+        lease = self.live_arm.lease
+        if len(lease.pages) >= MOST_PAGES:
             await socket.close(_FULL)
             return
         self._door.let_in(socket.client)
-        page = desk.enter()
+        page = lease.enter()
         showing = asyncio.create_task(self._show(socket, page))
         try:
             await self._listen(socket, page)
         finally:
-            desk.leave(page)
+            lease.leave(page)
             showing.cancel()
 
     async def _show(self, socket: WebSocket, page: int) -> None:
         """Send what changes. A page that is slow misses frames; nothing piles up."""
-        screen, desk, frames = self.rig.screen, self.rig.desk, -1
+        screen, lease, frames = self.live_arm.screen, self.live_arm.lease, -1
         told: tuple[int | None, ...] = ()
         with suppress(WebSocketDisconnect, RuntimeError):
             while True:
-                now = screen.versions, desk.writer, desk.asking, len(desk.pages)
+                now = screen.versions, lease.writer, lease.asking, len(lease.pages)
                 if now != told:
                     told = now
-                    await socket.send_text(json.dumps({"state": self.rig.told_to(page)}))
+                    await socket.send_text(json.dumps({"state": self.live_arm.told_to(page)}))
                 if screen.frames != frames:
                     frames = screen.frames
                     await socket.send_text(f'{{"frame": {screen.frame}}}')
@@ -179,13 +179,13 @@ class LiveServer:
             while True:
                 text = await socket.receive_text()
                 try:
-                    order = read_order(text, self.rig.screen.state["joints"])
+                    order = read_order(text, self.live_arm.screen.state["joints"])
                     if isinstance(order, Choose | PutBack):  # which take a while
                         task = asyncio.create_task(self._do(socket, page, order))
                         doing.add(task)
                         task.add_done_callback(doing.discard)
                     else:
-                        self.rig.order(page, order)
+                        self.live_arm.order(page, order)
                 except UnusableInput as error:
                     await socket.send_text(json.dumps({"refused": str(error)}))
         except (WebSocketDisconnect, RuntimeError, KeyError):
@@ -193,7 +193,7 @@ class LiveServer:
 
     async def _do(self, socket: WebSocket, page: int, order: AnyOrder) -> None:
         try:
-            await asyncio.to_thread(self.rig.order, page, order)
+            await asyncio.to_thread(self.live_arm.order, page, order)
         except PneumarmError as error:
             with suppress(WebSocketDisconnect, RuntimeError):
                 await socket.send_text(json.dumps({"refused": str(error)}))
@@ -203,10 +203,15 @@ class _Uvicorn(uvicorn.Server):
     """Says when it can be reached, and has the arm vented before anything else when it is to end."""
 
     def __init__(
-        self, config: uvicorn.Config, rig: Rig, door: Door, listening: socket.socket, opened: Callable[[], None]
+        self,
+        config: uvicorn.Config,
+        live_arm: LiveArm,
+        door: Door,
+        listening: socket.socket,
+        opened: Callable[[], None],
     ) -> None:
         super().__init__(config)
-        self._rig, self._door, self._listening, self._opened = rig, door, listening, opened
+        self._live_arm, self._door, self._listening, self._opened = live_arm, door, listening, opened
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Begin to serve what comes through the door."""
@@ -225,7 +230,7 @@ class _Uvicorn(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Take a signal to end."""
-        self._rig.leave()
+        self._live_arm.leave()
         super().handle_exit(sig, frame)
 
 

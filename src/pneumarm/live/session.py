@@ -27,16 +27,16 @@ from pneumarm.control import Monitor
 from pneumarm.control.monitor.findings import Finding
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.live.choices import Mover
-from pneumarm.live.desk import HOLD_AFTER, VENT_AFTER
 from pneumarm.live.faults import Switches
 from pneumarm.live.figures import PlayFigures
-from pneumarm.live.hand import Dragged, drawn
+from pneumarm.live.hand import Dragged, curve_reference
+from pneumarm.live.lease import HOLD_AFTER, VENT_AFTER
 from pneumarm.live.orders import Faults, FollowCurve, GoTo, Hold, Order, Relax, Release, Stop
-from pneumarm.live.picture import behind
+from pneumarm.live.picture import unwrapped
 from pneumarm.live.screen import Screen
 from pneumarm.live.words import prevented, sentence
 from pneumarm.task.reference import counts_of
-from pneumarm.transitions.watch import warm_up
+from pneumarm.transitions.watch import warm_up_watch
 
 _MOST_ORDERS = 200  # that wait for the next turn; then the oldest is forgotten
 _FINDINGS = 6  # newest, that are told
@@ -88,7 +88,7 @@ class Session:
         self._mover, self._watch, self._screen, self._silence = mover, watch, screen, silence
         self._orders: deque[Order | Mover] = deque(maxlen=_MOST_ORDERS)
         self._stop, self._leave = Event(), Event()
-        virtual = behind(arm, VirtualArm)
+        virtual = unwrapped(arm, VirtualArm)
         self._switches = None if virtual is None else Switches(virtual)
         self._vent = np.full(self.arm.applied.shape, -1, np.int8)
         self._middle = np.full(arm.spec.joints, sum(arm.spec.angle_range) / 2)
@@ -118,7 +118,7 @@ class Session:
     def run(self) -> None:
         """Move the arm until somebody leaves; it is vented then. Failures are shown, and wait for a release."""
         self._screen.tell(mode=Mode.OPENING, why="")
-        warm_up(self._watch, self.arm.spec)  # here and not before, so that the page can be looked at meanwhile
+        warm_up_watch(self._watch, self.arm.spec)  # here and not before, so that the page can be looked at meanwhile
         try:
             while not self._leave.is_set():
                 try:
@@ -234,7 +234,7 @@ class Session:
 
     def _follow(self, order: FollowCurve, mover: Mover) -> None:
         angles = self._within(counts_of(order.degrees, self.arm.spec), mover)
-        self._curve = drawn(order.seconds, angles, self._now)
+        self._curve = curve_reference(order.seconds, angles, self._now)
         self.mode, self._why = Mode.FOLLOWING, ""
         self.figures.new_curve()
         self._begin(self._curve)
@@ -278,7 +278,7 @@ class Session:
 
         Who has stopped it meant that it stays so.
         """
-        board = behind(self.arm, SerialArm)
+        board = unwrapped(self.arm, SerialArm)
         if board is None:
             return False
         try:
@@ -299,7 +299,7 @@ class Session:
 
     def _try_again(self) -> None:
         """Take up the arm again: somebody has looked at it."""
-        board = behind(self.arm, SerialArm)
+        board = unwrapped(self.arm, SerialArm)
         try:
             if board is not None:
                 board.rearm()

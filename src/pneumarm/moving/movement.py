@@ -69,13 +69,13 @@ class Moved:
     """How far each joint went beyond the goal in its direction, shape (joints,) [degrees]."""
     tries: int
     switches: int
-    """Of all tries."""
+    """Valve changes of all tries."""
     air: float | None
     """Air taken from the supply in all tries [normal litres]; None where the arm cannot say."""
     recorded: Recorded
     """The last try."""
     spec: ArmSpec
-    """Of the arm."""
+    """The arm."""
     goal_xy: NDArray[np.float64] | None = None
     """Where the hand was to be, shape (2,) [m]; None where the goal was given in angles."""
 
@@ -152,7 +152,7 @@ class Tracked:
     wanted: NDArray[np.float64]
     """What the reference asked for at each reading, shape (n, joints) [counts]."""
     spec: ArmSpec
-    """Of the arm."""
+    """The arm."""
 
     @property
     def time(self) -> NDArray[np.float64]:

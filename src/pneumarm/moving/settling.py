@@ -37,7 +37,7 @@ def settled_at(
     """
     outside = np.zeros(len(times), bool)
     for joint in off.T:
-        noise = scatter(joint[times > times[-1] - 1])
+        noise = reading_noise(joint[times > times[-1] - 1])
         if not noise < math.inf:
             return None  # numbers too large to say anything of
         if noise <= _SCATTERED * tolerance:
@@ -50,7 +50,7 @@ def settled_at(
     return float(times[first]) if first < len(times) and times[-1] - times[first] >= dwell else None
 
 
-def scatter(readings: NDArray[np.float64]) -> float:
+def reading_noise(readings: NDArray[np.float64]) -> float:
     """Return the standard deviation of the noise of ``readings`` (n,) that were made one period after the other."""
     if len(readings) <= _DIFFERENCES:
         return 0.0

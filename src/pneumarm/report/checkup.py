@@ -107,14 +107,14 @@ def _of_joint(checkup: Checkup, j: int) -> Section:
         figures=[
             Picture(muscles(checkup, j), "Each muscle filled, held and exhausted alone, the other vented.", times),
             Picture(
-                noise(checkup, j),
+                noise_figure(checkup, j),
                 "Noise at rest, detrended: power spectrum and autocorrelation (thesis A.1.3). White noise has a flat "
                 "spectrum and no correlation; the grey band holds 99 % of what white noise shows; beyond the dotted "
                 "lines it is said not to be white.",
                 f"noise of {figures.angle_noise:.2f} counts in the angle",
             ),
             Picture(
-                potentiometer(checkup, j),
+                potentiometer_figure(checkup, j),
                 "The angle at rest against the difference of the pressures, up and down; and how irregular the angle "
                 "is by place; over the dotted line it is worn there.",
                 f"the upper half turns {figures.halves:.2f} times as far; irregular by {figures.worst:.2f} degrees",
@@ -146,7 +146,7 @@ def muscles(checkup: Checkup, j: int) -> Figure:
 
 
 @styled
-def noise(checkup: Checkup, j: int) -> Figure:
+def noise_figure(checkup: Checkup, j: int) -> Figure:
     """Draw power spectrum and autocorrelation of the noise at rest."""
     figure, axes = panels(1, 2, 2.6)
     rest = checkup.joints[j].rest
@@ -178,7 +178,7 @@ def spectrum(values: np.ndarray, step: float, pieces: int = 16) -> tuple[np.ndar
 
 
 @styled
-def potentiometer(checkup: Checkup, j: int) -> Figure:
+def potentiometer_figure(checkup: Checkup, j: int) -> Figure:
     """Draw the angle against the pressure difference, and its irregularity by place."""
     figure, axes = panels(1, 2, 2.8)
     test = checkup.joints[j]

@@ -218,7 +218,7 @@ class Demonstration(Record):
     file = "demonstration.safetensors"
 
     time: Annotated[Array, "n"]
-    """Of the readings [s]."""
+    """Times of the readings [s]."""
     angle: Annotated[Array, "n joints"]
     """In counts."""
     pressure: Annotated[Array, "n joints 2"]
@@ -250,7 +250,7 @@ class MovingData(Record):
     file = "moving.safetensors"
 
     time: Annotated[Array, "n"]
-    """Of the readings [s]."""
+    """Times of the readings [s]."""
     angle: Annotated[Array, "n joints"]
     """[counts]"""
     wanted: Annotated[Array, "n joints"]

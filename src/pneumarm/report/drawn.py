@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from pneumarm.leaving import leave_by_exceptions
+from pneumarm.leaving import signals_as_exceptions
 from pneumarm.report.beside import WRITE
 from pneumarm.report.page import Section
 from pneumarm.report.run_report import read_run, write_report
@@ -38,7 +38,7 @@ def draw(folder: Path, wanted: Iterable[str]) -> None:
 
 
 if __name__ == "__main__":
-    leave_by_exceptions()
+    signals_as_exceptions()
     if hasattr(os, "nice"):
         os.nice(_NICE)
     draw(Path(sys.argv[1]), (line.strip() for line in sys.stdin))

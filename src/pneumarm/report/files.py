@@ -31,7 +31,7 @@ def read_results(folder: Path) -> dict[str, Any]:
     return results
 
 
-def save_spec(folder: Path, spec: ArmSpec) -> None:
+def write_spec(folder: Path, spec: ArmSpec) -> None:
     """Write what the report must know of the arm to ``folder``."""
     write_json(folder / SPEC, asdict(spec))
 
@@ -45,7 +45,7 @@ _KNOWN = {field.name for field in fields(ArmSpec)}  # of an arm
 
 
 def read_spec(path: Path) -> ArmSpec:
-    """Return what :func:`save_spec` wrote to ``path``; raises UnusableInput where it is something else."""
+    """Return what :func:`write_spec` wrote to ``path``; raises UnusableInput where it is something else."""
     stored = read_json(path, "the spec of an arm")
     try:
         if "angle_range" not in stored or set(stored) - _KNOWN:

@@ -33,12 +33,12 @@ from pneumarm.report.sections import (
     RunData,
     all_sections,
     arrival_words,
-    collected,
+    coverage_section,
     moving_words,
     one_step,
-    predicted,
     predicted_words,
     propagated,
+    simulation_section,
 )
 from pneumarm.task.movements import Movements, movements, read_episodes
 
@@ -50,7 +50,7 @@ def write_report(folder: Path, drawn: Mapping[str, Sequence[Section]] | None = N
 
     ``drawn`` are parts of it that have been drawn already, as in :data:`~.sections.PARTS`.
 
-    The folder holds ``results.json`` and ``arm.json`` (:func:`~.files.save_spec`); what else there is of the records
+    The folder holds ``results.json`` and ``arm.json`` (:func:`~.files.write_spec`); what else there is of the records
     (:class:`CoverageData`, ...), of ``episodes.csv`` and of demonstrations (:func:`~.files.save_demonstration`)
     enters it.
 
@@ -70,8 +70,8 @@ def write_analysis(
     path = folder / ANALYSIS
     sections = [
         one_step(quality, spec),
-        collected(coverage, spec),
-        predicted(quality, spec),
+        coverage_section(coverage, spec),
+        simulation_section(quality, spec),
         propagated(quality, spec, found),
     ]
     summary = predicted_words(quality, spec)

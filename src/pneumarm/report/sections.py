@@ -53,14 +53,14 @@ class RunData:
     moving: MovingData | None = None
 
 
-def learned(run: RunData) -> list[Section]:
+def learning_sections(run: RunData) -> list[Section]:
     """Return the sections of ``run`` on what is done before an agent moves the arm."""
     sections = []
     if run.coverage is not None:
-        sections.append(collected(run.coverage, run.spec))
+        sections.append(coverage_section(run.coverage, run.spec))
     if run.quality is not None:
         sections += [
-            predicted(run.quality, run.spec),
+            simulation_section(run.quality, run.spec),
             propagated(run.quality, run.spec, run.results.get("simulation", {})),
         ]
     if run.training is not None:
@@ -83,7 +83,7 @@ def moved(run: RunData) -> list[Section]:
     return sections
 
 
-PARTS: Mapping[str, Callable[[RunData], list[Section]]] = {"learned": learned, "moved": moved}
+PARTS: Mapping[str, Callable[[RunData], list[Section]]] = {"learned": learning_sections, "moved": moved}
 """What can be drawn before a run ends, each by its name, in the order in which it can."""
 
 
@@ -229,7 +229,7 @@ def _ranges(data: CoverageData, spec: ArmSpec) -> str:
     return f"All but 2% of the angles lie {', '.join(found)}; goals beyond them are refused."
 
 
-def collected(data: CoverageData, spec: ArmSpec) -> Section:
+def coverage_section(data: CoverageData, spec: ArmSpec) -> Section:
     """Return what the collected data covers."""
     occupied = int(data.cells_holding[1:].sum())
     text = [
@@ -312,14 +312,14 @@ def one_step(data: QualityData, spec: ArmSpec) -> Section:
     )
 
 
-def predicted(data: QualityData, spec: ArmSpec) -> Section:
+def simulation_section(data: QualityData, spec: ArmSpec) -> Section:
     """Return residues and isoplots."""
     joints = data.observation.shape[1]
     error = (data.predicted - data.target)[:, :, 0] / spec.counts_per_degree
     real, simulated = data.target - data.observation, data.predicted - data.observation
     pictures = [
         Picture(
-            figures.residue(data.target[:, :, 0], data.predicted[:, :, 0], spec),
+            figures.residues(data.target[:, :, 0], data.predicted[:, :, 0], spec),
             "Observed and simulated angle of successive transitions and the residue between them "
             "(thesis figure 3.1).",
         )

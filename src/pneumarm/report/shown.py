@@ -15,7 +15,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.report.data import Demonstration, MovingData
 from pneumarm.report.files import DEMONSTRATIONS, SPEC, read_spec
 from pneumarm.task.reference import parse_reference
-from pneumarm.transitions.rows import Rows, joined
+from pneumarm.transitions.rows import Rows, join_rows
 from pneumarm.transitions.store import SequenceEntry, Store
 
 Array = NDArray[np.float64]
@@ -74,14 +74,14 @@ def _of_store(store: Store, sequence: int | None, seconds: float) -> Shown:
     numbers = [sequence] if sequence is not None else list(entries)
     parts: list[Rows] = []
     for number in reversed(numbers):
-        rows = joined(store.blocks(sequences=partial(operator.eq, number), marked=True))
+        rows = join_rows(store.blocks(sequences=partial(operator.eq, number), marked=True))
         if parts and not 0 <= parts[0].time[0] - rows.time[-1] <= _PAUSE:
             break
         if parts and parts[-1].time[-1] - rows.time[0] > seconds:
             break
         parts.insert(0, rows)
     wanted = [_wanted(entries[int(rows.sequence[0])], rows, store.spec) for rows in parts]
-    rows = joined(parts)
+    rows = join_rows(parts)
     asked = np.concatenate(wanted)
     return Shown(
         store.spec,

@@ -54,7 +54,7 @@ class Stretches(NamedTuple):
     """What the networks have to predict, shape (n, steps, outputs)."""
 
 
-class Tape(NamedTuple):
+class StretchTape(NamedTuple):
     """What is kept of stretches on their way. Made by :func:`_tape`."""
 
     x: NDArray[np.float32]
@@ -165,14 +165,14 @@ def _trainable(parameters: SimulationParameters) -> tuple[Trainable, SimulationP
     return net, trained
 
 
-def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: Stretches) -> Tape:
+def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: Stretches) -> StretchTape:
     (size, units), (_, steps, outputs) = parameters.hidden.shape, recorded.observed.shape
     commands = simulation.window.command_size
 
     def zeros(*shape: int) -> NDArray[np.float32]:
         return np.zeros((*shape, _AT_ONCE), np.float32)
 
-    tape = Tape(
+    tape = StretchTape(
         x=zeros(steps + 1, size),
         hidden=zeros(steps, units),
         free=zeros(steps, outputs),
@@ -187,7 +187,7 @@ def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: St
     return tape
 
 
-def _put(tape: Tape, recorded: Stretches, random: np.random.Generator) -> None:
+def _put(tape: StretchTape, recorded: Stretches, random: np.random.Generator) -> None:
     """Put stretches drawn at random on the tape."""
     chosen = random.integers(len(recorded.state), size=_AT_ONCE)
     tape.x[0, : recorded.state.shape[1]] = recorded.state[chosen].T
@@ -195,7 +195,9 @@ def _put(tape: Tape, recorded: Stretches, random: np.random.Generator) -> None:
     tape.observed[...] = recorded.observed[chosen].transpose(1, 2, 0)
 
 
-def _weigh(parameters: SimulationParameters, tape: Tape, recorded: Stretches, random: np.random.Generator) -> None:
+def _weigh(
+    parameters: SimulationParameters, tape: StretchTape, recorded: Stretches, random: np.random.Generator
+) -> None:
     """Make the errors of each step and output as large as those of the others are."""
     sizes = []
     for _ in range(8):

@@ -164,7 +164,7 @@ class Isoplot(NamedTuple):
     """Transitions in each cell, (observed, predicted), shape (cells, cells)."""
 
 
-def isoplot(observed: ArrayLike, predicted: ArrayLike, cells: int = 100, points: int = 20_000) -> Isoplot:
+def isoplot_cells(observed: ArrayLike, predicted: ArrayLike, cells: int = 100, points: int = 20_000) -> Isoplot:
     """Return what an isoplot shows: the density in cells, and at most ``points`` evenly chosen points to draw.
 
     ``observed`` and ``predicted`` are changes from one step to the next, shape (n,).

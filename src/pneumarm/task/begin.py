@@ -165,8 +165,8 @@ def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
     for _ in range(_TRIES):
         joint = integer(random, goal.shape[0]) if goal.shape[0] > 1 else 0
         low, high = draw_interval(begin.domain, begin.weights, goal[joint], deviation, random)
-        first = below(begin.sorted[joint], low)
-        count = below(begin.sorted[joint], high) - first
+        first = count_below(begin.sorted[joint], low)
+        count = count_below(begin.sorted[joint], high) - first
         if count > 0:
             index = begin.order[joint, first + integer(random, count)]
             if distance(begin.angle[index], goal) <= deviation:
@@ -188,7 +188,7 @@ def distance(angle, goal):  # type: ignore[no-untyped-def]
 
 
 @part
-def below(sorted_, value):  # type: ignore[no-untyped-def]
+def count_below(sorted_, value):  # type: ignore[no-untyped-def]
     """Return how many of ``sorted_`` (n,) are below ``value``."""
     first, last = 0, sorted_.shape[0]
     while first < last:

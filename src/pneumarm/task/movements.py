@@ -198,7 +198,7 @@ def of_rows(rows: Iterable[Mapping[str, Any]], joints: int = 1) -> Movements:
     return Movements(**columns)
 
 
-def joined(parts: Iterable[Movements]) -> Movements:
+def join_movements(parts: Iterable[Movements]) -> Movements:
     """Return the movements of all ``parts``, of which there is at least one, one after the other."""
     return Movements(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 

@@ -139,14 +139,14 @@ def _smallest(
     pending: list[tuple[Transitions, NDArray[np.float64]]], count: int
 ) -> tuple[Transitions, NDArray[np.float64]]:
     draw = np.concatenate([d for _, d in pending])
-    together = joined([block for block, _ in pending])
+    together = join_transitions([block for block, _ in pending])
     if len(draw) <= count:
         return together, draw
     chosen = np.sort(np.argpartition(draw, count - 1)[:count])
     return picked(together, chosen), draw[chosen]
 
 
-def joined(parts: list[Transitions]) -> Transitions:
+def join_transitions(parts: list[Transitions]) -> Transitions:
     """Return the transitions of all ``parts`` (at least one) as one."""
     return Transitions._make(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
 

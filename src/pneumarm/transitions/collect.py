@@ -40,7 +40,7 @@ from pneumarm.transitions.fill_times import FillTimes, find_fill_times
 from pneumarm.transitions.players import Trajectory
 from pneumarm.transitions.rows import Recorded, broken_off, joinable
 from pneumarm.transitions.store import Store
-from pneumarm.transitions.watch import MOST_SPOILED, Patience, Watch, act_until, keep_watch, warm_up
+from pneumarm.transitions.watch import MOST_SPOILED, Patience, Watch, act_until, keep_watch, warm_up_watch
 
 KINDS = ("zero-velocity", "velocity", "pulses", "sparse", "controller")
 """Kinds of the sequences made here."""
@@ -320,7 +320,7 @@ class _Collection:
         if watch is not None:
             if kept["watch"] is not None:
                 watch.set_state(kept["watch"])
-            warm_up(watch, arm.spec)
+            warm_up_watch(watch, arm.spec)
 
     def find_fill_times(self) -> None:
         """Take what the settings leave to this arm from its fill times, found now or by an earlier call."""

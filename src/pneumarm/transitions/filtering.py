@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.errors import PneumarmError, UnusableInput
-from pneumarm.transitions.choice import hashed_uniform, held_out, joined, picked, sample
+from pneumarm.transitions.choice import hashed_uniform, held_out, join_transitions, picked, sample
 from pneumarm.transitions.grid import CellCounts, Coverage, Grid, GridSettings, span_grid
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import Transitions, Window, transitions
@@ -118,7 +118,7 @@ def filter_transitions(
     for block in training():
         counts.add(grid.cells(block.inputs))
     chosen = Filter(grid, counts, settings, seed, hold_out)
-    kept = joined([picked(block, chosen.part(block, "kept")) for block in _windows(source, window)])
+    kept = join_transitions([picked(block, chosen.part(block, "kept")) for block in _windows(source, window)])
     coverage = Coverage.of(grid, counts.arrays()[1], settings.per_cell, len(kept.sequence))
     return Filtered(kept, coverage, chosen, source)
 
@@ -137,9 +137,9 @@ class NewCells:
     """Which cells only the second half of the data reached (thesis section 3.2.3)."""
 
     half: Coverage
-    """Of the first half."""
+    """Coverage of the first half."""
     whole: Coverage
-    """Of everything."""
+    """Coverage of everything."""
 
     @property
     def count(self) -> int:

@@ -44,7 +44,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.address import StoreAddress
-from pneumarm.arm.fill import filled
+from pneumarm.arm.fill import estimated_pressures
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
 from pneumarm.files import as_toml, read_toml
@@ -353,7 +353,7 @@ def _sequences(reader: "_Reader", spec: ArmSpec) -> Iterator[Recorded]:
         yield Recorded(
             time=time,
             angle=per_joint[:, :, 0],
-            pressure=per_joint[:, :, 1:3] if spec.pressure_sensors else filled(spec, time, command),
+            pressure=per_joint[:, :, 1:3] if spec.pressure_sensors else estimated_pressures(spec, time, command),
             command=command,
             step=steps_of(time, spec.period) + np.cumsum(cut),
             kind="imported",

@@ -61,7 +61,7 @@ class Rows:
 _ARRAYS = tuple(one.name for one in fields(Rows) if one.name != "measured")
 
 
-def joined(blocks: Iterable[Rows]) -> Rows:
+def join_rows(blocks: Iterable[Rows]) -> Rows:
     """Return ``blocks`` of one arm, at least one, as a single one."""
     parts = list(blocks)
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}

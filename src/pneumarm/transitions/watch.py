@@ -118,7 +118,7 @@ def act_until(
     return Recorded.from_steps(steps, cycle.arm.spec, kind=kind, at_rest=at_rest, info=info)
 
 
-def warm_up(watch: Watch, spec: ArmSpec) -> None:
+def warm_up_watch(watch: Watch, spec: ArmSpec) -> None:
     """Have a copy of ``watch`` see made-up readings: nothing is to be compiled while an arm waits for its valves."""
     rehearsing = copy.deepcopy(watch)
     rehearsing.begin(at_rest=True)

@@ -9,7 +9,7 @@ import pytest
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, preset_parameters, resting_angle
 from pneumarm.arm.virtual.body import body_of
 from pneumarm.arm.virtual.constants import constants
-from pneumarm.arm.virtual.muscle import move
+from pneumarm.arm.virtual.muscle import bring_to_length
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR
 from pneumarm.arm.virtual.step import integrate
 from pneumarm.arm.virtual.trial import prepare, ring_frequency
@@ -68,7 +68,7 @@ def displaced(parameters, pressure, degrees):
             length = c["length_at_zero"] + (2 * m - 1) * parameters.joints[0].radius * angle
             if i == 0:
                 prepare(muscle, c, length, pressure)
-            move(muscle, c, length, 0.0, ATMOSPHERE, fixed.surroundings[0]["polytropic"], 0.0)
+            bring_to_length(muscle, c, length, 0.0, ATMOSPHERE, fixed.surroundings[0]["polytropic"], 0.0)
     return arm, rest
 
 

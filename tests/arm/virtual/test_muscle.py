@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from pneumarm.arm.virtual import MuscleParameters, draw_parameters
 from pneumarm.arm.virtual.constants import MUSCLE_CONSTANTS, _fill_muscle
-from pneumarm.arm.virtual.muscle import braid, compress, move, slip, static_tension
+from pneumarm.arm.virtual.muscle import braid, bring_to_length, compress, slip, static_tension
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR
 from pneumarm.arm.virtual.slow import adapt
 from pneumarm.arm.virtual.start import place
@@ -46,7 +46,7 @@ def muscle_at(c, length, pressure, temperature=20.0):
     muscle["temperature"] = temperature
     adapt(muscle, c)
     muscle["pressure"] = ATMOSPHERE + pressure
-    move(muscle, c, length, 0.0, ATMOSPHERE, 1.2, 0.0)
+    bring_to_length(muscle, c, length, 0.0, ATMOSPHERE, 1.2, 0.0)
     return muscle
 
 
@@ -138,7 +138,7 @@ def test_a_closed_muscle_keeps_p_v_to_the_n(start, end, bar, polytropic):
     muscle = muscle_at(c, start, bar * BAR)
     kept = []
     for length in np.linspace(start, end, 200):
-        move(muscle, c, length, 0.0, ATMOSPHERE, polytropic, 1e-3)
+        bring_to_length(muscle, c, length, 0.0, ATMOSPHERE, polytropic, 1e-3)
         # Above the threshold, where the bladder follows the braid.
         if muscle["engagement"] == 1.0:
             kept.append(muscle["pressure"] * (muscle["volume"] + c["dead_volume"]) ** polytropic)
@@ -153,7 +153,7 @@ def test_the_volume_law_is_of_third_order():
         muscle = muscle_at(c, 0.17, BAR)
         first = muscle["pressure"] * (muscle["volume"] + c["dead_volume"]) ** 1.2
         for length in np.linspace(0.17, 0.22, steps + 1)[1:]:
-            move(muscle, c, length, 0.0, ATMOSPHERE, 1.2, 0.0)
+            bring_to_length(muscle, c, length, 0.0, ATMOSPHERE, 1.2, 0.0)
         errors.append(abs(muscle["pressure"] * (muscle["volume"] + c["dead_volume"]) ** 1.2 / first - 1))
     assert errors[0] > 3 * errors[1] > 9 * errors[2]
 

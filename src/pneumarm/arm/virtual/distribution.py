@@ -27,7 +27,7 @@ from pneumarm.arm.virtual.parameters import (
     RoomParameters,
     SensorParameters,
 )
-from pneumarm.arm.virtual.trial import fill_time, ring_frequency, sweep
+from pneumarm.arm.virtual.trial import fill_time, range_of_motion, ring_frequency
 from pneumarm.errors import UnusableInput
 
 LEAST_SWEEP = math.radians(44)
@@ -77,7 +77,7 @@ class Figures(NamedTuple):
 def figures(parameters: ArmParameters, joint: int = 0) -> Figures:
     """Return the figures of ``joint``, computed with the supply at its mean."""
     body = body_of(parameters)
-    low, high, shortest, longest = sweep(body.constants, joint, 1.0 * BAR, False)
+    low, high, shortest, longest = range_of_motion(body.constants, joint, 1.0 * BAR, False)
     first, second = (fill_time(body, joint, m, 0.95 * BAR) for m in range(2))
     ring = ring_frequency(body, joint, 0.1 * BAR)
     return Figures((low, high), (shortest, longest), ring, (first, second))

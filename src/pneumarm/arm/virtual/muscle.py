@@ -79,7 +79,7 @@ def slip(muscle, c, stretch):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def move(muscle, c, length, speed, supply, polytropic, dt):  # type: ignore[no-untyped-def]
+def bring_to_length(muscle, c, length, speed, supply, polytropic, dt):  # type: ignore[no-untyped-def]
     """Bring the muscle to ``length`` [m], reached with ``speed`` [m/s] in ``dt`` [s], and update its tension.
 
     With ``dt`` and ``speed`` 0 it is an infinitely slow change of length.

@@ -11,7 +11,7 @@ import numpy as np
 
 from pneumarm.arm.virtual.chain import hanging_torque
 from pneumarm.arm.virtual.joint import cable_run, muscle_direction, muscle_length, stop_torque
-from pneumarm.arm.virtual.muscle import move, static_tension
+from pneumarm.arm.virtual.muscle import bring_to_length, static_tension
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, BAR, FREE_AIR
 from pneumarm.arm.virtual.slow import relax_muscle, surround
 from pneumarm.arm.virtual.state import INLET, OUTLET
@@ -82,7 +82,7 @@ def fast_forward(body, until):  # type: ignore[no-untyped-def]
                 muscle, c = body.muscles[j, m], body.constants.muscles[j, m]
                 relax_muscle(muscle, c, surroundings.temperature, elapsed)
                 leak(muscle, c, body.constants.surroundings[0], elapsed)
-        if not settle(body, trial):
+        if not find_equilibrium(body, trial):
             return False
     return True
 
@@ -119,7 +119,7 @@ def resting_torque(body, trial, j):  # type: ignore[no-untyped-def]
                 trial[i, m] = body.muscles[i, m]
                 if trial[i, m].open[OUTLET]:
                     trial[i, m].engagement = 0.0  # an open muscle is not compressed
-                move(trial[i, m], muscle_c, muscle_length(muscle_c, m, run), 0.0, supply, polytropic, 0.0)
+                bring_to_length(trial[i, m], muscle_c, muscle_length(muscle_c, m, run), 0.0, supply, polytropic, 0.0)
                 torque -= muscle_direction(m) * body.constants.joints[i].cables[j] * trial[i, m].tension
     return torque
 
@@ -132,7 +132,7 @@ def torque_at(body, trial, j, angle):  # type: ignore[no-untyped-def]
 
 
 @inner
-def settle(body, trial):  # type: ignore[no-untyped-def]
+def find_equilibrium(body, trial):  # type: ignore[no-untyped-def]
     """Move the joints to their equilibrium near by; False where there is none. ``trial`` (joints, 2) is workspace.
 
     One joint after the other, with the others held, until none moves: they stand on each other only weakly.
@@ -213,7 +213,7 @@ def static_torque(constants, pressures, with_stops, joints, j):  # type: ignore[
 def stand(constants, pressures, with_stops, joints):  # type: ignore[no-untyped-def]
     """Set the angles of ``joints`` (JOINT) to where they rest at gauge ``pressures`` (joints, 2) [Pa].
 
-    Without friction and after all creep. One joint after the other, as in :func:`settle`.
+    Without friction and after all creep. One joint after the other, as in :func:`find_equilibrium`.
     """
     for _ in range(_MOST_SWEEPS):
         moved = 0.0

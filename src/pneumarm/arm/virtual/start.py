@@ -3,7 +3,7 @@
 import numpy as np
 
 from pneumarm.arm.virtual.joint import cable_run, muscle_length
-from pneumarm.arm.virtual.muscle import braid, move
+from pneumarm.arm.virtual.muscle import braid, bring_to_length
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS
 from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.slow import adapt, surround
@@ -26,7 +26,7 @@ def start(body):  # type: ignore[no-untyped-def]
             place(muscle, c, muscle_length(c, m, run))
             muscle.temperature = cold
             adapt(muscle, c)
-            move(muscle, c, muscle.length, 0.0, surroundings.supply, 1.0, 0.0)
+            bring_to_length(muscle, c, muscle.length, 0.0, surroundings.supply, 1.0, 0.0)
 
 
 @kernel

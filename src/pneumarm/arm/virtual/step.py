@@ -8,7 +8,7 @@ count in the nominal arm, and below half a count rms in any of 20 drawn ones (la
 import math
 
 from pneumarm.arm.virtual.joint import accelerate, cable_run, muscle_direction, muscle_length
-from pneumarm.arm.virtual.muscle import move
+from pneumarm.arm.virtual.muscle import bring_to_length
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
 from pneumarm.arm.virtual.slow import surround, tick_muscle
 from pneumarm.arm.virtual.state import INLET, OUTLET, SLOW_TICK
@@ -30,7 +30,7 @@ def substep(body, supply, polytropic, dt):  # type: ignore[no-untyped-def]
         for m in range(2):
             muscle, c = body.muscles[j, m], body.constants.muscles[j, m]
             length = muscle_length(c, m, run)
-            move(muscle, c, length, muscle_direction(m) * speed, supply, polytropic, dt)
+            bring_to_length(muscle, c, length, muscle_direction(m) * speed, supply, polytropic, dt)
 
 
 @part

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from pneumarm.arm.virtual.joint import cable_run, muscle_length
-from pneumarm.arm.virtual.muscle import move
+from pneumarm.arm.virtual.muscle import bring_to_length
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, REFERENCE_TEMPERATURE
 from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.slow import adapt
@@ -25,7 +25,7 @@ _TURNS = 4  # turning points that make a frequency
 
 
 @kernel
-def sweep(constants, j, pressure, with_stops):  # type: ignore[no-untyped-def]
+def range_of_motion(constants, j, pressure, with_stops):  # type: ignore[no-untyped-def]
     """Return the lowest and highest angle [rad] of joint ``j``, and its shortest and longest muscle [m].
 
     One muscle of each joint is at gauge ``pressure`` [Pa], the other vented. Angles are those that are reached at
@@ -58,7 +58,7 @@ def prepare(muscle, c, length, pressure):  # type: ignore[no-untyped-def]
     muscle.temperature = REFERENCE_TEMPERATURE
     adapt(muscle, c)
     muscle.pressure = ATMOSPHERE + pressure
-    move(muscle, c, length, 0.0, ATMOSPHERE, 1.0, 0.0)
+    bring_to_length(muscle, c, length, 0.0, ATMOSPHERE, 1.0, 0.0)
 
 
 @kernel
@@ -72,7 +72,7 @@ def fill_time(body, j, m, target):  # type: ignore[no-untyped-def]
         if time > LONGEST_FILL:
             return math.inf
         time += SUBSTEP
-        move(muscle, c, c.length_at_zero, 0.0, air.supply, air.polytropic, SUBSTEP)
+        bring_to_length(muscle, c, c.length_at_zero, 0.0, air.supply, air.polytropic, SUBSTEP)
     return time + air.opening_delay
 
 
@@ -92,7 +92,7 @@ def pose(body, j, pressure, away):  # type: ignore[no-untyped-def]
                 length = muscle_length(c, m, run)
                 if i == 0:
                     prepare(muscle, c, length, pressure)
-                move(muscle, c, length, 0.0, ATMOSPHERE, polytropic, 0.0)
+                bring_to_length(muscle, c, length, 0.0, ATMOSPHERE, polytropic, 0.0)
 
 
 @kernel

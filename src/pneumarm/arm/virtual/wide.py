@@ -25,7 +25,7 @@ from pneumarm.arm.virtual.parameters import (
     RoomParameters,
     SensorParameters,
 )
-from pneumarm.arm.virtual.trial import fill_time, ring_frequency, sweep
+from pneumarm.arm.virtual.trial import fill_time, range_of_motion, ring_frequency
 from pneumarm.errors import UnusableInput
 
 LEAST_SWEEP = 0.7
@@ -67,7 +67,7 @@ def is_sound(parameters: ArmParameters) -> bool:
     body, limit, air = body_of(parameters), parameters.max_pressure, parameters.air
     full = min(limit, air.supply)
     for j, joint in enumerate(parameters.joints):
-        low, high, shortest, longest = sweep(body.constants, j, full, True)
+        low, high, shortest, longest = range_of_motion(body.constants, j, full, True)
         fill = [fill_time(body, j, m, 0.9 * full) for m in range(2)]
         sensed = max(muscle.sensor_share for muscle in joint.muscles) * air.supply
         if not (

@@ -174,17 +174,17 @@ def supplied(supply, level):  # type: ignore[no-untyped-def]
     Supply and the ``level`` of the muscle's pressure are parts of the usual supply, which is taken to be about 1 bar:
     choked flow falls with the absolute pressure before the valve; a straight line stands for the rest of ISO 6358.
     """
-    return 0.5 * (1.0 + supply) * reached(supply, level)
+    return 0.5 * (1.0 + supply) * choked_share(supply, level)
 
 
 @part
 def reduced(supply, level):  # type: ignore[no-untyped-def]
     """Return the same of a supply that has its ups and downs, of which a low one is to differ clearly."""
-    return max(supply, 0.15) * reached(supply, level)
+    return max(supply, 0.15) * choked_share(supply, level)
 
 
 @part
-def reached(supply, level):  # type: ignore[no-untyped-def]
+def choked_share(supply, level):  # type: ignore[no-untyped-def]
     """Return how much of the choked flow from ``supply`` is left at a ``level``; negative where air runs back."""
     return min(max((supply + 0.05 - level) / _NEAR, -_BACK), 1.0)
 

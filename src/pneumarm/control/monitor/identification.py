@@ -230,7 +230,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
 
 
 @part
-def predicted(known, m, x):  # type: ignore[no-untyped-def]
+def expected_change(known, m, x):  # type: ignore[no-untyped-def]
     """Return the change that is expected of muscle ``m`` by the features ``x`` [highest pressures]."""
     change = 0.0
     for i in range(FEATURES):
@@ -339,7 +339,7 @@ def expect_by_identification(known, readings, memory, angle, pressure, empty):  
         memory.base[m] = known.last[m, 0] * highest
         memory.trust[m] = independence(known.lasting[m, 0], known.lasting[m, 1])
         features(known, readings, 0, m, angle, full, known.x[m])
-        healthy = known.last[m, 0] + predicted(known, m, known.x[m])
+        healthy = known.last[m, 0] + expected_change(known, m, known.x[m])
         healthy = max(healthy, min(lowest_level(known, m), read))  # the line goes on below empty, no pressure does
         is_empty = (max(known.last[m, 0], read) - lowest_level(known, m)) * highest < empty
         variance = uncertainty(known, m, known.x[m], known.gain[m])
@@ -357,7 +357,7 @@ def expect_by_identification(known, readings, memory, angle, pressure, empty):  
                 leaving = features(known, readings, h, m, angle, full, known.x[muscles])
                 if is_empty and not takes_air(known.x[m]) and not takes_air(known.x[muscles]):
                     continue
-                other = known.last[m, 0] + predicted(known, m, known.x[muscles])
+                other = known.last[m, 0] + expected_change(known, m, known.x[muscles])
                 other = max(other, min(known.span[m, 0], healthy))
                 memory.expected[h, m], memory.doubt[h, m] = other * highest, leaving * highest
                 if abs(other - read) < abs(healthy - read):
@@ -370,7 +370,7 @@ def learn(known, m, angle, pressure):  # type: ignore[no-untyped-def]
     """Learn from the ``pressure`` that muscle ``m`` reads now [counts], after :func:`expect_by_identification`."""
     x, gain, variance, highest = known.x[m], known.gain[m], known.variance[m], known.look[2]
     change = pressure / highest - known.last[m, 0]
-    error = change - predicted(known, m, x)
+    error = change - expected_change(known, m, x)
     side, speed, level = class_of(known, m, angle)
     kept = known.error[m, side, speed, level]
     usual = max(kept[1], (_LEAST / highest) ** 2)

@@ -128,7 +128,7 @@ def keys_of(experiment: str) -> frozenset[str]:
     return frozenset(each.key for each in conclusions() if experiment in each.experiments)
 
 
-def read_results(laboratory: Path) -> dict[str, Results]:
+def read_all_results(laboratory: Path) -> dict[str, Results]:
     """Return the results of all experiments in the folder ``laboratory``, by name.
 
     Raises:
@@ -289,7 +289,7 @@ def summary(judged: Sequence[Judged]) -> list[str]:
     ]
 
 
-def figures(judged: Sequence[Judged]) -> dict[str, Any]:
+def claims_figures(judged: Sequence[Judged]) -> dict[str, Any]:
     """Return for programs what the page says."""
     return {
         "conclusions": [

@@ -1,6 +1,6 @@
 """What the rows say of the control frequency, besides what its words estimate."""
 
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.control_frequency.frequencies import THESIS_FREQUENCY, ControlFrequency
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import difference, mean
@@ -11,7 +11,7 @@ def analysis(experiment: ControlFrequency, rows: TrialRows) -> Analysis:
     trials, middle = experiment.trials, 1 + experiment.frequencies.index(THESIS_FREQUENCY)
     gains = {t: difference(rows, "reward", t, middle) for t in trials if t != middle}
     better, worse = any(one.low > 0 for one in gains.values()), all(one.high < 0 for one in gains.values())
-    words, found = filled(
+    words, found = filled_words(
         experiment,
         rows,
         frequencies=", ".join(trials.values()),

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings
 from pneumarm.experiments.there_and_back import (
     MOVEMENTS,
     TRAINING,
@@ -15,10 +15,11 @@ from pneumarm.experiments.there_and_back import (
     Prepared,
     prepared,
     train_and_move,
-    usual,
+    usual_recipe,
 )
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import TrainSettings
+from pneumarm.progress import Report
 from pneumarm.transitions import QUANTITIES
 
 THESIS_FREQUENCY = 30.0
@@ -74,7 +75,7 @@ class ControlFrequency(Experiment):
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of every frequency."""
-        recipes = [usual(settings, frequency=frequency) for frequency in self.frequencies]
+        recipes = [usual_recipe(settings, frequency=frequency) for frequency in self.frequencies]
         return [prepared(arm, folder, recipe, settings, progress) for recipe in recipes]
 
     def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:

@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from pneumarm.arm.open import with_options
-from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
-from pneumarm.experiments.several_joints import POLICY, THESIS, Lesson, SeveralJoints, learned, of_several
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings
+from pneumarm.experiments.several_joints import POLICY, THESIS, Lesson, SeveralJoints, lesson_results, of_several
 from pneumarm.experiments.there_and_back import Prepared
 from pneumarm.experiments.words import words_of
+from pneumarm.progress import Report
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +37,7 @@ class Coupling(SeveralJoints):
     def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Learn with the share of ``trial``, and move that arm."""
         chosen = material[(trial - 1) % len(self.shares)]
-        return {**chosen.figures, **learned(chosen, self.lessons[self.trials[trial]], run, settings)}
+        return {**chosen.figures, **lesson_results(chosen, self.lessons[self.trials[trial]], run, settings)}
 
 
 def coupling(*shares: float) -> Coupling:

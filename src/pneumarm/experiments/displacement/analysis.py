@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pneumarm.arm import ArmSpec
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.displacement.typical import AFTER, SERIES, Displacement
 from pneumarm.experiments.experiment import Analysis, TrialRows
@@ -27,7 +27,7 @@ def analysis(experiment: Displacement, rows: TrialRows) -> Analysis:
     small, middle, large = (f"{degrees:g}°" for degrees in displacements)
     out = {name: f"{name}: out of the way" for name in (small, large)}
     ringing = mean(rows, f"{middle}: ringing", 1)
-    words, found = filled(
+    words, found = filled_words(
         experiment,
         rows,
         harder=estimate(rows, Quantity(figure=out[small], less=out[large]), 1),

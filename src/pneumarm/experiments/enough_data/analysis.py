@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.enough_data.minutes import EnoughData
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import difference, mean
@@ -21,7 +21,7 @@ def analysis(experiment: EnoughData, rows: TrialRows) -> Analysis:
         enough = f"from {trials[fewest]} on the reward is that of {trials[last]}, within {_MARGIN:g}"
         less, transitions = difference(rows, "reward", fewest, last), mean(rows, "transitions", fewest).mean
         shown = f": {transitions:.0f} transitions; reward less that of the longest: {less:+.2f}"
-    words, found = filled(
+    words, found = filled_words(
         experiment,
         rows,
         gain=difference(rows, "reward", last, usual),

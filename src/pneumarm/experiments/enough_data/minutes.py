@@ -9,20 +9,21 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     MOVEMENTS,
     TRAINING,
     Prepared,
     Recipe,
-    collected,
-    place,
+    collect_until,
     quality,
     train_and_move,
+    trial_folder,
 )
 from pneumarm.experiments.words import words_of
 from pneumarm.files import read_json, write_json
+from pneumarm.progress import Report
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import begin_states
 from pneumarm.transitions import KINDS, Store, new_cells
@@ -60,13 +61,13 @@ class EnoughData(Experiment):
         question.
         """
         seed = settings.seed
-        whole = place(folder, {"arm": arm, "seed": seed, "minutes": list(self.minutes)})
+        whole = trial_folder(folder, {"arm": arm, "seed": seed, "minutes": list(self.minutes)})
         made = []
         for number, minutes in enumerate(self.minutes):
             recipe = Recipe(minutes=minutes)
             kept, file = whole / f"{number}.json", whole / f"{number}.safetensors"
             if not kept.exists():
-                transitions, took = collected(whole / STORE, arm, seed, recipe, progress)
+                transitions, took = collect_until(whole / STORE, arm, seed, recipe, progress)
                 with Store.open(whole / STORE) as store:
                     fitted = fit_store(store, replace(SINGLE_STEPS, seed=seed))
                     found = new_cells(store, fitted.simulation.window)

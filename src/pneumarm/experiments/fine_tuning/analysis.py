@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.drawing.colours import DARK, GREY, MIDDLE
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.differences import above, interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.fine_tuning.levels import FineTuning
@@ -24,7 +24,7 @@ def analysis(experiment: FineTuning, rows: TrialRows) -> Analysis:
     """Return the analysis of the array, and how the settings chosen by odd runs do in the even ones."""
     array, trials = experiment.array, experiment.trials
     of_array = array.analyse(rows.of(array.trials))
-    words, found = filled(experiment, rows, **confirmation(experiment, rows))
+    words, found = filled_words(experiment, rows, **confirmation(experiment, rows))
     shown = {
         CRITERIA[name]: [interval(rows.samples(values)) for values in rows.table(name, list(trials))]
         for name in ("reward", "success_rate", "episodes")

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.joint_data.transitions import JointData
 
@@ -13,4 +13,4 @@ def analysis(experiment: JointData, rows: TrialRows) -> Analysis:
     own: dict[str, Any] = {name: f"{size:,}" for name, size in numbers.items()}
     if "std angle" not in rows.of([experiment.alone]).figures:
         own |= dict.fromkeys(("angle", "relative", "pressure"))
-    return analysed(experiment, rows, *filled(experiment, rows, **own))
+    return analysed(experiment, rows, *filled_words(experiment, rows, **own))

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from pneumarm.arm.open import with_options
-from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings, Report
-from pneumarm.experiments.several_joints import POLICY, Lesson, SeveralJoints, learned, of_several
+from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings
+from pneumarm.experiments.several_joints import POLICY, Lesson, SeveralJoints, lesson_results, of_several
 from pneumarm.experiments.there_and_back import Prepared, prepared
 from pneumarm.experiments.words import words_of
+from pneumarm.progress import Report
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,7 @@ class JointData(SeveralJoints):
         chosen = material[trial - 1]
         if trial == self.alone:
             return chosen.figures
-        return {**chosen.figures, **learned(chosen, self.lessons[self.trials[trial]], run, settings)}
+        return {**chosen.figures, **lesson_results(chosen, self.lessons[self.trials[trial]], run, settings)}
 
 
 def joint_data(name: str, *sizes: int) -> JointData:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
-from pneumarm.experiments.several_joints import SeveralJoints, learned
+from pneumarm.experiments.several_joints import SeveralJoints, lesson_results
 from pneumarm.experiments.there_and_back import Prepared
 from pneumarm.learning import OnlineLearner, Shaping, TrainSettings, train
 
@@ -36,7 +36,10 @@ class JointExploration(SeveralJoints):
         """Learn with the rate of ``trial`` and move the arm; count how often an agent of any joint explores."""
         lesson = self.lessons[self.trials[trial]]
         seed = run_seed(settings, run) ^ zlib.crc32(material.arm.encode())
-        return {"exploring": exploring(material, lesson.learning, seed), **learned(material, lesson, run, settings)}
+        return {
+            "exploring": exploring(material, lesson.learning, seed),
+            **lesson_results(material, lesson, run, settings),
+        }
 
 
 def exploring(material: Prepared, settings: TrainSettings, seed: int) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Analysis, Axis, TrialRows
 from pneumarm.experiments.means import difference, over_arms, values
@@ -24,7 +24,7 @@ def analysis(experiment: NoiseForTransfer, rows: TrialRows) -> Analysis:
         """Return by how much the first of each pair of trials earns more, on average over the pairs."""
         return over_arms(np.mean([values(rows, "reward", a) - values(rows, "reward", b) for a, b in pairs], axis=0))
 
-    words, found = filled(
+    words, found = filled_words(
         experiment,
         rows,
         count=len(gains),

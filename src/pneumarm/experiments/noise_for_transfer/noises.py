@@ -7,16 +7,17 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, Report
+from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings
 from pneumarm.experiments.there_and_back import (
     DECISIVE,
     TRAINING,
     Prepared,
     prepared,
     train_and_move,
-    usual,
+    usual_recipe,
 )
 from pneumarm.experiments.words import words_of
+from pneumarm.progress import Report
 from pneumarm.simulation.noise import NoiseSettings
 
 
@@ -52,7 +53,7 @@ class NoiseForTransfer(Experiment):
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> Prepared:
         """Return the arm's simulation."""
-        return prepared(arm, folder, usual(settings), settings, progress)
+        return prepared(arm, folder, usual_recipe(settings), settings, progress)
 
     def measure(self, material: Prepared, trial: int, run: int, settings: LaboratorySettings) -> Figures:
         """Train an agent with the noise of ``trial``, and move the arm with it."""

@@ -1,6 +1,6 @@
 """What the rows say of learning on the arm alone, beside the thesis' guess."""
 
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import mean, of_trial
@@ -17,7 +17,7 @@ def analysis(experiment: OnTheArmOnly, rows: TrialRows) -> Analysis:
     won = sum(f["met"] > 0 for f in learned)
     low, high = (float(end) for end in wilson(won, len(learned)))  # all or none of them would have no spread
     met = Interval((low + high) / 2, (high - low) / 2, len(learned))
-    words, found = filled(experiment, rows, met=met, won=won, agents=len(learned))
+    words, found = filled_words(experiment, rows, met=met, won=won, agents=len(learned))
     took = ("hours", "movements", "seconds of a movement")
     return analysed(
         experiment,

@@ -84,7 +84,7 @@ class OnTheArmOnly(OnTheArm):
         if trial == IN_SIMULATION:
             agent = agent_of(material, self.agent, run, settings)
             with new_arm(material, run, settings) as arm:
-                goals = look(arm, self.agent, self.sizes.looks, run_seed(settings, run)).goal_range
+                goals = untrained_agent(arm, self.agent, self.sizes.looks, run_seed(settings, run)).goal_range
             same = replace(agent, goal_range=goals)  # it has learned goals in a wider range
             made = greedy_test(material, same, self.sizes.test, run, settings)
             return {**means(made), "hours": settings.transitions * agent.spec.period / 3600}
@@ -92,7 +92,7 @@ class OnTheArmOnly(OnTheArm):
         chosen, seed = replace(self.agent, max_episodes=most), run_seed(settings, run)
         with new_arm(material, run, settings) as arm:
             began = clock(arm)
-            found = learn_on(arm, look(arm, chosen, self.sizes.looks, seed), seed, began)
+            found = learn_on(arm, untrained_agent(arm, chosen, self.sizes.looks, seed), seed, began)
         tested = greedy_test(material, found.agent, self.sizes.test, run, settings)
         hours, deviation, performance = zip(*found.course, strict=True)
         return {
@@ -113,7 +113,7 @@ class OnTheArmOnly(OnTheArm):
         return self.sizes.looks + self.sizes.test + (most if trial == ON_ARM else 0)
 
 
-def look(arm: Arm, settings: TrainSettings, looks: int, seed: int) -> Agent:
+def untrained_agent(arm: Arm, settings: TrainSettings, looks: int, seed: int) -> Agent:
     """Return an agent for ``arm`` that has learned nothing, after visiting ``looks`` begin states.
 
     Its goals are the middle of the range between the angles at rest with one muscle inflated and the other vented.

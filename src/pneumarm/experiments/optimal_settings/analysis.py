@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import interval
@@ -24,7 +24,7 @@ def analysis(experiment: DerivedSettings, rows: TrialRows) -> Analysis:
         packaged_results(f"pneumarm.experiments.{one}", *_CRITERIA) for one in ("optimal_settings", "all_goals")
     )
     thesis = {name: [printed[name][0], arrayed[name][_TRIAL_10 - 1]] for name in _CRITERIA}
-    words, found = filled(
+    words, found = filled_words(
         experiment,
         rows,
         theirs=interval(thesis["reward"][1] - thesis["reward"][0]),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.differences import Interval, above
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array, blocks, over_arms
@@ -23,7 +23,7 @@ def analysis(experiment: Overnight, rows: TrialRows) -> Analysis:
     gains = {trial: over_arms(_gain(reward, place)) for trial, reward in rewards.items()}
     lost = over_arms((rewards[NO_NIGHT] - rewards[LEARNING])[:, :, place])
     adapted = over_arms(_gain(rewards[LEARNING], place) - _gain(rewards[NO_NIGHT], place))
-    words, found = filled(
+    words, found = filled_words(
         experiment,
         rows,
         lost=lost,

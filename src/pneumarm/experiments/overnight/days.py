@@ -13,7 +13,7 @@ from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_see
 from pneumarm.experiments.moving import MOVEMENTS, OnTheArm, agent_of, course, draws, new_arm
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.words import words_of
-from pneumarm.task.movements import joined
+from pneumarm.task.movements import join_movements
 
 
 class Days(NamedTuple):
@@ -77,7 +77,7 @@ class Overnight(OnTheArm):
                 _rest(arm, 3600 * sizes.hours)
             second = player(first.learned, arm, rate if days.second else 0.0, explores, seed + 1)
             next_day = second.play(*draws(agent, seed, sizes.second, MOVEMENTS, sizes.first))
-        return course(joined([day, next_day]), sizes.block)
+        return course(join_movements([day, next_day]), sizes.block)
 
     def movements(self, trial: int, arm: str, settings: LaboratorySettings) -> int:
         """Return those of both days."""

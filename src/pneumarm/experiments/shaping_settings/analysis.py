@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
 from pneumarm.drawing.colours import DARK, GREY, MIDDLE
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.differences import Interval, Verdict, below, interval
@@ -39,10 +39,10 @@ def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     # From here on columns are samples: runs where there is one arm, else the arms.
     samples = {name: np.stack([rows.samples(line) for line in table]) for name, table in tables.items()}
     differences = {name: _differences(experiment, table) for name, table in samples.items()}
-    words, found = filled(
+    words, found = filled_words(
         experiment,
         rows,
-        **measured(experiment, tables, len(rows.arms)),
+        **shaping_evidence(experiment, tables, len(rows.arms)),
         **{f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")},
     )
     strategy, results = words.sections
@@ -67,7 +67,7 @@ def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     )
 
 
-def measured(experiment: ShapingSettings, tables: Tables, arms: int) -> dict[str, Any]:
+def shaping_evidence(experiment: ShapingSettings, tables: Tables, arms: int) -> dict[str, Any]:
     """Return what claims are judged by, and the thesis' numbers beside it."""
     by_name = {name: number - 1 for number, name in experiment.trials.items()}
     shaped, without = by_name["as in the thesis"], by_name["no shaping"]

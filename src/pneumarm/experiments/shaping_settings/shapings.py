@@ -14,12 +14,12 @@ from pneumarm.experiments.experiment import (
     Experiment,
     Figures,
     LaboratorySettings,
-    Report,
 )
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.experiments.trainings import train_and_test, with_settings
 from pneumarm.experiments.words import words_of
 from pneumarm.learning import Exploration, TrainSettings
+from pneumarm.progress import Report
 
 _WITHOUT = Exploration(0.09, 10.0)
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import msgspec
 
-from pneumarm.experiments.analysis import analysed, filled, shown
+from pneumarm.experiments.analysis import analysed, filled_words, shown_trials
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import change
 from pneumarm.experiments.pictures import against
@@ -16,11 +16,11 @@ from pneumarm.report.page import Table
 def analysis(experiment: StateHistory, rows: TrialRows) -> Analysis:
     """Return errors and agents by history."""
     trials, count = experiment.trials, len(experiment.histories)
-    words, found = filled(experiment, rows, known="{known}")
+    words, found = filled_words(experiment, rows, known="{known}")
     step, second = words.sections
     # The thesis' numbers are of another arm, and out of scale.
     drawn = [msgspec.structs.replace(column, thesis=None) for column in step.columns]
-    without = shown(experiment, second)
+    without = shown_trials(experiment, second)
     pictures = [
         against(rows, which, experiment.axis, drawn, step.figure.format(known=known))
         for which, known in ((without, "unknown"), ({t: trials[t] for t in trials if t > count}, "known"))

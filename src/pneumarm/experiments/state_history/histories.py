@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
-from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.preparation import STORE
 from pneumarm.experiments.there_and_back import (
     AFTER_A_SECOND,
@@ -20,17 +20,18 @@ from pneumarm.experiments.there_and_back import (
     over_joints,
     prepared,
     train_and_move,
-    usual,
+    usual_recipe,
 )
 from pneumarm.experiments.words import words_of
 from pneumarm.networks import LevenbergMarquardt, levenberg_marquardt, nguyen_widrow
+from pneumarm.progress import Report
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, fit
 from pneumarm.simulation.fit import HIDDEN
 from pneumarm.simulation.quality import propagation
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.task import BeginStates, begin_states
 from pneumarm.transitions import KINDS, QUANTITIES, Store, Transitions, Window, filter_transitions
-from pneumarm.transitions.choice import joined, share_held_out
+from pneumarm.transitions.choice import join_transitions, share_held_out
 
 _HISTORIES = (1, 2, 3, 4)
 _FIT = replace(SINGLE_STEPS, epochs=30)
@@ -50,7 +51,7 @@ class HistoryMaterial:
     """Begin states by history."""
 
 
-def shortened(whole: Transitions, longest: Window, history: int) -> Transitions:
+def with_history(whole: Transitions, longest: Window, history: int) -> Transitions:
     """Return transitions with windows of ``history`` observations, cut out of those with ``longest`` windows."""
     size, past = longest.observation_size, longest.history * longest.observation_size
     commands = (history - 1) * longest.command_size
@@ -138,16 +139,16 @@ class StateHistory(Experiment):
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> HistoryMaterial:
         """Return the arm's filtered transitions."""
-        base = prepared(arm, folder, usual(settings), settings, progress)
+        base = prepared(arm, folder, usual_recipe(settings), settings, progress)
         longest = Window(base.simulation.spec.joints, max(self.histories))
         with Store.open(base.folder / STORE) as store:
             held_out = share_held_out([entry.number for entry in store.catalogue()], self.fit.held_out, settings.seed)
             filtered = filter_transitions(store, longest, seed=settings.seed, hold_out=held_out)
-            kept, apart = filtered.transitions, joined(list(filtered.stream("held-out")))
+            kept, apart = filtered.transitions, join_transitions(list(filtered.stream("held-out")))
             begin = {}
             for history in self.histories:
                 window = Window(longest.joints, history)
-                scaling = Scaling.of(shortened(kept, longest, history), window, valves=True)
+                scaling = Scaling.of(with_history(kept, longest, history), window, valves=True)
                 begin[history] = begin_states(store.blocks(kinds=KINDS), window, scaling, store.spec)
             return HistoryMaterial(base, kept, apart, store.spec, longest, begin)
 
@@ -157,7 +158,7 @@ class StateHistory(Experiment):
         history = self.histories[(trial - 1) % len(self.histories)]
         seed = run_seed(settings, run)
         window = Window(material.longest.joints, history)
-        kept, held_out = (shortened(w, material.longest, history) for w in (material.kept, material.held_out))
+        kept, held_out = (with_history(w, material.longest, history) for w in (material.kept, material.held_out))
         chosen = replace(self.fit, history=history, seed=seed)
         if with_period:
             found = errors_with_period(kept, held_out, window, chosen, material.base.simulation.limits)

@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array, blocks, difference, mean, over_arms, text, values
@@ -42,10 +42,10 @@ def analysis(experiment: TransferToTheArm, rows: TrialRows) -> Analysis:
     causes = causes_of_the_drop(rows)
     known = [name for name, one in causes.items() if one.samples and name != _ALL_THREE]
     largest = max(known, key=lambda name: causes[name].mean)
-    words, found = filled(
+    words, found = filled_words(
         experiment,
         rows,
-        **measured(rows, _PROGRESS // experiment.sizes.block),
+        **transfer_evidence(rows, _PROGRESS // experiment.sizes.block),
         model=causes[_MODEL],
         cold=causes[_COLD],
         largest=largest,
@@ -79,7 +79,7 @@ def analysis(experiment: TransferToTheArm, rows: TrialRows) -> Analysis:
     return replace(made, sections=[made.sections[0], whole])
 
 
-def measured(rows: TrialRows, progress: int) -> dict[str, Any]:
+def transfer_evidence(rows: TrialRows, progress: int) -> dict[str, Any]:
     """Return what else claims are judged by; ``progress`` is the block in which the thesis sees some."""
     frozen, slow = (blocks(rows, "reward", trial) for trial in (1, 2))
     return {

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pneumarm.drawing.colours import DARK, MIDDLE
-from pneumarm.experiments.analysis import analysed, filled
+from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array, mean, samples
 from pneumarm.experiments.valves_closed.inflation import CLOSED, OPEN, ValvesClosed
@@ -18,7 +18,7 @@ from pneumarm.report.style import panels, styled
 def analysis(experiment: ValvesClosed, rows: TrialRows) -> Analysis:
     """Return fit and performance each way."""
     period, pause = (mean(rows, name, OPEN).mean for name in ("period", "pause"))
-    words, found = filled(experiment, rows, period_ms=1e3 * period, pause_ms=1e3 * pause)
+    words, found = filled_words(experiment, rows, period_ms=1e3 * period, pause_ms=1e3 * pause)
     times = sorted(
         int(name.split()[1]) for name in rows.rows[0].figures if name.startswith("after ") and name.endswith("angle")
     )

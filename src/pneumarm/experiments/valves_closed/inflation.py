@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from pneumarm.arm import guarded
 from pneumarm.control import BEGIN
-from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, Report, run_seed
+from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.there_and_back import (
     DECISIVE,
     TRAINING,
     Prepared,
-    opened,
+    open_arm_at,
     prepared,
     train_and_move,
-    usual,
+    usual_recipe,
 )
 from pneumarm.experiments.words import words_of
+from pneumarm.progress import Report
 
 OPEN, CLOSED = 1, 2
 _PERIODS = 3
@@ -44,7 +45,7 @@ def inflation(
         Time [s], change of the angle of the first joint and of the pressure of the muscle [counts], each (n,).
 
     """
-    with opened(arm, seed) as found:
+    with open_arm_at(arm, seed) as found:
         guard, period = guarded(found), found.spec.period
         BEGIN.reach(guard, np.random.default_rng(seed))
         closed = np.zeros((found.spec.joints, 2), np.int8)
@@ -86,7 +87,7 @@ class ValvesClosed(Experiment):
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of each way."""
-        recipes = [usual(settings, close_while_computing=closed) for closed in (False, True)]
+        recipes = [usual_recipe(settings, close_while_computing=closed) for closed in (False, True)]
         return [prepared(arm, folder, recipe, settings, progress) for recipe in recipes]
 
     def measure(self, material: list[Prepared], trial: int, run: int, settings: LaboratorySettings) -> Figures:

@@ -20,7 +20,7 @@ from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import kernel
 from pneumarm.learning.online.exploration import choose, greedy
 from pneumarm.learning.online.values import Networks
-from pneumarm.learning.policy.inputs import write_inputs
+from pneumarm.learning.policy.inputs import write_policy_inputs
 from pneumarm.networks.layers import adam, backward, forward, split
 from pneumarm.random import integer
 from pneumarm.task.environment import CUT_OFF, GOES_ON, REACHED, ending
@@ -130,7 +130,7 @@ def collect_values(mind, rule, exploration, net, fleet, batch):  # type: ignore[
     steps, n, joints = batch.reward.shape
     episodes, successes, total = 0, 0, 0.0
     for k in range(steps + 1):
-        write_inputs(mind.inputs, fleet.x, fleet.actions, batch.inputs[k])
+        write_policy_inputs(mind.inputs, fleet.x, fleet.actions, batch.inputs[k])
         forward(net.layers, batch.inputs[k], net.units)
         for e in range(n):
             for joint in range(joints):

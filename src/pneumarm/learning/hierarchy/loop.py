@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.kernels import kernel, part
 from pneumarm.learning.hierarchy.settings import HierarchySettings
-from pneumarm.learning.online.loop import Workspace, decide, learn, look_ahead, remember, workspace
+from pneumarm.learning.online.loop import Workspace, decide, learn, look_ahead, loop_workspace, remember
 from pneumarm.learning.online.values import ActionValues, forget_traces, learner, td_target, update
 from pneumarm.simulation.kernel import UNIT_BLOCK
 from pneumarm.simulation.layout import INPUT_BLOCK, Layout, angle_at, layout_of, padded, velocity_at
@@ -51,7 +51,7 @@ class Hierarchy(NamedTuple):
     """Shape (m,); the upper agent chooses among m^joints."""
     period: int
     reward: RewardParameters
-    """Of the task."""
+    """Reward of the task."""
     unit: NDArray[np.float64]
     """Offset and scale of angle and velocity, shape (joints, 4): angle, angle, velocity, velocity."""
     layout: Layout
@@ -68,7 +68,7 @@ class LevelMemory(NamedTuple):
     seen: NDArray[np.float32]
     """What the upper agent saw when it chose, shape (its inputs,) [scaled]."""
     goal: NDArray[np.float64]
-    """Of all joints, shape (joints,) [counts]."""
+    """Goals of all joints, shape (joints,) [counts]."""
     aim: NDArray[np.float64]
     """Subgoals, shape (joints,) [counts]."""
     course: NDArray[np.float64]
@@ -115,8 +115,8 @@ def level_memory(levels: Hierarchy) -> LevelMemory:
     """Return workspace for both levels."""
     joints = len(levels.unit)
     return LevelMemory(
-        low=workspace(levels.lower, joints),
-        high=workspace(levels.upper, joints),
+        low=loop_workspace(levels.lower, joints),
+        high=loop_workspace(levels.upper, joints),
         seen=np.zeros(levels.upper.weights.shape[1] - 2, np.float32),
         goal=np.zeros(joints),
         aim=np.zeros(joints),

@@ -24,7 +24,7 @@ def train_hierarchy(
 ) -> Training[HierarchicalAgent]:
     """Train hierarchies and return the best; ``how`` as of :func:`~pneumarm.learning.training.train_side_by_side`.
 
-    Training of one ends as that of the thesis' agents does, see :func:`pneumarm.learning.online.training.train`.
+    Training of one ends as that of the thesis' agents does, see :func:`~.online.training.train_online`.
     """
     env = environment(simulation, begin_states, settings)
     return train_side_by_side(

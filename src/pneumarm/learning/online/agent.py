@@ -19,7 +19,7 @@ from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.kernels import part
 from pneumarm.learning.agents import ReachesGoals
-from pneumarm.learning.online.loop import Schedule, learn, look_ahead, remember, spread, workspace
+from pneumarm.learning.online.loop import Schedule, learn, look_ahead, loop_workspace, remember, spread
 from pneumarm.learning.online.settings import Exploration, TrainSettings
 from pneumarm.learning.online.testing import run_test
 from pneumarm.learning.online.values import (
@@ -184,7 +184,7 @@ class OnlineLearner:
         self._layout = layout_of(agent.window)
         self._x = np.zeros(self._layout.size, np.float32)
         self._x[self._layout.one] = 1
-        self._workspace = workspace(self._learner, joints)
+        self._workspace = loop_workspace(self._learner, joints)
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""

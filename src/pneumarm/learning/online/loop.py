@@ -23,7 +23,7 @@ from pneumarm.task.reward import paid
 
 
 class Workspace(NamedTuple):
-    """What a loop needs to remember from one step to the next. Made by :func:`workspace`."""
+    """What a loop needs to remember from one step to the next. Made by :func:`loop_workspace`."""
 
     before: NDArray[np.float32]
     """State vector before the action, shape (inputs,)."""
@@ -47,7 +47,7 @@ class Workspace(NamedTuple):
     """Whether each joint is at its goal, shape (joints,); of interest only to agents with goals of their own."""
 
 
-def workspace(learner: ActionValues, joints: int) -> Workspace:
+def loop_workspace(learner: ActionValues, joints: int) -> Workspace:
     """Return workspace for a loop in which ``learner`` moves so many joints."""
     agents, choices = learner.traced.shape
     return Workspace(

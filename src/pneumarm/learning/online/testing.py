@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.online.loop import Schedule, test_episodes, workspace
+from pneumarm.learning.online.loop import Schedule, loop_workspace, test_episodes
 from pneumarm.learning.online.settings import Exploration, TrainSettings
 from pneumarm.learning.online.values import learner
 from pneumarm.random import random_state
@@ -30,5 +30,5 @@ def run_test(
     record = movements(episodes, one.goal.size)
     schedule = Schedule(np.inf, float(exploration.epsilon), float(exploration.temperature), 0.0)
     acts = learner(weights, settings)
-    test_episodes(env, acts, schedule, one, workspace(acts, one.goal.size), random_state(seed), record)
+    test_episodes(env, acts, schedule, one, loop_workspace(acts, one.goal.size), random_state(seed), record)
     return record

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.loop import Schedule, train_episodes, workspace
+from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episodes
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.learning.online.shaping import adjusted, initial_deviation, stage
 from pneumarm.learning.online.testing import run_test
@@ -33,7 +33,7 @@ CURVES = ("episodes", "deviation", "criterion", "performance", "epsilon", "tempe
 """Columns of the training curves."""
 
 
-def train(
+def train_online(
     simulation: Simulation,
     begin_states: BeginStates,
     settings: TrainSettings | None = None,
@@ -169,7 +169,7 @@ class OnlineTrainee(ShapedLearner[Agent, TrainSettings]):
 
     def _run(self, schedule: Schedule, one: Episode, count: int) -> tuple[float, int, int]:
         worker = _apart(learner(self._weights, self._settings))
-        remembered = _apart(workspace(worker, one.goal.size))
+        remembered = _apart(loop_workspace(worker, one.goal.size))
         found: tuple[float, int, int] = train_episodes(
             self._env, worker, schedule, one, remembered, count, float(self._shaping[1])
         )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import inner, kernel, part
-from pneumarm.learning.policy.inputs import InputParameters, write_inputs
+from pneumarm.learning.policy.inputs import InputParameters, write_policy_inputs
 from pneumarm.learning.policy.proximal import FORBIDDEN, log_softmax, write_bias
 from pneumarm.networks.layers import Layers, forward, workspace
 from pneumarm.random import RandomState
@@ -32,10 +32,10 @@ class Mind(NamedTuple):
     limits: Limits
     inputs: InputParameters
     layers: Layers
-    """Of the policy."""
+    """Layers of the policy."""
     hold: float
     seeds: RandomState
-    """Of the noise in which it looks ahead, the same in every decision, shape (lanes, 4)."""
+    """Seeds of the noise in which it looks ahead, the same in every decision, shape (lanes, 4)."""
 
 
 class Lanes(NamedTuple):
@@ -79,7 +79,7 @@ def lanes(mind: Mind, sizes: tuple[int, ...], random: RandomState) -> Lanes:
 def judge_all(mind, lanes):  # type: ignore[no-untyped-def]
     """Let ``lanes.units[-1]`` be the logits of the actions, and ``lanes.actions`` the most probable, where alive."""
     arms = lanes.fleet
-    write_inputs(mind.inputs, arms.x, arms.actions, lanes.rows)
+    write_policy_inputs(mind.inputs, arms.x, arms.actions, lanes.rows)
     forward(mind.layers, lanes.rows, lanes.units)
     for e in range(lanes.actions.shape[0]):
         if not lanes.alive[e]:
@@ -168,7 +168,7 @@ def best_of(total, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def decide(mind, single, lanes, samples, horizon, clear):  # type: ignore[no-untyped-def]
+def decide_ahead(mind, single, lanes, samples, horizon, clear):  # type: ignore[no-untyped-def]
     """Set ``single.actions`` (1, joints) to what to do in the arm of ``single``, looking ahead where it is not clear.
 
     ``single`` are lanes with one arm, ``samples`` is workspace, shape (n,).

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.errors import PneumarmError
-from pneumarm.learning.policy.acting import Mind, decide, lanes
+from pneumarm.learning.policy.acting import Mind, decide_ahead, lanes
 from pneumarm.learning.policy.courses import Courses
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.policy.vain import begin, follow, take_up, vain
@@ -47,7 +47,7 @@ class PolicyActor:
         single = self._single
         if not self._decided:
             if self._courses is None or not self._courses.plan(self._mind, single):
-                decide(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
+                decide_ahead(self._mind, single, self._lanes, self._samples, self._horizon, self._clear)
                 if self._courses is not None:
                     self._courses.improve(self._mind, single, self._lanes, self._samples)
             take_up(single, self._vain)

@@ -15,8 +15,8 @@ from pneumarm.learning.fleet import FleetLearner, train_fleet
 from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.learning.policy.acting import Mind
 from pneumarm.learning.policy.actor import PolicyActor
-from pneumarm.learning.policy.inputs import input_parameters, input_size
-from pneumarm.learning.policy.proximal import Rule, batch, collect, improve
+from pneumarm.learning.policy.inputs import input_parameters, policy_input_size
+from pneumarm.learning.policy.proximal import Rule, batch, collect_batch, improve_policy
 from pneumarm.learning.policy.settings import PolicySettings
 from pneumarm.learning.policy.testing import run_policy
 from pneumarm.learning.possible import leave_out
@@ -92,7 +92,7 @@ class PolicyAgent(NetworkAgent):
 
 def policy_sizes(window: Window, settings: PolicySettings) -> tuple[int, ...]:
     """Return the units of each layer of a policy, inputs first."""
-    return (input_size(window, settings.squash), *settings.hidden, ACTIONS * window.joints)
+    return (policy_input_size(window, settings.squash), *settings.hidden, ACTIONS * window.joints)
 
 
 def mind(
@@ -117,11 +117,11 @@ def train_policy(
     simulation: Simulation, begin_states: BeginStates, settings: PolicySettings, seed: int = 0, **how: Any
 ) -> Training[PolicyAgent]:
     """Train policies and return the best; ``how`` as of :func:`~pneumarm.learning.fleet.train_fleet`."""
-    settings = practised(patient(settings, simulation), simulation)
+    settings = scaled_for_joints(with_longer_cutoff(settings, simulation), simulation)
     return train_fleet(lambda n: PolicyLearner(simulation, begin_states, settings, seed, n), settings, seed, **how)
 
 
-def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
+def with_longer_cutoff(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     """Return ``settings`` with as many actions until a movement is cut off as this arm may need.
 
     Valves can be so small that the joint is still on its way after 100 actions; how slow muscles are is found by
@@ -134,7 +134,7 @@ def patient(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     return replace(settings, cutoff=max(settings.cutoff, round(longest / simulation.spec.period)))
 
 
-def practised(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
+def scaled_for_joints(settings: PolicySettings, simulation: Simulation) -> PolicySettings:
     """Return ``settings`` with as many updates, and as little noise, as suit the joints of this arm."""
     joints = simulation.spec.joints
     if joints == 1:
@@ -178,8 +178,8 @@ class PolicyLearner(FleetLearner[PolicyAgent, PolicySettings]):
         """Act for a batch of steps and learn from them."""
         now, counts, (_, limits, inputs) = self._rule, self.counts, self.mind[:3]
         world = self._eased()
-        seen: tuple[int, int, float] = collect(world, limits, inputs, now, self.policy, self.fleet, self._batch)
-        counts[1] = improve(now, self.policy, self.value, self._batch, self.rates(), counts[1], self.random)
+        seen: tuple[int, int, float] = collect_batch(world, limits, inputs, now, self.policy, self.fleet, self._batch)
+        counts[1] = improve_policy(now, self.policy, self.value, self._batch, self.rates(), counts[1], self.random)
         return seen
 
     def _eased(self) -> Environment:

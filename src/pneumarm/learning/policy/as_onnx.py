@@ -5,7 +5,7 @@ import numpy as np
 from pneumarm.arm.valves import ACTIONS, VALVES
 from pneumarm.learning.policy.agent import PolicyAgent
 from pneumarm.learning.policy.proximal import FORBIDDEN
-from pneumarm.learning.scaled_state import scaled_state, state_words
+from pneumarm.learning.scaled_state import add_scaled_state, state_words
 from pneumarm.networks.onnx_graph import Graph
 
 
@@ -18,7 +18,7 @@ def policy_as_onnx(agent: PolicyAgent) -> bytes:
     """
     window, mind, graph = agent.window, agent.mind(), Graph()
     joints = window.joints
-    x = scaled_state(graph, window, agent.scaling)
+    x = add_scaled_state(graph, window, agent.scaling)
     goal = graph.input("goal", joints)
     last, still = graph.input("last_action", joints), graph.input("still", joints)
     offset, scale = (

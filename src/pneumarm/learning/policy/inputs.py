@@ -31,13 +31,13 @@ def input_parameters(window: Window, scaling: Scaling, squash: tuple[float, ...]
     return InputParameters(gain, layout_of(window))
 
 
-def input_size(window: Window, squash: tuple[float, ...]) -> int:
+def policy_input_size(window: Window, squash: tuple[float, ...]) -> int:
     """Return the number of inputs."""
     return window.state_size + window.joints * (1 + len(squash)) + 1
 
 
 @kernel
-def write_inputs(inputs, x, actions, rows):  # type: ignore[no-untyped-def]
+def write_policy_inputs(inputs, x, actions, rows):  # type: ignore[no-untyped-def]
     """Set ``rows`` (input_size, n) for the states ``x`` (inputs, n) after the last ``actions`` (n, joints)."""
     joints, n = actions.shape[1], actions.shape[0]
     row = inputs.layout.command

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import inner, kernel, part
-from pneumarm.learning.policy.inputs import write_inputs
+from pneumarm.learning.policy.inputs import write_policy_inputs
 from pneumarm.networks.layers import adam, backward, forward
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.random import integer, uniform
@@ -51,7 +51,7 @@ class Experience(NamedTuple):
     actions: NDArray[np.int64]
     """Shape (steps, n, joints)."""
     log_probability: NDArray[np.float32]
-    """Of the actions as they were chosen, shape (steps, n)."""
+    """Log probabilities of the actions as they were chosen, shape (steps, n)."""
     reward: NDArray[np.float32]
     """Shape (steps, n), in units of the scale of returns."""
     ended: NDArray[np.int64]
@@ -61,7 +61,7 @@ class Experience(NamedTuple):
     advantage: NDArray[np.float32]
     """Shape (steps, n)."""
     target: NDArray[np.float32]
-    """Of the values, shape (steps, n)."""
+    """Targets of the values, shape (steps, n)."""
     is_reached: NDArray[np.bool_]
     """Workspace, shape (n,)."""
     order: NDArray[np.int64]
@@ -167,7 +167,7 @@ def write_bias(limits, hold, x, actions, still, bias, e):  # type: ignore[no-unt
 def act_all(limits, inputs, rule, policy, fleet, batch, k):  # type: ignore[no-untyped-def]
     """Choose the actions of step ``k`` in all arms."""
     x = batch.inputs[k]
-    write_inputs(inputs, fleet.x, fleet.actions, x)
+    write_policy_inputs(inputs, fleet.x, fleet.actions, x)
     forward(policy.layers, x, policy.units)
     logits, probability, bias = policy.units[-1], policy.errors[-1], batch.bias[k]
     for e in range(fleet.goal.shape[0]):
@@ -190,7 +190,7 @@ def act_all(limits, inputs, rule, policy, fleet, batch, k):  # type: ignore[no-u
 
 
 @kernel
-def collect(environment, limits, inputs, rule, policy, fleet, batch):  # type: ignore[no-untyped-def]
+def collect_batch(environment, limits, inputs, rule, policy, fleet, batch):  # type: ignore[no-untyped-def]
     """Fill ``batch``, going on with the episodes of ``fleet``; return episodes, successes and sum of rewards."""
     task, part = environment.task, 1.0 / rule.scale
     episodes, successes, total = 0, 0, 0.0
@@ -207,12 +207,12 @@ def collect(environment, limits, inputs, rule, policy, fleet, batch):  # type: i
                 episodes += 1
                 successes += 1 if is_reached else 0
                 begin_one(environment, fleet, e)
-    write_inputs(inputs, fleet.x, fleet.actions, batch.inputs[batch.reward.shape[0]])
+    write_policy_inputs(inputs, fleet.x, fleet.actions, batch.inputs[batch.reward.shape[0]])
     return episodes, successes, total
 
 
 @inner
-def estimate(rule, value, batch):  # type: ignore[no-untyped-def]
+def estimate_advantages(rule, value, batch):  # type: ignore[no-untyped-def]
     """Set the advantages, normalised, and the targets of the values, by the network ``value``."""
     steps, n = batch.reward.shape
     for k in range(steps + 1):
@@ -275,9 +275,9 @@ def policy_errors(rule, policy, batch, k, part):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def improve(rule, policy, value, batch, rates, count, random):  # type: ignore[no-untyped-def]
+def improve_policy(rule, policy, value, batch, rates, count, random):  # type: ignore[no-untyped-def]
     """Learn from ``batch`` with the learning ``rates`` of policy and values; return the number of updates so far."""
-    estimate(rule, value, batch)
+    estimate_advantages(rule, value, batch)
     steps, n = batch.reward.shape
     part = 1.0 / n
     for k in range(steps):

@@ -111,7 +111,7 @@ class ServoAgent(NetworkAgent):
         wanted = self.settings.stiffness
         return replace(self, settings=replace(self.settings, stiffness=STIFF if wanted in (None, SOFT) else wanted))
 
-    def anew(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
+    def retrained(self, simulation: Simulation, begin: BeginStates, seed: int) -> Self:
         """Return the servo trained from the beginning in ``simulation``; how coarse its commands are stays."""
         return self.revised(simulation, train_servo(simulation, begin, self.settings, seed).agent.policy)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pneumarm.learning.scaled_state import scaled_state, state_words
+from pneumarm.learning.scaled_state import add_scaled_state, state_words
 from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.commands import GAIN, WHOLE
 from pneumarm.learning.servo.inputs import BENDS, FAR, PRESSURE_CHANGE
@@ -19,7 +19,7 @@ def servo_as_onnx(agent: ServoAgent) -> bytes:
     """
     window, steps = agent.window, agent.task.inputs.steps
     graph = Graph()
-    x = scaled_state(graph, window, agent.scaling)
+    x = add_scaled_state(graph, window, agent.scaling)
     reference = graph.input("reference", len(steps), window.joints)
     said = graph.network(split(agent.policy, agent.sizes), _seen(graph, agent, x, reference))
     graph.output(graph.reshaped(_pulses(graph, agent, x, said), window.joints, 2), "pulses", window.joints, 2)

@@ -27,7 +27,7 @@ _STILL = 0.3  # tolerances that the average of half of them may differ from that
 _SLOWLY, _EASY = 0.234, 1.2  # or that all readings for so long [s] differ by besides, as a share of the error
 _FORESEEN = 0.3  # s in which a joint that is at rest hardly moves, by its simulation or by its readings
 _STAYS, _STAYS_NOISE = 0.3, 3.0  # tolerances and noises of a reading by which it does, by the simulation ...
-_LAIN, _LAIN_NOISE = 0.5, 3.5  # ... and by the readings
+_SEEN_STILL, _SEEN_STILL_NOISE = 0.5, 3.5  # ... and by the readings
 _SHARES = np.array([0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1])  # of a pulse that are tried
 _AFTER = 0.1, 0.9  # s after a pulse in which the joint is to be at its goal ...
 _WANTED, _BESIDES = 0.8, 0.5  # ... by that share of its error, and that of what the integral adds
@@ -115,7 +115,7 @@ class Rest:
         self._spec, self._unit = spec, wanted.tolerance * spec.counts_per_degree
         tolerance = self._unit * (1.0 if spec.pulses else _COARSE)
         self.tolerance = tolerance
-        """Of a joint that comes to rest [counts]."""
+        """Tolerance of a joint that comes to rest [counts]."""
         self._near, self._still, self._most = NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
         noise = float((wanted.reading_noise * simulation.error_std[:, 0]).max())
         least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)
@@ -140,7 +140,7 @@ class Rest:
         self._foresight = Foresight(simulation) if fine else None
         self._after = slice(*(round(time / spec.period) for time in _AFTER))
         self._stays = _STAYS * tolerance + _STAYS_NOISE * noise
-        self._lain = _LAIN * tolerance + _LAIN_NOISE * noise
+        self._seen_still = _SEEN_STILL * tolerance + _SEEN_STILL_NOISE * noise
         left = _ANSWERED * noise / math.sqrt(self._look)
         self._quiet_below = max(wanted.quiet * tolerance, left / 2)
         self._alert_above = max(wanted.alert * tolerance, left)
@@ -209,9 +209,9 @@ class Rest:
         error = now - mean
         slow = (seen >= self._slowly) & (longer < self._still + _EASY * np.abs(error))
         steady = (seen >= self._waited) & (scatter < self._steady)
-        lain = (seen >= self._foreseen) & (lately < self._lain)
-        asked = stays & ~lain & (np.abs(error) <= self._near) & [not rest.calm for rest in self._joints]
-        steady &= lain | self._stay(asked, state)
+        still = (seen >= self._foreseen) & (lately < self._seen_still)
+        asked = stays & ~still & (np.abs(error) <= self._near) & [not rest.calm for rest in self._joints]
+        steady &= still | self._stay(asked, state)
         acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
         for j, rest in enumerate(self._joints):
             far, fast = _LEAVING if rest.calm else (1.0, 1.0)
@@ -227,16 +227,16 @@ class Rest:
                     rest.active.see(off / self._unit)
                 if rest.active.second:
                     rest.swings = 0
-                    rest.stir(_FARTHER * self.tolerance, off * self._share if abs(off) < self._close else 0.0)
+                    rest.mark_moving(_FARTHER * self.tolerance, off * self._share if abs(off) < self._close else 0.0)
                     continue
             rest.see(off, self._swing)
             if abs(error[j]) > far * self._near:
-                rest.go(lain[j])
+                rest.leave_goal(still[j])
                 acts[j] = rest.swings < _SWINGS or rest.damped.second
                 continue
             if not (rest.calm or steady[j]) or (drift[j] > fast * self._still and not slow[j]):
                 counted = min(max(error[j], -self._counted), self._counted) if abs(error[j]) < self._close else 0.0
-                rest.stir(self._kept, counted * self._share)
+                rest.mark_moving(self._kept, counted * self._share)
                 acts[j] = rest.swings < _SWINGS or rest.damped.second
                 continue
             rest.calm, rest.error = True, error[j]
@@ -313,16 +313,16 @@ class _Joint:
         """Note that it is far from what is asked for, or that this moves."""
         self.swings, self._side = 0, 0.0
         self.bias = 0.0
-        self.stir(0.0, 0.0)
+        self.mark_moving(0.0, 0.0)
 
-    def go(self, lain: np.bool_) -> None:
+    def leave_goal(self, still: np.bool_) -> None:
         """Note that it is far from its goal, and whether it lies still there: then its swings are over."""
-        if lain:
+        if still:
             self.leave()
         self.bias = 0.0
-        self.stir(0.0, 0.0)
+        self.mark_moving(0.0, 0.0)
 
-    def stir(self, kept: float, added: float) -> None:
+    def mark_moving(self, kept: float, added: float) -> None:
         """Note that it is near, but moves: its bias, with what is ``added``, is ``kept`` at most."""
         self.calm, self.quiet, self.look = False, False, 0
         self.left, self._pulses, self.error, self._before = 0, 1, 0.0, 0.0

@@ -10,7 +10,7 @@ from pneumarm.report.figures.importance import input_importance
 from pneumarm.report.figures.isoplots import isoplot
 from pneumarm.report.figures.marked import marked_rows
 from pneumarm.report.figures.propagation import error_propagation, expectation
-from pneumarm.report.figures.residues import Classification, residue, residue_by_class
+from pneumarm.report.figures.residues import Classification, residue_by_class, residues
 from pneumarm.report.figures.training import spread_of_agents, training_curves
 from pneumarm.report.figures.transfer import Phase, transfer_curves
 
@@ -32,8 +32,8 @@ __all__ = [
     "movement",
     "new_share",
     "projections",
-    "residue",
     "residue_by_class",
+    "residues",
     "spread_of_agents",
     "training_curves",
     "transfer_curves",

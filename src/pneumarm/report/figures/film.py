@@ -18,7 +18,7 @@ from pneumarm.task.changes import valve_changes
 Array = NDArray[np.float64]
 
 FRAMES_A_SECOND = 12.5
-"""Of a film; 80 ms a frame, which a GIF can tell exactly."""
+"""Frame rate of a film; 80 ms a frame, which a GIF can tell exactly."""
 _DPI = 110
 _SIZE = (7.4, 4.0)  # inch
 _PAST = 8  # places where the arm was before, in a figure

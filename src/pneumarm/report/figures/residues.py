@@ -19,7 +19,7 @@ IN_A_ROW = 200
 
 
 @styled
-def residue(observed: Array, simulated: Array, spec: ArmSpec) -> Described:
+def residues(observed: Array, simulated: Array, spec: ArmSpec) -> Described:
     """Draw the observed angle, the simulated one, and their difference, transition after transition.
 
     Args:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import Arm, Reading
 
 
-class PassedOn(Arm):
+class ArmWrapper(Arm):
     """``arm``, with its spec; what is not overridden is its own."""
 
     def __init__(self, arm: Arm) -> None:

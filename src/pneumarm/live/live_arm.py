@@ -10,9 +10,9 @@ from pneumarm.arm import guarded, open_arm
 from pneumarm.control.versions import HISTORY, TRAINED, put_back, read_history
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.live.choices import Choice, Mover, choices_in, monitor_for, opened
-from pneumarm.live.desk import Desk
 from pneumarm.live.faults import OFFERED
 from pneumarm.live.learning import Learning, LeftOff
+from pneumarm.live.lease import ControlLease
 from pneumarm.live.orders import AnyOrder, Beat, Choose, HandOver, Learn, PutBack, Stop, Take
 from pneumarm.live.pace import in_real_time
 from pneumarm.live.picture import drawing_of
@@ -22,7 +22,7 @@ from pneumarm.run import RunSettings, settings_in
 from pneumarm.simulation.enough import EnoughSettings
 
 
-class Rig:
+class LiveArm:
     """An arm and what can move it. Its thread opens the arm, moves it, and lets it learn when somebody wants that.
 
     Args:
@@ -40,7 +40,7 @@ class Rig:
         self, settings: RunSettings, named: Sequence[str], folder: Path | None, method: str | None = None
     ) -> None:
         self.settings, self.folder = settings, folder
-        self.screen, self.desk = Screen(), Desk()
+        self.screen, self.lease = Screen(), ControlLease()
         self._named, self._method = [Choice(Path(name).name, name) for name in named], method
         self._leave, self._learn, self._stop_learning = Event(), Event(), Event()
         self._lock = Lock()  # of choosing: one at a time
@@ -48,7 +48,7 @@ class Rig:
         self._session = self._open(self._choices())
         self._thread = Thread(target=self._main, name="arm", daemon=True)
 
-    def __enter__(self) -> "Rig":
+    def __enter__(self) -> "LiveArm":
         self._thread.start()
         return self
 
@@ -66,12 +66,12 @@ class Rig:
 
     def told_to(self, page: int) -> dict[str, Any]:
         """Return how things stand, as ``page`` is told it."""
-        desk = self.desk
+        lease = self.lease
         return self.screen.state | {
             "you": page,
-            "writer": desk.writer,
-            "asking": desk.asking,
-            "pages": len(desk.pages),
+            "writer": lease.writer,
+            "asking": lease.asking,
+            "pages": len(lease.pages),
         }
 
     def order(self, page: int, order: AnyOrder) -> None:
@@ -81,17 +81,17 @@ class Rig:
             UnusableInput: it does not control the arm, or that cannot be done.
 
         """
-        self.desk.hear(page)
+        self.lease.hear(page)
         if isinstance(order, Beat):
             return
         if isinstance(order, Take):
-            self.desk.take(page)
+            self.lease.take(page)
         elif isinstance(order, HandOver):
-            self.desk.hand_over(page)
+            self.lease.hand_over(page)
         elif isinstance(order, Stop):  # whoever sees that something goes wrong
             self._stop_learning.set()
             self._session.order(order)
-        elif page != self.desk.writer:
+        elif page != self.lease.writer:
             raise UnusableInput("another page controls the arm; ask for control")
         elif isinstance(order, Learn):
             self._begin_learning()
@@ -146,7 +146,7 @@ class Rig:
             can_learn=self._can_learn(),
             minutes=round((self.settings.transitions or 0) * spec.period / 60 or EnoughSettings().most_of(spec) / 60),
         )
-        return Session(guarded(paced), mover, watch, self.screen, lambda: self.desk.silence)
+        return Session(guarded(paced), mover, watch, self.screen, lambda: self.lease.silence)
 
     def _choices(self) -> list[Choice]:
         return [*self._named, *(choices_in(self.folder) if self.folder is not None else [])]

@@ -10,7 +10,7 @@ VENT_AFTER = 3.0
 """... and is vented after this [s]."""
 
 
-class Desk:
+class ControlLease:
     """The pages that are open, which of them controls the arm, and when that was heard last.
 
     The first page to take control has it. Another that wants it asks, and gets it when it is handed over, or when

@@ -5,20 +5,20 @@
 
 import re
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm import Arm, Reading
-from pneumarm.arm.virtual import VirtualArm, draw_parameters
+from pneumarm.arm.virtual import Fault, VirtualArm, draw_parameters
 
 
 class LateArm(Arm):
     """A virtual arm that hears ``late`` [s] what its valves are to do."""
 
-    def __init__(self, seed: int, late: float) -> None:
-        self._arm, self._late = VirtualArm(draw_parameters(seed)), late
+    def __init__(self, seed: int, late: float, faults: Sequence[Fault] = ()) -> None:
+        self._arm, self._late = VirtualArm(draw_parameters(seed), faults=faults), late
         self.spec = self._arm.spec
         self._under_way = deque[tuple[float, NDArray[np.int8]]]()
 

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from benchmarks.faults import KINDS, fitted, healthy_collecting, judged, play, watched_steps
+from tests.late_arms import LateArm
 
 from pneumarm.arm import Reading, open_arm
 from pneumarm.arm.virtual import (
@@ -122,6 +123,17 @@ def test_leaves_healthy_arms_alone(simulation):
 
 
 PULSED = replace(WHOLE_PERIODS, pulses=0.7)
+
+
+@pytest.mark.parametrize("late", [0.1, 0.2])
+def test_valves_that_answer_late_are_no_fault_and_one_that_sticks_is(late):
+    arm = LateArm(7, late, [StuckValve(muscle=1, begin=240.0)])
+    monitor = Monitor(arm.spec)
+    for step in watched_steps(arm, monitor, 7):
+        if step.reading.time > 280:
+            break
+    assert {(one.kind, one.joint, one.muscle) for one in monitor.findings} == {("stuck-valve", 1, 1)}
+    assert all(one.noticed > 240 for one in monitor.findings)
 
 
 @pytest.fixture(scope="module")

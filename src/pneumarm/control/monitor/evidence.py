@@ -30,7 +30,9 @@ from pneumarm.control.monitor.identification import (
     expect_by_identification,
     half_a_filling,
     learn,
+    learn_anew,
     note_answers,
+    note_dead_time,
     note_valves,
     remember_look,
     shift_slots,
@@ -259,6 +261,8 @@ def identify(known, readings, thresholds, memory, time, angle, pressure, judges)
                 for m in range(memory.std.shape[0]):
                     learn(known, m, angle, pressure[m // 2, m % 2])
             note_answers(known, pressure)
+            if note_dead_time(known, pressure):
+                learn_anew(known)
         remember_look(known, angle, pressure, False)
         shift_slots(known)
 

@@ -10,6 +10,10 @@ A *look* is a thirtieth of a second or a control period, whichever is longer: in
 nothing can be told from noise. Errors are kept by what the muscle was doing, so that each arm sets its own measure
 of what is far off.
 
+Valves may answer late. By how many looks says the lag at which commands and changes of pressures correlate most, once
+an arm has been watched for a while; where it is more than the slots reach, they begin so many looks ago from then on,
+and all is learned anew.
+
 Source: L. Ljung, "System identification", 2nd edition, sections 4.2 (ARX) and 11.2 (recursive least squares); the
 weight of a reading that is far off is that of a Student distribution.
 """
@@ -30,6 +34,8 @@ SLOTS = 3
 """Slots of a look."""
 LOOKS = 3
 """Looks whose slots are features: what is open now, and what may still be under way in pipes and hoses."""
+LATEST = 12
+"""Looks that valves may answer late at most."""
 EXPERIENCE = 20.0
 """An arm is not judged before it has been watched for so long [s]."""
 ALL = 40.0
@@ -74,7 +80,12 @@ class Identified(NamedTuple):
     """Part of each slot, newest first, in which the valves were told to be open, shape (m, slots, inlet and
     outlet)."""
     opened: NDArray[np.float64]
-    """How often the valves were told to open in this look and the one before, shape (m, 2, inlet and outlet)."""
+    """How often the valves were told to open in a look, newest first, shape (m, looks, inlet and outlet)."""
+    late: NDArray[np.float64]
+    """How many looks the valves answer late, and whether that was looked at, shape (2,)."""
+    answers: NDArray[np.float64]
+    """By lag in looks: sum of what was told times how pressures changed then, and of the square of what was told;
+    shape (LATEST + 2, 2)."""
     held: NDArray[np.float64]
     """Which valve is told to stay open at the end of the last period: 1 inlet, -1 outlet, 0 none; shape (m,)."""
     last: NDArray[np.float64]
@@ -122,8 +133,10 @@ def identified(spec: ArmSpec) -> Identified:
         covariance=np.tile(np.diag(prior**2), (muscles, 1, 1)),
         error=error,
         lasting=np.tile([1.0, 0.0, 0.0], (muscles, 1)),
-        open=np.zeros((muscles, _SLOTS, 2)),
-        opened=np.zeros((muscles, 2, 2)),
+        open=np.zeros((muscles, _SLOTS + SLOTS * LATEST, 2)),
+        opened=np.zeros((muscles, 2 + LATEST, 2)),
+        late=np.zeros(2),
+        answers=np.zeros((LATEST + 2, 2)),
         held=np.zeros(muscles),
         last=np.zeros((muscles, 3)),
         angle=np.zeros(spec.joints),
@@ -166,11 +179,12 @@ def note_valves(known, command):  # type: ignore[no-untyped-def]
 def shift_slots(known):  # type: ignore[no-untyped-def]
     """Make room for the slots of a new look."""
     for m in range(known.open.shape[0]):
-        for slot in range(_SLOTS - 1, -1, -1):
+        for slot in range(known.open.shape[1] - 1, -1, -1):
             for side in range(2):
                 known.open[m, slot, side] = known.open[m, slot - SLOTS, side] if slot >= SLOTS else 0.0
         for side in range(2):
-            known.opened[m, 1, side], known.opened[m, 0, side] = known.opened[m, 0, side], 0.0
+            for look in range(known.opened.shape[1] - 1, -1, -1):
+                known.opened[m, look, side] = known.opened[m, look - 1, side] if look > 0 else 0.0
 
 
 @part
@@ -186,9 +200,10 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     supply = 1.0
     if readings.supply[h] < math.inf:
         supply = reduced(readings.supply[h], filled / (full - lowest_level(known, m)))
-    taken, given, others, lost = 0.0, 0.0, 0.0, 0.0
+    taken, given, others, lost, late = 0.0, 0.0, 0.0, 0.0, int(known.late[0])
     for slot in range(_SLOTS):
-        told_in, told_out = known.open[source, slot, 0], known.open[source, slot, 1]
+        then = slot + SLOTS * late
+        told_in, told_out = known.open[source, then, 0], known.open[source, then, 1]
         taking = time_open(readings, h, m, 0, told_in, told_out) * supply
         giving = time_open(readings, h, m, 1, told_in, told_out)
         both = max(taking + giving - 1.0, 0.0)
@@ -199,7 +214,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
         given += giving / _SLOTS
         for other in range(known.open.shape[0]):
             if other != m:
-                others += known.open[other, slot, 0] / _SLOTS
+                others += known.open[other, then, 0] / _SLOTS
     place = (angle[joint] - known.look[4]) / known.look[3]
     turned = 10.0 * (angle[joint] - known.angle[joint]) / known.look[3]
     x[_CURVES] = taken * level * level
@@ -223,7 +238,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     x[_CURVES + 17] = empty * taken
     x[_CURVES + 18] = empty * given
     for look in range(2):  # a valve takes a while to open, and another one to close
-        fills, empties = known.opened[source, look, 0], known.opened[source, look, 1]
+        fills, empties = known.opened[source, late + look, 0], known.opened[source, late + look, 1]
         x[_CURVES + 19 + look] = 0.1 * supply * times_opened(readings, h, m, 0, fills, empties)
         x[_CURVES + 21 + look] = 0.1 * level * times_opened(readings, h, m, 1, fills, empties)
     return abs(lost)
@@ -265,8 +280,8 @@ def uncertainty(known, m, x, gain):  # type: ignore[no-untyped-def]
 @part
 def class_of(known, m, angle):  # type: ignore[no-untyped-def]
     """Return the class of errors (side, speed, level) that the change of muscle ``m`` until now belongs to."""
-    joint, taken, given = m // 2, 0.0, 0.0
-    for slot in range(2 * SLOTS):
+    joint, taken, given, begin = m // 2, 0.0, 0.0, SLOTS * int(known.late[0])
+    for slot in range(begin, begin + 2 * SLOTS):
         taken += known.open[m, slot, 0]
         given += known.open[m, slot, 1]
     side = 0 if taken + given == 0.0 else 1 if taken >= given else 2
@@ -399,9 +414,10 @@ def note_answers(known, pressure):  # type: ignore[no-untyped-def]
     """Note how the pressures (joints, 2) answer to what the valves were told, whatever was expected [counts]."""
     muscles, highest = known.last.shape[0], known.look[2]
     share = min(1.0, max(known.look[1] / _RECENT, 1.0 / (known.clock[2] + 1.0)))
+    begin = SLOTS * int(known.late[0])
     for m in range(muscles):
         level, told = pressure[m // 2, m % 2] / highest, 0.0
-        for slot in range(_SLOTS):
+        for slot in range(begin, begin + _SLOTS):
             told += (known.open[m, slot, 0] - known.open[m, slot, 1]) / _SLOTS
         change = level - known.last[m, 0]
         known.squares[m, 0] += share * (told * told - known.squares[m, 0])
@@ -411,6 +427,55 @@ def note_answers(known, pressure):  # type: ignore[no-untyped-def]
             known.agreement[m, other] += share * (told * change - known.agreement[m, other])
         known.answer[m, 1] = min(known.answer[m, 1], level)
         known.answer[m, 2] = max(known.answer[m, 2], level)
+
+
+@part
+def note_dead_time(known, pressure):  # type: ignore[no-untyped-def]
+    """Note by how many looks the valves answer late, by the pressures (joints, 2) of the first seconds [counts].
+
+    The look in which an arm without dead time answers is the newest one, or the one before. Returned is whether the
+    valves answer later than was thought, so that what was learned is of no use.
+    """
+    if known.late[1] > 0.0:
+        return False
+    for m in range(known.last.shape[0]):
+        change = pressure[m // 2, m % 2] / known.look[2] - known.last[m, 0]
+        for lag in range(LATEST + 2):
+            told = 0.0
+            for slot in range(SLOTS * lag, SLOTS * lag + SLOTS):
+                told += known.open[m, slot, 0] - known.open[m, slot, 1]
+            known.answers[lag, 0] += told * change
+            known.answers[lag, 1] += told * told
+    if known.clock[2] * known.look[1] < EXPERIENCE:
+        return False
+    known.late[1], best, most = 1.0, 0, 0.0
+    for lag in range(LATEST + 2):
+        agreement = known.answers[lag, 0] / np.sqrt(max(known.answers[lag, 1], 1e-12))
+        if agreement > most:
+            best, most = lag, agreement
+    known.late[0] = max(best - 1, 0)
+    return known.late[0] > 0.0
+
+
+@part
+def learn_anew(known):  # type: ignore[no-untyped-def]
+    """Forget what was learned of how pressures change, and how they answer."""
+    for m in range(known.weight.shape[0]):
+        for i in range(FEATURES):
+            known.weight[m, i] = 0.0
+            for k in range(FEATURES):
+                known.covariance[m, i, k] = 0.0
+            known.covariance[m, i, i] = (_BY_SLOT if i < _CURVES else _BY_CHANGE) ** 2
+        for side in range(SIDES):
+            for speed in range(SPEEDS):
+                for level in range(LEVELS):
+                    known.error[m, side, speed, level, 0] = _KNOWN
+                    known.error[m, side, speed, level, 1] = _ERROR**2
+        known.lasting[m, 0], known.lasting[m, 1], known.lasting[m, 2] = 1.0, 0.0, 0.0
+        for other in range(known.weight.shape[0]):
+            known.agreement[m, other] = 0.0
+        known.squares[m, 0] = known.squares[m, 1] = 0.0
+    known.clock[2] = 0.0
 
 
 @part
@@ -431,8 +496,8 @@ def is_settled(known, m, angle):  # type: ignore[no-untyped-def]
     It was told to empty for as long as is remembered, and hardly does any more, although more than the lowest reading
     is left; and its joint is slow, so that it is not stretched.
     """
-    told = 0.0
-    for slot in range(_SLOTS):
+    told, begin = 0.0, SLOTS * int(known.late[0])
+    for slot in range(begin, begin + _SLOTS):
         told += known.open[m, slot, 1]
     fallen, left = -known.last[m, 1] - known.last[m, 2], known.last[m, 0] - known.span[m, 0]
     _, speed, _ = class_of(known, m, angle)

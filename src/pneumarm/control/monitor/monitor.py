@@ -186,7 +186,7 @@ class Monitor:
         """
         known = self._known
         known.open[...] = known.opened[...] = known.held[...] = 0.0
-        known.clock[:2] = 0.0, 0.0 if at_rest else -LOOKS
+        known.clock[:2] = 0.0, 0.0 if at_rest else -LOOKS - known.late[0]
         if self._predictor is not None:
             return
         since = float(self._memory.clock[0])
@@ -520,5 +520,9 @@ class Monitor:
 
 def _identified_of(saved: Mapping[str, str], mine: Identified) -> Identified:
     """Return what was saved of what is known of an arm; ValueError where it is not of one like ``mine``."""
-    arrays = {name: np.frombuffer(b64decode(text)).reshape(getattr(mine, name).shape) for name, text in saved.items()}
-    return Identified(**{**mine._asdict(), **arrays})  # an earlier version remembered less
+    arrays = {name: np.frombuffer(b64decode(text)) for name, text in saved.items()}
+    for name in ("open", "opened"):  # an earlier version remembered less of the last commands
+        if name in arrays and "late" not in arrays:
+            del arrays[name]
+    shaped = {name: values.reshape(getattr(mine, name).shape) for name, values in arrays.items()}
+    return Identified(**{**mine._asdict(), **shaped})

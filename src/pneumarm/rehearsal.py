@@ -7,7 +7,6 @@ else comes of a rehearsal: a run without one gives the same results, later.
 What learns and what moves the arm afterwards are rehearsed beside each other, once there is a simulation for both.
 """
 
-import hashlib
 import json
 import os
 import subprocess
@@ -58,16 +57,7 @@ PARTS = {"learning": ("simulation", "training", "test"), "moving": ("transfer", 
 """The stages that a process rehearses, in their order; ``moving`` begins when ``simulation`` has been."""
 
 
-def installed(package: Path) -> str:
-    """Return a name for the sources below ``package`` where they lie and as old as they are.
-
-    Numba knows a source by its place and its time, so the same sources in another folder are compiled again.
-    """
-    newest = max(path.stat().st_mtime_ns for path in package.rglob("*.py"))
-    return hashlib.sha256(f"{package.resolve()} {newest}".encode()).hexdigest()[:16]
-
-
-_REHEARSED = CACHE_FOLDER / f"rehearsed-{installed(Path(__file__).parent)}"
+_REHEARSED = CACHE_FOLDER / "rehearsed"
 """How the names of files begin that say which parts have been."""
 
 

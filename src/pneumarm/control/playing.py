@@ -28,7 +28,7 @@ from pneumarm.arm.virtual.passing import pass_for, pass_until
 from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import borrowed, kernel, part
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import begin_acting, learn_and_act
 from pneumarm.learning.online.loop import Schedule, Workspace, workspace
@@ -411,7 +411,8 @@ def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignor
 @kernel
 def _play(body, watched, mind_schedule, rules, aims, record, performance):  # type: ignore[no-untyped-def]
     """Fill ``record`` with movements; return how many, and the performance (thesis eq. 4.14) after them."""
-    mind, schedule = mind_schedule
+    body, watched, rules, aims, record = borrowed((body, watched, rules, aims, record))
+    mind, schedule = borrowed(mind_schedule)
     goal = np.zeros(aims.goals.shape[1])
     for e in range(aims.goals.shape[0]):
         _reach(body, watched, rules, aims.durations[e])

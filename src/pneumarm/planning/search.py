@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import ACTIONS, VALVES, possible_actions
 from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import PART, kernel, part
+from pneumarm.kernels import PART, borrowed, kernel, part
 from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings
 from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
 from pneumarm.task.reward import Reward
@@ -410,6 +410,7 @@ def search(world, states, sought, workspace, begin, may_hold, most):  # type: ig
     Returns the length of the plan in ``workspace.plan``, its cost, what all plans cost at least, and the periods
     simulated. Plans that cost at least ``most`` are none.
     """
+    world, states, sought, workspace = borrowed((world, states, sought, workspace))
     count = workspace.free.shape[0]
     actions = sought.commands.shape[0]
     for k in range(count):

@@ -4,7 +4,7 @@ import math
 
 from pneumarm.arm.virtual.constants import BUMPS
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
-from pneumarm.kernels import inner, kernel
+from pneumarm.kernels import borrowed, inner, kernel
 from pneumarm.random import normal, uniform
 
 MOST_CONVERSIONS = 9
@@ -47,6 +47,7 @@ def worn(value, c):  # type: ignore[no-untyped-def]
 @kernel
 def sense(body, angle, pressure):  # type: ignore[no-untyped-def]
     """Write the readings into ``angle`` (joints,) and ``pressure`` (joints, 2) [counts]; return the time [s]."""
+    body, angle, pressure = borrowed((body, angle, pressure))
     c = body.constants.sensors[0]
     for j in range(len(body.joints)):
         angle[j] = potentiometer(body, j, body.sensor_random)

@@ -28,7 +28,7 @@ from llvmlite import ir
 from numba.extending import intrinsic, register_jitable
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-INNER: Any = {"nogil": True, "error_model": "numpy"}
+INNER: Any = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Options of Numba's for all that is compiled: without Python's lock, and with NumPy's rules of division, because a
 check for zero alone keeps a loop with a rational function in it from being vectorised."""
 PART: Any = {**INNER, "forceinline": True}

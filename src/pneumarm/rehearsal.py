@@ -7,6 +7,7 @@ else comes of a rehearsal: a run without one gives the same results, later.
 What learns and what moves the arm afterwards are rehearsed beside each other, once there is a simulation for both.
 """
 
+import gc
 import json
 import os
 import subprocess
@@ -46,6 +47,9 @@ _NICE = 4
 """So that the run, which moves an arm in time, has one of two cores for itself with two processes beside it.
 
 More would starve them on a computer that has other things to do, while the run waits for them."""
+_OBJECTS = 200_000
+"""So many new ones make Python look for garbage there: Numba keeps nearly all that it makes while it compiles, and with
+the usual 700 looking took a twelfth of the time."""
 _PATIENCE = 600.0
 """For so long [s] a stage may be rehearsed before it is taken to hang: eight times what the longest takes (80 s on a
 machine of 2 cores)."""
@@ -232,6 +236,7 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
 def main() -> None:
     """Rehearse a part of the piece on the standard input, and write the stages that are done."""
     leave_by_exceptions()  # also when the run that it is for has ended
+    gc.set_threshold(_OBJECTS)
     if hasattr(os, "nice"):
         os.nice(_NICE)
     piece = msgspec.convert(json.load(sys.stdin), Piece)

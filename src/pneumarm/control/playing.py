@@ -28,7 +28,7 @@ from pneumarm.arm.virtual.passing import pass_for, pass_until
 from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import borrowed, kernel, part
+from pneumarm.kernels import borrowed, inner, kernel, part
 from pneumarm.learning.online.agent import Agent
 from pneumarm.learning.online.learner import begin_acting, learn_and_act
 from pneumarm.learning.online.loop import Schedule, Workspace, workspace
@@ -243,7 +243,7 @@ def _schedule(exploration: Exploration | None) -> Schedule:
     return Schedule(np.inf, float(chosen.epsilon), float(chosen.temperature), 0.0)
 
 
-@kernel
+@inner
 def _read(body: Body, watched: _Guard) -> float:
     """Read the sensors, and count for how long inlets have been open; return the time."""
     time: float = sense(body, watched.angle, watched.pressure)
@@ -258,7 +258,7 @@ def _read(body: Body, watched: _Guard) -> float:
     return time
 
 
-@kernel
+@inner
 def _set(body: Body, watched: _Guard) -> None:
     """Set the valves as asked, but for inlets of muscles at their limits."""
     for j in range(watched.applied.shape[0]):
@@ -270,7 +270,7 @@ def _set(body: Body, watched: _Guard) -> None:
     command(body, watched.applied, watched.period)
 
 
-@kernel
+@inner
 def _wait(body: Body, watched: _Guard, seconds: float) -> None:
     """Let time pass, looking at the limits every period while an inlet is open."""
     while seconds > watched.period and (watched.applied > 0).any():
@@ -288,7 +288,7 @@ def _wait(body: Body, watched: _Guard, seconds: float) -> None:
     pass_for(body, seconds)
 
 
-@kernel
+@inner
 def _reach(body: Body, watched: _Guard, rules: _Rules, durations: Array) -> None:
     """As :meth:`BeginState.reach`, with the ``durations`` (joints, 2) [s] given."""
     _read(body, watched)
@@ -310,7 +310,7 @@ def _reach(body: Body, watched: _Guard, rules: _Rules, durations: Array) -> None
     _wait(body, watched, rules.settle)
 
 
-@kernel
+@inner
 def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
     """Put what was read into the state window, as :class:`~pneumarm.task.tracker.StateTracker` does."""
     sigma, observed = mind.sigma, 4 * velocity.size
@@ -330,7 +330,7 @@ def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
                 sigma[lag * observed + 4 * j + q] = scaled
 
 
-@kernel
+@inner
 def _begin(watched, mind, schedule, goal, velocity):  # type: ignore[no-untyped-def]
     """Begin a movement to ``goal`` in the state that was read."""
     place = mind.places
@@ -343,7 +343,7 @@ def _begin(watched, mind, schedule, goal, velocity):  # type: ignore[no-untyped-
     begin_acting(mind.learner, schedule, mind.x, mind.workspace, mind.random)
 
 
-@kernel
+@inner
 def _judge(watched, rules, goal, velocity, turn, gained):  # type: ignore[no-untyped-def]
     """Set what each joint has ``gained`` by its last action, whether it switched and is there; return if all are."""
     is_reached = True
@@ -367,7 +367,7 @@ class _Turn(NamedTuple):
     there: NDArray[np.bool_]
 
 
-@kernel
+@inner
 def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignore[no-untyped-def]
     """Make movement ``e`` to ``goal``, as ``move`` does; return whether it succeeded."""
     joints = goal.size

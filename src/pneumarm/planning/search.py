@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import ACTIONS, VALVES, possible_actions
 from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import PART, borrowed, kernel, part
+from pneumarm.kernels import INNER, borrowed, kernel, part
 from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings
 from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
 from pneumarm.task.reward import Reward
@@ -56,22 +56,14 @@ def copy(states: Any, to: int, source: int) -> None:
 
 
 # Compiled code picks by type as well: kernels handed over as arguments could not be cached.
-@overload(advance, jit_options=PART)
+@overload(advance, jit_options=INNER)
 def _advance(world, states, i, valves):  # type: ignore[no-untyped-def]
-    if states.instance_class is PhysicsStates:
-        return lambda world, states, i, valves: advance_physics(world, states, i, valves)
-    if states.instance_class is SimulatedStates:
-        return lambda world, states, i, valves: advance_simulated(world, states, i, valves)
-    return None
+    return _ADVANCE[states.instance_class].py_func
 
 
-@overload(copy, jit_options=PART)
+@overload(copy, jit_options=INNER)
 def _copy(states, to, source):  # type: ignore[no-untyped-def]
-    if states.instance_class is PhysicsStates:
-        return lambda states, to, source: copy_physics(states, to, source)
-    if states.instance_class is SimulatedStates:
-        return lambda states, to, source: copy_simulated(states, to, source)
-    return None
+    return _COPY[states.instance_class].py_func
 
 
 @dataclass(frozen=True)
@@ -287,7 +279,7 @@ def misses(states, i, sought):  # type: ignore[no-untyped-def]
     return worst
 
 
-@part(entry=True)
+@part
 def within(value, tolerance, std):  # type: ignore[no-untyped-def]
     """Return the probability that a normal deviate around ``value`` is not farther from 0 than ``tolerance``."""
     if std == 0.0:
@@ -307,7 +299,7 @@ def success(states, i, sought):  # type: ignore[no-untyped-def]
     return probability
 
 
-@part(entry=True)
+@part
 def fewest_periods(way, speed, slow, fastest, sharpest):  # type: ignore[no-untyped-def]
     """Return a lower bound of the periods in which a joint gets to its goal and slow.
 
@@ -357,8 +349,8 @@ def last_action(workspace, i):  # type: ignore[no-untyped-def]
 
 
 @part
-def descend(world, states, sought, workspace, i, parent, action):  # type: ignore[no-untyped-def]
-    """Make node ``i`` what ``action`` makes of ``parent``, which may be the same; return by how much it misses."""
+def begin_node(states, sought, workspace, i, parent, action):  # type: ignore[no-untyped-def]
+    """Make node ``i`` that of ``action`` after ``parent``, which may be the same, in the state before the action."""
     if i != parent:
         copy(states, i, parent)
         for k in range(workspace.holds[parent]):
@@ -378,8 +370,6 @@ def descend(world, states, sought, workspace, i, parent, action):  # type: ignor
     workspace.depth[i] = workspace.depth[parent] + 1
     workspace.switches[i] = workspace.switches[parent] + switched
     workspace.cost[i] = workspace.cost[parent] + sought.action_cost + sought.switch_cost * switched
-    advance(world, states, i, sought.commands[action])
-    return misses(states, i, sought)
 
 
 @part
@@ -444,7 +434,9 @@ def search(world, states, sought, workspace, begin, may_hold, most):  # type: ig
                 continue
             left -= 1
             child = workspace.free[left]
-            miss = descend(world, states, sought, workspace, child, i, action)
+            begin_node(states, sought, workspace, child, i, action)
+            advance(world, states, child, sought.commands[action])
+            miss = misses(states, child, sought)
             simulated += 1
             probability = success(states, child, sought)
             expected = workspace.cost[child] + sought.failure_cost * (1.0 - probability)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner
 from pneumarm.networks.layers import through_layer, weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.kernel import SimulationParameters
@@ -45,7 +45,7 @@ def step_workspace(simulation: SimulationParameters, n: int) -> StepWorkspace:
     return StepWorkspace(*(np.zeros((rows, n), np.float32) for rows in sizes))
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def last_units(simulation, work):  # type: ignore[no-untyped-def]
     """Return the units of the last hidden layer (units, n), those of the first being ``work.hidden``."""
     if simulation.second.shape[0] == 0:
@@ -59,7 +59,7 @@ def last_units(simulation, work):  # type: ignore[no-untyped-def]
     return work.second
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def predict_all(simulation, x, work):  # type: ignore[no-untyped-def]
     """Set the hidden units and ``work.change`` to what the networks make of ``x`` (size, n), commands in place."""
     change = work.change
@@ -78,7 +78,7 @@ def predict_all(simulation, x, work):  # type: ignore[no-untyped-def]
             add_sums(simulation.direct[:, begin:end].T, x[begin:end], change)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
     """Set ``following`` (size, n) to the states one period after ``x`` (size, n), whose commands are in place."""
     predict_all(simulation, x, work)
@@ -108,7 +108,7 @@ def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
             following[angle + 1, e] = (following[angle, e] - x[angle, e]) * rate + rest
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
     """Set ``sooner`` (size, n) to the derivatives by ``x``, those by ``following`` being ``later`` (size, n).
 

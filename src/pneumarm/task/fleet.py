@@ -139,7 +139,7 @@ def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-unty
     return does_something
 
 
-@kernel
+@inner
 def one(fleet, e):  # type: ignore[no-untyped-def]
     """Return arm ``e`` as a single episode; it is a view."""
     state = SimulationState(
@@ -178,7 +178,7 @@ def gained_by(task, fleet, e, is_reached):  # type: ignore[no-untyped-def]
     return paid(task.reward, is_reached, switches)
 
 
-@kernel
+@inner
 def take_all(environment, limits, fleet, actions, is_reached):  # type: ignore[no-untyped-def]
     """Take ``actions`` (n, joints) for a period; set ``is_reached`` (n,) to whether the goals are reached."""
     simulation = environment.simulation
@@ -192,7 +192,7 @@ def take_all(environment, limits, fleet, actions, is_reached):  # type: ignore[n
         is_reached[e] = reached(environment.task, one(fleet, e))
 
 
-@kernel
+@inner
 def take_alive(environment, limits, fleet, actions, alive, is_reached):  # type: ignore[no-untyped-def]
     """Do what :func:`take_all` does, in the arms that are ``alive`` (n,) alone."""
     simulation = environment.simulation
@@ -208,7 +208,7 @@ def take_alive(environment, limits, fleet, actions, alive, is_reached):  # type:
             is_reached[e] = reached(environment.task, one(fleet, e))
 
 
-@kernel
+@inner
 def advance(environment, limits, fleet, e):  # type: ignore[no-untyped-def]
     """Let arm ``e`` go to what is predicted, and note where that changes nothing."""
     arm, before = one(fleet, e), fleet.before[e]

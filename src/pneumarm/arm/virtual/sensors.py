@@ -14,7 +14,7 @@ BUMP_WIDTH = 6.0
 _RIPPLES = (17.0, 7.0)  # lengths of the lasting errors of a worn track, in counts
 
 
-@kernel
+@inner
 def convert(value, noise, c, random):  # type: ignore[no-untyped-def]
     """Return one conversion of ``value`` [counts]: with noise, rounded, within the converter's range."""
     disturbance = min(max(noise * normal(random), -c.noise_limit), c.noise_limit) if noise > 0.0 else 0.0
@@ -58,7 +58,7 @@ def sense(body, angle, pressure):  # type: ignore[no-untyped-def]
     return body.surroundings[0].time
 
 
-@kernel
+@inner
 def potentiometer(body, j, random):  # type: ignore[no-untyped-def]
     """Return what the potentiometer of joint ``j`` says [counts], with noise from ``random``."""
     c, track = body.constants.sensors[0], body.constants.joints[j]
@@ -76,7 +76,7 @@ def potentiometer(body, j, random):  # type: ignore[no-untyped-def]
     return angle
 
 
-@kernel
+@inner
 def shown(value, track, c, random):  # type: ignore[no-untyped-def]
     """Return what a potentiometer with faults shows at the angle ``value`` [counts]; ``track``: JOINT_CONSTANTS."""
     if track.bend > 0.0:

@@ -84,7 +84,7 @@ def look_ahead(learner, schedule, x, workspace, random):  # type: ignore[no-unty
     spread(workspace.next_chosen, workspace.next_actions)
 
 
-@part(entry=True)
+@part
 def decide(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
     """Let agents choose what to do next in ``x``."""
     for agent in range(workspace.next_chosen.shape[0]):
@@ -110,7 +110,7 @@ def spread(chosen, actions):  # type: ignore[no-untyped-def]
             left //= ACTIONS
 
 
-@part(entry=True)
+@part
 def learn(learner, workspace, is_reached):  # type: ignore[no-untyped-def]
     """Move the values of what was chosen towards their targets; the goal of all joints ``is_reached`` or not."""
     each = workspace.paid.shape[0] // workspace.chosen.shape[0]
@@ -127,7 +127,7 @@ def learn(learner, workspace, is_reached):  # type: ignore[no-untyped-def]
             forget_traces(learner, agent)
 
 
-@part(entry=True)
+@part
 def remember(workspace, x):  # type: ignore[no-untyped-def]
     """Remember the state ``x`` (inputs,) and what was chosen there."""
     for i in range(x.shape[0]):

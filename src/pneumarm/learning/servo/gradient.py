@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.learning.servo.commands import CommandParameters, write_commands
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, inputs_back, write_inputs
 from pneumarm.learning.servo.price import (
@@ -141,7 +141,7 @@ def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
         note_free(task, tape, t)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def note_free(task, tape, t):  # type: ignore[no-untyped-def]
     """Note what share of the gradient passes at step ``t``."""
     least, free = np.float32(task.past_the_limit), tape.work.free
@@ -150,7 +150,7 @@ def note_free(task, tape, t):  # type: ignore[no-untyped-def]
             tape.free[t, o, e] = max(free[o, e], least)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def note_underway(task, tape, t):  # type: ignore[no-untyped-def]
     """Note which joints are on their way to a goal that stays, at step ``t``."""
     lag, commands = task.simulation.history - 1, task.commands
@@ -163,7 +163,7 @@ def note_underway(task, tape, t):  # type: ignore[no-untyped-def]
             tape.underway[joint, e] = moves and wanted == tape.preview[t, -1, joint, e]
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def errors_at(task, tape, t, joint, error):  # type: ignore[no-untyped-def]
     """Set ``error`` (n,) to how far ``joint`` is from what is asked for at step ``t`` [tolerances]."""
     scale = task.inputs.tolerances[joint]
@@ -171,7 +171,7 @@ def errors_at(task, tape, t, joint, error):  # type: ignore[no-untyped-def]
         error[e] = (tape.x[t, 4 * joint, e] - tape.reference[t, joint, e]) * scale
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def prices_of_pressures(task, tape, t, joint, row):  # type: ignore[no-untyped-def]
     """Set ``row`` (3, n) to the price of the pressures of ``joint`` at step ``t`` and its slopes by both [scaled]."""
     first, scale = 4 * joint + 2, task.inputs.tolerances[joint]
@@ -191,7 +191,7 @@ def prices_of_pressures(task, tape, t, joint, row):  # type: ignore[no-untyped-d
         row[0, e], row[1, e], row[2, e] = price, by_one * to_share[0], by_two * to_share[1]
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
     """Return the price of all arms at step ``t``; set ``tape.sooner`` to ``share`` of its derivatives.
 
@@ -211,6 +211,7 @@ def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
         prices_of_pressures(task, tape, t + 1, joint, row)
         for e in range(n):
             total += row[0, e]
+        for e in range(n):
             later[4 * joint + 2, e] += row[1, e] * share
             later[4 * joint + 3, e] += row[2, e] * share
     tape.work.hidden[:] = tape.hidden[t]
@@ -259,14 +260,14 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     return total * share
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def go_sooner(task, tape, share):  # type: ignore[no-untyped-def]
     """Make the derivatives by a step's state those of the steps that follow the one before it, cut off."""
     tape.later[:] = tape.sooner
     cut_off(tape.later, np.float32(task.steepest) * share * task.inputs.tolerances.max(), tape.row[0])
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def cut_off(vectors, longest, square):  # type: ignore[no-untyped-def]
     """Shorten the ``vectors`` (size, n) that are longer than ``longest`` to that; ``square`` (n,) is workspace."""
     square[:] = _ZERO
@@ -280,11 +281,10 @@ def cut_off(vectors, longest, square):  # type: ignore[no-untyped-def]
             vectors[i, e] *= square[e]
 
 
-@kernel
-def learn_once(task, net, tape):  # type: ignore[no-untyped-def]
+def learn_once(task: ServoTask, net: Trainable, tape: Tape) -> float:
     """Move forward and back; return the mean cost of a step."""
     move_forward(task, net, tape)
-    return move_back(task, net, tape)
+    return float(move_back(task, net, tape))
 
 
 def errors_of(task: ServoTask, tape: Tape) -> NDArray[np.float32]:

@@ -20,6 +20,7 @@ from pneumarm.kernels import kernel, part
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import (
     ServoTask,
+    Tape,
     Trainable,
     errors_of,
     go_sooner,
@@ -138,36 +139,38 @@ def slopes_by_commands(task, plans, tape):  # type: ignore[no-untyped-def]
 
 
 @kernel(fastmath=FASTMATH)
-def improve(task, plans, tape, times, rate):  # type: ignore[no-untyped-def]
+def follow_slopes(plans, number, rate):  # type: ignore[no-untyped-def]
+    """Move the commands along the gradient, for the time ``number`` from 1, by Adam's rule."""
+    unbias, unbias_square = _ONE - _MEAN ** np.float32(number), _ONE - _SQUARE ** np.float32(number)
+    step = np.float32(rate) / unbias
+    for t in range(plans.commands.shape[0]):
+        for c in range(plans.commands.shape[1]):
+            commands, gradient = plans.commands[t, c], plans.gradient[t, c]
+            mean, square = plans.mean[t, c], plans.square[t, c]
+            for e in range(commands.shape[0]):
+                mean[e] = _MEAN * mean[e] + (_ONE - _MEAN) * gradient[e]
+                square[e] = _SQUARE * square[e] + (_ONE - _SQUARE) * gradient[e] * gradient[e]
+                moved = commands[e] - step * mean[e] / (np.sqrt(square[e] / unbias_square) + _TINY)
+                commands[e] = min(max(moved, -_ONE), _ONE)
+
+
+def improve(task: ServoTask, plans: Plans, tape: Tape, times: int, rate: float) -> None:
     """Make each plan better so many ``times``, and play the cheapest of all that there were, as all plans."""
-    plans.mean[:] = _ZERO
-    plans.square[:] = _ZERO
+    plans.mean[:] = 0.0
+    plans.square[:] = 0.0
     play(task, plans, tape)
     price(task, plans, tape)
     plans.best[:] = plans.commands
     plans.least[:] = plans.cost
     for number in range(times):
         slopes_by_commands(task, plans, tape)
-        unbias, unbias_square = _ONE - _MEAN ** np.float32(number + 1), _ONE - _SQUARE ** np.float32(number + 1)
-        step = np.float32(rate * (1.0 - number / times)) / unbias
-        for t in range(plans.commands.shape[0]):
-            for c in range(plans.commands.shape[1]):
-                commands, gradient = plans.commands[t, c], plans.gradient[t, c]
-                mean, square = plans.mean[t, c], plans.square[t, c]
-                for e in range(commands.shape[0]):
-                    mean[e] = _MEAN * mean[e] + (_ONE - _MEAN) * gradient[e]
-                    square[e] = _SQUARE * square[e] + (_ONE - _SQUARE) * gradient[e] * gradient[e]
-                    moved = commands[e] - step * mean[e] / (np.sqrt(square[e] / unbias_square) + _TINY)
-                    commands[e] = min(max(moved, -_ONE), _ONE)
+        follow_slopes(plans, number + 1, rate * (1.0 - number / times))
         play(task, plans, tape)
         price(task, plans, tape)
-        for e in range(plans.cost.shape[0]):
-            if plans.cost[e] < plans.least[e]:
-                plans.least[e] = plans.cost[e]
-                plans.best[:, :, e] = plans.commands[:, :, e]
-    cheapest = plans.least.argmin()
-    for e in range(plans.least.shape[0]):
-        plans.commands[:, :, e] = plans.best[:, :, cheapest]
+        better = plans.cost < plans.least
+        np.copyto(plans.least, plans.cost, where=better)
+        np.copyto(plans.best, plans.commands, where=better)
+    plans.commands[:] = plans.best[:, :, plans.least.argmin(), None]
     play(task, plans, tape)
 
 

@@ -25,12 +25,19 @@ import numba
 import numpy as np
 import platformdirs
 from llvmlite import ir
-from numba.extending import intrinsic, register_jitable
+from numba.extending import intrinsic, typeof_impl
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-INNER: Any = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+INNER: Any = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": False,
+    "forceinline": False,
+    "no_cfunc_wrapper": True,
+}
 """Options of Numba's for all that is compiled: without Python's lock, and with NumPy's rules of division, because a
-check for zero alone keeps a loop with a rational function in it from being vectorised."""
+check for zero alone keeps a loop with a rational function in it from being vectorised. What is not said here would be
+as in the caller that happens to be compiled first."""
 PART: Any = {**INNER, "forceinline": True}
 """... for a :func:`part`, and for what is one by the types of its arguments (``numba.extending.overload``)."""
 _KEEP = 3  # folders of earlier sources kept, so that switching back and forth does not recompile
@@ -154,8 +161,26 @@ def part(function: _Function | None = None, *, entry: bool = False, **options: A
 
 
 def _for_kernels(function: _Function | None, options: dict[str, Any]) -> Any:
-    decorate = register_jitable(**options)
-    return decorate if function is None else decorate(function)
+    def compile_(f: Any) -> Any:
+        return _ForKernels(f, numba.njit(**options, no_cpython_wrapper=True)(f))
+
+    return compile_ if function is None else compile_(function)
+
+
+class _ForKernels:
+    """A function that kernels call compiled, once for each kind of arguments, and Python as it is written."""
+
+    def __init__(self, function: Any, compiled: Any) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func, self.compiled = function, compiled
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.py_func(*arguments)
+
+
+@typeof_impl.register(_ForKernels)
+def _as_compiled(function: _ForKernels, _: object) -> Any:
+    return numba.typeof(function.compiled)
 
 
 _OWNER, _PARENT, _DATA, _FIELDS = 0, 1, 4, 7

@@ -48,8 +48,8 @@ _NICE = 4
 
 More would starve them on a computer that has other things to do, while the run waits for them."""
 _OBJECTS = 200_000
-"""So many new ones make Python look for garbage there: Numba keeps nearly all that it makes while it compiles, and with
-the usual 700 looking took a twelfth of the time."""
+"""So many new ones make Python look for garbage there: Numba keeps nearly all that it makes while it compiles, and
+with the usual 700 looking took a twelfth of the time."""
 _PATIENCE = 600.0
 """For so long [s] a stage may be rehearsed before it is taken to hang: eight times what the longest takes (80 s on a
 machine of 2 cores)."""

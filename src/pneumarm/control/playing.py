@@ -392,7 +392,8 @@ def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignor
             learn_and_act(mind.learner, schedule, mind.x, mind.workspace, mind.random, seen, success)
             if not goes_on(rules, success, record, e):
                 break
-        before[:] = watched.angle
+        for j in range(joints):
+            before[j] = watched.angle[j]
         then, is_first = time, False
         if watched.latency > 0.0:
             _wait(body, watched, watched.latency)

@@ -18,7 +18,7 @@ from pneumarm.kernels import inner
 from pneumarm.networks.layers import through_layer, weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.kernel import SimulationParameters
-from pneumarm.vectors import add_sums
+from pneumarm.vectors import add_sums, put
 
 
 class StepWorkspace(NamedTuple):
@@ -85,17 +85,12 @@ def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
     observed, commanded, n = simulation.observed, 2 * simulation.joints, x.shape[1]
     newest = simulation.history * observed
     command = newest + (simulation.history - 1) * commanded
-    for i in range(observed, newest):
-        following[i] = x[i - observed]
-    for i in range(newest + commanded, command):
-        following[i] = x[i - commanded]
+    put(following[observed:newest], x[: newest - observed])
+    put(following[newest + commanded : command], x[newest : command - commanded])
     if simulation.history > 1:
-        for i in range(commanded):
-            following[newest + i] = x[command + i]
-    for i in range(command, x.shape[0]):
-        following[i] = x[i]
-    for i in range(observed):
-        following[i] = x[i]
+        put(following[newest : newest + commanded], x[command : command + commanded])
+    put(following[command:], x[command:])
+    put(following[:observed], x[:observed])
     for o in range(work.change.shape[0]):
         place, lowest, highest = simulation.place[o], simulation.lowest[o], simulation.highest[o]
         for e in range(n):
@@ -119,13 +114,10 @@ def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
     newest = simulation.history * observed
     command = newest + (simulation.history - 1) * commanded
     sooner[:] = np.float32(0.0)
-    for i in range(observed, newest):
-        sooner[i - observed] = later[i]
-    for i in range(newest + commanded, command):
-        sooner[i - commanded] = later[i]
+    put(sooner[: newest - observed], later[observed:newest])
+    put(sooner[newest : command - commanded], later[newest + commanded : command])
     if simulation.history > 1:
-        for i in range(commanded):
-            sooner[command + i] = later[newest + i]
+        put(sooner[command : command + commanded], later[newest : newest + commanded])
     for joint in range(simulation.velocity.shape[0]):
         angle, rate = 4 * joint, simulation.velocity[joint, 0]
         for e in range(n):

@@ -28,6 +28,7 @@ from pneumarm.networks.layers import Trainable, backward, forward, through_weigh
 from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import StepWorkspace, step_all, step_back, step_workspace
 from pneumarm.simulation.kernel import SimulationParameters
+from pneumarm.vectors import put
 
 _ZERO = np.float32(0.0)
 
@@ -132,12 +133,12 @@ def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
         end = 0
         for layer in range(len(net.units) - 1):
             begin, end = end, end + net.units[layer].shape[0]
-            tape.units[t, begin:end] = net.units[layer]
+            put(tape.units[t, begin:end], net.units[layer])
         if task.commands.coarse > 0:
             note_underway(task, tape, t)
         write_commands(task.commands, x, tape.underway, net.units[-1], tape.slope[t], x[first : first + commanded])
         step_all(simulation, x, tape.x[t + 1], tape.work)
-        tape.hidden[t] = tape.work.hidden
+        put(tape.hidden[t], tape.work.hidden)
         note_free(task, tape, t)
 
 
@@ -214,14 +215,15 @@ def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
         for e in range(n):
             later[4 * joint + 2, e] += row[1, e] * share
             later[4 * joint + 3, e] += row[2, e] * share
-    tape.work.hidden[:] = tape.hidden[t]
-    tape.work.free[:] = tape.free[t]
+    put(tape.work.hidden, tape.hidden[t])
+    put(tape.work.free, tape.free[t])
     step_back(simulation, later, sooner, tape.work)
     for c in range(commanded):
         command, before = tape.x[t, first + c], row[0]
         before[:] = _ZERO
         if simulation.history > 1:
-            before[:] = tape.x[t, first - (simulation.history - 1) * commanded + c]
+            for e in range(n):
+                before[e] = tape.x[t, first - (simulation.history - 1) * commanded + c, e]
         total += price_of_changes(task.prices, command, before, row[1], row[2])
         for e in range(n):
             sooner[first + c, e] += row[1, e] * share
@@ -248,7 +250,7 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
         end = 0
         for layer in range(len(net.units) - 1):
             begin, end = end, end + net.units[layer].shape[0]
-            net.units[layer][:] = tape.units[t, begin:end]
+            put(net.units[layer], tape.units[t, begin:end])
         for c in range(commanded):
             for e in range(n):
                 net.errors[-1][c, e] = sooner[first + c, e] * tape.slope[t, c, e]
@@ -263,7 +265,7 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
 @inner(fastmath=FASTMATH)
 def go_sooner(task, tape, share):  # type: ignore[no-untyped-def]
     """Make the derivatives by a step's state those of the steps that follow the one before it, cut off."""
-    tape.later[:] = tape.sooner
+    put(tape.later, tape.sooner)
     cut_off(tape.later, np.float32(task.steepest) * share * task.inputs.tolerances.max(), tape.row[0])
 
 

@@ -36,6 +36,7 @@ from pneumarm.networks.tansig import FASTMATH
 from pneumarm.simulation.gradient import step_all
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.changes import changes
+from pneumarm.vectors import put
 
 _changes = part(changes)
 _HORIZON = 0.55  # s
@@ -94,7 +95,7 @@ def play(task, plans, tape):  # type: ignore[no-untyped-def]
                 x[first + c, e] = pulse if wished > _ZERO else -pulse
                 tape.slope[t, c, e] = leak if stopped else plans.there[c]
         step_all(simulation, x, tape.x[t + 1], tape.work)
-        tape.hidden[t] = tape.work.hidden
+        put(tape.hidden[t], tape.work.hidden)
         note_free(task, tape, t)
 
 

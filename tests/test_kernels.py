@@ -130,7 +130,7 @@ def test_a_kernel_may_make_arrays_also_where_a_part_is_the_first_to_call_it():
     assert outer(np.ones(3)) == 7.0
 
 
-def test_what_is_for_kernels_runs_as_plain_python_where_python_calls_it():
+def test_what_is_for_kernels_may_be_called_by_python_as_well():
     @inner
     def twice(x):
         return 2.0 * x

@@ -145,7 +145,10 @@ def kernel(function: _Function | None = None, **options: Any) -> Any:
 
 
 def inner(function: _Function | None = None, **options: Any) -> Any:
-    """Let kernels call ``function``, compiled into each of them. From Python it runs as plain Python."""
+    """Compile ``function`` into the kernels that call it; as a kernel of its own, with an entry, if Python does, too.
+
+    It is compiled once for each kind of arguments.
+    """
     return _for_kernels(function, {**INNER, **options})
 
 
@@ -153,7 +156,7 @@ def part(function: _Function | None = None, *, entry: bool = False, **options: A
     """Compile ``function`` as a part of hot loops: as :func:`inner`, but made to vanish in its caller.
 
     Parts take their arguments as named tuples of arrays, which take longer to pass on than a small network takes to
-    compute. One that Python calls often, too, needs an ``entry``: then it is a kernel as well.
+    compute. One that Python calls often needs an ``entry``: then it is a kernel, for kernels as well.
     """
     if entry:
         return kernel(function, **{**PART, **options})
@@ -162,20 +165,23 @@ def part(function: _Function | None = None, *, entry: bool = False, **options: A
 
 def _for_kernels(function: _Function | None, options: dict[str, Any]) -> Any:
     def compile_(f: Any) -> Any:
-        return _ForKernels(f, numba.njit(**options, no_cpython_wrapper=True)(f))
+        return _ForKernels(f, options)
 
     return compile_ if function is None else compile_(function)
 
 
 class _ForKernels:
-    """A function that kernels call compiled, once for each kind of arguments, and Python as it is written."""
-
-    def __init__(self, function: Any, compiled: Any) -> None:
+    def __init__(self, function: Any, options: dict[str, Any]) -> None:
         functools.update_wrapper(self, function)
-        self.py_func, self.compiled = function, compiled
+        self.py_func, self._options = function, options
+        self.compiled = numba.njit(**options, no_cpython_wrapper=True)(function)
+
+    @functools.cached_property
+    def _entry(self) -> Any:
+        return kernel(self.py_func, **self._options)
 
     def __call__(self, *arguments: Any) -> Any:
-        return self.py_func(*arguments)
+        return self._entry(*arguments)
 
 
 @typeof_impl.register(_ForKernels)

@@ -30,7 +30,7 @@ def test_an_arm_and_a_compiled_loop_count_alike(joints: int) -> None:
             switched = np.array([is_switch(*one) for one in zip(last, actions, strict=True)], np.int64)
             note_action(parts, switched, reached, record, 0)
             assert gained.tolist() == [paid(parts, reached, one) for one in switched]
-            assert tally.over == (not goes_on(task, reached, record, 0))
+            assert tally.over == (not goes_on.py_func(task, reached, record, 0))
             assert (tally.actions, tally.reward, tally.reached) == (record.actions[0], record.reward[0], reached)
             assert tally.paid == paid(parts, reached, switched.sum())
             last = actions

@@ -27,6 +27,7 @@ import platformdirs
 from llvmlite import ir
 from numba.extending import intrinsic, typeof_impl
 
+njit: Any = numba.njit
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 INNER: Any = {
     "nogil": True,
@@ -174,7 +175,7 @@ class _ForKernels:
     def __init__(self, function: Any, options: dict[str, Any]) -> None:
         functools.update_wrapper(self, function)
         self.py_func, self._options = function, options
-        self.compiled = numba.njit(**options, no_cpython_wrapper=True)(function)
+        self.compiled = njit(**options, no_cpython_wrapper=True)(function)
 
     @functools.cached_property
     def _entry(self) -> Any:

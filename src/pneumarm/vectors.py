@@ -90,16 +90,9 @@ def put(to: _Floats, source: _Floats) -> None:
             to[i, e] = source[i, e]
 
 
-@part(fastmath={"contract"})
 def product(a: _Floats, b: _Floats) -> float32:
-    """Return the sum of the products of ``a`` and ``b`` (n,), of every fourth one by itself; n is a multiple of 4."""
-    one = two = three = four = float32(0.0)
-    for i in range(0, a.shape[0], 4):
-        one += a[i] * b[i]
-        two += a[i + 1] * b[i + 1]
-        three += a[i + 2] * b[i + 2]
-        four += a[i + 3] * b[i + 3]
-    return (one + two) + (three + four)
+    """Return the sum of the products of ``a`` and ``b``, both (n,), a multiple of ``LANES``: a sum a lane."""
+    return (a * b).reshape(-1, LANES).sum(axis=0).sum()
 
 
 def add_sums(weights: Any, x: Any, out: Any) -> None:
@@ -180,6 +173,48 @@ def _tile(rows: int, vectors: int, lanes: int = LANES, anew: bool = False) -> An
 _anew_1, _anew_2, _anew_4 = _tile(1, 1, anew=True), _tile(1, 2, anew=True), _tile(1, 4, anew=True)
 _add_4_3, _add_1_3, _add_8_1, _add_1_1, _add_1 = _tile(4, 3), _tile(1, 3), _tile(8, 1), _tile(1, 1), _tile(1, 1, 1)
 """Rows, vectors, and where it is a single number and no vector: what sixteen registers hold with the factors."""
+
+
+@intrinsic
+def _product(_: Any, count, a, b):  # type: ignore[no-untyped-def]
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        count, *arrays = args
+        vector, place, lane = ir.VectorType(ir.FloatType(), LANES), ir.IntType(64), ir.IntType(32)
+        arrays = [floats_of(builder, array) for array in arrays]
+        before, loop, after = builder.block, builder.append_basic_block(), builder.append_basic_block()
+        builder.branch(loop)
+        builder.position_at_end(loop)
+        i, total = builder.phi(place), builder.phi(vector)
+        places = [builder.bitcast(builder.gep(array, [i]), vector.as_pointer()) for array in arrays]
+        term = builder.fmul(*(builder.load(at, align=4) for at in places), flags=_CONTRACT)
+        summed, ahead = builder.fadd(term, total, flags=_CONTRACT), builder.add(i, place(LANES))
+        builder.cbranch(builder.icmp_signed("<", ahead, count), loop, after)
+        for phi, begin, later in ((i, place(0), ahead), (total, ir.Constant(vector, None), summed)):
+            phi.add_incoming(begin, before)
+            phi.add_incoming(later, loop)
+        builder.position_at_end(after)
+        sums = [builder.extract_element(summed, lane(k)) for k in range(LANES)]
+        while len(sums) > 1:
+            sums = [builder.fadd(*pair) for pair in zip(sums[::2], sums[1::2], strict=True)]
+        return sums[0]
+
+    return types.float32(types.intp, a, b), generate
+
+
+@overload(product, jit_options=PART)
+def _products(a: _Floats, b: _Floats) -> Any:
+    return _product_in_lanes if EXTENDED else _plain_product
+
+
+def _product_in_lanes(a: _Floats, b: _Floats) -> Any:
+    return _product(a.shape[0], a, b)  # type: ignore[call-arg]
+
+
+def _plain_product(a: _Floats, b: _Floats) -> Any:
+    total = float32(0.0)
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
 
 
 @overload(weighted_sums, jit_options=PART)

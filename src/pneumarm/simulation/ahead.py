@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import borrowed, kernel
 from pneumarm.networks.layers import Trainable, adam, add_slopes, trainable
 from pneumarm.networks.network import Network
 from pneumarm.networks.tansig import FASTMATH
@@ -222,6 +222,7 @@ def move_ahead(simulation, tape):  # type: ignore[no-untyped-def]
 @kernel(fastmath=FASTMATH)
 def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost of a step to ``net.gradient``."""
+    net, simulation, tape = borrowed((net, simulation, tape))
     last = len(net.layers) - 1
     for o in range(simulation.output.shape[0]):
         for u in range(simulation.output.shape[1]):

@@ -214,7 +214,8 @@ def predict_change(simulation, state):  # type: ignore[no-untyped-def]
     for o in range(simulation.output_bias.shape[0]):
         state.change[o] = product(hidden, simulation.output[o]) + simulation.output_bias[o]
     for o in range(simulation.direct.shape[0]):
-        state.change[o] += product(x, simulation.direct[o])
+        for i in range(x.shape[0]):
+            state.change[o] += x[i] * simulation.direct[o, i]
 
 
 @part(entry=True)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import inner, kernel
+from pneumarm.kernels import borrowed, inner, kernel
 from pneumarm.learning.servo.commands import CommandParameters, write_commands
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, inputs_back, write_inputs
 from pneumarm.learning.servo.price import (
@@ -123,6 +123,7 @@ def tape(task: ServoTask, steps: int, n: int, hidden: int = 0) -> Tape:
 @kernel(fastmath=FASTMATH)
 def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
     """Let the policy ``net`` move all arms from ``tape.x[0]`` on."""
+    task, net, tape = borrowed((task, net, tape))
     simulation = task.simulation
     commanded = 2 * simulation.joints
     first = simulation.history * simulation.observed + (simulation.history - 1) * commanded
@@ -236,6 +237,7 @@ def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
 @kernel(fastmath=FASTMATH)
 def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost a step to ``net.gradient``, after :func:`move_forward`; return the cost."""
+    task, net, tape = borrowed((task, net, tape))
     simulation = task.simulation
     commanded = 2 * simulation.joints
     first = simulation.history * simulation.observed + (simulation.history - 1) * commanded

@@ -16,11 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import borrowed, inner, kernel, part
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import (
     ServoTask,
-    Tape,
     Trainable,
     errors_of,
     go_sooner,
@@ -77,7 +76,7 @@ def plans_of(steps: int, there: NDArray[np.float32], n: int) -> Plans:
     return Plans(commands, gradient, mean, square, np.zeros(n, np.float32), best, np.zeros(n, np.float32), there)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def play(task, plans, tape):  # type: ignore[no-untyped-def]
     """Play the commands from ``tape.x[0]`` on."""
     simulation, how = task.simulation, task.commands
@@ -99,7 +98,7 @@ def play(task, plans, tape):  # type: ignore[no-untyped-def]
         note_free(task, tape, t)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def price(task, plans, tape):  # type: ignore[no-untyped-def]
     """Set ``plans.cost`` to what the movements on ``tape`` cost; valve changes are counted."""
     simulation, cost = task.simulation, plans.cost
@@ -121,7 +120,7 @@ def price(task, plans, tape):  # type: ignore[no-untyped-def]
                 cost[e] += change * _changes(now, tape.x[t, first - lag + c, e] if lag else _ZERO)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def slopes_by_commands(task, plans, tape):  # type: ignore[no-untyped-def]
     """Set ``plans.gradient`` to the derivatives of what the movements on ``tape`` cost, after :func:`play`."""
     simulation = task.simulation
@@ -139,39 +138,48 @@ def slopes_by_commands(task, plans, tape):  # type: ignore[no-untyped-def]
         go_sooner(task, tape, _ONE)
 
 
+@inner
+def copy_plan(to, e, source, number):  # type: ignore[no-untyped-def]
+    """Make plan ``e`` of ``to`` plan ``number`` of ``source``."""
+    for t in range(to.shape[0]):
+        for c in range(to.shape[1]):
+            to[t, c, e] = source[t, c, number]
+
+
 @kernel(fastmath=FASTMATH)
-def follow_slopes(plans, number, rate):  # type: ignore[no-untyped-def]
-    """Move the commands along the gradient, for the time ``number`` from 1, by Adam's rule."""
-    unbias, unbias_square = _ONE - _MEAN ** np.float32(number), _ONE - _SQUARE ** np.float32(number)
-    step = np.float32(rate) / unbias
-    for t in range(plans.commands.shape[0]):
-        for c in range(plans.commands.shape[1]):
-            commands, gradient = plans.commands[t, c], plans.gradient[t, c]
-            mean, square = plans.mean[t, c], plans.square[t, c]
-            for e in range(commands.shape[0]):
-                mean[e] = _MEAN * mean[e] + (_ONE - _MEAN) * gradient[e]
-                square[e] = _SQUARE * square[e] + (_ONE - _SQUARE) * gradient[e] * gradient[e]
-                moved = commands[e] - step * mean[e] / (np.sqrt(square[e] / unbias_square) + _TINY)
-                commands[e] = min(max(moved, -_ONE), _ONE)
-
-
-def improve(task: ServoTask, plans: Plans, tape: Tape, times: int, rate: float) -> None:
+def improve(task, plans, tape, times, rate):  # type: ignore[no-untyped-def]
     """Make each plan better so many ``times``, and play the cheapest of all that there were, as all plans."""
-    plans.mean[:] = 0.0
-    plans.square[:] = 0.0
+    task, plans, tape = borrowed((task, plans, tape))
+    plans.mean[:] = _ZERO
+    plans.square[:] = _ZERO
     play(task, plans, tape)
     price(task, plans, tape)
-    plans.best[:] = plans.commands
-    plans.least[:] = plans.cost
+    for t in range(plans.commands.shape[0]):
+        put(plans.best[t], plans.commands[t])
+    for e in range(plans.cost.shape[0]):
+        plans.least[e] = plans.cost[e]
     for number in range(times):
         slopes_by_commands(task, plans, tape)
-        follow_slopes(plans, number + 1, rate * (1.0 - number / times))
+        unbias, unbias_square = _ONE - _MEAN ** np.float32(number + 1), _ONE - _SQUARE ** np.float32(number + 1)
+        step = np.float32(rate * (1.0 - number / times)) / unbias
+        for t in range(plans.commands.shape[0]):
+            for c in range(plans.commands.shape[1]):
+                commands, gradient = plans.commands[t, c], plans.gradient[t, c]
+                mean, square = plans.mean[t, c], plans.square[t, c]
+                for e in range(commands.shape[0]):
+                    mean[e] = _MEAN * mean[e] + (_ONE - _MEAN) * gradient[e]
+                    square[e] = _SQUARE * square[e] + (_ONE - _SQUARE) * gradient[e] * gradient[e]
+                    moved = commands[e] - step * mean[e] / (np.sqrt(square[e] / unbias_square) + _TINY)
+                    commands[e] = min(max(moved, -_ONE), _ONE)
         play(task, plans, tape)
         price(task, plans, tape)
-        better = plans.cost < plans.least
-        np.copyto(plans.least, plans.cost, where=better)
-        np.copyto(plans.best, plans.commands, where=better)
-    plans.commands[:] = plans.best[:, :, plans.least.argmin(), None]
+        for e in range(plans.cost.shape[0]):
+            if plans.cost[e] < plans.least[e]:
+                plans.least[e] = plans.cost[e]
+                copy_plan(plans.best, e, plans.commands, e)
+    cheapest = plans.least.argmin()
+    for e in range(plans.least.shape[0]):
+        copy_plan(plans.commands, e, plans.best, cheapest)
     play(task, plans, tape)
 
 

@@ -3,8 +3,8 @@
 A compiler turns a loop over a few hundred units into good vector instructions. Networks here have 5 to 50, and it
 does not know how many: it adds up in memory, in pieces of different widths, and spends more instructions on finding
 the way than on numbers. So what is added up here stays in registers over all inputs, ``LANES`` units or samples at
-once (:func:`_tile`, the one piece of code made by hand). Every sum is made in the order of its inputs, so what comes
-out does not depend on how wide the machine's vectors are.
+once (:func:`_tile` and :func:`_product`, the code made by hand). Every sum is made in the order of its inputs, or of
+its lanes, so what comes out does not depend on how wide the machine's vectors are.
 
 Each is an ordinary function, which says what it does and runs as plain Python; kernels (:mod:`pneumarm.kernels`) have
 loops of tiles in its place. Arrays are float32 and C-contiguous, unless a function says otherwise.

@@ -118,7 +118,7 @@ def multiplied(a: Any, b: Any) -> Any:
     return product(a, b)
 
 
-@pytest.mark.parametrize("size", [LANES, 3 * LANES, 16 * LANES])
+@pytest.mark.parametrize("size", [0, LANES, 3 * LANES, 16 * LANES])
 def test_a_product_is_what_the_function_says(size: int) -> None:
     a, b = numbers(size), numbers(size)[::-1].copy()
     assert multiplied(a, b) == product(a, b) == a @ b

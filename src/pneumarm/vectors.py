@@ -207,7 +207,7 @@ def _products(a: _Floats, b: _Floats) -> Any:
 
 
 def _product_in_lanes(a: _Floats, b: _Floats) -> Any:
-    return _product(a.shape[0], a, b)  # type: ignore[call-arg]
+    return _product(a.shape[0], a, b) if a.shape[0] > 0 else float32(0.0)  # type: ignore[call-arg]
 
 
 def _plain_product(a: _Floats, b: _Floats) -> Any:

@@ -64,7 +64,7 @@ lowest:  ## the quick tests with Python 3.11 and the oldest versions that are al
 	test -x $(LOWEST)/bin/python || $(PYTHON311) -m venv $(LOWEST)
 	sed -n '/^dependencies/,/^]/s/^ *"\([a-z0-9-]*\)>=\([0-9.]*\).*/\1==\2/p' pyproject.toml > $(LOWEST)/oldest.txt
 	$(LOWEST)/bin/pip install --quiet --disable-pip-version-check --constraint $(LOWEST)/oldest.txt --editable . pytest hypothesis psutil
-	$(LOWEST)/bin/python -m pytest tests/test_kernels.py tests/test_vectors.py tests/arm/test_*.py tests/networks tests/simulation tests/task tests/planning tests/transitions/test_store.py tests/transitions/test_window.py
+	$(LOWEST)/bin/python -m pytest tests/test_kernels.py tests/test_vectors.py tests/test_public_interfaces.py tests/arm/test_*.py tests/networks tests/simulation tests/task tests/planning tests/transitions/test_store.py tests/transitions/test_window.py
 
 site: setup  ## the documentation as pages to be read in a browser, into site/
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -1,6 +1,5 @@
 """What is rehearsed beside a run: every stage, on made-up data, of arms of any kind; once for each cache."""
 
-import os
 import signal
 import sys
 from collections.abc import Callable
@@ -13,7 +12,7 @@ import pytest
 from pneumarm import rehearsal
 from pneumarm.arm import open_arm
 from pneumarm.learning import ServoSettings
-from pneumarm.rehearsal import STAGES, Rehearsal, WarmUpJob, installed, warm_up_stages
+from pneumarm.rehearsal import STAGES, Rehearsal, WarmUpJob, warm_up_stages
 from pneumarm.run import Run, RunSettings
 from pneumarm.simulation import FitSettings
 
@@ -43,20 +42,6 @@ def run_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], N
         monkeypatch.setattr(sys, "executable", str(python))
 
     return run_by
-
-
-def test_the_same_sources_elsewhere_or_newer_are_rehearsed_anew(tmp_path: Path) -> None:
-    """Numba compiles them again."""
-    names = set()
-    for place in ("here", "there"):
-        (tmp_path / place).mkdir()
-        source = tmp_path / place / "one.py"
-        source.write_text("")
-        for when in (1_000, 2_000):
-            os.utime(source, (when, when))
-            names.add(installed(tmp_path / place))
-        assert installed(tmp_path / place) in names
-    assert len(names) == 4
 
 
 @pytest.mark.parametrize("name", ["virtual:seed=2", "virtual:wide,seed=3", "virtual:joints=2,seed=1"])

@@ -7,7 +7,7 @@ import pytest
 from numba.core.errors import TypingError
 
 from pneumarm.kernels import kernel
-from pneumarm.vectors import LANES, ROWS, add_products, add_sums, follow, weighted_sums
+from pneumarm.vectors import LANES, ROWS, add_products, add_sums, follow, product, weighted_sums
 
 SIZES = [
     (ROWS, LANES),
@@ -111,3 +111,14 @@ def test_sums_of_a_sample_do_not_depend_on_those_beside_it() -> None:
 def test_sums_over_many_samples_refuse_other_arrays_where_they_are_compiled(wrong: Any) -> None:
     with pytest.raises(TypingError):
         added_in_kernels(np.zeros((5, 4), np.float32), wrong, np.zeros((4, 9), np.float32))
+
+
+@kernel
+def multiplied(a: Any, b: Any) -> Any:
+    return product(a, b)
+
+
+@pytest.mark.parametrize("size", [0, LANES, 3 * LANES, 16 * LANES])
+def test_a_product_is_what_the_function_says(size: int) -> None:
+    a, b = numbers(size), numbers(size)[::-1].copy()
+    assert multiplied(a, b) == product(a, b) == a @ b

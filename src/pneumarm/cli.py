@@ -9,6 +9,7 @@ import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
 from typing import Any
 
 from cyclopts import App, CycloptsError, Group, Parameter, UnusedCliTokensError
@@ -265,7 +266,7 @@ def _run(arguments: list[str]) -> int:
             with suppress(OSError):
                 sys.stdout.close()  # or Python would try once more to write what is left
         else:
-            complain(f"{type(error).__name__}: {error} (a bug in pneumarm: PNEUMARM_DEBUG=1 shows where)")
+            complain(f"{type(error).__name__}: {error} ({_cause(error)})")
         return 1
     return 0
 
@@ -277,6 +278,16 @@ def _with_nobody_to_read() -> int:
         for stream in (sys.stdout, sys.stderr):
             os.dup2(nowhere, stream.fileno())
     return 128 + getattr(signal, "SIGPIPE", 13)  # Windows has none
+
+
+def _cause(error: Exception) -> str:
+    """Return what made an ``error`` that nobody expected, and what to do."""
+    passed = {Path(frame.filename).parts[-3:] for frame in traceback.extract_tb(error.__traceback__)}
+    if ("numba", "core", "caching.py") in passed:
+        from pneumarm.kernels import CACHE_FOLDER
+
+        return f"compiled code on the disk is damaged: delete the folder {CACHE_FOLDER} and try again"
+    return "a bug in pneumarm: PNEUMARM_DEBUG=1 shows where"
 
 
 def _too_many(error: UnusedCliTokensError) -> str:

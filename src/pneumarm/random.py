@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import inner, kernel
+from pneumarm.kernels import inner
 
 RandomState = NDArray[np.uint64]
 
@@ -49,7 +49,7 @@ def next_word(state):  # type: ignore[no-untyped-def]
     return result
 
 
-@kernel
+@inner
 def uniform(state):  # type: ignore[no-untyped-def]
     """Return a float64 uniform in [0, 1)."""
     return float(next_word(state) >> np.uint64(11)) * _TO_UNIT
@@ -80,7 +80,7 @@ _TAIL = 3.6541528853610088  # where 256 layers of equal area begin their tail
 _EDGE, _CURVE = _ziggurat()
 
 
-@kernel
+@inner
 def normal(state):  # type: ignore[no-untyped-def]
     """Return a standard normal deviate (the ziggurat of Marsaglia and Tsang, J. Stat. Softw. 5(8), 2000)."""
     while True:

@@ -5,7 +5,7 @@ compiled here goes to the same cache on the disk (:mod:`pneumarm.kernels`), and 
 else comes of a rehearsal: a run without one gives the same results, later.
 """
 
-import hashlib
+import gc
 import json
 import os
 import subprocess
@@ -41,6 +41,9 @@ _PLANNED = 4  # movements
 _NICE = 4
 """So that the run, which moves an arm in time, comes first. More would starve the rehearsal on a computer that has
 other things to do, while the run waits for it."""
+_OBJECTS = 200_000
+"""So many new ones make Python look for garbage there: Numba keeps nearly all that it makes while it compiles, and
+with the usual 700 looking took a twelfth of the time."""
 _PATIENCE = 600.0
 """For so long [s] a stage is waited for before its rehearsal is taken to hang: eight times what the longest takes (80
 s on a machine of 2 cores)."""
@@ -53,16 +56,7 @@ STAGES = ("simulation", "training", "test", "transfer", "settle", "bound")
 """What is rehearsed, in this order."""
 
 
-def installed(package: Path) -> str:
-    """Return a name for the sources below ``package`` where they lie and as old as they are.
-
-    Numba knows a source by its place and its time, so the same sources in another folder are compiled again.
-    """
-    newest = max(path.stat().st_mtime_ns for path in package.rglob("*.py"))
-    return hashlib.sha256(f"{package.resolve()} {newest}".encode()).hexdigest()[:16]
-
-
-_MARKER = CACHE_FOLDER / f"rehearsed-{installed(Path(__file__).parent)}"
+_MARKER = CACHE_FOLDER / "rehearsed"
 """The file that names the stages whose kernels are in the cache."""
 
 
@@ -189,6 +183,7 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
 def main() -> None:
     """Rehearse the job in the argument, and note the stages that are done."""
     signals_as_exceptions()  # also when the run that it is for has ended
+    gc.set_threshold(_OBJECTS)
     if hasattr(os, "nice"):
         os.nice(_NICE)
     job = msgspec.json.decode(sys.argv[1], type=WarmUpJob)

@@ -2,27 +2,24 @@
 
 A compiler turns a loop over a few hundred units into good vector instructions. Networks here have 5 to 50, and it
 does not know how many: it adds up in memory, in pieces of different widths, and spends more instructions on finding
-the way than on numbers. These functions are such loops written for the machine: ``LANES`` units at once (or twice as
-many), their sums in registers over all inputs. Every sum is made in the order of its inputs, so what comes out does
-not depend on how wide the machine's vectors are.
+the way than on numbers. So what is added up here stays in registers over all inputs, ``LANES`` units or samples at
+once (:func:`_tile` and :func:`_product`, the code made by hand). Every sum is made in the order of its inputs, or of
+its lanes, so what comes out does not depend on how wide the machine's vectors are.
 
-Each is an ordinary function, which says what it does and runs as plain Python, with a translation for kernels
-(:mod:`pneumarm.kernels`). Arrays are float32 and C-contiguous, unless a function says otherwise.
+Each is an ordinary function, which says what it does and runs as plain Python; kernels (:mod:`pneumarm.kernels`) have
+loops of tiles in its place. Arrays are float32 and C-contiguous, unless a function says otherwise.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic, overload
-from numba.np.arrayobj import make_array
 from numpy import float32
 from numpy.typing import NDArray
 
-from pneumarm.kernels import PART
+from pneumarm.kernels import EXTENDED, INNER, PART, floats_of, inner, part
 
 LANES = 8
 """Units are padded to a multiple of this."""
@@ -30,7 +27,6 @@ ROWS = 4
 """Inputs are padded to a multiple of this."""
 
 _Floats = NDArray[float32]
-_ALIGNED = 4  # bytes
 _CONTRACT = ("contract",)  # a product and a sum may become one instruction, which rounds once
 
 
@@ -46,9 +42,11 @@ def weighted_sums(x: _Floats, weights: _Floats, first: int, sums: _Floats) -> No
     """
     sums[:] = 0
     for i in range(x.shape[0]):
-        sums += x[i] * weights[i, first : first + sums.shape[0]]
+        for u in range(sums.shape[0]):
+            sums[u] += x[i] * weights[i, first + u]
 
 
+@part(fastmath={"contract"})
 def add_products(table: _Floats, first: int, x: _Floats, factors: _Floats) -> None:
     """Add ``x[i] factors[u]`` to ``table[i, first + u]``.
 
@@ -60,9 +58,11 @@ def add_products(table: _Floats, first: int, x: _Floats, factors: _Floats) -> No
 
     """
     for i in range(x.shape[0]):
-        table[i, first : first + factors.shape[0]] += x[i] * factors
+        for u in range(factors.shape[0]):
+            table[i, np.uint64(first + u)] += x[i] * factors[u]  # an unsigned index needs no test for wrapping around
 
 
+@part(fastmath={"contract"})
 def follow(table: _Floats, traces: _Floats, first: int, units: int, factor: float32, decay: float32) -> None:
     """Add ``factor`` times ``traces`` to ``table`` and multiply ``traces`` by ``decay``, in some columns of both.
 
@@ -75,11 +75,27 @@ def follow(table: _Floats, traces: _Floats, first: int, units: int, factor: floa
         decay: of the traces, afterwards.
 
     """
-    table[:, first : first + units] += factor * traces[:, first : first + units]
-    traces[:, first : first + units] *= decay
+    for i in range(table.shape[0]):
+        for u in range(first, first + units):
+            trace = traces[i, np.uint64(u)]
+            table[i, np.uint64(u)] += factor * trace
+            traces[i, np.uint64(u)] = trace * decay
 
 
-def add_sums(weights: _Floats, x: _Floats, out: _Floats) -> None:
+@inner
+def put(to: _Floats, source: _Floats) -> None:
+    """Copy ``source`` to ``to``, both (rows, n): in far less code than an assignment, which looks at the shapes."""
+    for i in range(to.shape[0]):
+        for e in range(to.shape[1]):
+            to[i, e] = source[i, e]
+
+
+def product(a: _Floats, b: _Floats) -> float32:
+    """Return the sum of the products of ``a`` and ``b``, both (n,), a multiple of ``LANES``: a sum a lane."""
+    return (a * b).reshape(-1, LANES).sum(axis=0).sum()
+
+
+def add_sums(weights: Any, x: Any, out: Any) -> None:
     """Add W^T x to ``out``: to each row of it the rows of ``x``, weighted, in their order.
 
     Args:
@@ -90,237 +106,167 @@ def add_sums(weights: _Floats, x: _Floats, out: _Floats) -> None:
     """
     for o in range(out.shape[0]):
         for i in range(x.shape[0]):
-            out[o] += weights[i, o] * x[i]
+            for e in range(x.shape[1]):
+                out[o, e] += weights[i, o] * x[i, e]
 
 
-class _Table:
-    """An array of a kernel while code for the kernel is made: what is at an index, in as many lanes as are wanted."""
+def _tile(rows: int, vectors: int, lanes: int = LANES, anew: bool = False) -> Any:
+    """Return, for kernels, a sum over inputs in ``rows`` times ``vectors`` of so many ``lanes``, held in registers.
 
-    def __init__(self, context: Any, builder: Any, kind: types.Array, value: Any) -> None:
-        array = make_array(kind)(context, builder, value)
-        self._builder, self._data = builder, array.data
-        self.shape = cgutils.unpack_tuple(builder, array.shape)
-        self._strides = cgutils.unpack_tuple(builder, array.strides)  # bytes
-
-    def _place(self, index: Any, lanes: int) -> Any:
-        kind = ir.VectorType(ir.FloatType(), lanes).as_pointer()
-        return self._builder.bitcast(self._builder.gep(self._data, [index]), kind)
-
-    def load(self, index: Any, lanes: int) -> Any:
-        return self._builder.load(self._place(index, lanes), align=_ALIGNED)
-
-    def store(self, value: Any, index: Any, lanes: int) -> None:
-        self._builder.store(value, self._place(index, lanes), align=_ALIGNED)
-
-    def spread(self, index: Any, lanes: int) -> Any:
-        """Return the number at ``index`` in every lane."""
-        return _spread(self._builder, self._builder.load(self._builder.gep(self._data, [index])), lanes)
-
-    def place(self, row: Any, column: Any) -> Any:
-        """Return the index of ``column`` in ``row`` of a matrix, whatever its strides are."""
-        size = ir.Constant(row.type, 4)
-        parts = [self._builder.mul(at, stride) for at, stride in zip((row, column), self._strides, strict=True)]
-        return self._builder.sdiv(self._builder.add(*parts), size, flags=["exact"])
-
-
-def _spread(builder: Any, number: Any, lanes: int) -> Any:
-    """Return a vector with ``number`` in every lane."""
-    kind, index = ir.VectorType(ir.FloatType(), lanes), ir.IntType(32)
-    first = builder.insert_element(ir.Constant(kind, ir.Undefined), number, ir.Constant(index, 0))
-    everywhere = ir.Constant(ir.VectorType(index, lanes), [0] * lanes)
-    return builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined), everywhere)
-
-
-def _multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
-    return builder.fadd(builder.fmul(a, b, flags=_CONTRACT), c, flags=_CONTRACT)
-
-
-def _blocks(builder: Any, count: Any, body: Callable[[list[Any], int], None], at_once: Sequence[int] = (1,)) -> None:
-    """Call ``body(places, lanes)`` for all vectors of ``count`` units, so many ``at_once`` while there are so many.
-
-    Vectors are wide ones where the count allows it.
+    ``add(count, weights, w, w_input, w_row, x, e, x_input, out, o, o_row)`` adds to ``out``, for each row and each
+    of the ``vectors * lanes`` columns, the sum over ``count`` inputs of weights times ``x``; ``anew``, it puts
+    the sum there. After each array come the place of the first number in its memory and the steps from input
+    to input, and from row to row.
     """
-    kind = count.type
-    is_wide = builder.icmp_unsigned("==", builder.urem(count, kind(2 * LANES)), kind(0))
-    with builder.if_else(is_wide) as cases:
-        for case, lanes in zip(cases, (2 * LANES, LANES), strict=True):
-            with case:
-                begin = kind(0)
-                for vectors in at_once:
-                    step = kind(vectors * lanes)
-                    left = builder.sub(count, begin)
-                    end = builder.add(begin, builder.sub(left, builder.urem(left, step)))
-                    with cgutils.for_range_slice(builder, begin, end, step) as (first, _):
-                        body([builder.add(first, kind(k * lanes)) for k in range(vectors)], lanes)
-                    begin = end
+
+    @intrinsic
+    def add(_: Any, count, weights, w, w_input, w_row, x, e, x_input, out, o, o_row):  # type: ignore[no-untyped-def]
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            count, weights, w, w_input, w_row, x, e, x_input, out, o, o_row = args
+            weights, x, out = (floats_of(builder, array) for array in (weights, x, out))
+            vector, place, index = ir.VectorType(ir.FloatType(), lanes), ir.IntType(64), ir.IntType(32)
+
+            def vectors_at(array: Any, first: Any) -> list[Any]:
+                at = [builder.add(first, place(v * lanes)) for v in range(vectors)]
+                return [builder.bitcast(builder.gep(array, [one]), vector.as_pointer()) for one in at]
+
+            def spread(number: Any) -> Any:
+                undefined, everywhere = (
+                    ir.Constant(vector, ir.Undefined),
+                    ir.Constant(ir.VectorType(index, lanes), None),
+                )
+                return builder.shuffle_vector(
+                    builder.insert_element(undefined, number, index(0)), undefined, everywhere
+                )
+
+            each = range(rows)
+            places = [at for r in each for at in vectors_at(out, builder.add(o, builder.mul(o_row, place(r))))]
+            begun = [ir.Constant(vector, None) if anew else builder.load(at, align=4) for at in places]
+            before, loop, after = builder.block, builder.append_basic_block(), builder.append_basic_block()
+            builder.cbranch(builder.icmp_signed(">", count, place(0)), loop, after)
+            builder.position_at_end(loop)
+            i, *totals = (builder.phi(kind) for kind in (place, *(vector for _ in places)))
+            seen = [builder.load(at, align=4) for at in vectors_at(x, builder.add(e, builder.mul(i, x_input)))]
+            first = builder.add(w, builder.mul(i, w_input))
+            factors = [builder.gep(weights, [builder.add(first, builder.mul(w_row, place(r)))]) for r in each]
+            terms = [builder.fmul(spread(builder.load(one)), of, flags=_CONTRACT) for one in factors for of in seen]
+            summed = [builder.fadd(*both, flags=_CONTRACT) for both in zip(terms, totals, strict=True)]
+            ahead = builder.add(i, place(1))
+            builder.cbranch(builder.icmp_signed("<", ahead, count), loop, after)
+            builder.position_at_end(after)
+            for phi, begin, later in zip((i, *totals), (place(0), *begun), (ahead, *summed), strict=True):
+                phi.add_incoming(begin, before)
+                phi.add_incoming(later, loop)
+            ends = [builder.phi(vector) for _ in places]
+            for phi, at, begin, later in zip(ends, places, begun, summed, strict=True):
+                phi.add_incoming(begin, before)
+                phi.add_incoming(later, loop)
+                builder.store(phi, at, align=4)
+            return context.get_dummy_value()
+
+        steps = types.intp, types.intp
+        return types.void(types.intp, weights, *steps, types.intp, x, *steps, out, *steps), generate
+
+    return add
 
 
-def _rows(builder: Any, count: Any, body: Callable[[Any], None]) -> None:
-    """Call ``body(row)`` for rows up to ``count``, a multiple of ``ROWS``, so many between two tests for the end."""
-    zero, step = ir.Constant(count.type, 0), ir.Constant(count.type, ROWS)
-    with cgutils.for_range_slice(builder, zero, count, step) as (first, _):
-        for k in range(ROWS):
-            body(builder.add(first, ir.Constant(count.type, k)))
-
-
-def _tables(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> list[_Table]:
-    return [
-        _Table(context, builder, kind, value)
-        for kind, value in zip(signature.args, args, strict=True)
-        if isinstance(kind, types.Array)
-    ]
-
-
-@intrinsic
-def _weighted_sums(typing: Any, x: Any, weights: Any, first: Any, sums: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> Any:
-        x, weights, sums = _tables(context, builder, signature, args)
-
-        def block(places: list[Any], lanes: int) -> None:
-            zero = ir.Constant(ir.VectorType(ir.FloatType(), lanes), None)
-            totals = [cgutils.alloca_once(builder, zero.type) for _ in places]
-            for total in totals:
-                builder.store(zero, total)
-
-            def row(i: Any) -> None:
-                begin, number = builder.add(builder.mul(i, weights.shape[1]), args[2]), x.spread(i, lanes)
-                for total, place in zip(totals, places, strict=True):
-                    weight = weights.load(builder.add(begin, place), lanes)
-                    builder.store(_multiply_add(builder, number, weight, builder.load(total)), total)
-
-            _rows(builder, x.shape[0], row)
-            for total, place in zip(totals, places, strict=True):
-                sums.store(builder.load(total), place, lanes)
-
-        _blocks(builder, sums.shape[0], block, at_once=(4, 2, 1))
-        return context.get_dummy_value()
-
-    return types.void(x, weights, types.intp, sums), generate
-
-
-@intrinsic
-def _add_products(typing: Any, table: Any, first: Any, x: Any, factors: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> Any:
-        table, x, factors = _tables(context, builder, signature, args)
-
-        def block(places: list[Any], lanes: int) -> None:
-            (u,) = places
-            factor = factors.load(u, lanes)
-
-            def row(i: Any) -> None:
-                place = builder.add(builder.add(builder.mul(i, table.shape[1]), args[1]), u)
-                moved = _multiply_add(builder, x.spread(i, lanes), factor, table.load(place, lanes))
-                table.store(moved, place, lanes)
-
-            _rows(builder, x.shape[0], row)
-
-        _blocks(builder, factors.shape[0], block)
-        return context.get_dummy_value()
-
-    return types.void(table, types.intp, x, factors), generate
+_anew_1, _anew_2, _anew_4 = _tile(1, 1, anew=True), _tile(1, 2, anew=True), _tile(1, 4, anew=True)
+_add_4_3, _add_1_3, _add_8_1, _add_1_1, _add_1 = _tile(4, 3), _tile(1, 3), _tile(8, 1), _tile(1, 1), _tile(1, 1, 1)
+"""Rows, vectors, and where it is a single number and no vector: what sixteen registers hold with the factors."""
 
 
 @intrinsic
-def _follow(typing: Any, table: Any, traces: Any, first: Any, units: Any, factor: Any, decay: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> Any:
-        table, traces = _tables(context, builder, signature, args)
-        first, units, factor, decay = args[2:]
+def _product(_: Any, count, a, b):  # type: ignore[no-untyped-def]
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        count, *arrays = args
+        vector, place, lane = ir.VectorType(ir.FloatType(), LANES), ir.IntType(64), ir.IntType(32)
+        arrays = [floats_of(builder, array) for array in arrays]
+        before, loop, after = builder.block, builder.append_basic_block(), builder.append_basic_block()
+        builder.branch(loop)
+        builder.position_at_end(loop)
+        i, total = builder.phi(place), builder.phi(vector)
+        places = [builder.bitcast(builder.gep(array, [i]), vector.as_pointer()) for array in arrays]
+        term = builder.fmul(*(builder.load(at, align=4) for at in places), flags=_CONTRACT)
+        summed, ahead = builder.fadd(term, total, flags=_CONTRACT), builder.add(i, place(LANES))
+        builder.cbranch(builder.icmp_signed("<", ahead, count), loop, after)
+        for phi, begin, later in ((i, place(0), ahead), (total, ir.Constant(vector, None), summed)):
+            phi.add_incoming(begin, before)
+            phi.add_incoming(later, loop)
+        builder.position_at_end(after)
+        sums = [builder.extract_element(summed, lane(k)) for k in range(LANES)]
+        while len(sums) > 1:
+            sums = [builder.fadd(*pair) for pair in zip(sums[::2], sums[1::2], strict=True)]
+        return sums[0]
 
-        def block(places: list[Any], lanes: int) -> None:
-            factors, decays = (_spread(builder, number, lanes) for number in (factor, decay))
-            with cgutils.for_range(builder, table.shape[0]) as loop:
-                begin = builder.add(builder.mul(loop.index, table.shape[1]), first)
-                place = builder.add(begin, places[0])
-                trace = traces.load(place, lanes)
-                table.store(_multiply_add(builder, factors, trace, table.load(place, lanes)), place, lanes)
-                traces.store(builder.fmul(trace, decays), place, lanes)
-
-        _blocks(builder, units, block)
-        return context.get_dummy_value()
-
-    return types.void(table, traces, types.intp, types.intp, types.float32, types.float32), generate
-
-
-_TILES = (LANES, 3, (4, 1)), (LANES, 1, (8, 1)), (1, 1, (1,))
-"""What is added up at once: lanes of a vector, vectors, rows of them; sixteen registers hold it with its factors."""
-
-
-@intrinsic
-def _add_sums(typing: Any, weights: Any, x: Any, out: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, args: Sequence[Any]) -> Any:
-        weights, x, out = _tables(context, builder, signature, args)
-        kind = x.shape[0].type
-
-        def tile(e: Any, lanes: int, vectors: int, first: Any, rows: int) -> None:
-            """Add to so many ``rows`` of ``out``, from ``first`` on, at the samples from ``e`` on."""
-            outputs = [builder.add(first, kind(r)) for r in range(rows)]
-            samples = [builder.add(e, kind(v * lanes)) for v in range(vectors)]
-            places = [out.place(o, at) for o in outputs for at in samples]
-            totals = [cgutils.alloca_once_value(builder, out.load(place, lanes)) for place in places]
-            with cgutils.for_range(builder, x.shape[0]) as loop:
-                seen = [x.load(x.place(loop.index, at), lanes) for at in samples]
-                factors = [weights.spread(weights.place(loop.index, o), lanes) for o in outputs]
-                terms = [(factor, one) for factor in factors for one in seen]
-                for total, (factor, one) in zip(totals, terms, strict=True):
-                    builder.store(_multiply_add(builder, factor, one, builder.load(total)), total)
-            for total, place in zip(totals, places, strict=True):
-                out.store(builder.load(total), place, lanes)
-
-        begin = kind(0)
-        for lanes, vectors, heights in _TILES:
-            with _steps(builder, begin, x.shape[1], lanes * vectors) as e:
-                first = kind(0)
-                for rows in heights:
-                    with _steps(builder, first, out.shape[0], rows) as o:
-                        tile(e, lanes, vectors, o, rows)
-                    first = _last(builder, first, out.shape[0], rows)
-            begin = _last(builder, begin, x.shape[1], lanes * vectors)
-        return context.get_dummy_value()
-
-    return types.void(weights, x, out), generate
+    return types.float32(types.intp, a, b), generate
 
 
-def _last(builder: Any, begin: Any, end: Any, step: int) -> Any:
-    """Return where whole steps from ``begin`` on, that do not go beyond ``end``, lead."""
-    left = builder.sub(end, begin)
-    return builder.sub(end, builder.urem(left, begin.type(step)))
+@overload(product, jit_options=PART)
+def _products(a: _Floats, b: _Floats) -> Any:
+    return _product_in_lanes if EXTENDED else _plain_product
 
 
-@contextmanager
-def _steps(builder: Any, begin: Any, end: Any, step: int) -> Iterator[Any]:
-    """Give a number for each whole step from ``begin`` on, none of which goes beyond ``end``."""
-    last = _last(builder, begin, end, step)
-    with cgutils.for_range_slice(builder, begin, last, begin.type(step)) as (at, _):
-        yield at
+def _product_in_lanes(a: _Floats, b: _Floats) -> Any:
+    return _product(a.shape[0], a, b) if a.shape[0] > 0 else float32(0.0)  # type: ignore[call-arg]
 
 
-def _is_float32(*kinds: types.Array) -> bool:
-    return all(kind.dtype == types.float32 for kind in kinds)
+def _plain_product(a: _Floats, b: _Floats) -> Any:
+    total = float32(0.0)
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
 
 
-_CALLED: Any = {**PART, "forceinline": False}
-"""What is long is in a kernel once, and called."""
-
-# Translations for kernels.
-overload(add_sums, jit_options=_CALLED)(
-    lambda weights, x, out: _call_add_sums if _is_float32(weights, x, out) and x.layout == out.layout == "C" else None
-)
-overload(weighted_sums, jit_options=PART)(lambda x, weights, first, sums: _call_weighted_sums)
-overload(add_products, jit_options=PART)(lambda table, first, x, factors: _call_add_products)
-overload(follow, jit_options=PART)(lambda table, traces, first, units, factor, decay: _call_follow)
+@overload(weighted_sums, jit_options=PART)
+def _weighted_sums(x: _Floats, weights: _Floats, first: int, sums: _Floats) -> Any:
+    return _weighted_in_tiles if EXTENDED else weighted_sums
 
 
-def _call_add_sums(weights, x, out):  # type: ignore[no-untyped-def]
-    _add_sums(weights, x, out)  # type: ignore[call-arg]
+def _weighted_in_tiles(x: _Floats, weights: _Floats, first: int, sums: _Floats) -> Any:
+    inputs, units, width = x.shape[0], sums.shape[0], weights.shape[1]
+    u = 0
+    while u + 4 * LANES <= units:
+        _anew_4(inputs, x, 0, 1, 0, weights, first + u, width, sums, u, 0)
+        u += 4 * LANES
+    if u + 2 * LANES <= units:
+        _anew_2(inputs, x, 0, 1, 0, weights, first + u, width, sums, u, 0)
+        u += 2 * LANES
+    if u < units:
+        _anew_1(inputs, x, 0, 1, 0, weights, first + u, width, sums, u, 0)
 
 
-def _call_weighted_sums(x, weights, first, sums):  # type: ignore[no-untyped-def]
-    _weighted_sums(x, weights, first, sums)  # type: ignore[call-arg]
+@overload(add_sums, jit_options=INNER)
+def _add_sums(weights: Any, x: Any, out: Any) -> Any:
+    if not weights.dtype == x.dtype == out.dtype == types.float32 or not x.layout == out.layout == "C":
+        return None
+    return _added_in_tiles if EXTENDED else add_sums
 
 
-def _call_add_products(table, first, x, factors):  # type: ignore[no-untyped-def]
-    _add_products(table, first, x, factors)  # type: ignore[call-arg]
-
-
-def _call_follow(table, traces, first, units, factor, decay):  # type: ignore[no-untyped-def]
-    _follow(table, traces, first, units, factor, decay)  # type: ignore[call-arg]
+def _added_in_tiles(weights: Any, x: Any, out: Any) -> Any:
+    inputs, samples, outputs = x.shape[0], x.shape[1], out.shape[0]
+    down, across = weights.strides[0] // 4, weights.strides[1] // 4
+    e = 0
+    while e + 3 * LANES <= samples:
+        o = 0
+        while o + 4 <= outputs:
+            place = o * samples + e
+            _add_4_3(inputs, weights, o * across, down, across, x, e, samples, out, place, samples)
+            o += 4
+        while o < outputs:
+            _add_1_3(inputs, weights, o * across, down, 0, x, e, samples, out, o * samples + e, 0)
+            o += 1
+        e += 3 * LANES
+    while e + LANES <= samples:
+        o = 0
+        while o + 8 <= outputs:
+            place = o * samples + e
+            _add_8_1(inputs, weights, o * across, down, across, x, e, samples, out, place, samples)
+            o += 8
+        while o < outputs:
+            _add_1_1(inputs, weights, o * across, down, 0, x, e, samples, out, o * samples + e, 0)
+            o += 1
+        e += LANES
+    while e < samples:
+        for o in range(outputs):
+            _add_1(inputs, weights, o * across, down, 0, x, e, samples, out, o * samples + e, 0)
+        e += 1

@@ -28,7 +28,7 @@ from pneumarm.arm.virtual.passing import pass_for, pass_until
 from pneumarm.arm.virtual.sensors import sense
 from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import borrowed, inner, kernel, part
 from pneumarm.learning.online.agent import Agent, begin_acting, learn_and_act
 from pneumarm.learning.online.loop import Schedule, Workspace, loop_workspace
 from pneumarm.learning.online.settings import Exploration
@@ -241,7 +241,7 @@ def _schedule(exploration: Exploration | None) -> Schedule:
     return Schedule(np.inf, float(chosen.epsilon), float(chosen.temperature), 0.0)
 
 
-@kernel
+@inner
 def _read(body: Body, watched: _Guard) -> float:
     """Read the sensors, and count for how long inlets have been open; return the time."""
     time: float = sense(body, watched.angle, watched.pressure)
@@ -256,7 +256,7 @@ def _read(body: Body, watched: _Guard) -> float:
     return time
 
 
-@kernel
+@inner
 def _set(body: Body, watched: _Guard) -> None:
     """Set the valves as asked, but for inlets of muscles at their limits."""
     for j in range(watched.applied.shape[0]):
@@ -268,7 +268,7 @@ def _set(body: Body, watched: _Guard) -> None:
     command(body, watched.applied, watched.period)
 
 
-@kernel
+@inner
 def _wait(body: Body, watched: _Guard, seconds: float) -> None:
     """Let time pass, looking at the limits every period while an inlet is open."""
     while seconds > watched.period and (watched.applied > 0).any():
@@ -286,7 +286,7 @@ def _wait(body: Body, watched: _Guard, seconds: float) -> None:
     pass_for(body, seconds)
 
 
-@kernel
+@inner
 def _reach(body: Body, watched: _Guard, rules: _Rules, durations: Array) -> None:
     """As :meth:`BeginState.reach`, with the ``durations`` (joints, 2) [s] given."""
     _read(body, watched)
@@ -308,7 +308,7 @@ def _reach(body: Body, watched: _Guard, rules: _Rules, durations: Array) -> None
     _wait(body, watched, rules.settle)
 
 
-@kernel
+@inner
 def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
     """Put what was read into the state window, as :class:`~pneumarm.task.tracker.StateTracker` does."""
     sigma, layout = mind.sigma, mind.layout
@@ -328,7 +328,7 @@ def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
                 sigma[reading_at(layout, lag, j, q)] = scaled
 
 
-@kernel
+@inner
 def _begin(watched, mind, schedule, goal, velocity):  # type: ignore[no-untyped-def]
     """Begin a movement to ``goal`` in the state that was read."""
     for j in range(goal.size):
@@ -340,7 +340,7 @@ def _begin(watched, mind, schedule, goal, velocity):  # type: ignore[no-untyped-
     begin_acting(mind.learner, schedule, mind.x, mind.workspace, mind.random)
 
 
-@kernel
+@inner
 def _judge(watched, rules, goal, velocity, turn, gained):  # type: ignore[no-untyped-def]
     """Set what each joint has ``gained`` by its last action, whether it switched and is there; return if all are."""
     is_reached = True
@@ -364,7 +364,7 @@ class _Turn(NamedTuple):
     there: NDArray[np.bool_]
 
 
-@kernel
+@inner
 def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignore[no-untyped-def]
     """Make movement ``e`` to ``goal``, as ``move`` does; return whether it succeeded."""
     joints = goal.size
@@ -389,7 +389,8 @@ def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignor
             learn_and_act(mind.learner, schedule, mind.x, mind.workspace, mind.random, seen, success)
             if not goes_on(rules, success, record, e):
                 break
-        before[:] = watched.angle
+        for j in range(joints):
+            before[j] = watched.angle[j]
         then, is_first = time, False
         if watched.latency > 0.0:
             _wait(body, watched, watched.latency)
@@ -408,7 +409,8 @@ def _move(body, watched, mind, schedule, rules, goal, record, e):  # type: ignor
 @kernel
 def _play(body, watched, mind_schedule, rules, aims, record, performance):  # type: ignore[no-untyped-def]
     """Fill ``record`` with movements; return how many, and the performance (thesis eq. 4.14) after them."""
-    mind, schedule = mind_schedule
+    body, watched, rules, aims, record = borrowed((body, watched, rules, aims, record))
+    mind, schedule = borrowed(mind_schedule)
     goal = np.zeros(aims.goals.shape[1])
     for e in range(aims.goals.shape[0]):
         _reach(body, watched, rules, aims.durations[e])

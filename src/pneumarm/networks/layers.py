@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import inner, kernel
 from pneumarm.networks.tansig import FASTMATH, tansig
-from pneumarm.vectors import add_sums
+from pneumarm.vectors import LANES, add_sums
 
 Layers = tuple[NDArray[np.float32], ...]
 
@@ -92,7 +92,7 @@ def workspace(sizes: tuple[int, ...], samples: int) -> Layers:
     return tuple(np.zeros((size, samples), np.float32) for size in sizes[1:])
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def weighted_sums(weights, x, out):  # type: ignore[no-untyped-def]
     """Set ``out`` (outputs, n) to W^T x, ``weights`` (at least inputs, outputs), ``x`` (inputs, n); no biases."""
     out[:] = np.float32(0.0)
@@ -117,67 +117,34 @@ def forward(layers, x, units):  # type: ignore[no-untyped-def]
         below = above
 
 
-@part(fastmath=FASTMATH)
-def product(a, b):  # type: ignore[no-untyped-def]
-    """Return the sum of the products of ``a`` and ``b``, both (n,)."""
-    total = np.float32(0.0)
-    for e in range(a.shape[0]):
-        total += a[e] * b[e]
-    return total
-
-
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def add_slopes(x, error, slope):  # type: ignore[no-untyped-def]
     """Add the derivatives by the weights to ``slope`` (inputs + 1, outputs): the sums of x error over the samples.
 
-    Eight sums, of two inputs and four outputs, at a time: what is loaded is used several times.
+    The errors are turned, so that what is added up at once are outputs and each sum runs in the order of the samples.
     """
-    inputs, outputs, n = np.uint64(x.shape[0]), np.uint64(error.shape[0]), np.uint64(x.shape[1])
-    pairs, fours = inputs - inputs % np.uint64(2), outputs - outputs % np.uint64(4)
-    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
+    inputs, outputs, n = x.shape[0], error.shape[0], x.shape[1]
+    width = (outputs + LANES - 1) // LANES * LANES
+    turned, sums = np.zeros((n, width), np.float32), np.zeros((inputs, width), np.float32)
     for o in range(outputs):
-        total = np.float32(0.0)
         for e in range(n):
-            total += error[o, e]
-        slope[inputs, o] += total
-    for i in range(np.uint64(0), pairs, two):
-        j = i + one
-        for o in range(np.uint64(0), fours, four):
-            p, q, r = o + one, o + two, o + three
-            a = b = c = d = np.float32(0.0)
-            s = t = u = v = np.float32(0.0)
-            for e in range(n):
-                a += x[i, e] * error[o, e]
-                b += x[i, e] * error[p, e]
-                c += x[i, e] * error[q, e]
-                d += x[i, e] * error[r, e]
-                s += x[j, e] * error[o, e]
-                t += x[j, e] * error[p, e]
-                u += x[j, e] * error[q, e]
-                v += x[j, e] * error[r, e]
-            slope[i, o] += a
-            slope[i, p] += b
-            slope[i, q] += c
-            slope[i, r] += d
-            slope[j, o] += s
-            slope[j, p] += t
-            slope[j, q] += u
-            slope[j, r] += v
-        for o in range(fours, outputs):
-            slope[i, o] += product(x[i], error[o])
-            slope[j, o] += product(x[j], error[o])
-    for i in range(pairs, inputs):
+            turned[e, o] = error[o, e]
+    add_sums(x.T, turned, sums)
+    for i in range(inputs):
         for o in range(outputs):
-            slope[i, o] += product(x[i], error[o])
+            slope[i, o] += sums[i, o]
+    for e in range(n):
+        for o in range(outputs):
+            slope[inputs, o] += turned[e, o]
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def through_weights(weights, error, below):  # type: ignore[no-untyped-def]
     """Set ``below`` (inputs, n) to the derivatives by a layer's inputs, from those by its outputs, ``error``."""
     weighted_sums(weights.T, error, below)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def through_layer(weights, error, units, below):  # type: ignore[no-untyped-def]
     """Set ``below`` (inputs, n) to the derivatives by what enters the tansig ``units`` (inputs, n)."""
     through_weights(weights, error, below)
@@ -186,7 +153,7 @@ def through_layer(weights, error, units, below):  # type: ignore[no-untyped-def]
             below[i, e] *= np.float32(1.0) - units[i, e] * units[i, e]
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def backward(net, x):  # type: ignore[no-untyped-def]
     """Add to ``net.gradient`` what the derivatives by the outputs, in ``net.errors[-1]``, make of it.
 

@@ -1,8 +1,8 @@
 """The sums over rows that a fit by Levenberg-Marquardt is made of, as kernels.
 
-Everything lies unit by unit, (units, rows), so that the sums run along memory. They are loops of our own rather than
-a library's matrix products: those start threads of their own, for which fits on other threads would have to wait.
-Sums may be split into the lanes of a vector (``reassoc``), in the same order in every run.
+They are loops of our own rather than a library's matrix products: those start threads of their own, for which fits on
+other threads would have to wait. What is added up at once lies side by side in memory, and each sum runs in the order
+of its terms, so that results do not depend on how a compiler makes vectors of it.
 """
 
 from typing import NamedTuple
@@ -11,21 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.kernels import inner, kernel
+from pneumarm.networks.tansig import FASTMATH
+from pneumarm.vectors import LANES, add_sums
 
-_TILE = 4
-"""Sums along one side of the piece of a result that is held in registers; tables are padded to a multiple of it."""
-_COLUMNS = 32
-"""Columns of a matrix that is solved that are worked on at a time."""
-_ROWS = 512
+_BLOCK = 30
+"""Rows of a matrix that is solved that are worked on at a time: few enough for the cache, a multiple of 3."""
+_ROWS = 128
 """Rows whose products are in memory at once: few enough for the cache."""
-_REORDERED = {"contract", "reassoc"}
 
 
 class Sums(NamedTuple):
     """Sums over rows for a network with ``m`` inputs, ``h`` hidden units, ``o`` outputs; the last of m + 1 inputs x
     and of h + 1 hidden units is a constant 1.
 
-    Letters as in :mod:`pneumarm.networks.levenberg_marquardt`; tables are padded at the end of both sides.
+    Letters as in :mod:`pneumarm.networks.levenberg_marquardt`; tables are padded to whole vectors.
     """
 
     xx_ss: NDArray[np.float64]
@@ -44,11 +43,11 @@ class Sums(NamedTuple):
         """Return sums of nothing, the constant counted among ``inputs``."""
 
         def padded(count: int) -> int:
-            return -(-count // _TILE) * _TILE
+            return -(-count // LANES) * LANES
 
         return cls(
-            xx_ss=np.zeros((padded(pairs(inputs)), padded(pairs(hidden)))),
-            x_sh=np.zeros((padded(inputs), padded(hidden * (hidden + 1)))),
+            xx_ss=np.zeros((pairs(inputs), padded(pairs(hidden)))),
+            x_sh=np.zeros((inputs, padded(hidden * (hidden + 1)))),
             hh=np.zeros((hidden + 1, hidden + 1)),
             x_se=np.zeros((inputs, hidden)),
             h_r=np.zeros((hidden + 1, outputs)),
@@ -60,7 +59,7 @@ def pairs(count: int) -> int:
     return count * (count + 1) // 2
 
 
-@kernel(fastmath=_REORDERED)
+@kernel(fastmath=FASTMATH)
 def weighted_sums(weights, a, total):  # type: ignore[no-untyped-def]
     """Write sum_j weights[j, k] a[j, i] into ``total`` (k, rows), for ``a`` (j, rows)."""
     for begin in range(0, a.shape[1], _ROWS):
@@ -81,169 +80,148 @@ def add_block(x, h, r, w, sums):  # type: ignore[no-untyped-def]
     ``w`` (hidden, outputs) are the output weights.
     """
     inputs, hidden = x.shape[0], h.shape[0] - 1
-    # Tiles of a fixed size, so that they lie in one piece; where the last one is not full, its inputs, units and
-    # residues are zero, and so is every product.
-    x_now = np.zeros((sums.x_sh.shape[0], _ROWS), np.float32)
-    h_now, r_now = np.empty((hidden + 1, _ROWS)), np.empty((r.shape[0], _ROWS))
-    slope, slope_error = np.empty((hidden, _ROWS)), np.empty((hidden, _ROWS))
-    xx = np.zeros((sums.xx_ss.shape[0], _ROWS), np.float32)
-    ss = np.zeros((sums.xx_ss.shape[1], _ROWS), np.float32)
-    sh = np.zeros((sums.x_sh.shape[1], _ROWS), np.float32)
+    # Tiles of a fixed size, (rows, ...); where the last one is not full its inputs, units and residues are zero, and
+    # so is every product.
+    x_now, h_now = np.zeros((_ROWS, inputs), np.float32), np.empty((_ROWS, hidden + 1))
+    r_now, slope, slope_error = np.empty((_ROWS, r.shape[0])), np.empty((_ROWS, hidden)), np.empty((_ROWS, hidden))
+    xx = np.zeros((_ROWS, sums.xx_ss.shape[0]), np.float32)
+    ss = np.zeros((_ROWS, sums.xx_ss.shape[1]), np.float32)
+    sh = np.zeros((_ROWS, sums.x_sh.shape[1]), np.float32)
     for begin in range(0, x.shape[1], _ROWS):
-        _copy_tile(x, begin, x_now)
-        _copy_tile(h, begin, h_now)
-        _copy_tile(r, begin, r_now)
+        _turn_tile(x, begin, x_now)
+        _turn_tile(h, begin, h_now)
+        _turn_tile(r, begin, r_now)
         _slopes(h_now, r_now, w, slope, slope_error)
-        _add_dots(x_now, slope_error, sums.x_se)
-        _add_dots(h_now, r_now, sums.h_r)
-        _add_dots(h_now, h_now, sums.hh)
-        _pair_products(x_now, inputs, xx)
-        _pair_products(slope, hidden, ss)
+        _add_products(x_now, slope_error, sums.x_se)
+        _add_products(h_now, r_now, sums.h_r)
+        _add_products(h_now, h_now, sums.hh)
+        _pair_products(x_now, xx)
+        _pair_products(slope, ss)
         _all_products(slope, h_now, sh)
-        _add_tiles(xx, ss, sums.xx_ss)
-        _add_tiles(x_now, sh, sums.x_sh)
+        _add_in_float32(xx, ss, sums.xx_ss)
+        _add_in_float32(x_now, sh, sums.x_sh)
 
 
 @inner
-def _copy_tile(a, begin, tile):  # type: ignore[no-untyped-def]
-    """Copy the rows of ``a`` (..., rows) from ``begin`` on into ``tile``, zeros where they end."""
-    rows = min(a.shape[1] - begin, tile.shape[1])
+def _turn_tile(a, begin, tile):  # type: ignore[no-untyped-def]
+    """Copy the rows of ``a`` (..., rows) from ``begin`` on into ``tile`` (rows, ...), zeros where they end."""
+    rows = min(a.shape[1] - begin, tile.shape[0])
     for j in range(a.shape[0]):
         for i in range(rows):
-            tile[j, i] = a[j, begin + i]
-        for i in range(rows, tile.shape[1]):
-            tile[j, i] = 0
+            tile[i, j] = a[j, begin + i]
+        for i in range(rows, tile.shape[0]):
+            tile[i, j] = 0
 
 
 @inner
 def _slopes(h, r, w, slope, slope_error):  # type: ignore[no-untyped-def]
     """Write s_j and s_j e_j, e = W r, of every row."""
-    for j in range(slope.shape[0]):
-        for i in range(slope.shape[1]):
-            slope[j, i] = 1 - h[j, i] * h[j, i]
-            slope_error[j, i] = 0.0
-        for o in range(r.shape[0]):
-            for i in range(slope.shape[1]):
-                slope_error[j, i] += w[j, o] * r[o, i] * slope[j, i]
+    for i in range(slope.shape[0]):
+        for j in range(slope.shape[1]):
+            slope[i, j] = 1 - h[i, j] * h[i, j]
+            error = 0.0
+            for o in range(r.shape[1]):
+                error += w[j, o] * r[i, o]
+            slope_error[i, j] = error * slope[i, j]
 
 
 @inner
-def _pair_products(a, units, products):  # type: ignore[no-untyped-def]
-    """Write a_j a_k of the first ``units`` into ``products``, j <= k."""
-    c = 0
-    for j in range(units):
-        for k in range(j, units):
-            for i in range(a.shape[1]):
-                products[c, i] = a[j, i] * a[k, i]
-            c += 1
+def _pair_products(a, products):  # type: ignore[no-untyped-def]
+    """Write a_j a_k of every row into ``products``, j <= k."""
+    for i in range(a.shape[0]):
+        c = 0
+        for j in range(a.shape[1]):
+            for k in range(j, a.shape[1]):
+                products[i, c + k - j] = a[i, j] * a[i, k]
+            c += a.shape[1] - j
 
 
 @inner
 def _all_products(a, b, products):  # type: ignore[no-untyped-def]
-    """Write a_j b_k of all units into ``products``."""
-    for j in range(a.shape[0]):
-        for k in range(b.shape[0]):
-            for i in range(a.shape[1]):
-                products[j * b.shape[0] + k, i] = a[j, i] * b[k, i]
+    """Write a_j b_k of every row into ``products``."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            for k in range(b.shape[1]):
+                products[i, j * b.shape[1] + k] = a[i, j] * b[i, k]
 
 
-@kernel(fastmath=_REORDERED)
-def _add_dots(a, b, total):  # type: ignore[no-untyped-def]
-    """Add sum_i a_ji b_ki to ``total`` (j, k)."""
+@inner(fastmath=FASTMATH)
+def _add_products(a, b, total):  # type: ignore[no-untyped-def]
+    """Add sum_i a_ij b_ik to ``total`` (j, k), four rows at a time."""
+    for i in range(0, a.shape[0], 4):
+        p, q, r, s = b[i], b[i + 1], b[i + 2], b[i + 3]
+        for j in range(a.shape[1]):
+            pj, qj, rj, sj, row = a[i, j], a[i + 1, j], a[i + 2, j], a[i + 3, j], total[j]
+            for k in range(row.shape[0]):
+                row[k] += pj * p[k] + qj * q[k] + rj * r[k] + sj * s[k]
+
+
+@inner
+def _add_in_float32(a, b, total):  # type: ignore[no-untyped-def]
+    """Do the same, with sums over the rows in float32; ``b`` is padded to whole vectors."""
+    tile = np.zeros(total.shape, np.float32)
+    add_sums(a, b, tile)
     for j in range(total.shape[0]):
         for k in range(total.shape[1]):
-            dot = 0.0
-            for i in range(a.shape[1]):
-                dot += a[j, i] * b[k, i]
-            total[j, k] += dot
+            total[j, k] += tile[j, k]
 
 
-@kernel(fastmath=_REORDERED)
-def _add_tiles(a, b, total):  # type: ignore[no-untyped-def]
-    """Do the same for padded tables, two by four sums at a time: six loads for eight multiplications."""
-    for j in range(0, a.shape[0], 2):
-        a0, a1 = a[j], a[j + 1]
-        for k in range(0, b.shape[0], _TILE):
-            b0, b1, b2, b3 = b[k], b[k + 1], b[k + 2], b[k + 3]
-            s00 = s01 = s02 = s03 = s10 = s11 = s12 = s13 = np.float32(0)
-            for i in range(a.shape[1]):
-                x, y = a0[i], a1[i]
-                s00 += x * b0[i]
-                s01 += x * b1[i]
-                s02 += x * b2[i]
-                s03 += x * b3[i]
-                s10 += y * b0[i]
-                s11 += y * b1[i]
-                s12 += y * b2[i]
-                s13 += y * b3[i]
-            total[j, k] += s00
-            total[j, k + 1] += s01
-            total[j, k + 2] += s02
-            total[j, k + 3] += s03
-            total[j + 1, k] += s10
-            total[j + 1, k + 1] += s11
-            total[j + 1, k + 2] += s12
-            total[j + 1, k + 3] += s13
-
-
-@kernel(fastmath=_REORDERED)
+@kernel(fastmath=FASTMATH)
 def solve_positive(matrix, right):  # type: ignore[no-untyped-def]
     """Replace ``right`` (n,) by the solution of ``matrix`` times it, and ``matrix`` (n, n) by its Cholesky factor.
 
-    Returns whether the symmetric matrix, of which the lower half is read, is positive definite. Columns are worked
-    on a few at a time, so that the rows that all others are multiplied by stay in the cache.
+    Returns whether the symmetric matrix, of which the upper half is read, is positive definite. Rows are worked on a
+    few at a time, so that those that all others are subtracted from stay in the cache.
     """
     n = matrix.shape[0]
-    for first in range(0, n, _COLUMNS):
-        last = min(first + _COLUMNS, n)
-        _subtract_dots(matrix, first, last)
-        for j in range(first, last):
-            for i in range(j, n):
-                dot = 0.0
-                for k in range(first, j):
-                    dot += matrix[i, k] * matrix[j, k]
-                matrix[i, j] -= dot
-            if not matrix[j, j] > 0:
+    for first in range(0, n, _BLOCK):
+        last = min(first + _BLOCK, n)
+        for i in range(first, last):
+            _subtract_rows(matrix, first, i, i, 1)
+            if not matrix[i, i] > 0:
                 return False
-            pivot = np.sqrt(matrix[j, j])
-            for i in range(j, n):
-                matrix[i, j] /= pivot
+            pivot = np.sqrt(matrix[i, i])
+            for e in range(i, n):
+                matrix[i, e] /= pivot
+        for i in range(last, n, 2):
+            _subtract_rows(matrix, first, last, i, min(2, n - i))
     for i in range(n):
-        for k in range(i):
-            right[i] -= matrix[i, k] * right[k]
         right[i] /= matrix[i, i]
+        for e in range(i + 1, n):
+            right[e] -= matrix[i, e] * right[i]
     for i in range(n - 1, -1, -1):
-        right[i] /= matrix[i, i]
-        for k in range(i):
-            right[k] -= matrix[i, k] * right[i]
+        total = right[i]
+        for e in range(i + 1, n):
+            total -= matrix[i, e] * right[e]
+        right[i] = total / matrix[i, i]
     return True
 
 
-@kernel(fastmath=_REORDERED)
-def _subtract_dots(matrix, first, last):  # type: ignore[no-untyped-def]
-    """Subtract from each entry in columns ``first`` to ``last`` the product of its two rows in the columns before.
+@inner(fastmath=FASTMATH)
+def _subtract_rows(matrix, begin, end, i, count):  # type: ignore[no-untyped-def]
+    """Subtract from row ``i``, or two where ``count`` is 2, each row from ``begin`` to ``end`` times its entry there.
 
-    Two by four sums at a time, as in :func:`_add_tiles`.
+    Three rows at a time, from two: what is loaded is used several times.
     """
     n = matrix.shape[0]
-    for i in range(first, n, 2):
-        a0, a1 = matrix[i], matrix[min(i + 1, n - 1)]
-        for j in range(first, min(last, i + 2), _TILE):
-            b0, b1 = matrix[j], matrix[min(j + 1, n - 1)]
-            b2, b3 = matrix[min(j + 2, n - 1)], matrix[min(j + 3, n - 1)]
-            s00 = s01 = s02 = s03 = s10 = s11 = s12 = s13 = 0.0
-            for k in range(first):
-                x, y = a0[k], a1[k]
-                s00 += x * b0[k]
-                s01 += x * b1[k]
-                s02 += x * b2[k]
-                s03 += x * b3[k]
-                s10 += y * b0[k]
-                s11 += y * b1[k]
-                s12 += y * b2[k]
-                s13 += y * b3[k]
-            for c, (upper, lower) in enumerate(((s00, s10), (s01, s11), (s02, s12), (s03, s13))):
-                if j + c < last:
-                    a0[j + c] -= upper
-                    if i + 1 < n:
-                        a1[j + c] -= lower
+    for first in range(i, n, _ROWS):
+        last = min(first + _ROWS, n)
+        a, b = matrix[i, first:last], matrix[i + count - 1, first:last]
+        for k in range(begin, end - 2, 3):
+            p, q, r = matrix[k, first:last], matrix[k + 1, first:last], matrix[k + 2, first:last]
+            p0, q0, r0 = matrix[k, i], matrix[k + 1, i], matrix[k + 2, i]
+            if count == 1:
+                for e in range(a.shape[0]):
+                    a[e] = a[e] - p0 * p[e] - q0 * q[e] - r0 * r[e]
+            else:
+                p1, q1, r1 = matrix[k, i + 1], matrix[k + 1, i + 1], matrix[k + 2, i + 1]
+                for e in range(a.shape[0]):
+                    a[e] = a[e] - p0 * p[e] - q0 * q[e] - r0 * r[e]
+                    b[e] = b[e] - p1 * p[e] - q1 * q[e] - r1 * r[e]
+        for k in range(end - (end - begin) % 3, end):
+            p = matrix[k, first:last]
+            for e in range(a.shape[0]):
+                a[e] -= matrix[k, i] * p[e]
+            if count == 2:
+                for e in range(b.shape[0]):
+                    b[e] -= matrix[k, i + 1] * p[e]

@@ -50,7 +50,7 @@ def cost_of_reading(wanted, angle, step):  # type: ignore[no-untyped-def]
     return total
 
 
-@kernel
+@inner
 def play(world, states, wanted, plan, first, last, place, limit, command):  # type: ignore[no-untyped-def]
     """Play ``plan`` (steps, joints, 2) from ``first`` to before ``last`` in the state ``place``; return the cost.
 

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS, VALVES, possible_actions
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import borrowed, kernel, part
 from pneumarm.planning.world import advance, copy
 from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings
 from pneumarm.task.reward import Reward
@@ -254,7 +254,7 @@ def misses(states, i, sought):  # type: ignore[no-untyped-def]
     return worst
 
 
-@part(entry=True)
+@part
 def within(value, tolerance, std):  # type: ignore[no-untyped-def]
     """Return the probability that a normal deviate around ``value`` is not farther from 0 than ``tolerance``."""
     if std == 0.0:
@@ -274,7 +274,7 @@ def success(states, i, sought):  # type: ignore[no-untyped-def]
     return probability
 
 
-@part(entry=True)
+@part
 def fewest_periods(way, speed, slow, fastest, sharpest):  # type: ignore[no-untyped-def]
     """Return a lower bound of the periods in which a joint gets to its goal and slow.
 
@@ -324,8 +324,8 @@ def last_action(workspace, i):  # type: ignore[no-untyped-def]
 
 
 @part
-def descend(world, states, sought, workspace, i, parent, action):  # type: ignore[no-untyped-def]
-    """Make node ``i`` what ``action`` makes of ``parent``, which may be the same; return by how much it misses."""
+def begin_node(states, sought, workspace, i, parent, action):  # type: ignore[no-untyped-def]
+    """Make node ``i`` that of ``action`` after ``parent``, which may be the same, in the state before the action."""
     if i != parent:
         copy(states, i, parent)
         for k in range(workspace.holds[parent]):
@@ -345,8 +345,6 @@ def descend(world, states, sought, workspace, i, parent, action):  # type: ignor
     workspace.depth[i] = workspace.depth[parent] + 1
     workspace.switches[i] = workspace.switches[parent] + switched
     workspace.cost[i] = workspace.cost[parent] + sought.action_cost + sought.switch_cost * switched
-    advance(world, states, i, sought.commands[action])
-    return misses(states, i, sought)
 
 
 @part
@@ -377,6 +375,7 @@ def search(world, states, sought, workspace, begin, may_hold, most):  # type: ig
     Returns the length of the plan in ``workspace.plan``, its cost, what all plans cost at least, and the periods
     simulated. Plans that cost at least ``most`` are none.
     """
+    world, states, sought, workspace = borrowed((world, states, sought, workspace))
     count = workspace.free.shape[0]
     actions = sought.commands.shape[0]
     for k in range(count):
@@ -410,7 +409,9 @@ def search(world, states, sought, workspace, begin, may_hold, most):  # type: ig
                 continue
             left -= 1
             child = workspace.free[left]
-            miss = descend(world, states, sought, workspace, child, i, action)
+            begin_node(states, sought, workspace, child, i, action)
+            advance(world, states, child, sought.commands[action])
+            miss = misses(states, child, sought)
             simulated += 1
             probability = success(states, child, sought)
             expected = workspace.cost[child] + sought.failure_cost * (1.0 - probability)

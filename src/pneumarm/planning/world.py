@@ -11,7 +11,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from pneumarm.arm.virtual.rollout import PhysicsStates, advance_physics, copy_physics
-from pneumarm.kernels import PART
+from pneumarm.kernels import INNER
 from pneumarm.simulation.rollout import SimulatedStates, advance_simulated, copy_simulated
 
 _ADVANCE = {PhysicsStates: advance_physics, SimulatedStates: advance_simulated}
@@ -29,13 +29,11 @@ def copy(states: Any, to: int, source: int) -> None:
 
 
 # Compiled code picks by type as well: kernels handed over as arguments could not be cached.
-@overload(advance, jit_options=PART)
+@overload(advance, jit_options=INNER)
 def _advance(world, states, i, valves):  # type: ignore[no-untyped-def]
-    compiled = _ADVANCE.get(states.instance_class)
-    return compiled and (lambda world, states, i, valves: compiled(world, states, i, valves))
+    return _ADVANCE[states.instance_class].py_func
 
 
-@overload(copy, jit_options=PART)
+@overload(copy, jit_options=INNER)
 def _copy(states, to, source):  # type: ignore[no-untyped-def]
-    compiled = _COPY.get(states.instance_class)
-    return compiled and (lambda states, to, source: compiled(states, to, source))
+    return _COPY[states.instance_class].py_func

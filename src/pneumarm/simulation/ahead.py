@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import borrowed, kernel
 from pneumarm.networks.layers import Trainable, adam, add_slopes, trainable
 from pneumarm.networks.network import Network
 from pneumarm.networks.tansig import FASTMATH
@@ -29,6 +29,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.choice import hashed_uniform, held_out
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import transitions
+from pneumarm.vectors import put
 
 UPDATES = 1000
 """How often stretches are drawn and learned from; divided by the number of joints, whose networks are larger."""
@@ -213,15 +214,16 @@ def move_ahead(simulation, tape):  # type: ignore[no-untyped-def]
     """Let the simulation make all steps of the stretches on the tape."""
     first, commanded = simulation.layout.command, simulation.layout.commanded
     for t in range(tape.command.shape[0]):
-        tape.x[t, first : first + commanded] = tape.command[t]
+        put(tape.x[t, first : first + commanded], tape.command[t])
         step_all(simulation, tape.x[t], tape.x[t + 1], tape.work)
-        tape.hidden[t] = tape.work.hidden
-        tape.free[t] = tape.work.free
+        put(tape.hidden[t], tape.work.hidden)
+        put(tape.free[t], tape.work.free)
 
 
 @kernel(fastmath=FASTMATH)
 def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost of a step to ``net.gradient``."""
+    net, simulation, tape = borrowed((net, simulation, tape))
     last = len(net.layers) - 1
     for o in range(simulation.output.shape[0]):
         for u in range(simulation.output.shape[1]):
@@ -239,14 +241,14 @@ def learn_ahead(net, simulation, tape):  # type: ignore[no-untyped-def]
             for e in range(n):
                 error = (tape.x[t + 1, place, e] - tape.observed[t, o, e]) * weight
                 later[place, e] += min(max(error, -clip), clip) * weight * share
-        work.hidden[:] = tape.hidden[t]
-        work.free[:] = tape.free[t]
+        put(work.hidden, tape.hidden[t])
+        put(work.free, tape.free[t])
         step_back(simulation, later, sooner, work)
         add_slopes(tape.x[t], work.slope, net.slopes[0])
         if last == 2:
             add_slopes(work.hidden, work.second_slope, net.slopes[1])
         add_slopes(work.second if last == 2 else work.hidden, work.change, net.slopes[last])
-        later[:] = sooner
+        put(later, sooner)
         later[first : first + commanded] = np.float32(0.0)  # commands are as they were
 
 

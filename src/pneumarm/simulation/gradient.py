@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner
 from pneumarm.networks.layers import through_layer, weighted_sums
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.kernel import SimulationParameters
 from pneumarm.simulation.layout import angle_at, velocity_at
-from pneumarm.vectors import add_sums
+from pneumarm.vectors import add_sums, put
 
 
 class StepWorkspace(NamedTuple):
@@ -46,7 +46,7 @@ def step_workspace(simulation: SimulationParameters, n: int) -> StepWorkspace:
     return StepWorkspace(*(np.zeros((rows, n), np.float32) for rows in sizes))
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def last_units(simulation, work):  # type: ignore[no-untyped-def]
     """Return the units of the last hidden layer (units, n), those of the first being ``work.hidden``."""
     if simulation.second.shape[0] == 0:
@@ -60,7 +60,7 @@ def last_units(simulation, work):  # type: ignore[no-untyped-def]
     return work.second
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def predict_all(simulation, x, work):  # type: ignore[no-untyped-def]
     """Set the hidden units and ``work.change`` to what the networks make of ``x`` (size, n), commands in place."""
     change = work.change
@@ -79,24 +79,19 @@ def predict_all(simulation, x, work):  # type: ignore[no-untyped-def]
             add_sums(simulation.direct[:, begin:end].T, x[begin:end], change)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
     """Set ``following`` (size, n) to the states one period after ``x`` (size, n), whose commands are in place."""
     predict_all(simulation, x, work)
     layout, n = simulation.layout, x.shape[1]
     observed, commanded, command = layout.observed, layout.commanded, layout.command
     newest = layout.history * observed
-    for i in range(observed, newest):
-        following[i] = x[i - observed]
-    for i in range(newest + commanded, command):
-        following[i] = x[i - commanded]
+    put(following[observed:newest], x[: newest - observed])
+    put(following[newest + commanded : command], x[newest : command - commanded])
     if layout.history > 1:
-        for i in range(commanded):
-            following[newest + i] = x[command + i]
-    for i in range(command, x.shape[0]):
-        following[i] = x[i]
-    for i in range(observed):
-        following[i] = x[i]
+        put(following[newest : newest + commanded], x[command : command + commanded])
+    put(following[command:], x[command:])
+    put(following[:observed], x[:observed])
     for o in range(work.change.shape[0]):
         place, lowest, highest = simulation.place[o], simulation.lowest[o], simulation.highest[o]
         for e in range(n):
@@ -110,7 +105,7 @@ def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
             following[velocity, e] = (following[angle, e] - x[angle, e]) * rate + rest
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
     """Set ``sooner`` (size, n) to the derivatives by ``x``, those by ``following`` being ``later`` (size, n).
 
@@ -121,13 +116,10 @@ def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
     observed, commanded, command = layout.observed, layout.commanded, layout.command
     newest = layout.history * observed
     sooner[:] = np.float32(0.0)
-    for i in range(observed, newest):
-        sooner[i - observed] = later[i]
-    for i in range(newest + commanded, command):
-        sooner[i - commanded] = later[i]
+    put(sooner[: newest - observed], later[observed:newest])
+    put(sooner[newest : command - commanded], later[newest + commanded : command])
     if layout.history > 1:
-        for i in range(commanded):
-            sooner[command + i] = later[newest + i]
+        put(sooner[command : command + commanded], later[newest : newest + commanded])
     for joint in range(simulation.velocity.shape[0]):
         angle, velocity = angle_at(layout, 0, joint), velocity_at(layout, 0, joint)
         rate = simulation.velocity[joint, 0]

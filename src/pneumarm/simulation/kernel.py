@@ -18,7 +18,7 @@ from pneumarm.simulation.layout import Layout, angle_at, command_at, layout_of, 
 from pneumarm.simulation.noise import add_noise, begin_noise
 from pneumarm.simulation.simulation import Scaling, Simulation
 from pneumarm.transitions.window import Window
-from pneumarm.vectors import weighted_sums
+from pneumarm.vectors import product, weighted_sums
 
 UNIT_BLOCK = 16
 
@@ -181,15 +181,10 @@ def predict_change(simulation, state):  # type: ignore[no-untyped-def]
         tansig(state.second)
         hidden = state.second
     for o in range(simulation.output_bias.shape[0]):
-        total = np.float32(0.0)
-        for u in range(hidden.shape[0]):
-            total += hidden[u] * simulation.output[o, u]
-        state.change[o] = total + simulation.output_bias[o]
+        state.change[o] = product(hidden, simulation.output[o]) + simulation.output_bias[o]
     for o in range(simulation.direct.shape[0]):
-        total = np.float32(0.0)
         for i in range(x.shape[0]):
-            total += x[i] * simulation.direct[o, i]
-        state.change[o] += total
+            state.change[o] += x[i] * simulation.direct[o, i]
 
 
 @part(entry=True)

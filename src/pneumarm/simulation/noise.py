@@ -101,14 +101,14 @@ def noise_parameters(settings: NoiseSettings, simulation: Simulation) -> NoisePa
     )
 
 
-@part(entry=True)
+@part
 def begin_noise(noise, average, random):  # type: ignore[no-untyped-def]
     """Put the moving ``average`` (outputs,) into its stationary distribution."""
     for o in range(noise.std.shape[0]):
         average[o] = normal(random)
 
 
-@part(entry=True)
+@part
 def noise_share(noise, joint, x, change):  # type: ignore[no-untyped-def]
     """Return the share of the noise that ``joint`` gets, moving as fast as ``change`` predicts."""
     output, place = noise.source[joint, 0], noise.source[joint, 1]
@@ -117,7 +117,7 @@ def noise_share(noise, joint, x, change):  # type: ignore[no-untyped-def]
     return min(share, np.float32(1.0))
 
 
-@part(entry=True)
+@part
 def add_noise(noise, x, change, average, random):  # type: ignore[no-untyped-def]
     """Add noise to ``change`` (outputs,), the scaled change that the networks predict from the state ``x``."""
     if noise.std.shape[0] == 0:

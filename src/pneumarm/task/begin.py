@@ -111,7 +111,7 @@ def begin_parameters(
     return BeginParameters(begin.states, begin.angle, order, sorted_, np.array(domain, np.float64), cumulative)
 
 
-@part(entry=True)
+@part
 def side_probability(goal, domain):  # type: ignore[no-untyped-def]
     """Return the probability of a begin state below ``goal`` in the ``domain`` of angles (thesis eq. 4.15, 4.16).
 
@@ -120,7 +120,7 @@ def side_probability(goal, domain):  # type: ignore[no-untyped-def]
     return (goal - domain[0]) / (domain[1] - domain[0])
 
 
-@part(entry=True)
+@part
 def draw_interval(domain, weights, goal, deviation, random):  # type: ignore[no-untyped-def]
     """Return a sub-interval of begin angles of a joint around its ``goal``, as its ends [counts] (section 4.3.2).
 
@@ -152,7 +152,7 @@ def draw_goal_near(goal_range, weights, angle, deviation, random, goal):  # type
         goal[joint] = first + (last - first) * uniform(random)
 
 
-@part(entry=True)
+@part
 def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
     """Return the index of a begin state for ``goal`` (joints,) within ``deviation`` [counts].
 

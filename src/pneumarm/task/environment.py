@@ -122,7 +122,7 @@ def episode(environment: Environment, random: RandomState) -> Episode:
     )
 
 
-@part(entry=True)
+@part
 def begin_episode(environment, episode, deviation, random):  # type: ignore[no-untyped-def]
     """Draw goals and a begin state within ``deviation`` [counts] of them from ``random``, and put the arm there."""
     task = environment.task
@@ -163,7 +163,7 @@ def order(task, episode, actions):  # type: ignore[no-untyped-def]
         episode.command[2 * joint + 1] = task.commands[joint, action, 1]
 
 
-@part(entry=True)
+@part
 def take(environment, episode, actions):  # type: ignore[no-untyped-def]
     """Take ``actions`` (joints,) for a period; return whether the goals are reached."""
     order(environment.task, episode, actions)
@@ -211,7 +211,7 @@ def at_goal(task, episode, joint):  # type: ignore[no-untyped-def]
     return has_reached(task.reward, angle(task, episode, joint), velocity(task, episode, joint), episode.goal[joint])
 
 
-@part(entry=True)
+@part
 def reached(task, episode):  # type: ignore[no-untyped-def]
     """Return whether every joint is at its goal and slow."""
     are_all = True

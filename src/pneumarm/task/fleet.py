@@ -143,7 +143,7 @@ def is_useful(limits, x, actions, still, joint, action):  # type: ignore[no-unty
     return does_something
 
 
-@kernel
+@inner
 def one(fleet, e):  # type: ignore[no-untyped-def]
     """Return arm ``e`` as a single episode; it is a view."""
     state = SimulationState(
@@ -182,13 +182,13 @@ def gained_by(task, fleet, e, is_reached):  # type: ignore[no-untyped-def]
     return paid(task.reward, is_reached, switches)
 
 
-@kernel
+@inner
 def take_all(environment, limits, fleet, actions, is_reached):  # type: ignore[no-untyped-def]
     """Take ``actions`` (n, joints) for a period; set ``is_reached`` (n,) to whether the goals are reached."""
     take_alive(environment, limits, fleet, actions, np.ones(actions.shape[0], np.bool_), is_reached)
 
 
-@kernel
+@inner
 def take_alive(environment, limits, fleet, actions, alive, is_reached):  # type: ignore[no-untyped-def]
     """Do what :func:`take_all` does, in the arms that are ``alive`` (n,) alone."""
     for e in range(actions.shape[0]):
@@ -203,7 +203,7 @@ def take_alive(environment, limits, fleet, actions, alive, is_reached):  # type:
             is_reached[e] = reached(environment.task, one(fleet, e))
 
 
-@kernel
+@inner
 def advance_alive(environment, fleet, alive):  # type: ignore[no-untyped-def]
     """Let a control period pass in the arms that are ``alive`` (n,), under their commands."""
     simulation = environment.simulation

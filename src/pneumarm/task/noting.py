@@ -13,7 +13,7 @@ def note_begin(task, episode, record, e):  # type: ignore[no-untyped-def]
         record.angle_begin[e, joint] = angle(task, episode, joint)
 
 
-@part(entry=True)
+@part
 def note_action(reward, switched, is_reached, record, e):  # type: ignore[no-untyped-def]
     """Count an action of movement ``e``, whose joints ``switched`` (joints,), and what is paid for it."""
     switches = 0

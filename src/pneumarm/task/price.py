@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import inner, part
 from pneumarm.networks.tansig import FASTMATH
 
 _ONE, _ZERO = np.float32(1.0), np.float32(0.0)
@@ -46,13 +46,17 @@ def prices_of_errors(prices: PriceParameters, error: NDArray[np.floating]) -> ND
     return 0.5 * np.log1p(beyond**2) + prices.far * size
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def price_of_error(prices, error, slope):  # type: ignore[no-untyped-def]
-    """Return the sum of the prices of the ``error`` (n,) in tolerances; set ``slope`` (n,) to its derivatives."""
+    """Return the sum of the prices of the ``error`` (n,) in tolerances; set ``slope`` (n,) to its derivatives.
+
+    The errors are replaced by their prices, as a loop that adds up does one number at a time.
+    """
+    for e in range(error.shape[0]):
+        error[e], slope[e] = price_of_one_error(prices, error[e])
     total = _ZERO
     for e in range(error.shape[0]):
-        price, slope[e] = price_of_one_error(prices, error[e])
-        total += price
+        total += error[e]
     return total
 
 
@@ -66,7 +70,7 @@ def price_of_one_error(prices, error):  # type: ignore[no-untyped-def]
     return np.float32(0.5) * np.log(square) + far * size, sign * (sharp * beyond / square + far)
 
 
-@part(entry=True)
+@part
 def price_of_slack(prices, error, share):  # type: ignore[no-untyped-def]
     """Return the price of a muscle's pressure, as a ``share`` of the range, and its slope by that.
 
@@ -80,7 +84,7 @@ def price_of_slack(prices, error, share):  # type: ignore[no-untyped-def]
     return price * short, -price
 
 
-@part(entry=True)
+@part
 def price_of_cocontraction(prices, mean):  # type: ignore[no-untyped-def]
     """Return the price of the ``mean`` pressure of two muscles, as a share of the range, and its slope by that."""
     price, stiffness = np.float32(prices.cocontraction), np.float32(prices.stiffness)
@@ -107,9 +111,12 @@ def holding(size):  # type: ignore[no-untyped-def]
     return _ZERO, _ZERO
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def price_of_changes(prices, command, before, slope, slope_before):  # type: ignore[no-untyped-def]
-    """Return the price of the commands (n,) of one muscle after those ``before``; set the slopes by both, signed."""
+    """Return the price of the commands (n,) of one muscle after those ``before``; set the slopes by both, signed.
+
+    The commands ``before`` are replaced by the changes, as in :func:`price_of_error`.
+    """
     change, total = np.float32(prices.change), _ZERO
     for e in range(command.shape[0]):
         sign = _ONE if command[e] >= _ZERO else -_ONE
@@ -118,11 +125,14 @@ def price_of_changes(prices, command, before, slope, slope_before):  # type: ign
         held, held_slope = holding(abs(command[e]))
         old, old_slope = holding(abs(before[e]))
         if command[e] * before[e] > _ZERO:
-            total += o * (_ONE - old) + o * (_ONE - held)
+            changes = o * (_ONE - old) + o * (_ONE - held)
             by_o, by_old = (_ONE - old) + (_ONE - held), -o
         else:
-            total += o + o * (_ONE - held) + old * (_ONE - o)
+            changes = o + o * (_ONE - held) + old * (_ONE - o)
             by_o, by_old = _ONE + (_ONE - held) - old, _ONE - o
         slope[e] = change * sign * (by_o * o_slope - o * held_slope)
         slope_before[e] = change * sign_before * by_old * old_slope
+        before[e] = changes
+    for e in range(before.shape[0]):
+        total += before[e]
     return change * total

@@ -74,7 +74,7 @@ def has_reached(reward, angle, velocity, goal):  # type: ignore[no-untyped-def]
     return (abs(angle - goal) <= reward.angle_tolerance) & (abs(velocity) <= reward.velocity_tolerance)
 
 
-@part(entry=True)
+@part
 def is_switch(before, action):  # type: ignore[no-untyped-def]
     """Return whether a joint's ``action`` is a switch after the one ``before`` it, -1 where it is the first."""
     return before >= 0 and before != action

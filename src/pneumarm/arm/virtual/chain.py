@@ -18,7 +18,7 @@ import math
 from pneumarm.kernels import part
 
 
-@part(entry=True)
+@part
 def swing(body):  # type: ignore[no-untyped-def]
     """Set ``torque`` of the joints to that of the weight and of the swinging of all links, and their ``inertia``."""
     joints, c = body.joints, body.constants.joints
@@ -63,7 +63,7 @@ def own_torque(c, angle):  # type: ignore[no-untyped-def]
     return c.push - (c.own_weight * math.sin(angle + c.tilt) if c.own_weight > 0.0 else 0.0)
 
 
-@part(entry=True)
+@part
 def solve(joints):  # type: ignore[no-untyped-def]
     """Divide ``torque`` by the mass matrix in ``inertia``: elimination, stable as that is positive definite."""
     n = len(joints)

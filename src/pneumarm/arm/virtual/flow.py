@@ -2,10 +2,10 @@
 
 import math
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner
 
 
-@kernel
+@inner
 def flow_function(ratio, c):  # type: ignore[no-untyped-def]
     """Return the flow relative to choked flow at the pressure ``ratio`` <= 1 (downstream over upstream).
 
@@ -22,7 +22,7 @@ def flow_function(ratio, c):  # type: ignore[no-untyped-def]
     return c.laminar_slope * (1.0 - ratio)
 
 
-@kernel
+@inner
 def free_air(conductance, source, sink, c):  # type: ignore[no-untyped-def]
     """Return the flow from ``source`` to ``sink`` (absolute pressures [Pa]), negative where it runs back.
 

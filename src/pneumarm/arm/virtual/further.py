@@ -23,7 +23,7 @@ from pneumarm.arm.virtual.constants import GRAVITY
 from pneumarm.arm.virtual.passing import pass_time
 from pneumarm.arm.virtual.sensors import median_conversion, potentiometer
 from pneumarm.errors import UnusableInput
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.random import RandomState, random_state
 
 KINDS = ("velocity", "acceleration", "temperature")
@@ -130,7 +130,7 @@ def pass_sampling(body, further, until):  # type: ignore[no-untyped-def]
     pass_time(body, until)
 
 
-@kernel
+@inner
 def felt_along(body, j):  # type: ignore[no-untyped-def]
     """Return what an accelerometer across link ``j`` feels [m/s2]."""
     joints, c = body.joints, body.constants.joints

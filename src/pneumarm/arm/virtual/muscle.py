@@ -16,10 +16,10 @@ from pneumarm.arm.virtual.flow import free_air
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS, FREE_AIR
 from pneumarm.arm.virtual.state import INLET, OUTLET
 from pneumarm.arm.virtual.threshold import engage, threshold
-from pneumarm.kernels import inner, kernel
+from pneumarm.kernels import inner
 
 
-@kernel
+@inner
 def braid(c, length):  # type: ignore[no-untyped-def]
     """Return the pull per pressure f [m2] and the volume V [m3] of the braid at ``length`` [m]."""
     relative = length * c.per_rest_length
@@ -49,7 +49,7 @@ def air_in(muscle, c, supply):  # type: ignore[no-untyped-def]
     return flow, taken
 
 
-@kernel
+@inner
 def compress(muscle, c, volume, air, polytropic):  # type: ignore[no-untyped-def]
     """Bring the pressure up to date after ``air`` [m3 of free air] came in and the braid took ``volume`` [m3].
 
@@ -62,7 +62,7 @@ def compress(muscle, c, volume, air, polytropic):  # type: ignore[no-untyped-def
     muscle.volume = volume
 
 
-@kernel
+@inner
 def slip(muscle, c, stretch):  # type: ignore[no-untyped-def]
     """Stretch the Maxwell-slip elements by ``stretch`` [m] and return their pull [N].
 
@@ -78,7 +78,7 @@ def slip(muscle, c, stretch):  # type: ignore[no-untyped-def]
     return total
 
 
-@kernel
+@inner
 def bring_to_length(muscle, c, length, speed, supply, polytropic, dt):  # type: ignore[no-untyped-def]
     """Bring the muscle to ``length`` [m], reached with ``speed`` [m/s] in ``dt`` [s], and update its tension.
 
@@ -100,7 +100,7 @@ def bring_to_length(muscle, c, length, speed, supply, polytropic, dt):  # type: 
     muscle.tension = max(0.0, muscle.engaged * pull + passive + creep + dry + viscous)
 
 
-@kernel
+@inner
 def static_tension(c, pressure, length):  # type: ignore[no-untyped-def]
     """Return the pull [N] at ``pressure`` [Pa gauge] without friction and after all creep, at 20 degrees."""
     engaged, _ = engage(pressure - threshold(c.threshold, c, length))

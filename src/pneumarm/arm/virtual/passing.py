@@ -4,7 +4,7 @@ import math
 
 from pneumarm.arm.virtual.rest import CALM_SAMPLES, CALM_SPEED, LAST, LONG, SAMPLE, fast_forward, fastest, steady
 from pneumarm.arm.virtual.step import SUBSTEP, integrate
-from pneumarm.kernels import inner, kernel
+from pneumarm.kernels import borrowed, inner, kernel
 from pneumarm.random import uniform
 
 MOST_LATENESS = 8.0
@@ -14,6 +14,7 @@ MOST_LATENESS = 8.0
 @kernel
 def pass_time(body, until):  # type: ignore[no-untyped-def]
     """Let time pass until the clock shows ``until`` [s], by fast-forward where the arm rests."""
+    body = borrowed(body)
     surroundings = body.surroundings[0]
     calm = 0
     while until - surroundings.time > LONG:

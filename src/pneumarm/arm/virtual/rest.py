@@ -62,7 +62,7 @@ def steady(body):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inner
 def fast_forward(body, until):  # type: ignore[no-untyped-def]
     """Bring a resting arm to ``until`` [s]; return False, before that, where it would not stay at rest."""
     surroundings = body.surroundings[0]

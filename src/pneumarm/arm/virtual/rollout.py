@@ -145,18 +145,18 @@ def copy_physics(states, to, source):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def advance_physics(physics, states, i, valves):  # type: ignore[no-untyped-def]
+def advance_physics(world, states, i, valves):  # type: ignore[no-untyped-def]
     """Let one turn of the control cycle pass in state ``i``: latency, ``valves`` (joints, 2), rest of the period."""
-    body = body_at(physics, states, i)
+    body = body_at(world, states, i)
     begin = body.surroundings[0].time
-    states.due[i] += physics.period
-    acted = begin + physics.latency
+    states.due[i] += world.period
+    acted = begin + world.latency
     pass_time(body, acted)
-    command(body, valves, physics.period)
+    command(body, valves, world.period)
     pass_time(body, max(states.due[i], acted))
     for j in range(states.angle.shape[1]):
         states.velocity[i, j] = states.angle[i, j]  # kept until the new angle is read
-    look(physics, states, i)
+    look(world, states, i)
     elapsed = body.surroundings[0].time - begin
     for j in range(states.angle.shape[1]):
         states.velocity[i, j] = _velocity(states.angle[i, j], states.velocity[i, j], elapsed)

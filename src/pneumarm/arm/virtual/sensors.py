@@ -4,7 +4,7 @@ import math
 
 from pneumarm.arm.virtual.constants import BUMPS
 from pneumarm.arm.virtual.parameters import ATMOSPHERE
-from pneumarm.kernels import inner, kernel
+from pneumarm.kernels import borrowed, inner, kernel
 from pneumarm.random import normal, uniform
 
 MOST_CONVERSIONS = 9
@@ -14,7 +14,7 @@ BUMP_WIDTH = 6.0
 _RIPPLES = (17.0, 7.0)  # lengths of the lasting errors of a worn track, in counts
 
 
-@kernel
+@inner
 def convert(value, noise, c, random):  # type: ignore[no-untyped-def]
     """Return one conversion of ``value`` [counts]: with noise, rounded, within the converter's range."""
     disturbance = min(max(noise * normal(random), -c.noise_limit), c.noise_limit) if noise > 0.0 else 0.0
@@ -47,6 +47,7 @@ def worn(value, c):  # type: ignore[no-untyped-def]
 @kernel
 def sense(body, angle, pressure):  # type: ignore[no-untyped-def]
     """Write the readings into ``angle`` (joints,) and ``pressure`` (joints, 2) [counts]; return the time [s]."""
+    body, angle, pressure = borrowed((body, angle, pressure))
     c = body.constants.sensors[0]
     for j in range(len(body.joints)):
         angle[j] = potentiometer(body, j, body.sensor_random)
@@ -57,7 +58,7 @@ def sense(body, angle, pressure):  # type: ignore[no-untyped-def]
     return body.surroundings[0].time
 
 
-@kernel
+@inner
 def potentiometer(body, j, random):  # type: ignore[no-untyped-def]
     """Return what the potentiometer of joint ``j`` says [counts], with noise from ``random``."""
     c, track = body.constants.sensors[0], body.constants.joints[j]
@@ -75,7 +76,7 @@ def potentiometer(body, j, random):  # type: ignore[no-untyped-def]
     return angle
 
 
-@kernel
+@inner
 def shown(value, track, c, random):  # type: ignore[no-untyped-def]
     """Return what a potentiometer with faults shows at the angle ``value`` [counts]; ``track``: JOINT_CONSTANTS."""
     if track.bend > 0.0:

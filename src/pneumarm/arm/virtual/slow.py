@@ -3,7 +3,7 @@
 import math
 
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS, REFERENCE_TEMPERATURE
-from pneumarm.kernels import inner, kernel
+from pneumarm.kernels import inner
 from pneumarm.random import normal
 
 BLADDER_PER_DEGREE = 0.003
@@ -20,7 +20,7 @@ DAY = 86400.0
 """Seconds of a day."""
 
 
-@kernel
+@inner
 def adapt(muscle, c):  # type: ignore[no-untyped-def]
     """Bring the parameters that depend on the muscle's temperature, and the creep's pull, up to date."""
     warmth = muscle.temperature - REFERENCE_TEMPERATURE

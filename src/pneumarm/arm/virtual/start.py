@@ -7,7 +7,7 @@ from pneumarm.arm.virtual.muscle import braid, bring_to_length
 from pneumarm.arm.virtual.parameters import ATMOSPHERE, ELEMENTS
 from pneumarm.arm.virtual.rest import stand
 from pneumarm.arm.virtual.slow import adapt, surround
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 
 
 @kernel
@@ -29,7 +29,7 @@ def start(body):  # type: ignore[no-untyped-def]
             bring_to_length(muscle, c, muscle.length, 0.0, surroundings.supply, 1.0, 0.0)
 
 
-@kernel
+@inner
 def place(muscle, c, length):  # type: ignore[no-untyped-def]
     """Put a muscle at ``length`` [m], vented and with all creep and friction relaxed."""
     muscle.pressure = ATMOSPHERE

@@ -13,7 +13,7 @@ from pneumarm.arm.virtual.parameters import ATMOSPHERE
 from pneumarm.arm.virtual.slow import surround, tick_muscle
 from pneumarm.arm.virtual.state import INLET, OUTLET, SLOW_TICK
 from pneumarm.arm.virtual.valve import toggle_due
-from pneumarm.kernels import inner, kernel, part
+from pneumarm.kernels import inner, part
 
 SUBSTEP = 0.5e-3
 """Longest substep [s]."""
@@ -57,7 +57,7 @@ def slow_tick(body):  # type: ignore[no-untyped-def]
             tick_muscle(body.muscles[j, m], body.constants.muscles[j, m], surroundings.temperature)
 
 
-@kernel
+@inner
 def integrate(body, until, longest):  # type: ignore[no-untyped-def]
     """Advance everything until the clock shows ``until`` [s], in substeps of at most ``longest`` [s]."""
     surroundings, polytropic = body.surroundings[0], body.constants.surroundings[0].polytropic

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner
 
 SOFTNESS = 1000.0
 """Width w of the threshold, 0.01 bar [Pa]."""
@@ -32,7 +32,7 @@ def _cubics() -> NDArray[np.float64]:
 _CUBICS = _cubics()
 
 
-@kernel
+@inner
 def threshold(at_rest, c, length):  # type: ignore[no-untyped-def]
     """Return the pressure p_th [Pa gauge] at which the bladder touches the weave at ``length`` [m].
 
@@ -43,7 +43,7 @@ def threshold(at_rest, c, length):  # type: ignore[no-untyped-def]
     return at_rest * min(max(c.contact * sine - c.contact_offset, 0.0), 2.0)
 
 
-@kernel
+@inner
 def engage(above):  # type: ignore[no-untyped-def]
     """Return p_eff [Pa] and s = dp_eff/dp for a pressure that is ``above`` the threshold by so much [Pa]."""
     widths = above * (1.0 / SOFTNESS)

@@ -12,7 +12,7 @@ from pneumarm.arm.virtual.slow import adapt
 from pneumarm.arm.virtual.start import place
 from pneumarm.arm.virtual.state import INLET, JOINT, OUTLET
 from pneumarm.arm.virtual.step import SUBSTEP, substep
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 
 LONGEST_FILL = 10.0
 """A muscle that is not full by then never is [s]."""
@@ -50,7 +50,7 @@ def range_of_motion(constants, j, pressure, with_stops):  # type: ignore[no-unty
     return lowest, highest, shortest, longest
 
 
-@kernel
+@inner
 def prepare(muscle, c, length, pressure):  # type: ignore[no-untyped-def]
     """Put a muscle at ``length`` [m] and gauge ``pressure`` [Pa], closed, relaxed, at the reference temperature."""
     place(muscle, c, length)
@@ -76,7 +76,7 @@ def fill_time(body, j, m, target):  # type: ignore[no-untyped-def]
     return time + air.opening_delay
 
 
-@kernel
+@inner
 def pose(body, j, pressure, away):  # type: ignore[no-untyped-def]
     """Close all muscles at gauge ``pressure`` [Pa] and move joint ``j`` slowly ``away`` [rad] from where it rests."""
     joints, fixed, polytropic = body.joints, body.constants, body.constants.surroundings[0].polytropic

@@ -7,10 +7,10 @@ times at which a valve toggles, so that every edge falls exactly between two sub
 import math
 
 from pneumarm.arm.virtual.state import INLET, QUEUE
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 
 
-@kernel
+@inner
 def switch(muscle, side, wanted, time):  # type: ignore[no-untyped-def]
     """Have the valve on ``side`` be ``wanted`` (0 or 1) from ``time`` [s] on.
 
@@ -64,7 +64,7 @@ def command_sides(body, until):  # type: ignore[no-untyped-def]
                     switch(body.muscles[j, m], side, 0, until[j, m, side] + c.closing_delay)
 
 
-@kernel
+@inner
 def toggle_due(muscle, now):  # type: ignore[no-untyped-def]
     """Toggle the valves whose time has come, and return the time of the next toggle [s] (inf if none)."""
     following = math.inf

@@ -37,7 +37,7 @@ from pneumarm.control.monitor.identification import (
     remember_look,
     shift_slots,
 )
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import borrowed, inner, kernel, part
 
 _velocity = part(derived_velocity)
 
@@ -200,6 +200,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
 @kernel
 def see_by_identification(known, readings, thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
     """Weigh a reading by what is known of the arm; the valves chosen after it go into ``memory.command[0]``."""
+    known, readings, memory = borrowed((known, readings, memory))
     is_experienced = known.clock[2] * known.look[1] >= EXPERIENCE
     forget_torn_hoses(thresholds, readings, memory)
     identify(known, readings, thresholds, memory, time, angle, pressure, is_experienced)
@@ -216,6 +217,7 @@ def see_by_simulation(  # type: ignore[no-untyped-def]
     The arm is identified besides. Unless it ``trusts_simulation``, what is known of the arm judges its valves and the
     simulation only whether it has changed; ``thresholds`` are those of each.
     """
+    predictor, known, readings, memory = borrowed((predictor, known, readings, memory))
     by_simulation, by_identification = thresholds
     forget(by_simulation, memory)
     if memory.clock[1] >= memory.clock[2]:
@@ -241,7 +243,7 @@ def see_by_simulation(  # type: ignore[no-untyped-def]
     observe(memory, time, angle, pressure)
 
 
-@part
+@inner
 def identify(known, readings, thresholds, memory, time, angle, pressure, judges):  # type: ignore[no-untyped-def]
     """Learn of the arm from a reading that is a look; if it ``judges``, weigh the hypotheses, too."""
     if memory.clock[1] < 1.0:
@@ -267,7 +269,7 @@ def identify(known, readings, thresholds, memory, time, angle, pressure, judges)
         shift_slots(known)
 
 
-@part
+@inner
 def forget(thresholds, memory):  # type: ignore[no-untyped-def]
     """Let evidence fade while nothing was found: what adds up for minutes is an error of the simulation."""
     if memory.clock[5] == 0.0:
@@ -278,7 +280,7 @@ def forget(thresholds, memory):  # type: ignore[no-untyped-def]
                 memory.disagreement[j, q] = faded(thresholds.kept, memory.disagreement[j, q])
 
 
-@part
+@inner
 def forget_torn_hoses(thresholds, readings, memory):  # type: ignore[no-untyped-def]
     """Let evidence of torn hoses fade while nothing was found.
 
@@ -291,27 +293,27 @@ def forget_torn_hoses(thresholds, readings, memory):  # type: ignore[no-untyped-
                 memory.score[h] = faded(thresholds.torn, memory.score[h])
 
 
-@part
+@inner
 def faded(kept, evidence):  # type: ignore[no-untyped-def]
     """Return what is left of ``evidence`` after a period, of which such a part is ``kept``."""
     left = kept * evidence
     return left if left > _NOTHING else 0.0
 
 
-@part
+@inner
 def usual(thresholds, memory, j):  # type: ignore[no-untyped-def]
     """Return how many standard deviations count as one; a simulation is worse where a joint moves fast."""
     fast = memory.observed[0, j, 1] / thresholds.fast
     return thresholds.inflation * math.sqrt(1.0 + fast * fast)
 
 
-@part
+@inner
 def what_is_new(memory, j, q):  # type: ignore[no-untyped-def]
     """Return which part of the evidence of a residual is new."""
     return independence(memory.lasting[j, q, 1], memory.lasting[j, q, 2])
 
 
-@part
+@inner
 def note_residual(lasting, error):  # type: ignore[no-untyped-def]
     """Note in ``lasting`` of a quantity how much a standardised residual is like the one before."""
     cut = min(max(error, -_LASTING), _LASTING)
@@ -321,13 +323,13 @@ def note_residual(lasting, error):  # type: ignore[no-untyped-def]
     lasting[3] = cut
 
 
-@part
+@inner
 def surprise(error):  # type: ignore[no-untyped-def]
     """Return -log p of a standardised residual, up to a constant."""
     return 0.5 * (FREEDOM + 1.0) * math.log1p(error * error / FREEDOM)
 
 
-@part
+@inner
 def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ignore[no-untyped-def]
     """Add the evidence of ``pressure`` (joints, 2) to that of every hypothesis."""
     most = 0.0
@@ -376,7 +378,7 @@ def weigh_hypotheses(thresholds, readings, memory, time, pressure):  # type: ign
             memory.score[h] = max(memory.score[h] - (most - 2.0 * thresholds.alarm), 0.0)
 
 
-@part
+@inner
 def is_calm(thresholds, memory, m):  # type: ignore[no-untyped-def]
     """Return whether muscle ``m`` is closed for as long as the window reaches, and its joint hardly moves."""
     calm = abs(memory.observed[0, m // 2, 1]) < thresholds.calm
@@ -385,7 +387,7 @@ def is_calm(thresholds, memory, m):  # type: ignore[no-untyped-def]
     return calm
 
 
-@part
+@inner
 def weigh_disagreement(thresholds, memory, j, q, error, time):  # type: ignore[no-untyped-def]
     """Add the evidence of a standardised residual that residuals are ``apart`` times as large as usual."""
     evidence = surprise(error) - surprise(error / thresholds.apart) - math.log(thresholds.apart)
@@ -403,7 +405,7 @@ def weigh_disagreement(thresholds, memory, j, q, error, time):  # type: ignore[n
     memory.disagreement[j, q] = min(max(total, 0.0), 2.0 * thresholds.changed)
 
 
-@part
+@inner
 def place_residual(thresholds, memory, j, angle, error):  # type: ignore[no-untyped-def]
     """Keep the standardised residual of an ``angle`` [counts] with those at angles like it."""
     part_of_range = (angle - thresholds.low) / (thresholds.high - thresholds.low)
@@ -412,7 +414,7 @@ def place_residual(thresholds, memory, j, angle, error):  # type: ignore[no-unty
     zone[1] += (min(error * error, _LARGEST * _LARGEST) - zone[1]) / min(zone[0], _VISITS)
 
 
-@kernel
+@inner
 def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: ignore[no-untyped-def]
     """Count readings on a rail, and equal readings in a row, with what the pressures did meanwhile."""
     for j in range(angle.shape[0]):
@@ -444,7 +446,7 @@ def look_at_potentiometers(thresholds, memory, time, angle, pressure):  # type: 
             memory.stayed[j, at_edge(thresholds, moved, angle[j]), 0] += 1.0
 
 
-@part
+@inner
 def has_jumped(thresholds, rail, moved, movement):  # type: ignore[no-untyped-def]
     """Return whether an angle went so far onto a rail by this ``movement`` [counts] as no joint of this arm turns."""
     usual = 1.5 * moved[1] if moved[0] >= thresholds.experience else 3.0 * thresholds.jump
@@ -454,13 +456,13 @@ def has_jumped(thresholds, rail, moved, movement):  # type: ignore[no-untyped-de
     return abs(movement) > limit
 
 
-@part
+@inner
 def at_edge(thresholds, moved, angle):  # type: ignore[no-untyped-def]
     """Return 1 for an ``angle`` that is among the farthest that were seen, as at an end stop, else 0."""
     return 1 if angle - moved[2] < thresholds.edge or moved[3] - angle < thresholds.edge else 0
 
 
-@part
+@inner
 def observe(memory, time, angle, pressure):  # type: ignore[no-untyped-def]
     """Shift the window and put a reading in front, its velocity derived (thesis section 2.3.4)."""
     history = memory.observed.shape[0]

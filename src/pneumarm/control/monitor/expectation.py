@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.control.monitor.hypotheses import at_once, carried_out, leaked
-from pneumarm.kernels import part
+from pneumarm.kernels import inner
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import (
     SimulationParameters,
@@ -85,7 +85,7 @@ def _usual_errors(simulation: Simulation) -> NDArray[np.float64]:
     return std
 
 
-@part
+@inner
 def expect_further(predictor, lag):  # type: ignore[no-untyped-def]
     """Put what further sensors said ``lag`` readings ago where the networks read it."""
     layout, velocities = predictor.simulation.layout, predictor.velocities
@@ -97,7 +97,7 @@ def expect_further(predictor, lag):  # type: ignore[no-untyped-def]
         predictor.state.x[further_at(layout, lag, i)] = np.float32(scaled)
 
 
-@part
+@inner
 def expect_by_simulation(predictor, readings, memory):  # type: ignore[no-untyped-def]
     """Set in ``memory`` the pressures that are expected under every hypothesis, and the angles of a healthy arm.
 
@@ -134,7 +134,7 @@ def expect_by_simulation(predictor, readings, memory):  # type: ignore[no-untype
                 doubt[m] = _LOST * abs(predictor.following[m] - doubt[m])
 
 
-@part
+@inner
 def expect_under(predictor, readings, memory, h, both):  # type: ignore[no-untyped-def]
     """Set in ``predictor`` the pressures that follow under hypothesis ``h`` if two open valves do ``both``.
 

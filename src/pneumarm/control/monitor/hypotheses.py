@@ -189,7 +189,7 @@ def choked_share(supply, level):  # type: ignore[no-untyped-def]
     return min(max((supply + 0.05 - level) / _NEAR, -_BACK), 1.0)
 
 
-@part(entry=True)
+@part
 def time_open(readings, h, m, valve, told_in, told_out):  # type: ignore[no-untyped-def]
     """Return for which part of a time the inlet (0) or the outlet (1) of muscle ``m`` is open under hypothesis ``h``.
 
@@ -199,7 +199,7 @@ def time_open(readings, h, m, valve, told_in, told_out):  # type: ignore[no-unty
     return told_out * states[0] + max(0.0, 1.0 - told_in - told_out) * states[1] + told_in * states[2]
 
 
-@part(entry=True)
+@part
 def times_opened(readings, h, m, valve, fills, empties):  # type: ignore[no-untyped-def]
     """Return how often the inlet (0) or the outlet (1) of muscle ``m`` opened under hypothesis ``h``.
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.monitor.hypotheses import independence, leaked, reduced, time_open, times_opened
-from pneumarm.kernels import part
+from pneumarm.kernels import inner
 
 LOOK = 1 / 30
 """Time between two looks [s], where the control period is not longer."""
@@ -154,7 +154,7 @@ def identified(spec: ArmSpec) -> Identified:
     )
 
 
-@part
+@inner
 def note_valves(known, command):  # type: ignore[no-untyped-def]
     """Note for which parts of the slots the valves were told to be open by the last period's ``command`` (m,)."""
     periods = known.look[0]
@@ -175,7 +175,7 @@ def note_valves(known, command):  # type: ignore[no-untyped-def]
         known.held[m] = 0.0 if share < 1.0 else 1.0 if command[m] > 0.0 else -1.0
 
 
-@part
+@inner
 def shift_slots(known):  # type: ignore[no-untyped-def]
     """Make room for the slots of a new look."""
     for m in range(known.open.shape[0]):
@@ -187,7 +187,7 @@ def shift_slots(known):  # type: ignore[no-untyped-def]
                 known.opened[m, look, side] = known.opened[m, look - 1, side] if look > 0 else 0.0
 
 
-@part
+@inner
 def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-def]
     """Write the features of muscle ``m`` under hypothesis ``h`` into ``x``; ``angle`` (joints,) is what is read now.
 
@@ -244,7 +244,7 @@ def features(known, readings, h, m, angle, full, x):  # type: ignore[no-untyped-
     return abs(lost)
 
 
-@part
+@inner
 def expected_change(known, m, x):  # type: ignore[no-untyped-def]
     """Return the change that is expected of muscle ``m`` by the features ``x`` [highest pressures]."""
     change = 0.0
@@ -253,7 +253,7 @@ def expected_change(known, m, x):  # type: ignore[no-untyped-def]
     return change
 
 
-@part
+@inner
 def takes_air(x):  # type: ignore[no-untyped-def]
     """Return whether a muscle with the features ``x`` takes air, or still may."""
     taken = 0.0
@@ -262,7 +262,7 @@ def takes_air(x):  # type: ignore[no-untyped-def]
     return taken > 0.0
 
 
-@part
+@inner
 def uncertainty(known, m, x, gain):  # type: ignore[no-untyped-def]
     """Return the variance of what is expected by ``x``, and write covariance times ``x`` into ``gain``."""
     gain[:] = 0.0
@@ -277,7 +277,7 @@ def uncertainty(known, m, x, gain):  # type: ignore[no-untyped-def]
     return max(variance, 0.0)
 
 
-@part
+@inner
 def class_of(known, m, angle):  # type: ignore[no-untyped-def]
     """Return the class of errors (side, speed, level) that the change of muscle ``m`` until now belongs to."""
     joint, taken, given, begin = m // 2, 0.0, 0.0, SLOTS * int(known.late[0])
@@ -293,7 +293,7 @@ def class_of(known, m, angle):  # type: ignore[no-untyped-def]
     return side, speed, 0 if full < _EMPTY else 1 if full < _LOW else 2 if full < _FULL else 3
 
 
-@part
+@inner
 def lowest_level(known, m):  # type: ignore[no-untyped-def]
     """Return what is read of muscle ``m`` when it is empty, as far as is known [highest pressures].
 
@@ -304,13 +304,13 @@ def lowest_level(known, m):  # type: ignore[no-untyped-def]
     return min(least, _HIGHEST_EMPTY)
 
 
-@part
+@inner
 def highest_level(known, m):  # type: ignore[no-untyped-def]
     """Return the highest pressure of muscle ``m`` that was read [highest pressures]."""
     return max(known.span[m, 1], lowest_level(known, m) + 0.1)
 
 
-@part
+@inner
 def filling(known, m, level):  # type: ignore[no-untyped-def]
     """Return how fast muscle ``m`` fills at a ``level`` with its inlet open [highest pressures a look]."""
     rate = level * level * (known.weight[m, _CURVES] + level * known.weight[m, _CURVES + 11])
@@ -319,14 +319,14 @@ def filling(known, m, level):  # type: ignore[no-untyped-def]
     return rate
 
 
-@part
+@inner
 def half_a_filling(known, m):  # type: ignore[no-untyped-def]
     """Return half of what an open inlet fills into muscle ``m`` in a look when it is empty [counts]."""
     rate = filling(known, m, lowest_level(known, m)) + known.weight[m, _CURVES + 17]
     return 0.5 * max(rate, 0.0) * known.look[2]
 
 
-@part
+@inner
 def level_of_supply(known, m):  # type: ignore[no-untyped-def]
     """Return at which pressure the inlet of muscle ``m`` lets no more air in, about [highest pressures]."""
     low, top = lowest_level(known, m), highest_level(known, m)
@@ -338,7 +338,7 @@ def level_of_supply(known, m):  # type: ignore[no-untyped-def]
     return min(top + 0.5 * (top - low) * most / (half - most), max(_FARTHEST, top))
 
 
-@part
+@inner
 def expect_by_identification(known, readings, memory, angle, pressure, empty):  # type: ignore[no-untyped-def]
     """Set in ``memory`` what pressures are expected under every hypothesis [counts], and how uncertain that is.
 
@@ -380,7 +380,7 @@ def expect_by_identification(known, readings, memory, angle, pressure, empty):  
                     memory.doubt[h, m] = math.sqrt(doubt + leaving * leaving) * highest
 
 
-@part
+@inner
 def learn(known, m, angle, pressure):  # type: ignore[no-untyped-def]
     """Learn from the ``pressure`` that muscle ``m`` reads now [counts], after :func:`expect_by_identification`."""
     x, gain, variance, highest = known.x[m], known.gain[m], known.variance[m], known.look[2]
@@ -409,7 +409,7 @@ def learn(known, m, angle, pressure):  # type: ignore[no-untyped-def]
     lasting[2] = cut
 
 
-@part
+@inner
 def note_answers(known, pressure):  # type: ignore[no-untyped-def]
     """Note how the pressures (joints, 2) answer to what the valves were told, whatever was expected [counts]."""
     muscles, highest = known.last.shape[0], known.look[2]
@@ -429,7 +429,7 @@ def note_answers(known, pressure):  # type: ignore[no-untyped-def]
         known.answer[m, 2] = max(known.answer[m, 2], level)
 
 
-@part
+@inner
 def note_dead_time(known, pressure):  # type: ignore[no-untyped-def]
     """Note by how many looks the valves answer late, by the pressures (joints, 2) of the first seconds [counts].
 
@@ -457,7 +457,7 @@ def note_dead_time(known, pressure):  # type: ignore[no-untyped-def]
     return known.late[0] > 0.0
 
 
-@part
+@inner
 def learn_anew(known):  # type: ignore[no-untyped-def]
     """Forget what was learned of how pressures change, and how they answer."""
     for m in range(known.weight.shape[0]):
@@ -478,7 +478,7 @@ def learn_anew(known):  # type: ignore[no-untyped-def]
     known.clock[2] = 0.0
 
 
-@part
+@inner
 def doubt_what_counts_from(known, m, change):  # type: ignore[no-untyped-def]
     """Trust less what was learned of muscle ``m`` near empty: empty it reads less or more by ``change`` than thought.
 
@@ -489,7 +489,7 @@ def doubt_what_counts_from(known, m, change):  # type: ignore[no-untyped-def]
         known.covariance[m, i, i] += part * part
 
 
-@part
+@inner
 def is_settled(known, m, angle):  # type: ignore[no-untyped-def]
     """Return whether muscle ``m`` is as empty as it gets.
 
@@ -504,7 +504,7 @@ def is_settled(known, m, angle):  # type: ignore[no-untyped-def]
     return told > _SLOTS - 0.01 and speed == 0 and fallen <= _SETTLED * left  # a sum of parts is rounded
 
 
-@part
+@inner
 def remember_look(known, angle, pressure, fresh):  # type: ignore[no-untyped-def]
     """Remember what is read at a look; ``fresh`` says that a sequence begins with it."""
     for m in range(known.last.shape[0]):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.learning.online.exploration import choose, greedy
 from pneumarm.learning.online.values import Networks
 from pneumarm.learning.policy.inputs import write_policy_inputs
@@ -157,7 +157,7 @@ def collect_values(mind, rule, exploration, net, fleet, batch):  # type: ignore[
     return episodes, successes, total
 
 
-@kernel
+@inner
 def lambda_returns(reward, ended, best, discount, decay, target):  # type: ignore[no-untyped-def]
     """Set ``target`` to G, see the top of this module; shapes as in :class:`ValueBatch`."""
     steps, n, joints = reward.shape

@@ -8,7 +8,7 @@ from pneumarm.kernels import part
 from pneumarm.random import uniform
 
 
-@part(entry=True)
+@part
 def greedy(values):  # type: ignore[no-untyped-def]
     """Return the action with the highest of ``values`` (9,), the first of equals."""
     best, highest = 0, values[0]
@@ -18,7 +18,7 @@ def greedy(values):  # type: ignore[no-untyped-def]
     return best
 
 
-@part(entry=True)
+@part
 def choose(values, epsilon, temperature, odds, random):  # type: ignore[no-untyped-def]
     """Return the greedy action, or with probability ``epsilon`` another one by the Boltzmann distribution.
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS
-from pneumarm.kernels import part
+from pneumarm.kernels import borrowed, kernel, part
 from pneumarm.learning.online.exploration import choose, greedy
 from pneumarm.learning.online.values import ActionValues, action_values, forget_traces, td_target, update
 from pneumarm.task.environment import at_goal, begin_episode, gained, take
@@ -84,7 +84,7 @@ def look_ahead(learner, schedule, x, workspace, random):  # type: ignore[no-unty
     spread(workspace.next_chosen, workspace.next_actions)
 
 
-@part(entry=True)
+@part
 def decide(learner, schedule, x, workspace, random):  # type: ignore[no-untyped-def]
     """Let agents choose what to do next in ``x``."""
     for agent in range(workspace.next_chosen.shape[0]):
@@ -110,7 +110,7 @@ def spread(chosen, actions):  # type: ignore[no-untyped-def]
             left //= ACTIONS
 
 
-@part(entry=True)
+@part
 def learn(learner, workspace, is_reached):  # type: ignore[no-untyped-def]
     """Move the values of what was chosen towards their targets; the goal of all joints ``is_reached`` or not."""
     each = workspace.paid.shape[0] // workspace.chosen.shape[0]
@@ -127,7 +127,7 @@ def learn(learner, workspace, is_reached):  # type: ignore[no-untyped-def]
             forget_traces(learner, agent)
 
 
-@part(entry=True)
+@part
 def remember(workspace, x):  # type: ignore[no-untyped-def]
     """Remember the state ``x`` (inputs,) and what was chosen there."""
     for i in range(x.shape[0]):
@@ -136,7 +136,7 @@ def remember(workspace, x):  # type: ignore[no-untyped-def]
         workspace.chosen[agent] = workspace.next_chosen[agent]
 
 
-@part(entry=True)
+@kernel(inline="always")
 def train_episode(environment, learner, schedule, episode, workspace):  # type: ignore[no-untyped-def]
     """Run one episode, learning; return actions taken, sum of rewards, and whether the goal was reached."""
     x, random, total = episode.state.x, episode.state.random, 0.0
@@ -162,6 +162,7 @@ def train_episode(environment, learner, schedule, episode, workspace):  # type: 
 @part(entry=True)
 def train_episodes(environment, learner, schedule, episode, workspace, count, performance):  # type: ignore[no-untyped-def]
     """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes."""
+    environment, learner, episode, workspace = borrowed((environment, learner, episode, workspace))
     steps = 0
     for e in range(count):
         actions, _, success = train_episode(environment, learner, schedule, episode, workspace)
@@ -178,6 +179,8 @@ def test_episodes(environment, learner, schedule, episode, workspace, random, re
 
     Actions are greedy where the epsilon of ``schedule`` is 0; else they explore, by random numbers of the episode.
     """
+    environment, learner, episode = borrowed(environment), borrowed(learner), borrowed(episode)
+    workspace, random, record = borrowed(workspace), borrowed(random), borrowed(record)
     task, x = environment.task, episode.state.x
     for e in range(record.actions.shape[0]):
         begin_episode(environment, episode, np.inf, random)

@@ -194,13 +194,13 @@ def action_values(learner, agent, x, values):  # type: ignore[no-untyped-def]
         values[action] = value * np.float32(learner.scale)
 
 
-@part(entry=True)
+@part
 def td_target(reward, discount, next_value, terminal):  # type: ignore[no-untyped-def]
     """Return what Q(s_k, a_k) should have been: r_{k+1} + gamma Q(s_{k+1}, .), where a terminal state has 0."""
     return reward if terminal else reward + discount * next_value
 
 
-@part(entry=True, fastmath=_IN_ORDER)
+@part(fastmath=_IN_ORDER)
 def backpropagate(learner, agent, x, action):  # type: ignore[no-untyped-def]
     """Return the value of ``action`` in ``x`` and leave its network's activations and slopes in the learner.
 
@@ -233,7 +233,7 @@ def add_gradient(learner, table, x, action, factor):  # type: ignore[no-untyped-
     add_products(table, first, x, slope)
 
 
-@part(entry=True)
+@part
 def update(learner, agent, x, action, target):  # type: ignore[no-untyped-def]
     """Move the value of ``action`` in ``x`` towards ``target``; return the error delta, in units of reward."""
     delta = target - backpropagate(learner, agent, x, action)
@@ -257,7 +257,7 @@ def follow_traces(learner, agent, factor):  # type: ignore[no-untyped-def]
             follow(weights, traces, action * width, width, factor, decay)
 
 
-@part(entry=True)
+@part
 def forget_traces(learner, agent):  # type: ignore[no-untyped-def]
     """Set the traces of ``agent`` to 0, as at the start of every episode."""
     traces, width = learner.traces[agent], learner.activation.shape[0]

@@ -75,7 +75,7 @@ def lanes(mind: Mind, sizes: tuple[int, ...], random: RandomState) -> Lanes:
     )
 
 
-@kernel
+@inner
 def judge_all(mind, lanes):  # type: ignore[no-untyped-def]
     """Let ``lanes.units[-1]`` be the logits of the actions, and ``lanes.actions`` the most probable, where alive."""
     arms = lanes.fleet

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner
 from pneumarm.networks.tansig import tansig
 from pneumarm.simulation.layout import Layout, angle_at, layout_of
 from pneumarm.simulation.simulation import Scaling
@@ -36,7 +36,7 @@ def policy_input_size(window: Window, squash: tuple[float, ...]) -> int:
     return window.state_size + window.joints * (1 + len(squash)) + 1
 
 
-@kernel
+@inner
 def write_policy_inputs(inputs, x, actions, rows):  # type: ignore[no-untyped-def]
     """Set ``rows`` (input_size, n) for the states ``x`` (inputs, n) after the last ``actions`` (n, joints)."""
     joints, n = actions.shape[1], actions.shape[0]

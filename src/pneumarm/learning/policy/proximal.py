@@ -127,7 +127,7 @@ def exponential(values):  # type: ignore[no-untyped-def]
         values[e] = p
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def log_softmax(logits, bias, probability):  # type: ignore[no-untyped-def]
     """Replace ``logits`` (9 joints, n) plus ``bias`` by log probabilities; set ``probability`` to these."""
     n = logits.shape[1]
@@ -234,7 +234,7 @@ def estimate_advantages(rule, value, batch):  # type: ignore[no-untyped-def]
             batch.advantage[k, e] = (batch.advantage[k, e] - mean) * part
 
 
-@kernel
+@inner
 def advantages(reward, ended, value, discount, decay, advantage):  # type: ignore[no-untyped-def]
     """Set ``advantage`` (steps, n), see the top of this module; ``value`` is (steps + 1, n)."""
     steps, n = reward.shape
@@ -248,7 +248,7 @@ def advantages(reward, ended, value, discount, decay, advantage):  # type: ignor
             advantage[k, e] = later
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def policy_errors(rule, policy, batch, k, part):  # type: ignore[no-untyped-def]
     """Set the derivatives of step ``k``'s loss, times ``part``, by the logits; ``policy.units[-1]`` holds these."""
     logits, probability = policy.units[-1], policy.errors[-1]

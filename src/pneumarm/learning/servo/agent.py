@@ -266,7 +266,7 @@ class ServoLearner(Learner[ServoAgent]):
         random = np.random.default_rng([self._seed, _MOVEMENTS, self._number, number])
         fresh = random.random(wanted.arms) < _RENEWED
         self._prepare(random, fresh if number else np.ones(wanted.arms, bool))
-        price = float(learn_once(self._task_now(), self.net, self.tape))
+        price = learn_once(self._task_now(), self.net, self.tape)
         self.updates += 1
         adam(self.net, wanted.learning_rate * (1 - number / wanted.updates), wanted.largest_gradient, number + 1)
         return price

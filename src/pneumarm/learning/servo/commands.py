@@ -72,7 +72,7 @@ def shortest_share(spec: ArmSpec) -> float:
     return min(spec.shortest_pulse / spec.period, 1.0) if spec.pulses else _AS_IF
 
 
-@part(entry=True)
+@part
 def rounded(size, shortest, step):  # type: ignore[no-untyped-def]
     """Return a pulse of ``size`` periods as the valve can make it: none, or between ``shortest`` and the period."""
     if step > _ZERO:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import borrowed, inner, kernel
 from pneumarm.learning.servo.commands import CommandParameters, write_commands
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, inputs_back, write_inputs
 from pneumarm.networks.layers import Trainable, backward, forward, through_weights
@@ -29,6 +29,7 @@ from pneumarm.task.price import (
     price_of_error,
     price_of_slack,
 )
+from pneumarm.vectors import put
 
 _ZERO = np.float32(0.0)
 
@@ -123,6 +124,7 @@ def tape(task: ServoTask, steps: int, n: int, hidden: int = 0) -> Tape:
 @kernel(fastmath=FASTMATH)
 def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
     """Let the policy ``net`` move all arms from ``tape.x[0]`` on."""
+    task, net, tape = borrowed((task, net, tape))
     simulation = task.simulation
     first, commanded = simulation.layout.command, simulation.layout.commanded
     for t in range(tape.slope.shape[0]):
@@ -132,16 +134,16 @@ def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
         end = 0
         for layer in range(len(net.units) - 1):
             begin, end = end, end + net.units[layer].shape[0]
-            tape.units[t, begin:end] = net.units[layer]
+            put(tape.units[t, begin:end], net.units[layer])
         if task.commands.coarse > 0:
             note_underway(task, tape, t)
         write_commands(task.commands, x, tape.underway, net.units[-1], tape.slope[t], x[first : first + commanded])
         step_all(simulation, x, tape.x[t + 1], tape.work)
-        tape.hidden[t] = tape.work.hidden
+        put(tape.hidden[t], tape.work.hidden)
         note_free(task, tape, t)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def note_free(task, tape, t):  # type: ignore[no-untyped-def]
     """Note what share of the gradient passes at step ``t``."""
     least, free = np.float32(task.past_the_limit), tape.work.free
@@ -150,7 +152,7 @@ def note_free(task, tape, t):  # type: ignore[no-untyped-def]
             tape.free[t, o, e] = max(free[o, e], least)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def note_underway(task, tape, t):  # type: ignore[no-untyped-def]
     """Note which joints are on their way to a goal that stays, at step ``t``."""
     layout, commands = task.simulation.layout, task.commands
@@ -164,7 +166,7 @@ def note_underway(task, tape, t):  # type: ignore[no-untyped-def]
             tape.underway[joint, e] = moves and wanted == tape.preview[t, -1, joint, e]
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def errors_at(task, tape, t, joint, error):  # type: ignore[no-untyped-def]
     """Set ``error`` (n,) to how far ``joint`` is from what is asked for at step ``t`` [tolerances]."""
     scale, angle = task.inputs.tolerances[joint], angle_at(task.simulation.layout, 0, joint)
@@ -172,7 +174,7 @@ def errors_at(task, tape, t, joint, error):  # type: ignore[no-untyped-def]
         error[e] = (tape.x[t, angle, e] - tape.reference[t, joint, e]) * scale
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def prices_of_pressures(task, tape, t, joint, row):  # type: ignore[no-untyped-def]
     """Set ``row`` (3, n) to the price of the pressures of ``joint`` at step ``t`` and its slopes by both [scaled]."""
     layout, scale = task.simulation.layout, task.inputs.tolerances[joint]
@@ -193,7 +195,7 @@ def prices_of_pressures(task, tape, t, joint, row):  # type: ignore[no-untyped-d
         row[0, e], row[1, e], row[2, e] = price, by_one * to_share[0], by_two * to_share[1]
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
     """Return the price of all arms at step ``t``; set ``tape.sooner`` to ``share`` of its derivatives.
 
@@ -216,14 +218,15 @@ def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
             total += row[0, e]
             later[pressure, e] += row[1, e] * share
             later[pressure + 1, e] += row[2, e] * share
-    tape.work.hidden[:] = tape.hidden[t]
-    tape.work.free[:] = tape.free[t]
+    put(tape.work.hidden, tape.hidden[t])
+    put(tape.work.free, tape.free[t])
     step_back(simulation, later, sooner, tape.work)
     for c in range(commanded):
         command, before = tape.x[t, first + c], row[0]
         before[:] = _ZERO
         if layout.history > 1:
-            before[:] = tape.x[t, before_first + c]
+            for e in range(n):
+                before[e] = tape.x[t, before_first + c, e]
         total += price_of_changes(task.prices, command, before, row[1], row[2])
         for e in range(n):
             sooner[first + c, e] += row[1, e] * share
@@ -236,6 +239,7 @@ def price_of_a_step(task, tape, t, share):  # type: ignore[no-untyped-def]
 @kernel(fastmath=FASTMATH)
 def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     """Add the gradient of the mean cost a step to ``net.gradient``, after :func:`move_forward`; return the cost."""
+    task, net, tape = borrowed((task, net, tape))
     simulation = task.simulation
     first, commanded = simulation.layout.command, simulation.layout.commanded
     steps, n = tape.slope.shape[0], tape.slope.shape[2]
@@ -249,7 +253,7 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
         end = 0
         for layer in range(len(net.units) - 1):
             begin, end = end, end + net.units[layer].shape[0]
-            net.units[layer][:] = tape.units[t, begin:end]
+            put(net.units[layer], tape.units[t, begin:end])
         for c in range(commanded):
             for e in range(n):
                 net.errors[-1][c, e] = sooner[first + c, e] * tape.slope[t, c, e]
@@ -261,14 +265,14 @@ def move_back(task, net, tape):  # type: ignore[no-untyped-def]
     return total * share
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def go_sooner(task, tape, share):  # type: ignore[no-untyped-def]
     """Make the derivatives by a step's state those of the steps that follow the one before it, cut off."""
-    tape.later[:] = tape.sooner
+    put(tape.later, tape.sooner)
     cut_off(tape.later, np.float32(task.steepest) * share * task.inputs.tolerances.max(), tape.row[0])
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def cut_off(vectors, longest, square):  # type: ignore[no-untyped-def]
     """Shorten the ``vectors`` (size, n) that are longer than ``longest`` to that; ``square`` (n,) is workspace."""
     square[:] = _ZERO
@@ -282,11 +286,10 @@ def cut_off(vectors, longest, square):  # type: ignore[no-untyped-def]
             vectors[i, e] *= square[e]
 
 
-@kernel
-def learn_once(task, net, tape):  # type: ignore[no-untyped-def]
+def learn_once(task: ServoTask, net: Trainable, tape: Tape) -> float:
     """Move forward and back; return the mean cost of a step."""
     move_forward(task, net, tape)
-    return move_back(task, net, tape)
+    return float(move_back(task, net, tape))
 
 
 def errors_of(task: ServoTask, tape: Tape) -> NDArray[np.float32]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel
+from pneumarm.kernels import inner, kernel
 from pneumarm.networks.tansig import FASTMATH, tansig
 from pneumarm.simulation.layout import Layout, angle_at, command_at, layout_of, pressure_at
 from pneumarm.simulation.simulation import Simulation
@@ -103,7 +103,7 @@ def write_inputs(parameters, x, noise, now, preview, inputs):  # type: ignore[no
             row += 3
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def inputs_back(parameters, inputs, slopes, x_slopes):  # type: ignore[no-untyped-def]
     """Add to ``x_slopes`` (size, n) the derivatives by states, ``slopes`` (inputs, n) being those by inputs."""
     layout, n = parameters.layout, inputs.shape[1]

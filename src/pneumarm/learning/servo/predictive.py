@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.kernels import kernel, part
+from pneumarm.kernels import borrowed, inner, kernel, part
 from pneumarm.learning.servo.commands import rounded
 from pneumarm.learning.servo.gradient import (
     ServoTask,
@@ -36,6 +36,7 @@ from pneumarm.simulation.layout import angle_at, command_at, pressure_at
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.changes import changes
 from pneumarm.task.price import price_of_one_error
+from pneumarm.vectors import put
 
 _changes = part(changes)
 _HORIZON = 0.55  # s
@@ -76,7 +77,7 @@ def plans_of(steps: int, there: NDArray[np.float32], n: int) -> Plans:
     return Plans(commands, gradient, mean, square, np.zeros(n, np.float32), best, np.zeros(n, np.float32), there)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def play(task, plans, tape):  # type: ignore[no-untyped-def]
     """Play the commands from ``tape.x[0]`` on."""
     simulation, how = task.simulation, task.commands
@@ -93,11 +94,11 @@ def play(task, plans, tape):  # type: ignore[no-untyped-def]
                 x[first + c, e] = pulse if wished > _ZERO else -pulse
                 tape.slope[t, c, e] = leak if stopped else plans.there[c]
         step_all(simulation, x, tape.x[t + 1], tape.work)
-        tape.hidden[t] = tape.work.hidden
+        put(tape.hidden[t], tape.work.hidden)
         note_free(task, tape, t)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def price(task, plans, tape):  # type: ignore[no-untyped-def]
     """Set ``plans.cost`` to what the movements on ``tape`` cost; valve changes are counted."""
     simulation, cost = task.simulation, plans.cost
@@ -118,7 +119,7 @@ def price(task, plans, tape):  # type: ignore[no-untyped-def]
                 cost[e] += change * _changes(now, tape.x[t, before + c, e] if layout.history > 1 else _ZERO)
 
 
-@kernel(fastmath=FASTMATH)
+@inner(fastmath=FASTMATH)
 def slopes_by_commands(task, plans, tape):  # type: ignore[no-untyped-def]
     """Set ``plans.gradient`` to the derivatives of what the movements on ``tape`` cost, after :func:`play`."""
     simulation = task.simulation
@@ -135,15 +136,26 @@ def slopes_by_commands(task, plans, tape):  # type: ignore[no-untyped-def]
         go_sooner(task, tape, _ONE)
 
 
+@inner
+def copy_plan(to, e, source, number):  # type: ignore[no-untyped-def]
+    """Make plan ``e`` of ``to`` plan ``number`` of ``source``."""
+    for t in range(to.shape[0]):
+        for c in range(to.shape[1]):
+            to[t, c, e] = source[t, c, number]
+
+
 @kernel(fastmath=FASTMATH)
 def improve(task, plans, tape, times, rate):  # type: ignore[no-untyped-def]
     """Make each plan better so many ``times``, and play the cheapest of all that there were, as all plans."""
+    task, plans, tape = borrowed((task, plans, tape))
     plans.mean[:] = _ZERO
     plans.square[:] = _ZERO
     play(task, plans, tape)
     price(task, plans, tape)
-    plans.best[:] = plans.commands
-    plans.least[:] = plans.cost
+    for t in range(plans.commands.shape[0]):
+        put(plans.best[t], plans.commands[t])
+    for e in range(plans.cost.shape[0]):
+        plans.least[e] = plans.cost[e]
     for number in range(times):
         slopes_by_commands(task, plans, tape)
         unbias, unbias_square = _ONE - _MEAN ** np.float32(number + 1), _ONE - _SQUARE ** np.float32(number + 1)
@@ -162,10 +174,10 @@ def improve(task, plans, tape, times, rate):  # type: ignore[no-untyped-def]
         for e in range(plans.cost.shape[0]):
             if plans.cost[e] < plans.least[e]:
                 plans.least[e] = plans.cost[e]
-                plans.best[:, :, e] = plans.commands[:, :, e]
+                copy_plan(plans.best, e, plans.commands, e)
     cheapest = plans.least.argmin()
     for e in range(plans.least.shape[0]):
-        plans.commands[:, :, e] = plans.best[:, :, cheapest]
+        copy_plan(plans.commands, e, plans.best, cheapest)
     play(task, plans, tape)
 
 

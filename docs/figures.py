@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from pneumarm.drawing.moving_arm import moving_arm
-from pneumarm.report.figures import movement
+from pneumarm.report.figures.film import movement
 from pneumarm.report.run_report import read_run
 from pneumarm.report.shown import read_shown
 from pneumarm.report.style import svg

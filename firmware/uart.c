@@ -3,6 +3,7 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "board.h"
 #include "protocol.h"
 
 /* Powers of two, so that indices wrap by a mask. An index is one byte: reading it needs no lock, and each is
@@ -47,12 +48,12 @@ void uart_take(void)
 	take();
 }
 
-ISR(USART_RX_vect)
+ISR(UART_RECEIVED)
 {
 	take();
 }
 
-ISR(USART_UDRE_vect)
+ISR(UART_EMPTY)
 {
 	uint8_t tail = out_tail;
 	UDR0 = out_ring[tail];

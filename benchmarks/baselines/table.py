@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pneumarm.files import write_text
-from pneumarm.report.figures import Baseline, baselines
+from pneumarm.report.figures.baselines import Baseline, baselines
 from pneumarm.report.ledger import with_interval
 from pneumarm.report.page import Picture, Section, Table, render
 from pneumarm.report.style import RASTER_DPI

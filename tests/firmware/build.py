@@ -12,6 +12,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[1] / "firmware"
 BUILD = FIRMWARE / "build"
+BOARD = "uno"
+"""The board that the tests are of."""
 _DATA, _EEPROM = 0x800000, 0x810000
 """Where the linker puts the data memory and the EEPROM."""
 PACKAGES = "gcc-avr avr-libc libsimavr-dev libelf-dev make gcc"
@@ -52,16 +54,22 @@ def _run(*command: str) -> None:
 def hex_file() -> Path:
     """Return the firmware as it is flashed."""
     with _alone():
-        _run("make", "-C", str(FIRMWARE))
-    return BUILD / "pneumarm.hex"
+        _run("make", "-C", str(FIRMWARE), f"BOARD={BOARD}")
+    return elf_file().with_suffix(".hex")
+
+
+def elf_file() -> Path:
+    """Return where the firmware lies with its symbols."""
+    return BUILD / BOARD / "pneumarm.elf"
 
 
 def hash_of_sources() -> int:
     """Return what a program of these sources calls itself, by the lists in its Makefile."""
     makefile = (FIRMWARE / "Makefile").read_text()
     lists = [line.split(":=")[1].split() for line in makefile.splitlines() if line.startswith(("SOURCES", "HEADERS"))]
-    names = [name for names in lists for name in names]
-    assert set(names) == {path.name for path in FIRMWARE.glob("*.[ch]")}
+    names = [name.replace("$(BOARD)", BOARD) for names in lists for name in names]
+    files = [*FIRMWARE.glob("*.[ch]"), *(FIRMWARE / "boards" / BOARD).iterdir()]
+    assert set(names) == {path.relative_to(FIRMWARE).as_posix() for path in files}
     digest = hashlib.sha256(b"".join((FIRMWARE / name).read_bytes() for name in [*names, "Makefile"]))
     return int(digest.hexdigest()[:8], 16)
 
@@ -71,7 +79,7 @@ def symbols() -> dict[str, tuple[int, int]]:
     """Return the address in the data memory and the size of each variable of the firmware; ends have no size."""
     hex_file()
     listing = subprocess.run(
-        ["avr-nm", "--print-size", str(BUILD / "pneumarm.elf")], capture_output=True, text=True, check=True
+        ["avr-nm", "--print-size", str(elf_file())], capture_output=True, text=True, check=True
     ).stdout
     found = {}
     for line in listing.splitlines():

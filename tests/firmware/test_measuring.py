@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from tests.firmware import wire
-from tests.firmware.build import BUILD, missing
+from tests.firmware.build import elf_file, missing
 from tests.firmware.chip import Chip
 from tests.firmware.figures import ANALOG, armed
 from tests.firmware.host import Host
@@ -167,9 +167,7 @@ def test_time_never_goes_back() -> None:
 
 def test_time_wraps_after_32_bits() -> None:
     with armed() as host:
-        symbols = subprocess.run(
-            ["avr-nm", str(BUILD / "pneumarm.elf")], capture_output=True, text=True, check=True
-        ).stdout
+        symbols = subprocess.run(["avr-nm", str(elf_file())], capture_output=True, text=True, check=True).stdout
         address = re.search(r"^00800(\w+) b ticks_us", symbols, re.MULTILINE)
         assert address is not None
         for i, byte in enumerate((2**32 - 5000).to_bytes(4, "little")):

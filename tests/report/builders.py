@@ -12,7 +12,7 @@ from pneumarm.control import Adapted, Finding
 from pneumarm.control.condition import Condition
 from pneumarm.learning import CURVES
 from pneumarm.report.data import CoverageData, Demonstration, MarkedData, QualityData, TrainingData, TransferData
-from pneumarm.report.figures import Baseline
+from pneumarm.report.figures.baselines import Baseline
 from pneumarm.report.sections import RunData
 from pneumarm.report.style import of_joint
 from pneumarm.statistics import Estimate

@@ -7,8 +7,19 @@ import pytest
 
 from pneumarm.arm import ArmSpec
 from pneumarm.drawing.colours import DARK, LIGHT, MIDDLE
-from pneumarm.report import figures
-from pneumarm.report.figures import Classification
+from pneumarm.report.figures.adaptation import CurveMark, adaptation_curves
+from pneumarm.report.figures.baselines import Baseline, baselines
+from pneumarm.report.figures.coverage import cells, new_share, projections
+from pneumarm.report.figures.displacement import against_displacement
+from pneumarm.report.figures.episodes import distributions
+from pneumarm.report.figures.film import movement
+from pneumarm.report.figures.importance import input_importance
+from pneumarm.report.figures.isoplots import isoplot
+from pneumarm.report.figures.marked import marked_rows
+from pneumarm.report.figures.propagation import error_propagation, expectation
+from pneumarm.report.figures.residues import Classification, residue_by_class, residues
+from pneumarm.report.figures.training import spread_of_agents, training_curves
+from pneumarm.report.figures.transfer import transfer_curves
 from pneumarm.report.sections import RunData, all_sections, classifications, levels, phases_of
 from pneumarm.report.style import svg
 from pneumarm.statistics import Estimate
@@ -31,32 +42,30 @@ def figures_of(n, joints):
     far = (test.distance[won], test.actions[won], test.all_switches[won])
     real, simulated = q.target - q.observation, q.predicted - q.observation
     adapted = builders.adaptation(n, joints)
-    marks = [figures.CurveMark(event.movement, event.what) for event in adapted.events]
+    marks = [CurveMark(event.movement, event.what) for event in adapted.events]
     m = builders.movement(joints=joints, n=max(n // 8, 1))
     k = builders.marked(n, builders.marked().reasons if n else ())
     made = {
-        "projections": figures.projections(seen.observation, spec),
-        "cells": figures.cells(seen.cells_holding, 5, seen.growth),
-        "residue": figures.residues(q.target[:, :, 0], q.predicted[:, :, 0], spec),
-        "residue_by_class": figures.residue_by_class(simulated[:, 0, 0], classifications(q, 0, spec)),
-        "isoplot": figures.isoplot(real, simulated, spec),
-        "propagation": figures.error_propagation(q.propagation, spec),
-        "importance": figures.input_importance(q.weights, q.inputs, q.outputs),
-        "distributions": figures.distributions(test.reward, test.actions, test.all_switches, won),
-        "transfer": figures.transfer_curves(phases, levels(test)),
-        "displacement": figures.against_displacement(*far, spec),
-        "baselines": figures.baselines(*(builders.baselines(min(n, 10)) if n else ([], {}))),
-        "adaptation": figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14),
-        "marked": figures.marked_rows(k.spans, k.reason, k.reasons, k.ends.tolist(), k.stages, spec.period),
-        "movement": figures.movement(m.shown(spec), m.seconds, tolerance=25.0),
+        "projections": projections(seen.observation, spec),
+        "cells": cells(seen.cells_holding, 5, seen.growth),
+        "residue": residues(q.target[:, :, 0], q.predicted[:, :, 0], spec),
+        "residue_by_class": residue_by_class(simulated[:, 0, 0], classifications(q, 0, spec)),
+        "isoplot": isoplot(real, simulated, spec),
+        "propagation": error_propagation(q.propagation, spec),
+        "importance": input_importance(q.weights, q.inputs, q.outputs),
+        "distributions": distributions(test.reward, test.actions, test.all_switches, won),
+        "transfer": transfer_curves(phases, levels(test)),
+        "displacement": against_displacement(*far, spec),
+        "baselines": baselines(*(builders.baselines(min(n, 10)) if n else ([], {}))),
+        "adaptation": adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14),
+        "marked": marked_rows(k.spans, k.reason, k.reasons, k.ends.tolist(), k.stages, spec.period),
+        "movement": movement(m.shown(spec), m.seconds, tolerance=25.0),
     }
     if t is not None:
-        made["shaping"] = figures.training_curves(t.curves, t.columns, t.evaluated, t.chosen, spec)
+        made["shaping"] = training_curves(t.curves, t.columns, t.evaluated, t.chosen, spec)
         learned = t.curves[:, :, [0, 3, 4]]
-        made["learning"] = figures.training_curves(
-            learned, ("episodes", "reward", "success"), t.evaluated, t.chosen, spec
-        )
-        made["spread"] = figures.spread_of_agents(t.reward, t.success, t.chosen)
+        made["learning"] = training_curves(learned, ("episodes", "reward", "success"), t.evaluated, t.chosen, spec)
+        made["spread"] = spread_of_agents(t.reward, t.success, t.chosen)
     return made
 
 
@@ -128,7 +137,7 @@ def test_drawing_leaves_the_style_of_others_alone():
     import matplotlib
 
     before = dict(matplotlib.rcParams)
-    svg(figures.cells(np.array([0, 3, 4]), 5, np.empty((0, 2), np.int64)))
+    svg(cells(np.array([0, 3, 4]), 5, np.empty((0, 2), np.int64)))
     assert dict(matplotlib.rcParams) == before
 
 
@@ -138,8 +147,8 @@ def test_same_arrays_give_the_same_svg():
     for _ in range(2):
         m, c = arrays
         pair = (
-            figures.movement(m.shown(SPEC), m.seconds, tolerance=25.0),
-            figures.projections(c.observation, SPEC),
+            movement(m.shown(SPEC), m.seconds, tolerance=25.0),
+            projections(c.observation, SPEC),
         )
         made.append([svg(f) for f in pair])
     assert made[0] == made[1]
@@ -149,7 +158,7 @@ def test_same_arrays_give_the_same_svg():
 def test_isoplot_shows_the_bias_of_a_simulation_that_predicts_too_little():
     random = np.random.default_rng(0)
     real = random.normal(0, 10, (500, 1, 4))
-    figure = figures.isoplot(real, 0.5 * real, SPEC)
+    figure = isoplot(real, 0.5 * real, SPEC)
     assert [t.get_text() for t in figure.axes[0].get_legend().get_texts()] == ["ideal, 45°", "slope 0.500"]
     assert "angle: slope 0.500" in figure.alt
 
@@ -158,14 +167,14 @@ def test_expected_propagation_is_equation_3_7_with_the_thesis_numbers():
     # Table 5.2: 6.70 counts become 36.70 after one second at 30 Hz.
     measured = np.zeros((30, 1, 4))
     measured[0, 0] = (6.70, 0.19, 1.94, 1.52)
-    assert np.allclose(figures.expectation(measured)[-1, 0, (0, 2, 3)], (36.70, 10.63, 8.33), atol=0.01)
+    assert np.allclose(expectation(measured)[-1, 0, (0, 2, 3)], (36.70, 10.63, 8.33), atol=0.01)
 
 
 def test_residue_by_class_tells_where_the_simulation_is_unsure():
     random = np.random.default_rng(0)
     velocity = random.uniform(-3, 3, 9000)
     residue = random.normal(0, 1 + np.abs(velocity))
-    text = figures.residue_by_class(residue, [Classification("velocity [°/s]", velocity)]).alt
+    text = residue_by_class(residue, [Classification("velocity [°/s]", velocity)]).alt
     least, where_least, most, where_most = (
         float(v) for v in re.search(r"from ([\d.]+)° \(at (\S+)\) to ([\d.]+)° \(at (\S+)\)", text).groups()
     )
@@ -174,19 +183,19 @@ def test_residue_by_class_tells_where_the_simulation_is_unsure():
 
 
 def test_growth_of_coverage_is_the_thesis_test_for_enough_data():
-    assert figures.new_share(np.array([[100, 50], [200, 80], [400, 80]])) == 0
-    assert figures.new_share(np.array([[0, 0], [400, 80]])) == pytest.approx(0.5)
+    assert new_share(np.array([[100, 50], [200, 80], [400, 80]])) == 0
+    assert new_share(np.array([[0, 0], [400, 80]])) == pytest.approx(0.5)
 
 
 def test_cells_counts_every_occupied_cell_once():
     held = np.bincount(np.random.default_rng(0).geometric(0.02, 3000))
-    figure = figures.cells(held, 5, np.empty((0, 2), np.int64))
+    figure = cells(held, 5, np.empty((0, 2), np.int64))
     assert sum(bar.get_height() for bar in figure.axes[0].patches) == 3000
 
 
 def test_movement_marks_goal_and_valves():
     m = builders.movement()
-    figure = figures.movement(m.shown(SPEC), m.seconds, tolerance=25.0)
+    figure = movement(m.shown(SPEC), m.seconds, tolerance=25.0)
     _arm, angle, _pressure, valves = figure.axes
     (legend,) = figure.legends
     assert [t.get_text() for t in legend.get_texts()] == ["angle", "asked for", "muscle 1", "muscle 2"]
@@ -202,7 +211,7 @@ def test_movement_marks_goal_and_valves():
 
 def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():
     phases = phases_of(builders.transfer(counts=(50, 0, 0)))
-    figure = figures.transfer_curves(phases, {"reward": 12.5}, window=101)
+    figure = transfer_curves(phases, {"reward": 12.5}, window=101)
     curve = next(line for line in figure.axes[0].lines if len(line.get_xdata()) == 50)
     assert np.allclose(curve.get_ydata(), phases[0].reward.mean())
     assert any(np.allclose(line.get_ydata(), 12.5) for line in figure.axes[0].lines if len(line.get_ydata()))
@@ -210,7 +219,7 @@ def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():
 
 def test_the_alternative_of_distributions_holds_their_numbers():
     test = builders.run().test
-    alt = figures.distributions(test.reward, test.actions, test.all_switches, test.success).alt
+    alt = distributions(test.reward, test.actions, test.all_switches, test.success).alt
     assert f"{test.success.mean():.2%}" in alt
     assert f"median {np.median(test.actions):g}" in alt
 
@@ -224,17 +233,17 @@ def test_rewards_far_below_are_cut_off_but_never_those_of_the_best_method():
     def method(name, *rewards):
         mean = float(np.mean(rewards))
         interval = Estimate(mean, mean - 9, mean + 9, 9)
-        return figures.Baseline(name, np.full(len(rewards), 50.0), np.array(rewards), interval)
+        return Baseline(name, np.full(len(rewards), 50.0), np.array(rewards), interval)
 
     spread, bad = method("spread", -33.0, -107.0), method("bad", -300.0)
-    assert figures.baselines([spread, bad], {}).axes[0].get_ylim() == (-109.0, -31.0)
+    assert baselines([spread, bad], {}).axes[0].get_ylim() == (-109.0, -31.0)
     good = method("good", 30.0, 28.0)
-    assert figures.baselines([good, spread], {}).axes[0].get_ylim() == (-17.0, 32.0)
+    assert baselines([good, spread], {}).axes[0].get_ylim() == (-17.0, 32.0)
 
 
 def test_baselines_stand_at_their_rewards_beside_the_bound():
     trained, untrained = builders.baselines()
-    figure = figures.baselines(trained, untrained)
+    figure = baselines(trained, untrained)
     place = figure.axes[0]
     drawn = {(x, y) for line in place.lines for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)}
     for baseline in trained:
@@ -244,13 +253,13 @@ def test_baselines_stand_at_their_rewards_beside_the_bound():
     low, high = place.get_ylim()
     assert low < min(baseline.reward.min() for baseline in trained) < 40.2 < high
     assert "open loop: 40.20 without training" in figure.alt
-    assert figures.baselines([], {}).alt == "Reward against training time. No baseline was measured."
+    assert baselines([], {}).alt == "Reward against training time. No baseline was measured."
 
 
 def test_the_adaptation_is_told_with_its_figures():
     adapted = builders.adaptation()
-    marks = [figures.CurveMark(event.movement, event.what) for event in adapted.events]
-    words = figures.adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14).alt
+    marks = [CurveMark(event.movement, event.what) for event in adapted.events]
+    words = adaptation_curves(adapted.squares, adapted.quantities, marks, 1.14).alt
     first = np.sqrt(adapted.squares[:100, 1, 0].mean())
     assert f"angle {first:.2f} in the first hundred" in words
     assert words.endswith(

@@ -1,7 +1,9 @@
 """``pneumarm export``."""
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 from pneumarm.address import Address, ServerAddress
 from pneumarm.commands.common import AnyStore, Json, OwnMethod
@@ -17,19 +19,22 @@ from pneumarm.transitions import Store
 from pneumarm.transitions.export import FORMATS, export_recording
 from pneumarm.transitions.schema import is_store
 
+_OUT = (
+    f"What to write. Of a store: {', '.join(f'{end} ({one.words})' for end, one in FORMATS.items())}. Of an agent: "
+    ".onnx, its network and scaling, or .c, the same as C99 that needs no library, of one that settles, holds and "
+    "tracks."
+)
 
-def export_(file: AnyStore, /, *, out: Path, method: OwnMethod = None, json: Json = False) -> None:
-    """Export a recording (CSV, Parquet, LeRobot, Minari, Rerun) or an agent (ONNX, C) for other programs.
+
+def export_(
+    file: AnyStore, /, *, out: Annotated[Path, Parameter(help=_OUT)], method: OwnMethod = None, json: Json = False
+) -> None:
+    """Export a recording (CSV, Parquet, LeRobot and others) or an agent (ONNX, C) for other programs.
 
     Parameters
     ----------
     file
         The store, or the agent.
-    out
-        What to write. Of a store: .csv or .parquet (beside it lies arm.csv.toml, by which it is imported again),
-        .lerobot (a folder, LeRobot's format v3.0), .minari (a folder) or .rrd (to be looked at with Rerun). Of an
-        agent: .onnx, its network and scaling, or .c, the same as C99 that needs no library, of one that settles,
-        holds and tracks.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """

@@ -9,7 +9,7 @@ All experiments of a laboratory share a folder:
     LABORATORY/NAME/results.json          what they say, for programs
     LABORATORY/NAME/page.html             what they say, for people
 
-To add an experiment, make a folder (a package) here and name it in :mod:`.registry`. The folder holds
+To add an experiment, make a folder (a package) here; :mod:`.registry` finds it by its ``EXPERIMENT``. It holds
 
 - ``__init__.py``: the question, the factors, the command and the answer in two sentences, and ``EXPERIMENT``;
 - ``words.toml``: what is estimated from the rows, the tables and pictures of the page, and the claims of the thesis

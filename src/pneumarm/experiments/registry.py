@@ -1,38 +1,18 @@
 """Experiments by name, loaded when they are asked for."""
 
 import importlib
+import re
+from pathlib import Path
 
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Experiment
 
 PLACES = {
-    "switch-punishment": "switch_punishment",
-    "all-goals": "all_goals",
-    "long-training": "long_training",
-    "optimal-settings": "optimal_settings",
-    "no-shaping": "no_shaping",
-    "control-frequency": "control_frequency",
-    "state-history": "state_history",
-    "enough-data": "enough_data",
-    "noise-for-transfer": "noise_for_transfer",
-    "valves-closed": "valves_closed",
-    "shaping-settings": "shaping_settings",
-    "fine-tuning": "fine_tuning",
-    "transfer": "transfer",
-    "transferability": "transferability",
-    "goal-area": "goal_area",
-    "overnight": "overnight",
-    "on-the-arm-only": "on_the_arm_only",
-    "displacement": "displacement",
-    "goal-pairs": "goal_pairs",
-    "joint-data": "joint_data",
-    "joint-data-long": "joint_data_long",
-    "joint-exploration": "joint_exploration",
-    "joint-agents": "joint_agents",
-    "hierarchy": "hierarchy",
-    "coupling": "coupling",
+    file.parent.name.replace("_", "-"): file.parent.name
+    for file in sorted(Path(__file__).parent.glob("*/__init__.py"))
+    if re.search(r"^EXPERIMENT = ", file.read_text(encoding="utf-8"), re.MULTILINE)
 }
-"""Name: package below this one; each has an ``EXPERIMENT``."""
+"""Packages below this one that have an ``EXPERIMENT``, by its name; read as text, so that none is loaded for it."""
 
 
 def experiment(name: str) -> Experiment:

@@ -6,8 +6,8 @@ from typing import Any
 from pneumarm.arm.counts import Counts
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.condition import COLLECTING, LINK, WAYS, rows_marked
-from pneumarm.report import figures
 from pneumarm.report.data import MarkedData
+from pneumarm.report.figures.marked import marked_rows
 from pneumarm.report.ledger import MISSING
 from pneumarm.report.page import Picture, Section, Table
 
@@ -137,7 +137,7 @@ def _table(counts: Mapping[str, Counts], rows: Sequence[tuple[str, list[int]]], 
 def _picture(marked: MarkedData, spec: ArmSpec) -> Picture:
     numbers = (marked.spans, marked.reason, marked.reasons)
     return Picture(
-        figures.marked_rows(*numbers, marked.ends.tolist(), [_STAGES.get(s, s) for s in marked.stages], spec.period),
+        marked_rows(*numbers, marked.ends.tolist(), [_STAGES.get(s, s) for s in marked.stages], spec.period),
         "Stored rows that are marked, by what was found, over the time that was recorded; the ways to begin states "
         "are not recorded (no figure in the thesis).",
     )

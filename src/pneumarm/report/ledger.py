@@ -9,7 +9,7 @@ import numpy as np
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.report import thesis
 from pneumarm.report.data import QualityData, TransferData
-from pneumarm.report.figures import expectation
+from pneumarm.report.figures.propagation import expectation
 from pneumarm.report.page import Table
 from pneumarm.report.style import quantities
 from pneumarm.statistics import Estimate, mean_estimate, rate_estimate

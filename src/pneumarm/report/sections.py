@@ -13,7 +13,6 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.arm.valves import to_actions
 from pneumarm.control.versions import Adapted
 from pneumarm.drawing.moving_arm import Shown
-from pneumarm.report import figures
 from pneumarm.report.data import (
     CoverageData,
     Demonstration,
@@ -23,9 +22,17 @@ from pneumarm.report.data import (
     TrainingData,
     TransferData,
 )
-from pneumarm.report.figures import Classification, CurveMark, Phase
-from pneumarm.report.figures.residues import IN_A_ROW
-from pneumarm.report.figures.training import PRICE
+from pneumarm.report.figures.adaptation import CurveMark, adaptation_curves
+from pneumarm.report.figures.coverage import cells, new_share, projections
+from pneumarm.report.figures.displacement import against_displacement
+from pneumarm.report.figures.episodes import distributions
+from pneumarm.report.figures.film import movement
+from pneumarm.report.figures.importance import input_importance
+from pneumarm.report.figures.isoplots import isoplot
+from pneumarm.report.figures.propagation import error_propagation
+from pneumarm.report.figures.residues import IN_A_ROW, Classification, residue_by_class, residues
+from pneumarm.report.figures.training import PRICE, spread_of_agents, training_curves
+from pneumarm.report.figures.transfer import Phase, transfer_curves
 from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger, written
 from pneumarm.report.page import Picture, Section, Table
@@ -239,7 +246,7 @@ def coverage_section(data: CoverageData, spec: ArmSpec) -> Section:
         "and a recording does not say which of the others this arm can be in. " + _ranges(data, spec)
     ]
     if len(data.growth) > 1:
-        share = figures.new_share(data.growth)
+        share = new_share(data.growth)
         text.append(
             f"The second half of the data added {share:.1%} of the occupied cells. Whether it made the "
             "simulation any better is another question, which pneumarm coverage answers."
@@ -249,12 +256,12 @@ def coverage_section(data: CoverageData, spec: ArmSpec) -> Section:
         text,
         (
             Picture(
-                figures.projections(data.observation, spec),
+                projections(data.observation, spec),
                 "Where the observations lie (99.9% of each quantity); where it is blank there were none "
                 "(thesis section 3.2.2; no figure there).",
             ),
             Picture(
-                figures.cells(data.cells_holding, data.per_cell, data.growth),
+                cells(data.cells_holding, data.per_cell, data.growth),
                 "Transitions in the cells of the filter's grid and, where it was followed, the number of cells "
                 "occupied while collecting (thesis section 3.2.3; no figure there).",
             ),
@@ -319,7 +326,7 @@ def simulation_section(data: QualityData, spec: ArmSpec) -> Section:
     real, simulated = data.target - data.observation, data.predicted - data.observation
     pictures = [
         Picture(
-            figures.residues(data.target[:, :, 0], data.predicted[:, :, 0], spec),
+            residues(data.target[:, :, 0], data.predicted[:, :, 0], spec),
             "Observed and simulated angle of successive transitions and the residue between them "
             "(thesis figure 3.1).",
         )
@@ -328,7 +335,7 @@ def simulation_section(data: QualityData, spec: ArmSpec) -> Section:
         classes = classifications(data, joint, spec)
         pictures.append(
             Picture(
-                figures.residue_by_class(error[:, joint], classes),
+                residue_by_class(error[:, joint], classes),
                 f"Residue of the angle{of_joint(joint, joints)} against classes of the transitions "
                 "(thesis figure 3.2): "
                 "points are transitions, squares and bars are mean and standard deviation in a class. A trend of the "
@@ -338,7 +345,7 @@ def simulation_section(data: QualityData, spec: ArmSpec) -> Section:
         )
     pictures.append(
         Picture(
-            figures.isoplot(real, simulated, spec),
+            isoplot(real, simulated, spec),
             "Simulated against observed change, coloured by the number of transitions. The closer to the 45° line "
             "and the narrower, the better; a slope other than 1 is a structural error (thesis figures 3.3 to 3.5).",
         )
@@ -360,7 +367,7 @@ def propagated(data: QualityData, spec: ArmSpec, figures_found: Mapping[str, Any
     """
     pictures = [
         Picture(
-            figures.error_propagation(data.propagation, spec),
+            error_propagation(data.propagation, spec),
             "Standard deviation of the error when the simulation runs freely, beside the growth with the square root "
             "of the steps that uncorrelated errors would give (thesis eq. 3.7; no figure there).",
         )
@@ -368,7 +375,7 @@ def propagated(data: QualityData, spec: ArmSpec, figures_found: Mapping[str, Any
     if data.weights.size:
         pictures.append(
             Picture(
-                figures.input_importance(data.weights, data.inputs, data.outputs),
+                input_importance(data.weights, data.inputs, data.outputs),
                 "Weights of a least-squares fit as the importance of its inputs: the change of an output, in its "
                 "standard deviations, for one standard deviation of the input (thesis section 3.2.4; "
                 "no figure there).",
@@ -428,13 +435,11 @@ def trained(data: TrainingData, spec: ArmSpec) -> Section:
     if len(data.columns) > 1:
         pictures.append(
             Picture(
-                figures.training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec),
+                training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec),
                 learned,
             )
         )
-    pictures.append(
-        Picture(figures.spread_of_agents(data.reward, data.success, data.chosen, priced=priced), validated)
-    )
+    pictures.append(Picture(spread_of_agents(data.reward, data.success, data.chosen, priced=priced), validated))
     return Section("Training in the simulation", text, pictures)
 
 
@@ -448,7 +453,7 @@ def tested(test: Movements) -> Section:
         ),
         (
             Picture(
-                figures.distributions(test.reward, test.actions, test.all_switches, test.success),
+                distributions(test.reward, test.actions, test.all_switches, test.success),
                 "Reward, actions and switches of the test's episodes; the dashed line is the median. Values beyond "
                 "the drawn range are counted in the outermost bar (thesis section 5.2; no figure there).",
             ),
@@ -472,7 +477,7 @@ def transferred(data: TransferData, test: Movements | None) -> Section:
         ),
         (
             Picture(
-                figures.transfer_curves(phases, reference),
+                transfer_curves(phases, reference),
                 "Reward, success, actions and switches on the arm (thesis figures 5.9 to 5.12; as there actions and "
                 "switches are those of successful episodes). Averages do not reach over the borders of the phases.",
             ),
@@ -499,7 +504,7 @@ def adapted(data: Adapted, spec: ArmSpec) -> Section:
         text,
         (
             Picture(
-                figures.adaptation_curves(squares, names, marks, math.sqrt(WatchSettings().allowance)),
+                adaptation_curves(squares, names, marks, math.sqrt(WatchSettings().allowance)),
                 "Error of the simulation on the arm over that of its fit, as moving means of 20 movements; 1 is an "
                 "arm that is as it was (no figure in the thesis, whose agent learns while it moves, section 5.5).",
             ),
@@ -540,9 +545,7 @@ def by_displacement(data: TransferData, test: Movements | None, spec: ArmSpec) -
         won = episodes.success
         pictures.append(
             Picture(
-                figures.against_displacement(
-                    episodes.distance[won], episodes.actions[won], episodes.all_switches[won], spec
-                ),
+                against_displacement(episodes.distance[won], episodes.actions[won], episodes.all_switches[won], spec),
                 f"Actions and switches of successful episodes {where} against their angular displacement (thesis "
                 "figures 5.15 and 5.16). Points are shifted up and down a little to show how many there are.",
             )
@@ -561,7 +564,7 @@ def demonstrated(demonstrations: tuple[Demonstration, ...], spec: ArmSpec) -> Se
     """Return the typical movements."""
     pictures = [
         Picture(
-            figures.movement(m.shown(spec), m.seconds, tolerance=GOAL_TOLERANCE),
+            movement(m.shown(spec), m.seconds, tolerance=GOAL_TOLERANCE),
             f"A movement on the arm: {m.name} (compare thesis figures 5.17 to 5.19, which have neither pressures nor "
             f"valve signals). The band is the goal ± {GOAL_TOLERANCE / spec.counts_per_degree:.1f}°; at the dotted "
             "line it is reached and the control ends.",

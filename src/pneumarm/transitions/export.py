@@ -7,8 +7,9 @@ whether a sequence began at rest is not in it.
 """
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,9 +26,6 @@ from pneumarm.transitions.rerun import export_rerun
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 
-FORMATS = (".csv", ".parquet", ".lerobot", ".minari", ".rrd")
-"""What can be written, by the end of the file's name."""
-_FOLDERS = (".lerobot", ".minari")
 _ANYTHING = (-1e9, 1e9)
 """Range in the mapping: what was recorded has been checked."""
 _HEAD = "# How pneumarm import reads what was exported."
@@ -43,6 +41,16 @@ class Exported(NamedTuple):
     """The file by which ``pneumarm import`` reads it again; None where it cannot."""
 
 
+class Format(NamedTuple):
+    """A format of recordings."""
+
+    write: Callable[[Store, Path], Exported]
+    """Writes a store whole or not at all, in bounded memory."""
+    words: str
+    """What it is, for the command's help."""
+    is_folder: bool = False
+
+
 def export_recording(store: Store, path: Path) -> Exported:
     """Write the rows of ``store`` to ``path``, whole or not at all, in bounded memory.
 
@@ -53,14 +61,20 @@ def export_recording(store: Store, path: Path) -> Exported:
     """
     if path.suffix not in FORMATS:
         raise UnusableInput(f"{path}: a store is exported to a name that ends in {' or '.join(FORMATS)}")
-    (require_output if path.suffix in _FOLDERS else require_folder)(path)
-    if path.suffix == ".minari":
-        return Exported(**export_minari(store, path), mapping=None)
-    if path.suffix == ".rrd":
-        return Exported(**export_rerun(store, path), mapping=None)
-    if path.suffix == ".lerobot":
-        counts = export_lerobot(store, path, _mapping(store, "episode_index", "observation.time"))
-        return Exported(**counts, mapping=str(mapping_beside(path)))
+    format_ = FORMATS[path.suffix]
+    (require_output if format_.is_folder else require_folder)(path)
+    return format_.write(store, path)
+
+
+def _lerobot(store: Store, path: Path) -> Exported:
+    counts = export_lerobot(store, path, _mapping(store, "episode_index", "observation.time"))
+    return Exported(**counts, mapping=str(mapping_beside(path)))
+
+
+def _as_table(
+    write: Callable[[Path, list[str], Iterator[NDArray[np.float64]]], int], store: Store, path: Path
+) -> Exported:
+    """Have ``write`` make one table of the store, and put the mapping beside it."""
     mapping = mapping_beside(path)
     if mapping.exists() and not _is_ours(mapping):
         raise UnusableInput(f"{mapping}: is no mapping of an export and is left alone; export under another name")
@@ -71,8 +85,7 @@ def export_recording(store: Store, path: Path) -> Exported:
             sequences.update(np.unique(rows.sequence).tolist())
             yield _table(rows, store.further)
 
-    names = _names(store)
-    written = (_write_parquet if path.suffix == ".parquet" else _write_csv)(path, names, tables())
+    written = write(path, _names(store), tables())
     write_text(mapping, _mapping(store, "sequence", "time"))
     return Exported(written, len(sequences), str(mapping))
 
@@ -156,3 +169,18 @@ def _mapping(store: Store, sequence: str, time: str) -> str:
 
 def _column(what: str, told: dict[str, Any]) -> str:
     return f"{what} = {as_toml(told)}"
+
+
+_TABLE = "a table, imported again by the .toml beside it"
+FORMATS = {
+    ".csv": Format(partial(_as_table, _write_csv), _TABLE),
+    ".parquet": Format(partial(_as_table, _write_parquet), _TABLE),
+    ".lerobot": Format(_lerobot, "a folder, LeRobot's format v3.0", is_folder=True),
+    ".minari": Format(
+        lambda store, path: Exported(**export_minari(store, path), mapping=None), "a folder", is_folder=True
+    ),
+    ".rrd": Format(
+        lambda store, path: Exported(**export_rerun(store, path), mapping=None), "to be looked at with Rerun"
+    ),
+}
+"""What a store can be exported as, by the end of the file's name."""

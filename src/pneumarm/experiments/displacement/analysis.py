@@ -12,7 +12,8 @@ from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import estimate, from_series, mean, series_of
 from pneumarm.experiments.words import Quantity
 from pneumarm.report.data import Demonstration
-from pneumarm.report.figures import against_displacement, movement
+from pneumarm.report.figures.displacement import against_displacement
+from pneumarm.report.figures.film import movement
 from pneumarm.report.page import Picture, Table
 from pneumarm.report.thesis import GOAL_TOLERANCE
 

@@ -321,7 +321,7 @@ IMPROVED = """
 import hashlib
 import numpy as np
 from pneumarm.learning import PolicySettings
-from pneumarm.learning.policy.proximal import batch, improve
+from pneumarm.learning.policy.proximal import batch, improve_policy
 from pneumarm.learning.policy.agent import rule
 from pneumarm.networks.layers import initial_weights, trainable
 from pneumarm.random import random_state
@@ -332,7 +332,7 @@ value = trainable(initial_weights((*hidden, 1), 1.0, random), (*hidden, 1), arms
 made_up = batch(steps, hidden[0], 1, arms)
 for part in (made_up.inputs, made_up.reward):
     part[:] = random.normal(size=part.shape)
-improve(rule(PolicySettings()), policy, value, made_up, (1e-3, 1e-3), 0, random_state((1,)))
+improve_policy(rule(PolicySettings()), policy, value, made_up, (1e-3, 1e-3), 0, random_state((1,)))
 print(hashlib.sha256(policy.flat.tobytes() + value.flat.tobytes()).hexdigest())
 """
 TRAINED = """

@@ -16,6 +16,7 @@ from rich.table import Table
 from pneumarm.address import masked
 from pneumarm.errors import shortened
 
+_LONGEST_LINE = 480  # characters of an error
 _NARROWEST = 20  # columns in which tables and helps can be laid out; terminals that cannot tell say 0
 _columns = os.environ.get("COLUMNS", "")
 if not re.fullmatch("[0-9]{2,6}", _columns) or int(_columns) < _NARROWEST:
@@ -36,7 +37,7 @@ def complain(error: BaseException | str) -> None:
     """
     line = masked(" ".join(str(error).split()))
     shown = (one if one.isprintable() else one.encode("unicode_escape").decode() for one in line)
-    print(f"pneumarm: {shortened(''.join(shown))}", file=sys.stderr)
+    print(f"pneumarm: {shortened(''.join(shown), _LONGEST_LINE)}", file=sys.stderr)
 
 
 def open_closed_streams() -> None:

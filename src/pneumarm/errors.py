@@ -6,7 +6,7 @@ Every message says what was expected, what came, and what to do; the command lin
 import re
 
 _LONG_WORD = re.compile(r"(?<!\S)(\S{60})\S{40,}(\S{30})")
-_LONGEST = 480  # characters of a message: what a file holds may be repeated in it, and can be of any length
+_LONGEST = 1000  # characters of a message: what a file holds may be repeated in it, and can be of any length
 
 
 class PneumarmError(Exception):
@@ -18,10 +18,10 @@ class PneumarmError(Exception):
         super().__init__(shortened(str(message)))
 
 
-def shortened(message: str) -> str:
-    """Return ``message`` without what is in the middle of its long words, and of itself if it is long."""
+def shortened(message: str, longest: int = _LONGEST) -> str:
+    """Return ``message`` without what is in the middle of its long words, and of itself if it is over ``longest``."""
     message = _LONG_WORD.sub(r"\1...\2", message)
-    return message if len(message) <= _LONGEST else f"{message[: _LONGEST - 205]} ... {message[-200:]}"
+    return message if len(message) <= longest else f"{message[: longest - 205]} ... {message[-200:]}"
 
 
 class UnusableInput(PneumarmError):  # noqa: N818 - reads as a sentence where it is raised

@@ -173,7 +173,7 @@ def test_factors_reach_the_training(name: str) -> None:
 
 
 def test_no_experiment_is_said() -> None:
-    with pytest.raises(UnusableInput, match="no experiment 'nothing'; there are switch-punishment"):
+    with pytest.raises(UnusableInput, match="no experiment 'nothing'; there are all-goals"):
         experiment("nothing")
 
 

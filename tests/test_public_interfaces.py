@@ -165,7 +165,7 @@ def foreign(x, y):
 
 foreign(np.ones(9), np.ones(9))
 (code,) = foreign.inspect_asm().values()
-print(re.sub(r"foreign(B\\d+)?v\\d+|B\\d+v\\d+|\\.\\d{12,}|at 0x[0-9a-f]+", "foreign", code))
+print(re.sub(r"foreign(B\\d+)?v\\d+|B\\d+v\\d+|\\.\\d{12,}[.\\w]*|at 0x[0-9a-f]+", "foreign", code))
 """
 
 

@@ -1,8 +1,11 @@
-"""The later stages of a run, rehearsed on made-up data in a process beside it, so that their kernels are compiled.
+"""The later stages of a run, rehearsed on made-up data in processes beside it, so that their kernels are compiled.
 
 On a fresh machine most of a first run is compiling. The arm's moving compiles kernels of its own meanwhile; what is
 compiled here goes to the same cache on the disk (:mod:`pneumarm.kernels`), and the run takes it from there. Nothing
 else comes of a rehearsal: a run without one gives the same results, later.
+
+What learns and what moves the arm afterwards are rehearsed beside each other, the second once the fit that both need
+is compiled.
 """
 
 import gc
@@ -28,6 +31,7 @@ from pneumarm.console import peak_memory
 from pneumarm.control import Monitor, TransferSettings, transfer
 from pneumarm.kernels import CACHE_FOLDER
 from pneumarm.learning import ServoSettings, test, train
+from pneumarm.learning.servo.agent import ServoLearner
 from pneumarm.leaving import signals_as_exceptions
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.simulation import FitSettings, SimulationArm, fit_store
@@ -52,8 +56,8 @@ _LOOK = 0.1
 _ENDING = 10.0
 """For so long [s] a process that was killed is waited for; the system keeps one that hangs in a disk."""
 
-STAGES = ("simulation", "training", "test", "transfer", "settle", "bound")
-"""What is rehearsed, in this order."""
+PARTS = {"learning": ("simulation", "training", "test"), "moving": ("transfer", "settle", "bound")}
+"""The stages that a process rehearses, in their order."""
 
 
 _MARKER = CACHE_FOLDER / "rehearsed"
@@ -72,37 +76,45 @@ class WarmUpJob:
 
 
 class Rehearsal:
-    """A rehearsal in a process of its own, unless all stages have been before; ended with the block it is in.
+    """A rehearsal of the parts that have not been before, each in a process; ended with the block it is in.
 
     It is ended when a stage is waited for in vain for ``patience`` [s]; the run compiles for itself then.
     """
 
     def __init__(self, patience: float = _PATIENCE) -> None:
         self._patience = patience
-        self._process: subprocess.Popen[bytes] | None = None
+        self._job: WarmUpJob | None = None
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self.memory = 0.0
-        """The most that the process has held [MB]; told when it has ended."""
+        """The most that a process has held [MB]; told when it has ended."""
 
     def begin(self, job: WarmUpJob) -> None:
-        """Begin, unless all of it is in the kernel cache."""
-        if self._process is not None or _rehearsed() >= {*STAGES}:
+        """Begin with what learns, unless it is in the kernel cache."""
+        self._job = job
+        self._start("learning")
+
+    def _start(self, part: str) -> None:
+        if self._job is None or part in self._processes or _rehearsed() >= {*PARTS[part]}:
             return
-        command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", json.dumps(asdict(job))]
+        command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", part, json.dumps(asdict(self._job))]
         nothing = subprocess.DEVNULL
         errors = None if os.environ.get("PNEUMARM_DEBUG") else nothing  # it is no part of the run
         with suppress(OSError):
-            self._process = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
+            self._processes[part] = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
 
     def wait_for(self, stage: str) -> None:
         """Return when the kernels of ``stage`` are in the cache, or will not be."""
         deadline = monotonic() + self._patience
-        while self._process is not None and self._process.poll() is None and stage not in _rehearsed():
+        process = next((self._processes.get(part) for part, stages in PARTS.items() if stage in stages), None)
+        while process is not None and process.poll() is None and stage not in _rehearsed():
             if monotonic() > deadline:
                 with suppress(OSError):
-                    _note(*STAGES)  # or it would hang in every run
+                    _note(*PARTS["learning"], *PARTS["moving"])  # or it would hang in every run
                 self._end()
             else:
                 sleep(_LOOK)
+        if stage == "simulation":
+            self._start("moving")
 
     def __enter__(self) -> Self:
         return self
@@ -111,10 +123,11 @@ class Rehearsal:
         self._end()
 
     def _end(self) -> None:
-        if self._process is not None:
-            self._process.kill()
+        for process in self._processes.values():
+            process.kill()
             with suppress(subprocess.TimeoutExpired):
-                self._process.wait(_ENDING)
+                process.wait(_ENDING)
+        if self._processes:
             self.memory = peak_memory(children=True)
 
 
@@ -131,18 +144,21 @@ def _note(*stages: str) -> None:
         marker.writelines(f"{stage}\n" for stage in stages)
 
 
-def warm_up_stages(job: WarmUpJob, folder: Path) -> Iterator[str]:
-    """Do all stages with as little as possible in ``folder``; name those whose kernels are compiled."""
+def warm_up_stages(job: WarmUpJob, part: str, folder: Path) -> Iterator[str]:
+    """Do the stages of ``part`` with as little as possible in ``folder``; name those whose kernels are compiled."""
     with Store.create(folder / "made-up.db", job.spec) as store:
         store.append_all(_made_up(job.spec))
         layers = job.fit.layers or (1 if job.spec.joints == 1 else 2)  # as a longer recording will have
         simulation = fit_store(store, replace(job.fit, epochs=1, layers=layers)).simulation
         begin = begin_states(store, simulation.window, simulation.scaling, simulation.spec)
-        yield "simulation"
-        agent = train(simulation, begin, replace(job.servo, agents=1, updates=1, validation_movements=8)).agent
-        yield "training"
-        test(agent, simulation, begin, 8)
-        yield "test"
+        if part == "learning":
+            yield "simulation"
+            agent = train(simulation, begin, replace(job.servo, agents=1, updates=1, validation_movements=8)).agent
+            yield "training"
+            test(agent, simulation, begin, 8)
+            yield "test"
+            return
+        agent = ServoLearner(simulation, begin, replace(job.servo, coarse=0.0), 0, 0).agent()  # which learned nothing
         monitor = Monitor(job.spec, simulation, mode="warn")
         warm_up_watch(monitor, job.spec)
         with SimulationArm(simulation) as arm:
@@ -181,14 +197,14 @@ def _made_up(spec: ArmSpec) -> Iterator[Recorded]:
 
 
 def main() -> None:
-    """Rehearse the job in the argument, and note the stages that are done."""
+    """Rehearse a part of the job in the arguments, and note the stages that are done."""
     signals_as_exceptions()  # also when the run that it is for has ended
     gc.set_threshold(_OBJECTS)
     if hasattr(os, "nice"):
         os.nice(_NICE)
-    job = msgspec.json.decode(sys.argv[1], type=WarmUpJob)
+    part, job = sys.argv[1], msgspec.json.decode(sys.argv[2], type=WarmUpJob)
     with TemporaryDirectory() as folder:
-        for stage in warm_up_stages(job, Path(folder)):
+        for stage in warm_up_stages(job, part, Path(folder)):
             _note(stage)
 
 

@@ -45,12 +45,13 @@ def run_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], N
 
 
 @pytest.mark.parametrize("name", ["virtual:seed=2", "virtual:wide,seed=3", "virtual:joints=2,seed=1"])
-def test_every_stage_is_rehearsed(name: str, tmp_path: Path) -> None:
+def test_every_stage_is_rehearsed(name: str, marker: Path, tmp_path: Path) -> None:
     with open_arm(name) as arm:
         job = WarmUpJob(arm.spec, FitSettings(), SMALL, None)
     for part, stages in PARTS.items():
         (tmp_path / part).mkdir()
         assert tuple(warm_up_stages(job, part, tmp_path / part)) == stages
+        marker.write_text("simulation")  # which what moves waits for
 
 
 def test_a_rehearsal_is_waited_for_and_ended(job: WarmUpJob) -> None:
@@ -59,6 +60,7 @@ def test_a_rehearsal_is_waited_for_and_ended(job: WarmUpJob) -> None:
         beside.begin(replace(job, physics="virtual:seed=2"))
         beside.wait_for("simulation")
         beside.wait_for("bound")
+        beside.wait_for("settle")
         assert rehearsal._rehearsed() >= {*PARTS["moving"], "simulation"}
     assert beside.memory > 100
 

@@ -4,8 +4,8 @@ On a fresh machine most of a first run is compiling. The arm's moving compiles k
 compiled here goes to the same cache on the disk (:mod:`pneumarm.kernels`), and the run takes it from there. Nothing
 else comes of a rehearsal: a run without one gives the same results, later.
 
-What learns and what moves the arm afterwards are rehearsed beside each other, the second once the fit that both need
-is compiled.
+What learns and what moves the arm afterwards are rehearsed beside each other. The second begins with plans in the
+true physics of a virtual arm, which need no simulation, and goes on once the fit that both need is compiled.
 """
 
 import gc
@@ -56,7 +56,7 @@ _LOOK = 0.1
 _ENDING = 10.0
 """For so long [s] a process that was killed is waited for; the system keeps one that hangs in a disk."""
 
-PARTS = {"learning": ("simulation", "training", "test"), "moving": ("transfer", "settle", "bound")}
+PARTS = {"learning": ("simulation", "training", "test"), "moving": ("bound", "transfer", "settle")}
 """The stages that a process rehearses, in their order."""
 
 
@@ -83,24 +83,19 @@ class Rehearsal:
 
     def __init__(self, patience: float = _PATIENCE) -> None:
         self._patience = patience
-        self._job: WarmUpJob | None = None
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self.memory = 0.0
         """The most that a process has held [MB]; told when it has ended."""
 
     def begin(self, job: WarmUpJob) -> None:
-        """Begin with what learns, unless it is in the kernel cache."""
-        self._job = job
-        self._start("learning")
-
-    def _start(self, part: str) -> None:
-        if self._job is None or part in self._processes or _rehearsed() >= {*PARTS[part]}:
-            return
-        command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", part, json.dumps(asdict(self._job))]
+        """Begin with the parts that are not in the kernel cache."""
         nothing = subprocess.DEVNULL
         errors = None if os.environ.get("PNEUMARM_DEBUG") else nothing  # it is no part of the run
-        with suppress(OSError):
-            self._processes[part] = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
+        for part, stages in PARTS.items():
+            if part not in self._processes and not _rehearsed() >= {*stages}:
+                command = [sys.executable, "-P", "-m", "pneumarm.rehearsal", part, json.dumps(asdict(job))]
+                with suppress(OSError):
+                    self._processes[part] = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
 
     def wait_for(self, stage: str) -> None:
         """Return when the kernels of ``stage`` are in the cache, or will not be."""
@@ -113,8 +108,6 @@ class Rehearsal:
                 self._end()
             else:
                 sleep(_LOOK)
-        if stage == "simulation":
-            self._start("moving")
 
     def __enter__(self) -> Self:
         return self
@@ -146,6 +139,13 @@ def _note(*stages: str) -> None:
 
 def warm_up_stages(job: WarmUpJob, part: str, folder: Path) -> Iterator[str]:
     """Do the stages of ``part`` with as little as possible in ``folder``; name those whose kernels are compiled."""
+    if part == "moving":
+        if job.physics is not None:
+            _plan(job.physics)
+        yield "bound"
+        deadline = monotonic() + _PATIENCE
+        while "simulation" not in _rehearsed() and monotonic() < deadline:
+            sleep(_LOOK)
     with Store.create(folder / "made-up.db", job.spec) as store:
         store.append_all(_made_up(job.spec))
         layers = job.fit.layers or (1 if job.spec.joints == 1 else 2)  # as a longer recording will have
@@ -167,14 +167,15 @@ def warm_up_stages(job: WarmUpJob, part: str, folder: Path) -> Iterator[str]:
             moves = MoveTrialSettings(goals=1, hold=0.2, frequencies=(1.0,), seconds=0.5)
             try_moving(arm, agent.controller(), simulation.goal_range, moves)
             yield "settle"
-    if job.physics is not None:
-        with open_arm(job.physics) as physics:
-            assert isinstance(physics, VirtualArm)
-            low, high = simulation.goal_range.T
-            # To a goal that cannot be reached no plan is sought.
-            middle = np.stack([0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high], axis=1)
-            measure_bound(physics, middle, BoundSettings(episodes=_PLANNED))
-    yield "bound"
+
+
+def _plan(arm: str) -> None:
+    """Plan some movements of a virtual ``arm``, near its middle, for to goals out of reach no plan is sought."""
+    with open_arm(arm) as physics:
+        assert isinstance(physics, VirtualArm)
+        low, high = physics.spec.angle_range
+        middle = np.tile([0.55 * low + 0.45 * high, 0.45 * low + 0.55 * high], (physics.spec.joints, 1))
+        measure_bound(physics, middle, BoundSettings(episodes=_PLANNED))
 
 
 def _made_up(spec: ArmSpec) -> Iterator[Recorded]:

@@ -172,6 +172,7 @@ def test_it_works_from_the_current_folder(done: Path, tmp_path: Path) -> None:
 
 def test_a_file_alone_runs_no_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "stranger", raising=False)  # which another test may have imported
     Path("stranger.py").write_text("open('it ran', 'w')\n")
     write_arrays(tmp_path / "agent", "stranger:MINE", {}, {"near": np.zeros(1)})
     with pytest.raises(UnusableInput, match="give --method stranger:MINE"):

@@ -111,6 +111,9 @@ def main() -> int:
     parser.add_argument("revision")
     parser.add_argument("--only", default="", help="a part of the names of what is run, with all that it needs")
     given = parser.parse_args()
+    known = ["git", "-C", ROOT, "rev-parse", "--quiet", "--verify", f"{given.revision}^{{commit}}"]
+    if subprocess.run(known, stdout=subprocess.DEVNULL, check=False).returncode:
+        parser.error(f"revision {given.revision!r}: expected one that git knows, such as main or HEAD~3")
     different = 0
     with sources(given.revision) as before, tempfile.TemporaryDirectory() as temporary:
         pairs = zip(

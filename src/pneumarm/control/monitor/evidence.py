@@ -30,7 +30,7 @@ from pneumarm.control.monitor.identification import (
     expect_by_identification,
     half_a_filling,
     learn,
-    learn_anew,
+    forget_learned,
     note_answers,
     note_dead_time,
     note_valves,
@@ -264,7 +264,7 @@ def identify(known, readings, thresholds, memory, time, angle, pressure, judges)
                     learn(known, m, angle, pressure[m // 2, m % 2])
             note_answers(known, pressure)
             if note_dead_time(known, pressure):
-                learn_anew(known)
+                forget_learned(known)
         remember_look(known, angle, pressure, False)
         shift_slots(known)
 

@@ -458,7 +458,7 @@ def note_dead_time(known, pressure):  # type: ignore[no-untyped-def]
 
 
 @inner
-def learn_anew(known):  # type: ignore[no-untyped-def]
+def forget_learned(known):  # type: ignore[no-untyped-def]
     """Forget what was learned of how pressures change, and how they answer."""
     for m in range(known.weight.shape[0]):
         for i in range(FEATURES):

@@ -28,9 +28,9 @@ from pneumarm.control.monitor.hypotheses import TORN, has_torn_hose, independenc
 from pneumarm.control.monitor.identification import (
     EXPERIENCE,
     expect_by_identification,
+    forget_learned,
     half_a_filling,
     learn,
-    forget_learned,
     note_answers,
     note_dead_time,
     note_valves,

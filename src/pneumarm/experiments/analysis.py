@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, TrialRows
 from pneumarm.experiments.means import estimate, means_table, numbers
 from pneumarm.experiments.pictures import against, dots
+from pneumarm.experiments.verdict import Interval
 from pneumarm.experiments.words import Quantity, SectionWords, Words
 from pneumarm.report.page import Picture, Section, Table
 
@@ -77,7 +77,7 @@ def analysed(
 
     """
     if figures is None:
-        named = {name: {t: one._asdict() for t, one in found[name].items()} for name in words.results}
+        named = {name: {t: one.figures() for t, one in found[name].items()} for name in words.results}
         figures = named or _columns(experiment, rows, words)
     sections = []
     for place, section in enumerate(words.sections):
@@ -87,7 +87,7 @@ def analysed(
         )
         drawn = (pictures or {}).get(place) or _drawn(experiment, rows, section, trials)
         sections.append(Section(section.title, section.text, drawn, [*made, *(tables or {}).get(place, ())]))
-    claims = [Claim(c.claim, c.thesis, c.ours, c.verdict(found), c.about) for c in words.claims]
+    claims = [Claim(c.claim, c.thesis, c.ours, c.about, c.stated, found) for c in words.claims]
     return Analysis([words.question, *words.summary], figures, sections, claims)
 
 

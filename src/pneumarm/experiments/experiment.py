@@ -5,6 +5,7 @@ import importlib.util
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.differences import Verdict
+from pneumarm.experiments.verdict import Criterion, Interval, Judgement, Verdict
 from pneumarm.experiments.words import Words
 from pneumarm.progress import Report
 from pneumarm.settings import NonNegativeInt, PositiveInt, Settings
@@ -67,7 +68,12 @@ class TrialRows:
 
     rows: tuple[Row, ...]
 
-    @property
+    @cached_property
+    def by_key(self) -> Mapping[tuple[str, int, int], Row]:
+        """Rows by what identifies them."""
+        return {row.key: row for row in self.rows}
+
+    @cached_property
     def arms(self) -> tuple[str, ...]:
         """Arms in the order of their names."""
         return tuple(sorted({row.arm for row in self.rows}))
@@ -82,7 +88,7 @@ class TrialRows:
         wanted = set(trials)
         return TrialRows(tuple(row for row in self.rows if row.trial in wanted))
 
-    @property
+    @cached_property
     def runs(self) -> int:
         """Highest number of a run."""
         return max((row.run for row in self.rows), default=0)
@@ -95,20 +101,16 @@ class TrialRows:
 
         """
         arms = self.arms if arm is None else (arm,)
-        found = {row.key: row.figures[figure] for row in self.rows}
+        found = self.by_key
         keys = [[(a, t, r) for a in arms for r in range(1, self.runs + 1)] for t in trials]
         missing = [key for line in keys for key in line if key not in found]
         if missing:
             raise UnusableInput(f"{len(missing)} rows are missing, the first is {missing[0]}; finish the sweep first")
-        return np.array([[found[key] for key in line] for line in keys])
+        return np.array([[found[key].figures[figure] for key in line] for line in keys])
 
-    def samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the independent samples in ``values`` (arms times runs,), a line of a table.
-
-        Runs on one arm share its simulation: where there are several arms they are their means, shape (arms,).
-        """
-        arms = len(self.arms)
-        return values if arms == 1 else values.reshape(arms, -1).mean(axis=1)
+    def pooled(self, figure: str, trials: Sequence[int]) -> NDArray[np.float64]:
+        """Return ``figure`` of all ``trials``, those of each arm side by side, shape (arms, trials times runs)."""
+        return np.stack([self.table(figure, trials, arm).ravel() for arm in self.arms])
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,28 @@ class Claim:
     """The thesis' evidence."""
     ours: str
     """Ours, with an interval where there is one."""
-    verdict: Verdict
     about: str
     """Which of the thesis' conclusions it is about, by its key in ``claims/conclusions.toml``."""
+    criterion: Criterion
+    """What was stated of it beforehand."""
+    found: Mapping[str, Any]
+    """What it is judged by."""
+
+    @cached_property
+    def judgement(self) -> Judgement:
+        """What its criterion makes of what was found."""
+        return self.criterion.judge(self.found)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether it holds."""
+        return self.judgement.verdict
+
+    @property
+    def medians(self) -> str:
+        """What the medians of the runs say in place of their means, for people."""
+        found = [self.found[name] for name in self.criterion.names]
+        return "; ".join(str(one.median) for one in found if isinstance(one, Interval) and one.median)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 It says what is estimated from the rows, how each section shows them, and by what each claim of the thesis is judged.
 Texts hold what was found, by name and with the form of a number, as of :meth:`str.format`: ``lost: {drop:.2f}``,
-``{success:.1%}`` (:class:`~.differences.Interval`). Line breaks in them are spaces.
+``{success:.1%}`` (:class:`~.verdict.Interval`). Line breaks in them are spaces.
 """
 
 import re
@@ -13,9 +13,7 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import Interval, Verdict, above, all_hold, below, within_margin
-
-_RULE = re.compile(r"(\|?)(\w+)\|? ([<>]) (-?[\d.]+)")
+from pneumarm.experiments.verdict import Criterion
 
 
 class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -29,6 +27,8 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Trial that is subtracted, within runs: by name, or by number, negative from the last."""
     percent: bool = False
     """Whether what is subtracted is what the difference is given in percent of."""
+    share: bool = False
+    """Whether each row is a yes (1) or a no (0), as of an agent that met the criterion."""
     factor: float = 1.0
     """Multiplies the values."""
 
@@ -59,24 +59,8 @@ class ClaimWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     thesis: str
     """The thesis' evidence."""
     ours: str
-    holds: str
-    """When it holds: ``drop > 15``, ``drop < 0``, ``|drop| < 3``, several with ``and``; or the name of a verdict that
-    was found. It is open while a 95 % interval allows both."""
-
-    def verdict(self, found: Mapping[str, Any]) -> Verdict:
-        """Return the verdict that what was ``found`` allows."""
-        known: Verdict | None = found.get(self.holds)
-        return known or all_hold([_verdict(rule, found) for rule in self.holds.split(" and ")])
-
-
-def _verdict(rule: str, found: Mapping[str, Any]) -> Verdict:
-    parts = _RULE.fullmatch(rule)
-    if parts is None:
-        raise ValueError(f"{rule!r}: expected a rule such as 'drop > 15' or '|drop| < 3'")
-    interval: Interval = found[parts[2]]
-    if parts[1]:
-        return within_margin(interval, float(parts[4]))
-    return (above if parts[3] == ">" else below)(interval, float(parts[4]))
+    stated: Criterion
+    """What is stated of it before any row is computed."""
 
 
 class SectionWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -132,7 +116,8 @@ class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         known = {name: value for name, value in found.items() if value is not None}
         words: dict[str, Any] = msgspec.to_builtins(self)
         missing = found.keys() - known.keys()
-        words["claims"] = [claim for claim in words["claims"] if claim["holds"].split()[0] not in missing]
+        lacking = [missing.intersection(claim.stated.names) for claim in self.claims]
+        words["claims"] = [claim for claim, lacks in zip(words["claims"], lacking, strict=True) if not lacks]
         return msgspec.convert(_changed(words, lambda text: text.format_map(known)), Words)
 
 

@@ -18,10 +18,12 @@ from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import EffectClaim, Factorial
 from pneumarm.experiments.findings import (
+    MARGINAL,
     fewest_switches,
     nearly_all_succeed,
+    off_policy_never_diverges,
     traces_are_marginal,
-    trial_10_is_good,
+    trial_10_is_best,
     weights_dominate,
     weights_matter_more_than_settings,
 )
@@ -40,7 +42,7 @@ EXPERIMENT = Factorial(
         "Which settings of the learning method matter when all goals are learned, and which are best?",
         "Thesis section 5.4.2, appendix C.2",
     ),
-    runs=8,
+    runs=4,
     design=thesis_design(),
     base=BASE,
     thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),
@@ -51,6 +53,7 @@ EXPERIMENT = Factorial(
         EffectClaim("reward", 2, raises=False, about="neurons"),
         EffectClaim("reward", 2, raises=True, loss="std", about="neurons"),
         EffectClaim("reward", 1, raises=False, about="learning-rate"),
+        EffectClaim("reward", 1, raises=False, about="learning-rate", slight=MARGINAL),
         EffectClaim("reward", 1, raises=True, loss="std", about="learning-rate"),
         EffectClaim("reward", 11, raises=False, about="traces"),
         EffectClaim("reward", 12, raises=True, about="gamma"),
@@ -62,8 +65,9 @@ EXPERIMENT = Factorial(
         weights_matter_more_than_settings,
         weights_dominate,
         traces_are_marginal,
-        trial_10_is_good,
+        trial_10_is_best,
         nearly_all_succeed,
         fewest_switches,
+        off_policy_never_diverges,
     ),
 )

@@ -5,7 +5,7 @@ import numpy as np
 from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.enough_data.minutes import EnoughData
 from pneumarm.experiments.experiment import Analysis, TrialRows
-from pneumarm.experiments.means import difference, mean
+from pneumarm.experiments.means import difference
 
 _THESIS = 120.0  # minutes (section 3.2.2)
 _MARGIN = 2.0  # reward that does not matter: two actions of some seventeen
@@ -14,20 +14,21 @@ _MARGIN = 2.0  # reward that does not matter: two actions of some seventeen
 def analysis(experiment: EnoughData, rows: TrialRows) -> Analysis:
     """Return coverage, fit and performance by minutes."""
     trials, last = experiment.trials, len(experiment.minutes)
-    usual = 1 + int(np.argmin([abs(minutes - _THESIS) for minutes in experiment.minutes]))
+    usual, half = (
+        1 + int(np.argmin([abs(minutes - wanted) for minutes in experiment.minutes]))
+        for wanted in (_THESIS, _THESIS / 2)
+    )
     fewest = _fewest(rows, last)
-    enough, shown = f"nothing less than {trials[last]} is shown to be as good, within {_MARGIN:g} of its reward", ""
+    enough = f"nothing less than {trials[last]} is shown to be as good, within {_MARGIN:g} of its reward"
     if fewest is not None:
         enough = f"from {trials[fewest]} on the reward is that of {trials[last]}, within {_MARGIN:g}"
-        less, transitions = difference(rows, "reward", fewest, last), mean(rows, "transitions", fewest).mean
-        shown = f": {transitions:.0f} transitions; reward less that of the longest: {less:+.2f}"
     words, found = filled_words(
         experiment,
         rows,
         gain=difference(rows, "reward", last, usual),
-        fewer="open" if fewest is None else "holds" if fewest < usual else "does not hold",
+        shorter=difference(rows, "reward", last, half),
         enough=enough,
-        shown=shown,
+        half=trials[half],
         usual=trials[usual],
         shortest=trials[1],
         longest=trials[last],

@@ -14,7 +14,7 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import ALL, EffectClaim, Factorial
-from pneumarm.experiments.findings import training_on_improves, training_on_improves_little, trial_10_is_good
+from pneumarm.experiments.findings import training_on_improves, training_on_improves_little, trial_10_is_best
 from pneumarm.experiments.words import Words
 
 EXPERIMENT = Factorial(
@@ -24,12 +24,12 @@ EXPERIMENT = Factorial(
         "Do agents that learn slowly outperform the fast ones in the end, and who gains by training on?",
         "Thesis section 5.4.3, appendix C.3",
     ),
-    runs=3,
+    runs=4,
     design=thesis_design(),
     base=BASE,
     thesis=packaged_results(__name__, "reward", "gain", "actions", "switches"),
     continued=50_000,
     criteria=("gain", *ALL),
     effect_claims=(EffectClaim("gain", 4, raises=True, loss="std", about="q-fluctuates"),),
-    findings=(training_on_improves, training_on_improves_little, trial_10_is_good),
+    findings=(training_on_improves, training_on_improves_little, trial_10_is_best),
 )

@@ -27,7 +27,7 @@ EXPERIMENT = Factorial(
         "Is shaping needed to learn the task at all, and which settings are best without it?",
         "Thesis section 5.4.4, appendix C.5",
     ),
-    runs=3,
+    runs=4,
     design=thesis_design(),
     base=replace(BASE, shaping=None, exploration=Exploration(0.09, 10.0)),
     thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),

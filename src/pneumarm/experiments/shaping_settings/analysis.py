@@ -13,12 +13,12 @@ from pneumarm.drawing.colours import DARK, GREY, MIDDLE
 from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
-from pneumarm.experiments.differences import Interval, Verdict, below, interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
-from pneumarm.experiments.means import Array
+from pneumarm.experiments.means import Array, by_arm
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
 from pneumarm.experiments.trainings import CRITERIA, LEARNING
+from pneumarm.experiments.verdict import Interval, interval
 from pneumarm.learning import TrainSettings
 from pneumarm.learning.online.shaping import initial_deviation, stage
 from pneumarm.report.page import Picture, Table
@@ -26,6 +26,7 @@ from pneumarm.report.style import panels, styled
 
 _CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episodes", "met")
 _SHOWN = ("reward", "success_rate", "episodes")
+_SMALLEST = 1e-9
 
 Tables = Mapping[str, NDArray[np.float64]]
 """Tables by figure, shapes (trials, runs)."""
@@ -37,12 +38,13 @@ def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     """Return every trial's results and its difference from the thesis' settings within runs."""
     tables = {name: rows.table(name, list(experiment.trials)) for name in _CRITERIA}
     # From here on columns are samples: runs where there is one arm, else the arms.
-    samples = {name: np.stack([rows.samples(line) for line in table]) for name, table in tables.items()}
+    arms = len(rows.arms)
+    samples = {name: np.stack([by_arm(line.reshape(arms, -1)) for line in table]) for name, table in tables.items()}
     differences = {name: _differences(experiment, table) for name, table in samples.items()}
     words, found = filled_words(
         experiment,
         rows,
-        **shaping_evidence(experiment, tables, len(rows.arms)),
+        **shaping_evidence(experiment, tables, arms),
         **{f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")},
     )
     strategy, results = words.sections
@@ -78,10 +80,10 @@ def shaping_evidence(experiment: ShapingSettings, tables: Tables, arms: int) -> 
         for one in ("all_goals", "no_shaping")
     )
     spreads = (one["reward"].std(axis=1, ddof=1).mean() for one in (with_it, without_it))
-    spread, narrower = _spread(tables["reward"][shaped], tables["reward"][without], arms)
+    in_words, spread = _spread(tables["reward"][shaped], tables["reward"][without], arms)
     return {
+        "in_words": in_words,
         "spread": spread,
-        "narrower": narrower,
         "share": _share(tables["met"][without]),
         "share_worn": _share(tables["met"][worn_without]),
         "share_shaped": _share(tables["met"][worn]),
@@ -128,23 +130,13 @@ def _results(experiment: ShapingSettings, tables: Tables, differences: Differenc
     return Table(header, lines, caption)
 
 
-def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Verdict]:
-    """Return both standard deviations on an arm, and whether the first is significantly smaller (Pitman and Morgan).
-
-    Runs are pairs; the variances differ where sum and difference of the pairs are correlated.
-    """
-    apart = [values.reshape(arms, -1) for values in (shaped, without)]
-    x, y = ((values - values.mean(axis=1, keepdims=True)).ravel() for values in apart)
-    freedom = len(x) - arms
-    if freedom < 1:
-        return "one run", "open"
-    text = " against ".join(f"{np.sqrt((v * v).sum() / freedom):.2f}" for v in (x, y))
-    less, more = x - y, x + y
-    if freedom < 4 or less.std() == 0 or more.std() == 0:
-        return text, "open"
-    correlation = np.clip(np.corrcoef(less, more)[0, 1], -1 + 1e-12, 1 - 1e-12)
-    # Fisher's transform makes the correlation about normal, with this standard deviation.
-    return text, below(Interval(float(np.arctanh(correlation)), 1.96 / math.sqrt(freedom - 2), freedom))
+def _spread(shaped: Array, without: Array, arms: int) -> tuple[str, Interval]:
+    """Return both standard deviations on an arm in words, and the logarithm of their ratio, over arms."""
+    tables = [values.reshape(arms, -1) for values in (shaped, without)]
+    if tables[0].shape[1] < 2:
+        return "one run", Interval(math.nan, math.inf, 0)
+    x, y = (np.maximum(values.std(axis=1, ddof=1), _SMALLEST) for values in tables)
+    return " against ".join(f"{math.sqrt((v * v).mean()):.2f}" for v in (x, y)), interval(np.log(x / y), arms)
 
 
 def _share(met: NDArray[np.float64]) -> str:

@@ -24,7 +24,7 @@ EXPERIMENT = Factorial(
         "What does a punishment of -8 for a switch do to the movements, and to the training?",
         "Thesis section 5.4.1, appendix C.1",
     ),
-    runs=3,
+    runs=4,
     design=packaged_design(__name__),
     base=BASE,
     thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),

@@ -4,7 +4,7 @@ The same class does all of them; what they are is data, in the folder of each.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -80,6 +80,8 @@ class Factorial(Trainings):
     """What is analysed."""
     effect_claims: tuple[EffectClaim, ...] = ()
     """What the thesis concludes of single effects."""
+    cited: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """The thesis' counterparts of what is shown of each criterion (:func:`~.table_sections.table_sections`)."""
     findings: tuple["Finding", ...] = ()
     """What else it concludes (:mod:`.findings`)."""
 
@@ -121,7 +123,7 @@ class Factorial(Trainings):
         for name, analysis in ours.items():
             if name.startswith(EXPLORING):
                 continue  # these are in the table above; their pictures would double the page
-            sections += table_sections(analysis, _IN_WORDS.get(name, name), name, cited=True)
+            sections += table_sections(analysis, _IN_WORDS.get(name, name), name, self.cited.get(name, {}))
         return Analysis(
             summary=[self.words.question, *self._answer(rows, ours)],
             figures={

@@ -61,6 +61,35 @@ EXPERIMENT = Factorial(
         EffectClaim("episodes", 12, raises=False, about="gamma-episodes"),
         EffectClaim("episodes", 11, raises=True, about="traces"),
     ),
+    cited={
+        "reward": {
+            "results": "tables 5.5 and C.7",
+            "runs": "figs. 5.1 and C.1",
+            "half-normal runs": "fig. C.2",
+            "mean": "figs. 5.2 and C.3",
+            "std": "figs. 5.3 and C.4",
+            "half-normal": "figs. 5.4, 5.5, C.5 and C.6",
+            "ranking": "table 5.6",
+        },
+        "actions": {
+            "results": "table C.8",
+            "mean": "fig. C.7",
+            "std": "fig. C.8",
+            "half-normal": "figs. C.9 and C.10",
+        },
+        "switches": {
+            "results": "table C.9",
+            "mean": "fig. C.11",
+            "std": "fig. C.12",
+            "half-normal": "figs. C.13 and C.14",
+        },
+        "episodes": {
+            "results": "table C.10",
+            "mean": "figs. 5.6 and C.15",
+            "std": "fig. C.16",
+            "half-normal": "figs. C.17 and C.18",
+        },
+    },
     findings=(
         weights_matter_more_than_settings,
         weights_dominate,

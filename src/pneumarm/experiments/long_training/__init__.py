@@ -31,5 +31,18 @@ EXPERIMENT = Factorial(
     continued=50_000,
     criteria=("gain", *ALL),
     effect_claims=(EffectClaim("gain", 4, raises=True, loss="std", about="q-fluctuates"),),
+    cited={
+        "gain": {
+            "runs": "fig. C.21",
+            "half-normal runs": "figs. C.22 and C.23",
+            "mean": "figs. 5.7 and C.24",
+            "std": "figs. 5.8 and C.25",
+            "half-normal": "figs. C.26 and C.27",
+            "ranking": "table 5.9",
+        },
+        "reward": {"results": "tables 5.8 and C.11", "runs": "fig. C.19", "half-normal runs": "fig. C.20"},
+        "actions": {"results": "table C.12", "mean": "fig. C.28", "half-normal": "figs. C.30 and C.31"},
+        "switches": {"results": "table C.13", "mean": "fig. C.32", "half-normal": "figs. C.34 and C.35"},
+    },
     findings=(training_on_improves, training_on_improves_little, trial_10_is_best),
 )

@@ -31,5 +31,11 @@ EXPERIMENT = Factorial(
     design=thesis_design(),
     base=replace(BASE, shaping=None, exploration=Exploration(0.09, 10.0)),
     thesis=packaged_results(__name__, "reward", "actions", "switches", "episodes"),
+    cited={
+        "reward": {"results": "table C.21"},
+        "actions": {"results": "table C.19"},
+        "switches": {"results": "table C.20"},
+        "episodes": {"results": "table C.22"},
+    },
     findings=(agents_meet_the_criterion,),
 )

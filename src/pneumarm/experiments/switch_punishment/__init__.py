@@ -34,5 +34,11 @@ EXPERIMENT = Factorial(
         EffectClaim("actions", 12, raises=False, about="punishment"),
         EffectClaim("episodes", 12, raises=True, about="punishment-episodes"),
     ),
+    cited={
+        "reward": {"results": "table C.2"},
+        "switches": {"results": "table C.3"},
+        "actions": {"results": "table C.4"},
+        "episodes": {"results": "table C.5"},
+    },
     findings=(punishment_halves_switches, punishment_costs_actions),
 )

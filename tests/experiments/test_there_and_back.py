@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from pneumarm.arm import open_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.claims import keys_of
 from pneumarm.experiments.control_frequency import ControlFrequency
@@ -17,6 +18,7 @@ from pneumarm.experiments.control_frequency.frequencies import at_frequency
 from pneumarm.experiments.enough_data import EnoughData
 from pneumarm.experiments.experiment import Claim, Experiment, LaboratorySettings, Row, TrialRows, sorted_rows
 from pneumarm.experiments.noise_for_transfer import NoiseForTransfer
+from pneumarm.experiments.preparation import PROCEDURES
 from pneumarm.experiments.registry import experiment
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.state_history import StateHistory
@@ -28,7 +30,7 @@ from pneumarm.experiments.valves_closed.inflation import inflation
 from pneumarm.experiments.verdict import OPEN
 from pneumarm.learning import TrainSettings
 from pneumarm.simulation import SINGLE_STEPS, fit
-from pneumarm.transitions import Store, Transitions, Window, transitions
+from pneumarm.transitions import Store, Transitions, Window, collect, transitions
 
 ARM = "virtual:seed=3"
 QUICK = replace(SINGLE_STEPS, epochs=4)
@@ -179,6 +181,21 @@ def test_what_was_made_is_not_made_again(material: Prepared, laboratory: Path) -
     assert made() == before
     assert again.figures == material.figures
     np.testing.assert_array_equal(again.begin.states, material.begin.states)
+
+
+def test_arms_are_recorded_as_in_the_thesis_or_as_ours_apart(material: Prepared, tmp_path: Path) -> None:
+    """Each way is what collecting that way gives, and no recording of one is taken for the other."""
+    made = {"thesis": material.folder}
+    ours = replace(SMALL, collecting="ours")
+    made["ours"] = prepared(ARM, material.folder.parent, Recipe(2400), ours, _silent).folder
+    assert made["thesis"] != made["ours"]
+    for name, folder in made.items():
+        with open_arm(ARM, SMALL.seed) as arm, Store.for_arm(tmp_path / name, arm.spec) as store:
+            collect(arm, store, 2400, SMALL.seed, settings=PROCEDURES[name])
+            expected = np.concatenate([rows.angle for rows in store.blocks()])
+        with Store.open(folder / "transitions.db") as store:
+            found = np.concatenate([rows.angle for rows in store.blocks()])
+        np.testing.assert_array_equal(found, expected)
 
 
 def test_the_arm_is_controlled_at_the_frequency(material: Prepared, laboratory: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -40,6 +40,8 @@ class LaboratorySettings(Settings):
     """Greedy movements that every agent is tested with (thesis section 5.2)."""
     max_episodes: PositiveInt | None = None
     """Training episodes at most; otherwise as many as the experiment says."""
+    collecting: Literal["thesis", "ours"] = "thesis"
+    """How arms are recorded: as in the thesis, or with lean sequences and begin states by this arm's own times."""
     exploring: bool = False
     """Test every agent a second time, exploring as when its training ended; that takes as long as training it."""
 

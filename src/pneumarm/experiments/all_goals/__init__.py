@@ -1,15 +1,8 @@
 """All goal angles (section 5.4.2, appendix C.2): which settings of the learning method matter, and which are best?
 
-Five factors of the method on L16, eight runs from different weights, tested on all goals.
+Five factors of the method on L16, runs from different weights (thesis: eight), tested on all goals.
 
     pneumarm experiment all-goals
-
-On arms 1 to 5, four runs each, other weights with the same settings make 65 ± 15 % of the variance (in the thesis'
-own table 83 %). A learning rate of 0.10, 10 neurons and traces cost 18 ± 5, 8 ± 7 and 16 ± 7 of reward, largely
-because together with gamma 0.98 (trial 14) they diverge; SARSA and Q-learning do not differ significantly. Agents
-reach 85 % of their goals in the test, where the thesis' reach nearly all, and 96 % while they learn on, which is what
-the criterion is about: an agent that is stuck unlearns the action that holds it, and the same weights, frozen, stay
-stuck.
 """
 
 from dataclasses import replace

@@ -60,6 +60,11 @@ class FoundClaim(msgspec.Struct, frozen=True):
     arms: int
     p: float
 
+    @property
+    def short(self) -> str:
+        """Its verdict, and how many arms would decide it."""
+        return f"{self.verdict} ({self.arms:,} arms would)" if self.arms else self.verdict
+
 
 class Results(msgspec.Struct, frozen=True):
     """The part of ``results.json`` that claims rest on."""
@@ -230,7 +235,7 @@ HEADER = ("claim", "thesis", "here, with 95 % intervals", "from", "verdict")
 def evidence(judged: Judged) -> list[list[str]]:
     """Return a line for each claim, by :data:`HEADER`: thesis beside ours, arms and runs, verdict."""
     return [
-        [claim.claim, claim.thesis, claim.ours, f"{results.experiment}: {results.sample}", claim.verdict]
+        [claim.claim, claim.thesis, claim.ours, f"{results.experiment}: {results.sample}", claim.short]
         for results, claim in judged.claims
     ]
 
@@ -249,8 +254,8 @@ def as_markdown(judged: Sequence[Judged]) -> str:
 def _evidence(judged: Judged) -> Section:
     header = [HEADER[0], "stated beforehand", *HEADER[1:3], "by the medians", *HEADER[3:]]
     lines = [
-        [text, claim.stated, thesis, ours, claim.medians, sample, verdict_in_words(verdict, claim.why)]
-        for (text, thesis, ours, sample, verdict), (_, claim) in zip(evidence(judged), judged.claims, strict=True)
+        [text, claim.stated, thesis, ours, claim.medians, sample, verdict_in_words(claim.verdict, claim.why)]
+        for (text, thesis, ours, sample, _), (_, claim) in zip(evidence(judged), judged.claims, strict=True)
     ]
     caption = f"Thesis section {judged.conclusion.section.removeprefix('Thesis section ')}."
     tables = [Table(header, lines, caption, words=True)] if lines else []

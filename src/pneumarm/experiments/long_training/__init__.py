@@ -1,13 +1,8 @@
 """Training on to 50,000 episodes (section 5.4.3, appendix C.3): do slow learners outperform fast ones in the end?
 
-The first three runs of all-goals, trained on; ``gain`` is what that changed in the reward.
+The runs of all-goals, trained on (thesis: the first three); ``gain`` is what that changed in the reward.
 
     pneumarm experiment long-training
-
-On arms 1 to 5, four runs each, training on raises the reward by 13 ± 6, in the thesis by 3.6, and no factor
-significantly decides by how much. It spreads more with Q-learning than with SARSA, as in the thesis. Slow learners do
-not overtake the fast ones: the rank correlation of the episodes until the criterion with the last reward is -0.20 ±
-0.13.
 """
 
 from pneumarm.experiments.all_goals import BASE

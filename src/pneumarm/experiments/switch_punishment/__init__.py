@@ -1,13 +1,9 @@
 """Punishing a switch (section 5.4.1, appendix C.1): what does it do to the movements, and to the training?
 
-As all-goals, with the punishment (-8 or none) in place of the discount factor and the single goal 650; three runs.
+As all-goals, with the punishment (-8 or none) in place of the discount factor and the single goal 650 (thesis: three
+runs).
 
     pneumarm experiment switch-punishment
-
-On arms 1 to 5, four runs each, agents that are not punished switch 3.1 ± 0.6 times as often, in the thesis 2.8 times.
-Those that are punished also need fewer actions for a success, by 1.6 ± 1.1, where the thesis' need 1.6 more. The
-punishment shortens no training, because nearly all end at the earliest, when the deviation has grown to the whole
-range.
 """
 
 from pneumarm.experiments.all_goals import BASE

@@ -10,6 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import spearmanr
 
 from pneumarm.experiments.analysis import filled_words, number, shown_trials
+from pneumarm.experiments.claims import conclusions
 from pneumarm.experiments.experiment import Axis, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import rank_correlation
 from pneumarm.experiments.means import (
@@ -117,11 +118,13 @@ def test_words_are_filled_with_what_was_found_and_claims_left_out_that_lack_it()
     stated = [
         Criterion(figure=names, above=0.0, matters=1.0) for names in ("sure", ("sure", "vague"), ("sure", "unknown"))
     ]
-    claims = tuple(ClaimWords("it", "says {sure:.1f}", "yes", "{vague:.0f}", one) for one in stated)
-    words = Words("title", "question", "source", ("{sure:+.2f}",), claims=claims).filled(found)
+    claims = tuple(ClaimWords("says {sure:.1f}", "yes", "{vague:.0f}", one) for one in stated)
+    words = Words("title", "question", "source", ("{sure:+.2f}",), claims={"key": claims}).filled(found)
     assert words.summary == ("+5.00\u00a0±\u00a01.00",)
-    assert [claim.stated for claim in words.claims] == stated[:2]
-    assert {(claim.claim, claim.ours) for claim in words.claims} == {("says 5.0\u00a0±\u00a01.0", "0\u00a0±\u00a09")}
+    assert [claim.stated for claim in words.claims["key"]] == stated[:2]
+    assert {(claim.claim, claim.ours) for claim in words.claims["key"]} == {
+        ("says 5.0\u00a0±\u00a01.0", "0\u00a0±\u00a09")
+    }
 
 
 def test_pictures_say_in_words_what_they_draw() -> None:
@@ -162,9 +165,11 @@ def test_words_name_trials_and_columns_that_there_are(name: str) -> None:
     for one in made.words.estimates.values():
         assert number(made, one.trial) in made.trials
         assert one.base is None or number(made, one.base) in made.trials
-    for claim in made.words.claims:
-        assert claim.stated.matters > 0
-        assert (claim.stated.above, claim.stated.below) != (None, None)
+    for about, claims in made.words.claims.items():
+        assert about in {each.key for each in conclusions()}
+        for claim in claims:
+            assert claim.stated.matters > 0
+            assert (claim.stated.above, claim.stated.below) != (None, None)
     for section in made.words.sections:
         assert shown_trials(made, section)
         assert len(section.drawn) == len(section.dots)

@@ -55,7 +55,7 @@ def test_what_was_chosen_is_confirmed_by_other_runs() -> None:
 
 
 def verdict(found: dict[str, Any]) -> str:
-    return EXPERIMENT.words.claims[0].stated.judge(found).verdict
+    return EXPERIMENT.words.claims["fine-tuning"][0].stated.judge(found).verdict
 
 
 def test_the_page_has_the_array_and_trial_10() -> None:

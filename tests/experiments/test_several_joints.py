@@ -153,7 +153,7 @@ def made_up(chosen: SeveralJoints, figures: dict[str, dict[int, float]]) -> Tria
 
 
 def sized(name: str, value: float, arm: int) -> float:
-    size = 1e4 if name == "episodes" else 10.0 if "reward" in name else 1.0
+    size = 1e4 if name == "episodes" else 20.0 if "reward" in name else 1.0
     return size * value * (1 + 1e-3 * arm)
 
 

@@ -87,7 +87,11 @@ def analysed(
         )
         drawn = (pictures or {}).get(place) or _drawn(experiment, rows, section, trials)
         sections.append(Section(section.title, section.text, drawn, [*made, *(tables or {}).get(place, ())]))
-    claims = [Claim(c.claim, c.thesis, c.ours, c.about, c.stated, found) for c in words.claims]
+    claims = [
+        Claim(c.claim, c.thesis, c.ours, about, c.stated, found)
+        for about, of_it in words.claims.items()
+        for c in of_it
+    ]
     return Analysis([words.question, *words.summary], figures, sections, claims)
 
 

@@ -53,8 +53,6 @@ class Column(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class ClaimWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Something that the thesis says, and by what it is judged."""
 
-    about: str
-    """See :attr:`~.experiment.Claim.about`."""
     claim: str
     thesis: str
     """The thesis' evidence."""
@@ -109,15 +107,18 @@ class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     results: Mapping[str, Quantity] = {}
     """What programs get of every trial, in place of the columns."""
     sections: tuple[SectionWords, ...] = ()
-    claims: tuple[ClaimWords, ...] = ()
+    claims: Mapping[str, tuple[ClaimWords, ...]] = {}
+    """By the conclusion that they are about (:attr:`~.experiment.Claim.about`)."""
 
     def filled(self, found: Mapping[str, Any]) -> "Words":
         """Return the words with what was ``found`` in its places; claims on what is None are left out."""
         known = {name: value for name, value in found.items() if value is not None}
         words: dict[str, Any] = msgspec.to_builtins(self)
         missing = found.keys() - known.keys()
-        lacking = [missing.intersection(claim.stated.names) for claim in self.claims]
-        words["claims"] = [claim for claim, lacks in zip(words["claims"], lacking, strict=True) if not lacks]
+        for about, claims in self.claims.items():
+            words["claims"][about] = [
+                msgspec.to_builtins(claim) for claim in claims if not missing.intersection(claim.stated.names)
+            ]
         return msgspec.convert(_changed(words, lambda text: text.format_map(known)), Words)
 
 

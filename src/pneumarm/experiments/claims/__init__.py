@@ -42,10 +42,6 @@ class Conclusion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What would decide it, where no experiment does."""
 
 
-class _ConclusionsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    conclusions: tuple[Conclusion, ...]
-
-
 class FoundClaim(msgspec.Struct, frozen=True):
     """A claim in ``results.json``."""
 
@@ -116,7 +112,7 @@ class Judged:
 def conclusions() -> tuple[Conclusion, ...]:
     """Return what the thesis concludes, in its order."""
     text = (resources.files(__name__) / "conclusions.toml").read_text(encoding="utf-8")
-    return msgspec.convert(tomllib.loads(text), _ConclusionsFile).conclusions
+    return tuple(msgspec.convert({"key": key, **each}, Conclusion) for key, each in tomllib.loads(text).items())
 
 
 def keys_of(experiment: str) -> frozenset[str]:

@@ -71,7 +71,7 @@ class SectionWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     called: str | None = None
     """Replaces in these names what the expression matches."""
     columns: tuple[Column, ...] = ()
-    """Columns of its table."""
+    """Columns of its table; the file may name those of ``columns.toml``."""
     table: str = ""
     """Caption of its table."""
     figure: str = ""
@@ -133,5 +133,10 @@ def _changed(words: Any, change: Callable[[str], str]) -> Any:
 
 def words_of(package: str | None) -> Words:
     """Return the words in the file ``words.toml`` of a ``package``."""
-    text = (resources.files(package or "") / "words.toml").read_text(encoding="utf-8")
-    return msgspec.convert(_changed(tomllib.loads(text), lambda one: re.sub(r"\n\s*", " ", one)), Words)
+    words, known = (
+        tomllib.loads((resources.files(place) / name).read_text(encoding="utf-8"))
+        for place, name in ((package or "", "words.toml"), (__package__, "columns.toml"))
+    )
+    for section in words.get("sections", ()):
+        section["columns"] = [known[one] if isinstance(one, str) else one for one in section.get("columns", ())]
+    return msgspec.convert(_changed(words, lambda one: re.sub(r"\n\s*", " ", one)), Words)

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, TrialRows
+from pneumarm.experiments.experiment import Analysis, Experiment, TrialRows, claims_of
 from pneumarm.experiments.means import estimate, means_table, numbers
 from pneumarm.experiments.pictures import against, dots
 from pneumarm.experiments.verdict import Interval
@@ -87,12 +87,7 @@ def analysed(
         )
         drawn = (pictures or {}).get(place) or _drawn(experiment, rows, section, trials)
         sections.append(Section(section.title, section.text, drawn, [*made, *(tables or {}).get(place, ())]))
-    claims = [
-        Claim(c.claim, c.thesis, c.ours, about, c.stated, found)
-        for about, of_it in words.claims.items()
-        for c in of_it
-    ]
-    return Analysis([words.question, *words.summary], figures, sections, claims)
+    return Analysis([words.question, *words.summary], figures, sections, claims_of(words, found))
 
 
 def shown_trials(experiment: Experiment, section: SectionWords, *, called: bool = True) -> dict[int, str]:

@@ -148,6 +148,12 @@ class Claim:
         return "; ".join(str(one.median) for one in found if isinstance(one, Interval) and one.median)
 
 
+def claims_of(words: Words, found: Mapping[str, Any]) -> tuple[Claim, ...]:
+    """Return the claims of ``words`` that are filled with what was ``found``."""
+    named = ((about, one) for about, claims in words.claims.items() for one in claims)
+    return tuple(Claim(one.claim, one.thesis, one.ours, about, one.stated, found) for about, one in named)
+
+
 @dataclass(frozen=True)
 class Analysis:
     """What an experiment says."""

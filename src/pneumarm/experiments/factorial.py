@@ -14,7 +14,7 @@ from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_table
 from pneumarm.experiments.design.assignment import Design, Factor
 from pneumarm.experiments.design.loss import loss
-from pneumarm.experiments.experiment import ARMS, Analysis, Claim, Figures, LaboratorySettings, TrialRows
+from pneumarm.experiments.experiment import ARMS, Analysis, Claim, Figures, LaboratorySettings, TrialRows, claims_of
 from pneumarm.experiments.means import at_limit, over_arms
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, Trainings, train_and_test, with_settings
@@ -34,8 +34,8 @@ def _goal(criterion: str) -> Goal:
 _IN_WORDS = {**CRITERIA, "gain": "change of the reward by training on"}
 Analyses = Mapping[str, TableAnalysis]
 """Analyses by criterion."""
-Finding = Callable[["Factorial", TrialRows, Analyses, Analyses], Claim]
-"""Makes a claim of the rows, their analyses and the thesis'."""
+Finding = Callable[["Factorial", TrialRows, Analyses, Analyses], dict[str, Any]]
+"""Returns what claims are judged by, from the rows, their analyses and the thesis'."""
 
 
 MATTERS = {"reward": 2.0, "gain": 2.0, "actions": 1.0, "switches": 0.5, "episodes": 1000.0}
@@ -83,7 +83,7 @@ class Factorial(Trainings):
     cited: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """The thesis' counterparts of what is shown of each criterion (:func:`~.table_sections.table_sections`)."""
     findings: tuple["Finding", ...] = ()
-    """What else it concludes (:mod:`.findings`)."""
+    """What its words' claims are judged by (:mod:`.findings`)."""
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -165,7 +165,8 @@ class Factorial(Trainings):
                 if name in ours and (claim.loss == "mean" or rows.runs > 1):
                     effect = self.effect(rows, name, claim.column, ours[name], claim.loss)
                     found.append(_effect_claim(claim, _IN_WORDS[name], theirs[claim.criterion], self.design, effect))
-        return (*found, *(find(self, rows, ours, theirs) for find in self.findings))
+        known = {name: one for find in self.findings for name, one in find(self, rows, ours, theirs).items()}
+        return (*found, *claims_of(self.words.filled(known), known))
 
     def effect(
         self, rows: TrialRows, criterion: str, column: int, analysis: TableAnalysis, loss_name: Spread = "mean"

@@ -11,16 +11,15 @@ from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import EffectClaim, Factorial
 from pneumarm.experiments.findings import (
-    MARGINAL,
     fewest_switches,
-    nearly_all_succeed,
-    off_policy_never_diverges,
-    traces_are_marginal,
-    trial_10_is_best,
-    weights_dominate,
-    weights_matter_more_than_settings,
+    off_policy,
+    success,
+    traces,
+    trial_10,
+    weights_and_columns,
+    weights_and_settings,
 )
-from pneumarm.experiments.words import Words
+from pneumarm.experiments.words import words_of
 from pneumarm.learning import TrainSettings
 
 LONGEST = 50_000
@@ -30,11 +29,7 @@ BASE = replace(TrainSettings(), max_episodes=LONGEST)
 
 EXPERIMENT = Factorial(
     name="all-goals",
-    words=Words(
-        "All goal angles",
-        "Which settings of the learning method matter when all goals are learned, and which are best?",
-        "Thesis section 5.4.2, appendix C.2",
-    ),
+    words=words_of(__name__),
     runs=4,
     design=thesis_design(),
     base=BASE,
@@ -46,7 +41,7 @@ EXPERIMENT = Factorial(
         EffectClaim("reward", 2, raises=False, about="neurons"),
         EffectClaim("reward", 2, raises=True, loss="std", about="neurons"),
         EffectClaim("reward", 1, raises=False, about="learning-rate"),
-        EffectClaim("reward", 1, raises=False, about="learning-rate", slight=MARGINAL),
+        EffectClaim("reward", 1, raises=False, about="learning-rate", slight=8.0),
         EffectClaim("reward", 1, raises=True, loss="std", about="learning-rate"),
         EffectClaim("reward", 11, raises=False, about="traces"),
         EffectClaim("reward", 12, raises=True, about="gamma"),
@@ -84,12 +79,12 @@ EXPERIMENT = Factorial(
         },
     },
     findings=(
-        weights_matter_more_than_settings,
-        weights_dominate,
-        traces_are_marginal,
-        trial_10_is_best,
-        nearly_all_succeed,
+        weights_and_settings,
+        weights_and_columns,
+        traces,
+        trial_10,
+        success,
         fewest_switches,
-        off_policy_never_diverges,
+        off_policy,
     ),
 )

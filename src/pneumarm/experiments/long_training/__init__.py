@@ -9,16 +9,12 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import ALL, EffectClaim, Factorial
-from pneumarm.experiments.findings import training_on_improves, training_on_improves_little, trial_10_is_best
-from pneumarm.experiments.words import Words
+from pneumarm.experiments.findings import gains, trial_10
+from pneumarm.experiments.words import words_of
 
 EXPERIMENT = Factorial(
     name="long-training",
-    words=Words(
-        "All goal angles with 50,000 episodes",
-        "Do agents that learn slowly outperform the fast ones in the end, and who gains by training on?",
-        "Thesis section 5.4.3, appendix C.3",
-    ),
+    words=words_of(__name__),
     runs=4,
     design=thesis_design(),
     base=BASE,
@@ -39,5 +35,5 @@ EXPERIMENT = Factorial(
         "actions": {"results": "table C.12", "mean": "fig. C.28", "half-normal": "figs. C.30 and C.31"},
         "switches": {"results": "table C.13", "mean": "fig. C.32", "half-normal": "figs. C.34 and C.35"},
     },
-    findings=(training_on_improves, training_on_improves_little, trial_10_is_best),
+    findings=(gains, trial_10),
 )

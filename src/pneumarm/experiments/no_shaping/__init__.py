@@ -12,17 +12,13 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import thesis_design
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import Factorial
-from pneumarm.experiments.findings import agents_meet_the_criterion
-from pneumarm.experiments.words import Words
+from pneumarm.experiments.findings import criterion_met
+from pneumarm.experiments.words import words_of
 from pneumarm.learning import Exploration
 
 EXPERIMENT = Factorial(
     name="no-shaping",
-    words=Words(
-        "No shaping",
-        "Is shaping needed to learn the task at all, and which settings are best without it?",
-        "Thesis section 5.4.4, appendix C.5",
-    ),
+    words=words_of(__name__),
     runs=4,
     design=thesis_design(),
     base=replace(BASE, shaping=None, exploration=Exploration(0.09, 10.0)),
@@ -33,5 +29,5 @@ EXPERIMENT = Factorial(
         "switches": {"results": "table C.20"},
         "episodes": {"results": "table C.22"},
     },
-    findings=(agents_meet_the_criterion,),
+    findings=(criterion_met,),
 )

@@ -10,16 +10,12 @@ from pneumarm.experiments.all_goals import BASE
 from pneumarm.experiments.design.assignment import packaged_design
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.factorial import EffectClaim, Factorial
-from pneumarm.experiments.findings import punishment_costs_actions, punishment_halves_switches
-from pneumarm.experiments.words import Words
+from pneumarm.experiments.findings import punishment
+from pneumarm.experiments.words import words_of
 
 EXPERIMENT = Factorial(
     name="switch-punishment",
-    words=Words(
-        "Punishing a switch",
-        "What does a punishment of -8 for a switch do to the movements, and to the training?",
-        "Thesis section 5.4.1, appendix C.1",
-    ),
+    words=words_of(__name__),
     runs=4,
     design=packaged_design(__name__),
     base=BASE,
@@ -36,5 +32,5 @@ EXPERIMENT = Factorial(
         "actions": {"results": "table C.4"},
         "episodes": {"results": "table C.5"},
     },
-    findings=(punishment_halves_switches, punishment_costs_actions),
+    findings=(punishment,),
 )

@@ -201,11 +201,10 @@ class Factorial(Trainings):
             significant = [
                 f"{self.design.factor(label).name} {_step(self.design.factor(label))} ({effect})"
                 for label, effect in found.items()
-                if abs(effect.mean) > effect.half
+                if all(abs(one.mean) > one.half for one in (effect, effect.median or effect))
             ]
-            text.append(
-                f"Significant effects on the {_IN_WORDS[name]}: {', '.join(significant) or 'none of the factors'}."
-            )
+            said = ", ".join(significant) or "none of the factors"
+            text.append(f"Significant effects on the {_IN_WORDS[name]}, by mean and median: {said}.")
         text[:0] = [self._averages(rows, ours) + self._met(rows), *self._diverged(rows)]
         best = "reward" if "reward" in ours else name
         return [*text, self._best(ours[best], _IN_WORDS[best])] if judged_alike else text

@@ -14,7 +14,7 @@ from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
 from pneumarm.experiments.experiment import Analysis, TrialRows
-from pneumarm.experiments.means import Array, by_arm
+from pneumarm.experiments.means import Array, difference, mean
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
 from pneumarm.experiments.trainings import CRITERIA, LEARNING
@@ -37,23 +37,19 @@ Differences = Mapping[str, list[Interval | None]]
 def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     """Return every trial's results and its difference from the thesis' settings within runs."""
     tables = {name: rows.table(name, list(experiment.trials)) for name in _CRITERIA}
-    # From here on columns are samples: runs where there is one arm, else the arms.
-    arms = len(rows.arms)
-    samples = {name: np.stack([by_arm(line.reshape(arms, -1)) for line in table]) for name, table in tables.items()}
-    differences = {name: _differences(experiment, table) for name, table in samples.items()}
-    words, found = filled_words(
-        experiment,
-        rows,
-        **shaping_evidence(experiment, tables, arms),
-        **{f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")},
-    )
+    references = {n: experiment.reference(n) for n in experiment.trials}
+    differences = {
+        name: [None if n == of else difference(rows, name, n, of) for n, of in references.items()]
+        for name in _CRITERIA
+    }
+    words, found = filled_words(experiment, rows, **shaping_evidence(experiment, tables, len(rows.arms)))
     strategy, results = words.sections
     drawn = Picture(
         strategy_figure(experiment.train_settings(1), ArmSpec()),
         strategy.figure,
         "Exploration falls from 0.5 to 0.05 and temperature from 20 to 1; the criterion rises to 0.95.",
     )
-    shown = {CRITERIA[name]: [interval(values) for values in samples[name]] for name in _SHOWN}
+    shown = {CRITERIA[name]: [mean(rows, name, trial) for trial in experiment.trials] for name in _SHOWN}
     changes = {
         name: [[each.mean, each.half] if each else None for each in ones] for name, ones in differences.items()
     }
@@ -94,22 +90,6 @@ def shaping_evidence(experiment: ShapingSettings, tables: Tables, arms: int) -> 
 
 
 _THEIRS = ("reward", "episodes")
-
-
-def _differences(experiment: ShapingSettings, table: Array) -> list[Interval | None]:
-    references = {n: experiment.reference(n) for n in experiment.trials}
-    return [None if n == of else interval(table[n - 1] - table[of - 1]) for n, of in references.items()]
-
-
-def _significant(experiment: ShapingSettings, name: str, differences: Differences) -> str:
-    """Return in words what matters beyond chance."""
-    named = zip(experiment.trials.values(), differences[name], strict=True)
-    significant = [
-        f"{words} ({each if name == 'reward' else _whole(each)})"
-        for words, each in named
-        if each and abs(each.mean) > each.half
-    ]
-    return "; ".join(significant) or "none"
 
 
 def _results(experiment: ShapingSettings, tables: Tables, differences: Differences, caption: str) -> Table:

@@ -35,7 +35,9 @@ def filled_words(experiment: Experiment, rows: TrialRows, **own: Any) -> tuple[W
     words = experiment.words
     found: dict[str, Any] = {name: by_trial(experiment, rows, what) for name, what in words.results.items()}
     found |= {
-        name: estimate(rows, one, number(experiment, one.trial), number(experiment, one.base))
+        name: by_trial(experiment, rows, one)
+        if one.trial is None
+        else estimate(rows, one, number(experiment, one.trial), number(experiment, one.base))
         for name, one in words.estimates.items()
     }
     return words.filled(found | own), found | own

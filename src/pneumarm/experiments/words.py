@@ -34,10 +34,10 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class TrialQuantity(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A quantity in one trial."""
+    """A quantity in one trial, or in each."""
 
-    trial: str | int
-    """Name of the trial, or its number, negative from the last."""
+    trial: str | int | None = None
+    """Name of the trial, or its number, negative from the last; None for every trial but the base."""
 
 
 class Column(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):

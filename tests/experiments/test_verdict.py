@@ -264,7 +264,7 @@ def test_one_trial_that_diverges_decides_no_effect() -> None:
     said = LESS.judge({"found": effect})
     assert said.verdict == "in part"
     assert "by the mean it holds, by the median" in said.why
-    told = ALL_GOALS._diverged(rows)
+    told = ALL_GOALS.diverged(rows)
     assert told[0].startswith(
         "Diverged: 20 of 1280 agents earn less than one that does nothing (-100): 20 of trial 14"
     )

@@ -205,7 +205,7 @@ class Factorial(Trainings):
             ]
             said = ", ".join(significant) or "none of the factors"
             text.append(f"Significant effects on the {_IN_WORDS[name]}, by mean and median: {said}.")
-        text[:0] = [self._averages(rows, ours) + self._met(rows), *self._diverged(rows)]
+        text[:0] = [self._averages(rows, ours) + self._met(rows), *self.diverged(rows)]
         best = "reward" if "reward" in ours else name
         return [*text, self._best(ours[best], _IN_WORDS[best])] if judged_alike else text
 
@@ -214,7 +214,7 @@ class Factorial(Trainings):
         """What an agent earns that does nothing; one that earns less has diverged."""
         return self.base.reward.action * self.base.cutoff
 
-    def _diverged(self, rows: TrialRows) -> list[str]:
+    def diverged(self, rows: TrialRows) -> list[str]:
         """Return in words which agents have diverged: a result of its own."""
         lost = {trial: int((rows.table("reward", [trial]) < self.worst).sum()) for trial in self.trials}
         where = ", ".join(f"{count} of trial {trial}" for trial, count in lost.items() if count)
